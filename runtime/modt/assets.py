@@ -1,0 +1,46 @@
+"""Finds the files that come with the package: models/ and profiles/.
+
+They lie beside runtime/ in a checkout and an editable install, and inside the package in a wheel.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from modt.errors import MisuseError
+
+_PACKAGE = Path(__file__).resolve().parent
+_ROOTS = (_PACKAGE / "data", _PACKAGE.parents[1])
+
+
+def folder(kind: str) -> Path:
+    """The folder of that kind ("models" or "profiles").
+
+    Raises:
+        MisuseError: the installation lacks it.
+    """
+    for root in _ROOTS:
+        if (root / kind).is_dir():
+            return root / kind
+    raise MisuseError(_PACKAGE, f"no {kind}/ in this installation", "install modt again")
+
+
+def find(kind: str, name: str, suffix: str) -> Path:
+    """A file by its path, or by the bare name of one that comes with the package.
+
+    Raises:
+        MisuseError: there is none; the error lists the names there are.
+    """
+    path = Path(name)
+    if path.suffix == suffix or len(path.parts) > 1:
+        if path.is_file():
+            return path
+        raise MisuseError(path, "no such file", f"give a {suffix} file, or a name: {_names(kind, suffix)}")
+    inside = folder(kind) / f"{name}{suffix}"
+    if not inside.is_file():
+        raise MisuseError(name, f"not among the {kind}", f"use one of: {_names(kind, suffix)}")
+    return inside
+
+
+def _names(kind: str, suffix: str) -> str:
+    return ", ".join(sorted(p.stem for p in folder(kind).glob(f"*{suffix}")))

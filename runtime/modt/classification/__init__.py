@@ -1,0 +1,1 @@
+"""What a proposal is: network, scheduler, fusion."""

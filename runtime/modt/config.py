@@ -1,0 +1,168 @@
+"""Configuration: one frozen dataclass a stage, every value bounded and checked as it is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from modt.errors import MisuseError
+
+
+class ValueRangeError(MisuseError):
+    """A configuration value of the wrong type or out of its range; key says which."""
+
+    def __init__(self, key: str, cause: str, remedy: str) -> None:
+        super().__init__(key, cause, remedy)
+        self.key = key
+
+
+def _number(default: float | None, low: float, high: float, unit: str, meaning: str) -> Any:
+    return field(default=default, metadata={"low": low, "high": high, "unit": unit, "meaning": meaning})
+
+
+def _choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
+    return field(default=default, metadata={"options": options, "meaning": meaning})
+
+
+def _per_class(car: float, pedestrian: float, cyclist: float, low: float, high: float, meaning: str) -> Any:
+    return field(
+        default=(car, pedestrian, cyclist),
+        metadata={"low": low, "high": high, "length": 3, "meaning": meaning},
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageConfig:
+    """Base of every stage's configuration: checks each value against its declared bounds.
+
+    Raises:
+        ValueRangeError: a value is not of its kind or out of range.
+    """
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            _check(f.name, getattr(self, f.name), f.type, dict(f.metadata))
+
+
+def _check(key: str, value: object, kind: object, bounds: dict[str, Any]) -> None:
+    optional = "None" in str(kind)
+    if value is None and optional:
+        return
+    if "options" in bounds:
+        if value not in bounds["options"]:
+            raise ValueRangeError(key, f"{value!r} is unknown", f"use one of {', '.join(bounds['options'])}")
+        return
+    if str(kind) == "bool":
+        if not isinstance(value, bool):
+            raise ValueRangeError(key, f"{value!r} is no truth value", "use true or false")
+        return
+    if str(kind) == "str":
+        if not isinstance(value, str):
+            raise ValueRangeError(key, f"{value!r} is no text", "write a name")
+        return
+    numbers = value if "length" in bounds and isinstance(value, tuple) else (value,)
+    whole = str(kind).startswith("int")
+    span = f"{'a whole number' if whole else 'a number'} from {bounds['low']:g} to {bounds['high']:g}"
+    if "length" in bounds:
+        span = f"{bounds['length']} values, each {span}"
+        if len(numbers) != bounds["length"]:
+            raise ValueRangeError(key, f"{value!r} does not fit", f"give {span}")
+    unit = f" {bounds['unit']}" if bounds.get("unit") else ""
+    for number in numbers:
+        numeric = isinstance(number, int) if whole else isinstance(number, int | float)
+        if isinstance(number, bool) or not numeric:
+            raise ValueRangeError(
+                key, f"{value!r} is not {'a whole number' if whole else 'a number'}", f"give {span}{unit}"
+            )
+        if not bounds["low"] <= number <= bounds["high"]:
+            raise ValueRangeError(key, f"{number!r} is out of range", f"give {span}{unit}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorConfig(StageConfig):
+    """The sensor as segmentation sees it."""
+
+    height_m: float | None = _number(
+        1.73, 0.05, 5.0, "m", "above the ground; none: estimated from the stream"
+    )
+    min_range_m: float = _number(2.7, 0.0, 20.0, "m", "nearer points belong to the robot itself")
+    max_range_m: float = _number(80.0, 1.0, 400.0, "m", "farther points are left out")
+    azimuth_step_deg: float = _number(0.17, 0.01, 5.0, "deg", "between neighbouring returns of a beam")
+    elevation_step_deg: float = _number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
+    period_s: float = _number(0.1, 0.001, 10.0, "s", "of a sweep, where the stream has no stamps")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SegmentationConfig(StageConfig):
+    """Ground, clusters and the sizes of what can be an object (section III-A)."""
+
+    ground_tolerance_m: float = _number(0.25, 0.02, 1.0, "m", "points this near the ground belong to it")
+    max_slope_deg: float = _number(12.0, 0.5, 45.0, "deg", "of the ground")
+    max_height_m: float = _number(2.6, 0.3, 20.0, "m", "above ground; what hangs higher joins nothing")
+    cell_m: float = _number(0.18, 0.02, 2.0, "m", "clustering distance near the sensor")
+    min_points: int = _number(5, 1, 1000, "", "of a proposal")
+    max_extent_m: float = _number(12.0, 0.5, 50.0, "m", "longest side of a proposal")
+    min_height_m: float = _number(0.2, 0.0, 3.0, "m", "lowest proposal")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackingConfig(StageConfig):
+    """Filter, association and life of a track (sections III-B and IV-A)."""
+
+    association: str = _choice("robust", ("robust", "paper"), "how proposals find their tracks")
+    alpha: float = _number(2.0, 0.0, 100.0, "", "weight of 1 - IoU in the paper's cost")
+    beta: float = _number(0.01, 0.0, 10.0, "", "weight of the difference of point number")
+    gamma: float = _number(0.1, 0.0, 10.0, "", "weight of the difference of size")
+    t_da: float = _number(0.95, 0.0, 100.0, "", "highest cost of an association")
+    max_missed: int = _number(
+        8, 0, 100, "frames", "without a proposal before a track is deleted (N of a9 and a14)"
+    )
+    position_sigma_m: float = _number(0.3, 0.01, 5.0, "m", "of a measured position")
+    acceleration_sigma_mps2: float = _number(2.0, 0.01, 50.0, "m/s2", "process noise of the speed")
+    turn_sigma_radps: float = _number(0.3, 0.001, 10.0, "rad/s", "process noise of the heading")
+    initial_speed_sigma_mps: float = _number(5.0, 0.1, 50.0, "m/s", "of a new track")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClassificationConfig(StageConfig):
+    """The network and how its input is made (section V-A)."""
+
+    model: str = field(default="pointnet", metadata={"meaning": "name in models/ or path of an .onnx file"})
+    max_points: int = _number(400, 8, 4096, "", "of a proposal handed to the network")
+    batch: int = _number(8, 1, 256, "", "proposals of one network call at most")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SchedulerConfig(StageConfig):
+    """What one frame may spend on classification; none: no bound."""
+
+    calls_per_frame: int | None = _number(16, 0, 10000, "", "proposals classified")
+    cpu_ms_per_frame: float | None = _number(None, 0.0, 10000.0, "ms", "CPU time by the measured cost model")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FusionConfig(StageConfig):
+    """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
+
+    threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
+    alpha: tuple[float, float, float] = _per_class(
+        0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
+    )
+        0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
+    )
+    bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
+    range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")
+    extent_ratio: float = _number(0.3, 0.0, 10.0, "", "change of size that makes it independent")
+    start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProfileConfig:
+    """All of it: a sensor and a board, as a profile file describes them."""
+
+    sensor: SensorConfig = field(default_factory=SensorConfig)
+    segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    classification: ClassificationConfig = field(default_factory=ClassificationConfig)
+    scheduler: SchedulerConfig = field(default_factory=SchedulerConfig)
+    fusion: FusionConfig = field(default_factory=FusionConfig)

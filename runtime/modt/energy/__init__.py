@@ -1,0 +1,1 @@
+"""What it costs: ledger, meters, prediction."""

@@ -1,0 +1,1 @@
+"""Streams of frames: KITTI layouts, bare scans, the synthetic world."""

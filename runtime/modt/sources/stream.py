@@ -1,0 +1,63 @@
+"""What every source offers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from modt.geometry import Camera
+from modt.types import Frame
+
+
+@dataclass(frozen=True, slots=True)
+class StreamInfo:
+    """What is known of a stream before its first frame.
+
+    Attributes:
+        name: of the stream, for people.
+        layout: kind of source it was recognised as.
+        sequence: its KITTI tracking sequence number, 0 where it has none.
+        n_frames: frames to expect, None for an endless stream.
+        period_s: nominal time between frames [s].
+        camera: camera that the annotations and KITTI results refer to, None where there is none.
+        has_poses: frames carry T_world_sensor.
+        notes: what is missing, and what that costs.
+    """
+
+    name: str
+    layout: str
+    sequence: int
+    n_frames: int | None
+    period_s: float
+    camera: Camera | None
+    has_poses: bool
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A scan, or part of one, that could not be used.
+
+    Attributes:
+        frame: its index.
+        subject: file or device.
+        cause: what was wrong.
+        skipped: the whole scan was left out.
+    """
+
+    frame: int
+    subject: str
+    cause: str
+    skipped: bool
+
+
+class Stream(Protocol):
+    """A source of frames, in the order of time."""
+
+    info: StreamInfo
+    faults: list[Fault]
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames; what had to be left out is added to faults meanwhile."""
+        ...

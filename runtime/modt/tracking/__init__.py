@@ -1,0 +1,1 @@
+"""Following every proposal: EKF, association, state machines."""

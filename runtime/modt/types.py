@@ -1,0 +1,237 @@
+"""What the stages hand to one another.
+
+Everything is a structure of arrays: a frame's work is vectorised over points, proposals and tracks. P is the
+number of proposals in a frame, M the number of tracks alive, N the number of points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Int = NDArray[np.int64]
+Bool = NDArray[np.bool_]
+
+NONE = -1
+"""Index of nothing: a track without a proposal, a proposal without a track."""
+
+
+class ObjectClass(IntEnum):
+    """What a proposal can be; the value is its index in every posterior."""
+
+    BACKGROUND = 0
+    CAR = 1
+    PEDESTRIAN = 2
+    CYCLIST = 3
+
+
+CLASS_NAMES = tuple(c.name.lower() for c in ObjectClass)
+N_CLASSES = len(ObjectClass)
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """One full sweep.
+
+    Attributes:
+        index: number of the frame in its stream (gaps where the stream has gaps).
+        stamp_s: time of the sweep [s], never decreasing within a stream.
+        points: (N, 4) float32 x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1]. Finite
+            throughout; a point without a return lies at the origin.
+        T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
+    """
+
+    index: int
+    stamp_s: float
+    points: Float32
+    T_world_sensor: Float64 | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Proposals:
+    """The segments of one frame that could be objects.
+
+    Attributes:
+        members: (K,) indices of points in the frame, grouped by proposal.
+        offsets: (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]].
+        centroid: (P, 3) mean of each proposal's points [m, sensor frame].
+        box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
+        truncated: (P,) cut by the edge of the field of view.
+        occluded: (P,) cut by something nearer that stands in front of it.
+    """
+
+    members: Int
+    offsets: Int
+    centroid: Float64
+    box: Float64
+    truncated: Bool
+    occluded: Bool
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @property
+    def count(self) -> Int:
+        """(P,) points of each proposal."""
+        return np.diff(self.offsets)
+
+    def label(self, n_points: int) -> Int:
+        """(n_points,) proposal of each point of the frame, NONE where it belongs to none."""
+        out = np.full(n_points, NONE, np.int64)
+        out[self.members] = np.repeat(np.arange(len(self)), self.count)
+        return out
+
+    @classmethod
+    def empty(cls) -> Proposals:
+        """No proposals: a frame like any other."""
+        return cls(
+            members=np.zeros(0, np.int64),
+            offsets=np.zeros(1, np.int64),
+            centroid=np.zeros((0, 3)),
+            box=np.zeros((0, 7)),
+            truncated=np.zeros(0, np.bool_),
+            occluded=np.zeros(0, np.bool_),
+        )
+
+
+@dataclass(slots=True)
+class Tracks:
+    """The tracks alive, one row each; stages write the columns they own in place.
+
+    Columns of the tracker:
+        id: never used twice in a run.
+        state: where the track stands in the state machine (its enumeration's value).
+        x: (M, 4) filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1).
+        P: (M, 4, 4) its covariance.
+        box: (M, 7) last box seen, world frame.
+        proposal: proposal of this frame, NONE while the track is lost.
+        points: points of the last proposal.
+        age: frames since birth, the birth frame counting as 1.
+        hits: frames with a proposal.
+        missed: frames since the last proposal.
+    Columns of the fusion:
+        posterior: (M, 4) P(class | views), uniform before any.
+        fixed: the class is settled and not asked for again.
+        views: key observations fused.
+        key_points: points of the last key observation, 0 before any.
+        key_bearing: direction from which it was seen, relative to the object [rad].
+        key_range: distance from which it was seen [m].
+        key_extent: (M, 3) its box l, w, h [m].
+        waiting: frames since the track first asked for the class that it waits for.
+    """
+
+    id: Int
+    state: Int
+    x: Float64
+    P: Float64
+    box: Float64
+    proposal: Int
+    points: Int
+    age: Int
+    hits: Int
+    missed: Int
+    posterior: Float64
+    fixed: Bool
+    views: Int
+    key_points: Int
+    key_bearing: Float64
+    key_range: Float64
+    key_extent: Float64
+    waiting: Int
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    @classmethod
+    def blank(cls, m: int = 0) -> Self:
+        """M rows: no identity, no proposal, no view yet, uniform posterior."""
+
+        def zero(*shape: int) -> Float64:
+            return np.zeros((m, *shape))
+
+        def count() -> Int:
+            return np.zeros(m, np.int64)
+
+        return cls(
+            id=np.full(m, NONE, np.int64),
+            state=count(),
+            x=zero(4),
+            P=zero(4, 4),
+            box=zero(7),
+            proposal=np.full(m, NONE, np.int64),
+            points=count(),
+            age=count(),
+            hits=count(),
+            missed=count(),
+            posterior=np.full((m, N_CLASSES), 1.0 / N_CLASSES),
+            fixed=np.zeros(m, np.bool_),
+            views=count(),
+            key_points=count(),
+            key_bearing=zero(),
+            key_range=zero(),
+            key_extent=zero(3),
+            waiting=count(),
+        )
+
+    def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Every column with its name."""
+        return ((f.name, getattr(self, f.name)) for f in fields(self))
+
+    def take(self, rows: Int | Bool) -> Self:
+        """A copy of the rows given, by index or mask."""
+        return type(self)(**{name: column[rows] for name, column in self.columns()})
+
+    def append(self, other: Self) -> Self:
+        """These rows, then the other's."""
+        return type(self)(**{n: np.concatenate([c, getattr(other, n)]) for n, c in self.columns()})
+
+    def row_of_proposal(self, n_proposals: int) -> Int:
+        """(n_proposals,) row of the track that owns each proposal, NONE where there is none."""
+        rows = np.full(n_proposals, NONE, np.int64)
+        seen = np.flatnonzero(self.proposal != NONE)
+        rows[self.proposal[seen]] = seen
+        return rows
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """What one frame may spend on classification; None where nothing binds.
+
+    Attributes:
+        calls: proposals classified.
+        cpu_ms: CPU time by the cost model [ms].
+    """
+
+    calls: int | None = None
+    cpu_ms: float | None = None
+
+
+UNLIMITED = Budget()
+
+
+@dataclass(frozen=True, slots=True)
+class FrameResult:
+    """What is known after a frame.
+
+    Attributes:
+        frame: the sweep it is about.
+        proposals: its segments.
+        tracks: a copy of the tracks alive after the frame.
+        state_names: name of each value of tracks.state.
+        classified: proposals classified in this frame.
+        deferred: proposals that asked for a class and must wait for the next frame's budget.
+    """
+
+    frame: Frame
+    proposals: Proposals
+    tracks: Tracks
+    state_names: tuple[str, ...]
+    classified: int
+    deferred: int
