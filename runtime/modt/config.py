@@ -82,9 +82,7 @@ def _check(key: str, value: object, kind: object, bounds: dict[str, Any]) -> Non
 class SensorConfig(StageConfig):
     """The sensor as segmentation sees it."""
 
-    height_m: float | None = _number(
-        1.73, 0.05, 5.0, "m", "above the ground; none: estimated from the stream"
-    )
+    height_m: float | None = _number(1.73, 0.05, 5.0, "m", "above the ground; none: estimated from the stream")
     min_range_m: float = _number(2.7, 0.0, 20.0, "m", "nearer points belong to the robot itself")
     max_range_m: float = _number(80.0, 1.0, 400.0, "m", "farther points are left out")
     azimuth_step_deg: float = _number(0.17, 0.01, 5.0, "deg", "between neighbouring returns of a beam")
@@ -114,9 +112,7 @@ class TrackingConfig(StageConfig):
     beta: float = _number(0.01, 0.0, 10.0, "", "weight of the difference of point number")
     gamma: float = _number(0.1, 0.0, 10.0, "", "weight of the difference of size")
     t_da: float = _number(0.95, 0.0, 100.0, "", "highest cost of an association")
-    max_missed: int = _number(
-        8, 0, 100, "frames", "without a proposal before a track is deleted (N of a9 and a14)"
-    )
+    max_missed: int = _number(8, 0, 100, "frames", "without a proposal before a track is deleted (N of a9 and a14)")
     position_sigma_m: float = _number(0.3, 0.01, 5.0, "m", "of a measured position")
     acceleration_sigma_mps2: float = _number(2.0, 0.01, 50.0, "m/s2", "process noise of the speed")
     turn_sigma_radps: float = _number(0.3, 0.001, 10.0, "rad/s", "process noise of the heading")
@@ -146,8 +142,6 @@ class FusionConfig(StageConfig):
 
     threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
     alpha: tuple[float, float, float] = _per_class(
-        0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
-    )
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
     )
     bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
