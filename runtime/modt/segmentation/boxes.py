@@ -8,6 +8,7 @@ from modt.segmentation.groups import Groups
 from modt.types import Float32, Float64
 
 HEADINGS = np.deg2rad(np.arange(0, 90, 5.0))
+FAN = np.append(HEADINGS, HEADINGS + np.pi / 2)
 PAD_M = np.float32(0.05)
 """Added to each side, so that a thin line has an area to compare."""
 
@@ -20,12 +21,9 @@ def headings(x: Float32, y: Float32, groups: Groups) -> Float64:
         y: (K,) the same across [m].
         groups: what they belong to.
     """
-    c, s = np.cos(HEADINGS).astype(np.float32), np.sin(HEADINGS).astype(np.float32)
-    along = x[:, None] * c + y[:, None] * s
-    across = y[:, None] * c - x[:, None] * s
-    length = groups.most(along) - groups.least(along)
-    width = groups.most(across) - groups.least(across)
-    best: Float64 = HEADINGS[np.argmin((length + PAD_M) * (width + PAD_M), axis=1)]
+    side = np.stack([np.cos(FAN), np.sin(FAN)], axis=1).astype(np.float32) @ np.stack([x, y])
+    span = groups.most(side) - groups.least(side) + PAD_M
+    best: Float64 = HEADINGS[np.argmin(span[: len(HEADINGS)] * span[len(HEADINGS) :], axis=0)]
     return best
 
 

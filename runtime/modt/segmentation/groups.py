@@ -43,16 +43,16 @@ class Groups:
         return np.diff(self.offsets)
 
     def spread(self, values: Real) -> Real:
-        """(K, ...) a value a group given to each of its rows."""
-        return np.repeat(values, self.count, axis=0)
+        """(K,) a value a group given to each of its rows."""
+        return np.repeat(values, self.count)
 
     def least(self, values: Real) -> Real:
-        """(G, ...) least of (K, ...) values in each group."""
-        return np.minimum.reduceat(values, self.offsets[:-1])
+        """(..., G) least of (..., K) values in each group."""
+        return np.minimum.reduceat(values, self.offsets[:-1], axis=-1)
 
     def most(self, values: Real) -> Real:
-        """(G, ...) greatest of (K, ...) values in each group."""
-        return np.maximum.reduceat(values, self.offsets[:-1])
+        """(..., G) greatest of (..., K) values in each group."""
+        return np.maximum.reduceat(values, self.offsets[:-1], axis=-1)
 
     def mean(self, values: Real) -> Float64:
         """(G,) mean of (K,) values in each group."""
