@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.columns import Columns
+from modt.segmentation.grids import Int32, RootGrid
 from modt.types import NONE, Bool, Float32, Int
-
-Int32 = NDArray[np.int32]
 
 GAP_M = 0.3
 """Cells that touch in the bird's-eye view are joined if no more than this lies between them in height ..."""
@@ -56,72 +54,33 @@ class Clusters:
     Attributes:
         cell: (K,) cell of each point.
         sample: (C,) one point of each cell, its last.
+        top: (C,) greatest height above ground of each cell's points [m].
         of_cell: (C,) cluster of each cell, NONE where it could be no object.
         n: how many there are, numbered from 0.
     """
 
     cell: Int32
     sample: Int
+    top: Float32
     of_cell: Int
     n: int
 
 
-class RootGrid:
-    """A square grid over the plane drawn in by the square root of range.
-
-    A point at range r moves to sqrt(r) in its direction. A cell of side s in that plane covers s sqrt(r) across the
-    ray and twice that along it: as the sensor's spacing grows with range, and more so along the ray, so do the cells.
-
-    Args:
-        step: side of a cell [sqrt(m)].
-        max_range_m: how far it reaches.
-    """
-
-    def __init__(self, step: float, max_range_m: float) -> None:
-        self.step = step
-        self.centre = 2 * (int(np.sqrt(max_range_m) / (2 * step)) + 2)
-        self.side = 2 * self.centre
-        self._number: Int32 = np.full(self.side * self.side, NONE, np.int32)
-
-    def place(self, points: Columns) -> Int32:
-        """(K,) place of each point in the grid, row by row."""
-        scale = np.float32(1 / self.step) / points.root
-        place = (points.x * scale + np.float32(self.centre)).astype(np.int32)
-        place *= self.side
-        place += (points.y * scale + np.float32(self.centre)).astype(np.int32)
-        return place
-
-    def occupy(self, place: Int32) -> tuple[Int, Int32]:
-        """(C,) one point of each occupied cell, its last, and (K,) the cell of each point.
-
-        No sort and no search of the grid: every point writes its name in its cell, and those whose name still
-        stands there speak for theirs.
-        """
-        name = np.arange(len(place), dtype=np.int32)
-        self._number[place] = name
-        sample = np.flatnonzero(self._number[place] == name)
-        self._number[place[sample]] = name[: len(sample)]
-        cell = self._number[place]
-        self._number[place[sample]] = NONE
-        return sample, cell
-
-    def join(self, cells: Cells, beam_rad: float) -> Int:
-        """(C,) component of each cell: those that touch at a side or a corner, and in height, belong together."""
-        place = cells.row * np.int32(self.side) + cells.column
-        self._number[place] = np.arange(len(place), dtype=np.int32)
-        ahead = np.array([1, self.side - 1, self.side, self.side + 1], np.int32)
-        beside = self._number[place[:, None] + ahead].ravel()
-        self._number[place] = NONE
-        link = np.flatnonzero(beside >= 0)
-        one, other = link // len(ahead), beside[link]
-        gap = np.maximum(cells.low[one], cells.low[other]) - np.minimum(cells.high[one], cells.high[other])
-        bound = np.float32(GAP_M) + np.float32(GAP_BEAMS * beam_rad) * np.square(cells.root)
-        near = gap < bound[one]
-        ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(place))))
-        links = other[near]
-        graph = csr_array((np.ones(len(links)), links, ends), shape=(len(place), len(place)))
-        component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
-        return component
+def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
+    """(C,) component of each cell: those that touch at a side or a corner, and in height, belong together."""
+    place = cells.row * np.int32(grid.side) + cells.column
+    ahead = np.array([1, grid.side - 1, grid.side, grid.side + 1], np.int32)
+    beside = grid.look_up(place, ahead).ravel()
+    link = np.flatnonzero(beside >= 0)
+    one, other = link // len(ahead), beside[link]
+    gap = np.maximum(cells.low[one], cells.low[other]) - np.minimum(cells.high[one], cells.high[other])
+    bound = np.float32(GAP_M) + np.float32(GAP_BEAMS * beam_rad) * np.square(cells.root)
+    near = gap < bound[one]
+    ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(place))))
+    links = other[near]
+    graph = csr_array((np.ones(len(links)), links, ends), shape=(len(place), len(place)))
+    component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
+    return component
 
 
 class Clusterer:
@@ -154,12 +113,12 @@ class Clusterer:
         cluster = self._joined_coarsely(cells)
         extent = _extent(x, y, cluster)
         parts = np.flatnonzero((extent >= self.config.max_extent_m)[cluster])
-        piece = self.fine.join(cells.take(parts), self.beam_rad)
+        piece = join(self.fine, cells.take(parts), self.beam_rad)
         cluster[parts] = piece + len(extent)
         extents = np.append(extent, _extent(x[parts], y[parts], piece))
         proper = self._proper(cluster, cells, count, extents, len(extent))
         number = np.where(proper, np.cumsum(proper) - 1, NONE)
-        return Clusters(cell, sample, number[cluster], int(proper.sum()))
+        return Clusters(cell, sample, cells.high, number[cluster], int(proper.sum()))
 
     def _joined_coarsely(self, fine: Cells) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell which it is a quarter of."""
@@ -168,7 +127,7 @@ class Clusterer:
         sample, coarse = self.coarse.occupy(place)
         row, column = np.divmod(place[sample], np.int32(side))
         low, high = _bounds(fine.low, coarse, len(sample))[0], _bounds(fine.high, coarse, len(sample))[1]
-        return self.coarse.join(Cells(row, column, low, high, fine.root[sample]), self.beam_rad)[coarse]
+        return join(self.coarse, Cells(row, column, low, high, fine.root[sample]), self.beam_rad)[coarse]
 
     def _proper(self, cluster: Int, cells: Cells, count: Int, extent: Float32, n_coarse: int) -> Bool:
         """(G,) clusters of an object's size; pieces of something vast, numbered from n_coarse, must stand out."""

@@ -6,11 +6,9 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.columns import Columns
+from modt.segmentation.grids import SECTORS, PolarGrid
 from modt.types import Bool, Float32, Int
 
-SECTORS = 128
-RING_STEP = 0.15
-"""Rings lie this far apart in the square root of range [sqrt(m)]: 0.9 m at 10 m, 1.9 m at 40 m."""
 NOISE_M = 0.1
 """Lowest returns of neighbouring cells on one plane differ by less."""
 BEND = float(np.tan(np.deg2rad(4.0)))
@@ -21,36 +19,6 @@ START_M = 0.3
 """The ground beneath the sensor may lie this far from where it should."""
 BRIDGE_M = 6.0
 """Gaps beyond this widen the search no more."""
-
-
-class PolarGrid:
-    """Cells around the sensor: rings that widen with range, sectors of a pseudo-angle that needs no arctangent.
-
-    Args:
-        max_range_m: how far the rings reach.
-    """
-
-    def __init__(self, max_range_m: float) -> None:
-        self.rings = int(np.sqrt(max_range_m) / RING_STEP) + 2
-        edge = (np.arange(self.rings + 1) * RING_STEP) ** 2
-        self.range_m: Float32 = ((edge[1:] + edge[:-1]) / 2).astype(np.float32)
-
-    def cell(self, points: Columns) -> Int:
-        """(N,) cell of each point, ring by ring; points beyond the last ring belong to it."""
-        ring = (points.root * np.float32(1 / RING_STEP)).astype(np.int32)
-        np.minimum(ring, self.rings - 1, out=ring)
-        turn = np.abs(points.x)
-        turn += np.abs(points.y)
-        np.maximum(turn, np.float32(1e-6), out=turn)
-        np.divide(points.y, turn, out=turn)
-        np.subtract(np.float32(2.0), turn, out=turn, where=points.x < 0)
-        turn += np.float32(1.0)
-        turn *= np.float32(SECTORS / 4)
-        sector = turn.astype(np.int32)
-        sector &= SECTORS - 1
-        ring *= SECTORS
-        ring += sector
-        return ring.astype(np.int64)
 
 
 class Ground:
@@ -87,7 +55,7 @@ class Ground:
         reach += np.float32(START_M)
         plausible = np.abs(points.z + np.float32(sensor_height_m)) < reach
         plausible &= points.root > np.float32(self.near)
-        lowest = np.full(self.grid.rings * SECTORS, np.inf, np.float32)
+        lowest = np.full(self.grid.size, np.inf, np.float32)
         np.minimum.at(lowest, cell, np.where(plausible, points.z, np.float32(np.inf)))
         return lowest.reshape(-1, SECTORS)
 

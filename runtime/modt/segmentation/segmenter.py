@@ -11,10 +11,16 @@ from modt.segmentation.clusters import Clusterer
 from modt.segmentation.columns import Columns
 from modt.segmentation.ground import Ground
 from modt.segmentation.groups import Groups
+from modt.segmentation.height import sensor_height
+from modt.segmentation.occlusion import occluded
 from modt.types import Bool, Float32, Int, Proposals
 
 EDGE_M = 0.3
 """A proposal this near the edge of the field of view counts as cut by it."""
+OCCLUDER_M = 0.6
+"""What rises this high above ground hides what is behind it."""
+OUTLINE = 64
+"""Cells of a cluster, at most, that decide on its heading."""
 
 
 class Segmenter:
@@ -28,6 +34,7 @@ class Segmenter:
 
     def __init__(self, config: SegmentationConfig, sensor: SensorConfig, fov: FieldOfView) -> None:
         self.config, self.sensor, self.fov = config, sensor, fov
+        self.sensor_height = sensor_height(sensor)
         self.ground = Ground(sensor, config)
         self.clusterer = Clusterer(sensor, config)
         _keep_freed_pages()
@@ -36,7 +43,7 @@ class Segmenter:
         """Proposals of (N, 4) points; none for an empty sweep."""
         looked_at = None if self.fov.full else np.flatnonzero(self.fov.contains(points))
         sweep = Columns.of(points if looked_at is None else points[looked_at])
-        height = self.ground.height(sweep, self.sensor.height_m or 1.73)
+        height = self.ground.height(sweep, self.sensor_height.of(sweep))
         raised = np.flatnonzero(self._raised(sweep, height))
         if not len(raised):
             return Proposals.empty()
@@ -56,8 +63,9 @@ class Segmenter:
         if not clusters.n:
             return Proposals.empty()
         outline = Groups.of(clusters.of_cell, clusters.n)
-        corner = clusters.sample[outline.rows]
-        yaw = headings(raised.x[corner], raised.y[corner], outline)
+        x, y = raised.x[clusters.sample], raised.y[clusters.sample]
+        few = outline.thinned(OUTLINE)
+        yaw = headings(x[few.rows], y[few.rows], few)
         groups = Groups.of(clusters.of_cell[clusters.cell], clusters.n)
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
@@ -65,7 +73,8 @@ class Segmenter:
         truncated = np.zeros(clusters.n, np.bool_)
         if not self.fov.full:
             truncated = groups.least(self.fov.depth(np.stack([own.x, own.y, own.z], axis=1))) < EDGE_M
-        return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, np.zeros(clusters.n, np.bool_))
+        hidden = occluded(x, y, clusters.top > OCCLUDER_M, outline)
+        return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, hidden)
 
 
 def _keep_freed_pages() -> None:
