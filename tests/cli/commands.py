@@ -18,8 +18,8 @@ def environment() -> dict[str, str]:
 def modt(*arguments: object, cwd: Path, module: str = "modt.cli.main", **options) -> subprocess.CompletedProcess[str]:
     """Run a command to its end."""
     command = [sys.executable, "-m", module, *map(str, arguments)]
-    options = {"check": False, "capture_output": True, "text": True, "env": environment(), "cwd": cwd, **options}
-    return subprocess.run(command, **options)
+    options = {"capture_output": True, "text": True, "env": environment(), "cwd": cwd, **options}
+    return subprocess.run(command, check=False, **options)
 
 
 def begin(*arguments: object, cwd: Path) -> subprocess.Popen[str]:
