@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,11 +52,12 @@ class SyntheticStream:
         world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
         self.simulator = Simulator(world, model, seed)
         self.faults: list[Fault] = []
+        self._indices = range(max(1, round(seconds / model.period_s)))
         self.info = StreamInfo(
             name=f"{scene}, {sensor}, seed {seed}",
             layout="synthetic",
             sequence=0,
-            n_frames=max(1, round(seconds / model.period_s)),
+            n_frames=len(self._indices),
             period_s=model.period_s,
             camera=nominal_camera(),
             has_poses=True,
@@ -66,4 +69,13 @@ class SyntheticStream:
 
     def sweeps(self) -> Iterator[tuple[Frame, Truth]]:
         """The frames, each with the truth about it."""
-        return (self.simulator.sweep(i) for i in range(self.info.n_frames or 0))
+        return (self.simulator.sweep(i) for i in self._indices)
+
+    def between(self, first: int, last: int | None) -> SyntheticStream:
+        """The frames with first <= index < last; the others are never rendered."""
+        part = copy(self)
+        part.faults = []
+        whole = self._indices
+        part._indices = range(max(first, whole.start), min(whole.stop, whole.stop if last is None else last))
+        part.info = replace(self.info, n_frames=len(part._indices))
+        return part
