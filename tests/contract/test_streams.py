@@ -1,5 +1,7 @@
 """What every source promises, whichever it is."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -41,7 +43,7 @@ def test_frames_are_what_frames_are(stream):
 
 def test_time_and_index_go_forward(stream):
     frames = list(stream)
-    assert all(b.stamp_s >= a.stamp_s and b.index > a.index for a, b in zip(frames, frames[1:], strict=False))
+    assert all(b.stamp_s >= a.stamp_s and b.index > a.index for a, b in itertools.pairwise(frames))
 
 
 def test_a_stream_gives_the_same_frames_again(stream):
