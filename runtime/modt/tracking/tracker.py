@@ -44,7 +44,7 @@ class Tracker:
         return self._tracks
 
     @property
-    def T_world_sensor(self) -> Float64:  # noqa: N802 (a frame name)
+    def T_world_sensor(self) -> Float64:
         """(4, 4) pose that the last frame was placed by."""
         return self._T_world_sensor
 
