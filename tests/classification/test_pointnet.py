@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +30,7 @@ def random_layers(seed: int) -> Layers:
             (rng.normal(size=(a, b)) * np.sqrt(2 / a)).astype(np.float32),
             rng.normal(0, 0.3, b).astype(np.float32),
         )
-        for a, b in zip(SIZES, SIZES[1:], strict=False)
+        for a, b in pairwise(SIZES)
     ]
 
 
