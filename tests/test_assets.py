@@ -26,7 +26,7 @@ def probe(python: str, *, path: Path | None = None, cwd: Path) -> tuple[str, str
     env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     if path is not None:
         env["PYTHONPATH"] = str(path)
-    done = subprocess.run([python, "-c", PROBE], capture_output=True, text=True, env=env, cwd=cwd)
+    done = subprocess.run([python, "-c", PROBE], check=False, capture_output=True, text=True, env=env, cwd=cwd)
     assert done.returncode == 0, done.stderr
     package, files = done.stdout.splitlines()
     return package, files
