@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.metered import Metered
+from modt.classification.costed import CostedClassifier
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.types import NONE, UNLIMITED, Budget, Float32, Float64, Int, Proposals
 from tests.classification.scenes import blobs, seen
@@ -130,14 +130,14 @@ def test_no_measurement_breaks_the_cost_model(frames: list[tuple[int, float]]) -
     assert (price > 0).all()
 
 
-def test_metered_teaches_what_the_clock_says() -> None:
+def test_the_cost_model_is_taught_what_the_clock_says() -> None:
     class Still:
         def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
             return np.full((len(which), 4), 0.25)
 
     points, proposals = blobs([40, 60], np.random.default_rng(0))
     cost, clock = LinearCost(400), iter(range(0, 10**9, 3_000_000))
-    classifier = Metered(Still(), cost, lambda: next(clock))
+    classifier = CostedClassifier(Still(), cost, lambda: next(clock))
     for _ in range(100):
         out = classifier.classify(points, proposals, np.arange(2))
     assert out.shape == (2, 4)
