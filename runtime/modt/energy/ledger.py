@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar, TypeVarTuple
+from typing import Any, ParamSpec, Protocol, TypeVar
 
 SCHEMA = "modt.ledger/1"
 STAGES = ("source", "segmentation", "tracking", "scheduling", "classification", "fusion", "sink")
 
 Clock = Callable[[], int]
 Line = dict[str, Any]
-Args = TypeVarTuple("Args")
+P = ParamSpec("P")
 R = TypeVar("R")
 
 _CALLS, _ITEMS, _POINTS, _WALL, _CPU = range(5)
@@ -24,7 +24,7 @@ _CALLS, _ITEMS, _POINTS, _WALL, _CPU = range(5)
 class StageLedger(Protocol):
     """What the pipeline asks of a ledger."""
 
-    def run(self, stage: str, function: Callable[[*Args], R], *args: *Args) -> R:
+    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args), booked on the stage."""
         ...
 
@@ -53,11 +53,11 @@ class Ledger:
         self.span_overhead_ns, self.frame_overhead_ns = self._measure_overhead()
         self._wall0, self._cpu0 = wall_ns(), cpu_ns()
 
-    def run(self, stage: str, function: Callable[[*Args], R], *args: *Args) -> R:
+    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args), booked on the stage; its items are len(result) where that has one."""
         wall0, cpu0 = self._wall_ns(), self._cpu_ns()
         try:
-            result = function(*args)
+            result = function(*args, **kwargs)
         finally:
             cpu1, wall1 = self._cpu_ns(), self._wall_ns()
             row = self._stages.get(stage) or self._open(stage)
@@ -138,9 +138,9 @@ class Ledger:
 class NullLedger:
     """Books nothing."""
 
-    def run(self, stage: str, function: Callable[[*Args], R], *args: *Args) -> R:
+    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args)."""
-        return function(*args)
+        return function(*args, **kwargs)
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
         """Nothing."""
