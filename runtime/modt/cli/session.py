@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,6 @@ from modt.sinks.labels import PointLabels
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.sink import Sink
 from modt.types import FrameResult
-
 
 HELPER_SHARE = 0.01
 """CPU time of other threads, as a share of the loop's, up to which the process counts as single-threaded."""
@@ -59,11 +59,8 @@ class Session:
     def run(self, tick: Tick) -> dict[str, Any]:
         """Drive the stream through; returns the summary that was written."""
         summary = Summary()
-        tracks = self.directory.tracks()
-        sinks: list[Sink] = [tracks, self._kitti()]
-        if self.request.labels:
-            sinks.append(PointLabels(self.directory.path / "labels"))
-        ledger_lines = self.directory.ledger()
+        tracks, ledger_lines = self.directory.tracks(), self.directory.ledger()
+        sinks: list[Sink] = [tracks, *self._further_sinks()]
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_frame(tracks.last)
@@ -72,19 +69,21 @@ class Session:
 
         budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
-        with self.stop.on_signals():
+        with ExitStack() as stack:
+            stack.callback(ledger_lines.close)
+            for sink in sinks:
+                stack.callback(sink.close)
+            stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
         elapsed_s = time.monotonic() - began_s
-        for sink in sinks:
-            sink.close()
-        ledger_lines.close()
         figures = summary.result() | self._circumstances(summary.frames, elapsed_s)
         self.directory.summarise(figures)
         return figures
 
-    def _kitti(self) -> KittiResults:
-        info = self.stream.info
-        return KittiResults(self.directory.path / "kitti" / f"{info.sequence:04d}.txt", info.camera)
+    def _further_sinks(self) -> list[Sink]:
+        info, path = self.stream.info, self.directory.path
+        labels: list[Sink] = [PointLabels(path / "labels")] if self.request.labels else []
+        return [KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera), *labels]
 
     def _stream_name(self) -> str:
         return "".join(c if c.isalnum() or c in "._-" else "-" for c in self.stream.info.name)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -47,7 +47,8 @@ class LineFile:
                 while written < len(data):
                     written += self._file.write(data[written:])
             except OSError:
-                self._file.truncate(whole)
+                with suppress(OSError):
+                    self._file.truncate(whole)
                 raise
 
     def close(self) -> None:
