@@ -44,7 +44,12 @@ class Tracker:
         return self._tracks
 
     @property
-    def T_world_sensor(self) -> Float64:  # noqa: N802 (a frame name)
+    def state_names(self) -> tuple[str, ...]:
+        """Name of each value of tracks.state."""
+        return self.machine.names
+
+    @property
+    def T_world_sensor(self) -> Float64:
         """(4, 4) pose that the last frame was placed by."""
         return self._T_world_sensor
 
