@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
+from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -49,12 +52,13 @@ class SyntheticStream:
         model = sensor_model(sensor)
         world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
         self.simulator = Simulator(world, model, seed)
+        self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults: list[Fault] = []
         self.info = StreamInfo(
             name=f"{scene}, {sensor}, seed {seed}",
             layout="synthetic",
             sequence=0,
-            n_frames=max(1, round(seconds / model.period_s)),
+            n_frames=len(self._indices),
             period_s=model.period_s,
             camera=nominal_camera(),
             has_poses=True,
@@ -66,4 +70,11 @@ class SyntheticStream:
 
     def sweeps(self) -> Iterator[tuple[Frame, Truth]]:
         """The frames, each with the truth about it."""
-        return (self.simulator.sweep(i) for i in range(self.info.n_frames or 0))
+        return (self.simulator.sweep(i) for i in self._indices)
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last; the others are not rendered."""
+        part = copy.copy(self)
+        part._indices = range(first, len(self._indices) if last is None else min(last, len(self._indices)))
+        part.info = replace(self.info, n_frames=len(part._indices))
+        return part
