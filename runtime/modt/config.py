@@ -123,7 +123,7 @@ class TrackingConfig(StageConfig):
 class ClassificationConfig(StageConfig):
     """The network and how its input is made (section V-A)."""
 
-    model: str = field(default="pointnet", metadata={"meaning": "name in models/ or path of an .onnx file"})
+    model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
     max_points: int = _number(400, 8, 4096, "", "of a proposal handed to the network")
     batch: int = _number(8, 1, 256, "", "proposals of one network call at most")
 
@@ -143,6 +143,10 @@ class FusionConfig(StageConfig):
     threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
+    )
+    background_alpha: float = _number(0.5, 0.0, 10.0, "", "the same, of what looks like background")
+    prior: tuple[float, float, float] = _per_class(
+        0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
     )
     bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
     range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")
