@@ -94,12 +94,12 @@ class SensorConfig(StageConfig):
 class SegmentationConfig(StageConfig):
     """Ground, clusters and the sizes of what can be an object (section III-A)."""
 
-    ground_tolerance_m: float = _number(0.25, 0.02, 1.0, "m", "points this near the ground belong to it")
+    ground_tolerance_m: float = _number(0.2, 0.02, 1.0, "m", "points this near the ground belong to it")
     max_slope_deg: float = _number(12.0, 0.5, 45.0, "deg", "of the ground")
     max_height_m: float = _number(2.6, 0.3, 20.0, "m", "above ground; what hangs higher joins nothing")
-    cell_m: float = _number(0.18, 0.02, 2.0, "m", "clustering distance near the sensor")
+    cell_m: float = _number(0.095, 0.01, 2.0, "m", "side of a cluster cell at 10 m, growing as the square root of range")
     min_points: int = _number(5, 1, 1000, "", "of a proposal")
-    max_extent_m: float = _number(12.0, 0.5, 50.0, "m", "longest side of a proposal")
+    max_extent_m: float = _number(13.0, 0.5, 50.0, "m", "longest side of a proposal")
     min_height_m: float = _number(0.2, 0.0, 3.0, "m", "lowest proposal")
 
 
@@ -123,7 +123,7 @@ class TrackingConfig(StageConfig):
 class ClassificationConfig(StageConfig):
     """The network and how its input is made (section V-A)."""
 
-    model: str = field(default="pointnet", metadata={"meaning": "name in models/ or path of an .onnx file"})
+    model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
     max_points: int = _number(400, 8, 4096, "", "of a proposal handed to the network")
     batch: int = _number(8, 1, 256, "", "proposals of one network call at most")
 
@@ -143,6 +143,10 @@ class FusionConfig(StageConfig):
     threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
+    )
+    background_alpha: float = _number(0.5, 0.0, 10.0, "", "the same, of what looks like background")
+    prior: tuple[float, float, float] = _per_class(
+        0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
     )
     bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
     range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")

@@ -39,7 +39,11 @@ def confine(core: int | None) -> int | None:
     if core not in allowed:
         listed = ", ".join(map(str, allowed))
         raise MisuseError(f"core {core}", "not available to this process", f"use one of {listed}, or --core none")
-    os.sched_setaffinity(0, {core})
+    if allowed != [core]:
+        try:
+            os.sched_setaffinity(0, {core})
+        except PermissionError:
+            raise MisuseError(f"core {core}", "affinity may not be changed", "set CPUAffinity= in the unit") from None
     return core
 
 

@@ -1,0 +1,1 @@
+"""A synthetic LiDAR world: the stream that is always there."""

@@ -1,0 +1,86 @@
+"""Gathers bodies while a scene is laid out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.sources.synthetic import kinds, vehicles
+from modt.sources.synthetic.figures import Figures, Posture
+from modt.sources.synthetic.kinds import Kind
+from modt.sources.synthetic.motion import Path
+from modt.sources.synthetic.pieces import Pieces
+from modt.sources.synthetic.terrain import Terrain
+from modt.sources.synthetic.world import Body, World
+from modt.types import Float64
+
+
+class Builder:
+    """A world in the making.
+
+    Args:
+        rng: of the scene.
+        seconds: how long it lasts.
+    """
+
+    def __init__(self, rng: np.random.Generator, seconds: float) -> None:
+        self.rng, self.seconds = rng, seconds
+        self.bodies: list[Body] = []
+        self._people: list[tuple[float, ...]] = []
+
+    def scenery(self, pieces: Pieces, x: float, y: float, heading_rad: float) -> None:
+        """Something that is not annotated and never moves."""
+        self.bodies.append(Body(kinds.SCENERY, (0.0, 0.0, 0.0), Path.standing(x, y, heading_rad), pieces))
+
+    def vehicle(self, kind: Kind, path: Path) -> None:
+        """A car, a van or a truck of random proportions."""
+        size, make = {
+            kinds.CAR: (vehicles.car_size, vehicles.car),
+            kinds.VAN: (vehicles.van_size, vehicles.van),
+            kinds.TRUCK: (vehicles.truck_size, vehicles.truck),
+        }[kind]
+        measured = size(self.rng)
+        self.bodies.append(Body(kind, measured, path, make(self.rng, measured)))
+
+    def parked_bicycle(self, x: float, y: float, heading_rad: float) -> None:
+        """A bicycle without a rider."""
+        path = Path.standing(x, y, heading_rad)
+        self.bodies.append(Body(kinds.BICYCLE, (1.75, 0.55, 1.05), path, vehicles.bicycle(self.rng)))
+
+    def pedestrian(self, path: Path, speed_mps: float = 0.0) -> None:
+        """Someone on foot: walking where a speed is given, else standing."""
+        height = float(np.clip(self.rng.normal(1.74, 0.09), 1.15, 2.0))
+        stride = 0.24 * height * (0.6 + 0.3 * speed_mps) if speed_mps else 0.0
+        rate = np.pi * speed_mps / (2 * stride) if speed_mps else 0.0
+        length = 0.45 + 1.4 * stride if speed_mps else 0.5
+        breadth = float(self.rng.uniform(0.55, 0.7))
+        posture = Posture.WALK if speed_mps else Posture.STAND
+        self._person(kinds.PEDESTRIAN, (length, breadth, height), path, posture, height, rate, stride, Pieces.none())
+
+    def cyclist(self, path: Path, speed_mps: float) -> None:
+        """Someone on a bicycle."""
+        height = float(np.clip(self.rng.normal(1.74, 0.08), 1.5, 1.95))
+        size = (1.76, 0.6, 0.93 + 0.3 * height * np.cos(0.55) + 0.24 * height)
+        rate = 2 * np.pi * speed_mps / 4.5
+        self._person(kinds.CYCLIST, size, path, Posture.RIDE, height, rate, 0.0, vehicles.bicycle(self.rng))
+
+    def world(self, terrain: Terrain, ego: Path, height_m: float, sway_rad: float = 0.003) -> World:
+        """The world as it stands."""
+        columns: Float64 = np.array(self._people).reshape(-1, 7).T
+        figures = Figures(columns[0].astype(np.int64), columns[1].astype(np.int64), *columns[2:])
+        return World(terrain, self.bodies, figures, ego, height_m, sway_rad)
+
+    def _person(
+        self,
+        kind: Kind,
+        size: tuple[float, float, float],
+        path: Path,
+        posture: Posture,
+        height: float,
+        rate: float,
+        stride: float,
+        rigid: Pieces,
+    ) -> None:
+        girth = float(np.clip(self.rng.normal(1.0, 0.12), 0.75, 1.35))
+        phase = float(self.rng.uniform(0, 2 * np.pi))
+        self._people.append((len(self.bodies), posture, height, girth, phase, rate, stride))
+        self.bodies.append(Body(kind, size, path, rigid))

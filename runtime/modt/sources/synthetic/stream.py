@@ -1,0 +1,81 @@
+"""The synthetic world as a source of frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from dataclasses import replace
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.geometry import Camera
+from modt.sources.stream import Fault, StreamInfo
+from modt.sources.synthetic.scenes import SCENES
+from modt.sources.synthetic.sensors import sensor as sensor_model
+from modt.sources.synthetic.simulator import Simulator, Truth
+from modt.types import Frame
+
+FOCAL_PX, CENTRE_PX = 721.5, (609.5, 172.9)
+
+
+def nominal_camera() -> Camera:
+    """A camera beside the sensor as KITTI's left colour camera: 0.27 m ahead, 0.08 m below, level."""
+    T_camera_sensor = np.array(
+        [[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, -0.08], [1.0, 0.0, 0.0, -0.27], [0.0, 0.0, 0.0, 1.0]]
+    )
+    K = np.array([[FOCAL_PX, 0.0, CENTRE_PX[0], 0.0], [0.0, FOCAL_PX, CENTRE_PX[1], 0.0], [0.0, 0.0, 1.0, 0.0]])
+    return Camera(K @ T_camera_sensor, T_camera_sensor, 1242.0, 375.0)
+
+
+class SyntheticStream:
+    """A drive through a synthetic scene; the same bytes for the same arguments.
+
+    Args:
+        scene: name of the scene.
+        sensor: name of the sensor model.
+        seconds: how long it takes.
+        seed: of the scene, what happens in it and the noise.
+
+    Raises:
+        MisuseError: an unknown scene or sensor, or a duration that is none.
+    """
+
+    def __init__(self, scene: str = "street", sensor: str = "hdl-64e", seconds: float = 10.0, seed: int = 0) -> None:
+        if scene not in SCENES:
+            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
+        if not 0 < seconds <= 3600:
+            raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
+        if seed < 0:
+            raise MisuseError(seed, "no seed", "give a whole number from 0 on")
+        model = sensor_model(sensor)
+        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
+        self.simulator = Simulator(world, model, seed)
+        self.faults: list[Fault] = []
+        self._indices = range(max(1, round(seconds / model.period_s)))
+        self.info = StreamInfo(
+            name=f"{scene}, {sensor}, seed {seed}",
+            layout="synthetic",
+            sequence=0,
+            n_frames=len(self._indices),
+            period_s=model.period_s,
+            camera=nominal_camera(),
+            has_poses=True,
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames."""
+        return (frame for frame, _ in self.sweeps())
+
+    def sweeps(self) -> Iterator[tuple[Frame, Truth]]:
+        """The frames, each with the truth about it."""
+        return (self.simulator.sweep(i) for i in self._indices)
+
+    def between(self, first: int, last: int | None) -> SyntheticStream:
+        """The frames with first <= index < last; the others are never rendered."""
+        part = copy(self)
+        part.faults = []
+        whole = self._indices
+        part._indices = range(max(first, whole.start), min(whole.stop, whole.stop if last is None else last))
+        part.info = replace(self.info, n_frames=len(part._indices))
+        return part
