@@ -37,12 +37,21 @@ class SyntheticStream:
         sensor: name of the sensor model.
         seconds: how long it takes.
         seed: of the scene, what happens in it and the noise.
+        distort: leave the motion of a turning head in the scans.
 
     Raises:
         MisuseError: an unknown scene or sensor, or a duration that is none.
     """
 
-    def __init__(self, scene: str = "street", sensor: str = "hdl-64e", seconds: float = 10.0, seed: int = 0) -> None:
+    def __init__(
+        self,
+        scene: str = "street",
+        sensor: str = "hdl-64e",
+        seconds: float = 10.0,
+        seed: int = 0,
+        *,
+        distort: bool = False,
+    ) -> None:
         if scene not in SCENES:
             raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
         if not 0 < seconds <= 3600:
@@ -51,7 +60,7 @@ class SyntheticStream:
             raise MisuseError(seed, "no seed", "give a whole number from 0 on")
         model = sensor_model(sensor)
         world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
-        self.simulator = Simulator(world, model, seed)
+        self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults: list[Fault] = []
         self.info = StreamInfo(
