@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Protocol
 
+from modt.energy.ledger import StageLedger
 from modt.types import UNLIMITED, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
-
-P = ParamSpec("P")
-T = TypeVar("T")
 
 SOURCE, SINK = "source", "sink"
 SEGMENTATION, TRACKING, SCHEDULING, CLASSIFICATION, FUSION = STAGES = (
@@ -80,6 +77,10 @@ class Classifier(Protocol):
         """(R, 4) P(Y|X) of the proposals named."""
         ...
 
+    def facts(self) -> dict[str, str]:
+        """Which model it is, for the record of a run."""
+        ...
+
 
 class Fusion(Protocol):
     """Which views count, and what they add up to."""
@@ -93,18 +94,6 @@ class Fusion(Protocol):
         ...
 
 
-class Ledger(Protocol):
-    """Counts and times what it runs."""
-
-    def run(self, stage: str, function: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call the function in the name of a stage."""
-        ...
-
-    def close_frame(self, index: int) -> dict[str, Any]:
-        """The frame's line, and a fresh page."""
-        ...
-
-
 @dataclass(frozen=True, slots=True)
 class Pipeline:
     """The stages in their order; a mode of the method is a choice of these parts."""
@@ -114,7 +103,7 @@ class Pipeline:
     fusion: Fusion
     scheduler: Scheduler
     classifier: Classifier
-    ledger: Ledger
+    ledger: StageLedger
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
         """One frame, within a budget of classifications (Figs. 2 and 5)."""

@@ -70,6 +70,10 @@ class PointNet:
             out[rows] = self.infer(crops.padded(rows))
         return out
 
+    def facts(self) -> dict[str, str]:
+        """The model's file and hash, for the record of a run."""
+        return {"file": self.path.name, "sha256": self.sha256}
+
     def infer(self, batch: Float32) -> Float32:
         """(b, 4) network output of a (b, n, 3) canonical batch."""
         (output,) = self._session.run(None, {self._input: batch})

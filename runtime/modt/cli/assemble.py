@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from modt.classification.costed import CostedClassifier
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
-from modt.classification.scheduler import Scheduler
+from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import ProfileConfig
+from modt.energy.ledger import StageLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.pipeline import Fusion, Ledger, Pipeline
+from modt.pipeline import Fusion, Pipeline
 from modt.profile import DEFAULT
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
-from modt.sources.synthetic import SyntheticStream
+from modt.sources.synthetic.stream import SyntheticStream
 from modt.tracking.states import ACCURATE, EFFICIENT, StateMachine
 from modt.tracking.tracker import Tracker
 from modt.types import UNLIMITED, Budget
@@ -97,17 +100,19 @@ def field_of_view(request: Request, stream: Stream) -> FieldOfView:
     return FieldOfView.of_camera(stream.info.camera)
 
 
-def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledger) -> Pipeline:
+def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
     """The stages of a mode.
 
     Raises:
         MisuseError: the model cannot be used.
     """
+    cost = LinearCost(profile.classification.max_points)
+    network = PointNet(profile.classification, profile.sensor)
     return Pipeline(
         segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
         tracker=Tracker(profile.tracking, mode.machine),
         fusion=mode.fusion(profile),
-        scheduler=Scheduler(),
-        classifier=PointNet(profile.classification, profile.sensor),
+        scheduler=Scheduler(cost),
+        classifier=CostedClassifier(network, cost, time.thread_time_ns),
         ledger=ledger,
     )

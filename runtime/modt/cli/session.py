@@ -60,7 +60,7 @@ class Session:
         """Drive the stream through; returns the summary that was written."""
         summary = Summary()
         tracks, ledger_lines = self.directory.tracks(), self.directory.ledger()
-        sinks = [tracks, *self._further_sinks()]
+        sinks: list[Sink] = [tracks, *self._further_sinks()]
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_frame(tracks.last)
@@ -70,8 +70,9 @@ class Session:
         budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
         with ExitStack() as stack:
-            for open_file in (*sinks, ledger_lines):
-                stack.callback(open_file.close)
+            stack.callback(ledger_lines.close)
+            for sink in sinks:
+                stack.callback(sink.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
         elapsed_s = time.monotonic() - began_s

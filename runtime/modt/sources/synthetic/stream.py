@@ -83,7 +83,8 @@ class SyntheticStream:
 
     def between(self, first: int, last: int | None) -> Self:
         """The frames with first <= index < last; the others are not rendered."""
-        part = copy.copy(self)
-        part._indices = range(first, len(self._indices) if last is None else min(last, len(self._indices)))
+        part, whole = copy.copy(self), self._indices
+        part.faults = []
+        part._indices = range(max(first, whole.start), whole.stop if last is None else min(last, whole.stop))
         part.info = replace(self.info, n_frames=len(part._indices))
         return part
