@@ -41,7 +41,7 @@ class LinearCost:
     """
 
     def __init__(
-        self, max_points: int, per_call_ms: float = 0.1, per_point_ms: float = 0.001, forget: float = 0.98
+        self, max_points: int = 400, per_call_ms: float = 0.1, per_point_ms: float = 0.001, forget: float = 0.98
     ) -> None:
         self.max_points, self.forget = max_points, forget
         self.margin = 1.0
@@ -93,11 +93,11 @@ class Scheduler:
     by itself is therefore served in the end.
 
     Args:
-        cost: what a call costs.
+        cost: what a call costs; a model of its own that assumes the textbook's cost where none is given.
     """
 
-    def __init__(self, cost: CostModel) -> None:
-        self.cost = cost
+    def __init__(self, cost: CostModel | None = None) -> None:
+        self.cost = cost or LinearCost()
 
     def select(self, tracks: Tracks, proposals: Proposals, asks: Bool, budget: Budget) -> Selection:
         """The tracks to classify in this frame; writes tracks.waiting.
