@@ -121,9 +121,11 @@ def test_overhead_is_measured_with_the_clocks_given(machine: Machine) -> None:
 
     ledger = Ledger(machine.wall_ns, ticking)
     assert ledger.span_overhead_ns == 20
+    assert ledger.frame_overhead_ns == 20
+    ledger.run("tracking", machine.work, 100, 100)
     ledger.run("tracking", machine.work, 100, 100)
     machine.work(1_000, 0)
-    assert ledger.close_frame(0)["overhead_ns"] == 20
+    assert ledger.close_frame(0)["overhead_ns"] == 60
 
 
 def test_real_clocks_advance() -> None:

@@ -4,13 +4,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import linear_sum_assignment
-from tracking_scenes import box, frame_of
 
 from modt.config import TrackingConfig
 from modt.tracking.association import FORBIDDEN, PaperAssociation, assign
 from modt.tracking.sightings import AXES, sight
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
+
+from .tracking_scenes import box, frame_of
 
 EYE = np.eye(4)
 

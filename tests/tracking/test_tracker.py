@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tracking_scenes import box, frame_of
 
 from modt.config import TrackingConfig
 from modt.tracking.states import ACCURATE, EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, Proposals
+
+from .tracking_scenes import box, frame_of
 
 ASSOCIATIONS = ["robust", "paper"]
 EYE = np.eye(4)

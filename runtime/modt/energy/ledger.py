@@ -7,7 +7,7 @@ a frame add up to it: the stages' spans, the ledger's own overhead and what is l
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sized
+from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 SCHEMA = "modt.ledger/1"
@@ -24,7 +24,7 @@ _CALLS, _ITEMS, _POINTS, _WALL, _CPU = range(5)
 class StageLedger(Protocol):
     """What the pipeline asks of a ledger."""
 
-    def run(self, stage: str, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args), booked on the stage."""
         ...
 
@@ -48,28 +48,30 @@ class Ledger:
     def __init__(self, wall_ns: Clock = time.perf_counter_ns, cpu_ns: Clock = time.thread_time_ns) -> None:
         self._wall_ns, self._cpu_ns = wall_ns, cpu_ns
         self._stages: dict[str, list[int]] = {}
-        self._marks: list[str] = []
-        self.span_overhead_ns = self._measure_overhead()
+        self._wall0, self._cpu0 = wall_ns(), cpu_ns()
+        self.span_overhead_ns = self.frame_overhead_ns = 0
+        self.span_overhead_ns, self.frame_overhead_ns = self._measure_overhead()
         self._wall0, self._cpu0 = wall_ns(), cpu_ns()
 
-    def run(self, stage: str, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args), booked on the stage; its items are len(result) where that has one."""
-        wall, cpu = self._wall_ns(), self._cpu_ns()
+        wall0, cpu0 = self._wall_ns(), self._cpu_ns()
         try:
             result = function(*args, **kwargs)
         finally:
-            cpu, wall = self._cpu_ns() - cpu, self._wall_ns() - wall
-            row = self._stages.setdefault(stage, [0, 0, 0, 0, 0])
+            cpu1, wall1 = self._cpu_ns(), self._wall_ns()
+            row = self._stages.get(stage) or self._open(stage)
             row[_CALLS] += 1
-            row[_WALL] += wall
-            row[_CPU] += cpu
-        if isinstance(result, Sized):
-            row[_ITEMS] += len(result)
+            row[_WALL] += wall1 - wall0
+            row[_CPU] += cpu1 - cpu0
+        length = getattr(result, "__len__", None)
+        if length is not None:
+            row[_ITEMS] += length()
         return result
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
         """Books work on the stage that the length of its result does not tell."""
-        row = self._stages.setdefault(stage, [0, 0, 0, 0, 0])
+        row = self._stages.get(stage) or self._open(stage)
         row[_ITEMS] += items
         row[_POINTS] += points
 
@@ -83,20 +85,25 @@ class Ledger:
         frame_wall, frame_cpu = wall - self._wall0, cpu - self._cpu0
         self._wall0, self._cpu0 = wall, cpu
         rows, self._stages = self._stages, {}
-        marks, self._marks = self._marks, []
-        spans = sum(row[_WALL] for row in rows.values())
-        if frame_cpu < 0 or frame_wall < spans or any(row[_WALL] < 0 or row[_CPU] < 0 for row in rows.values()):
-            marks.append("clock")
-            for row in rows.values():
+        marks: list[str] = []
+        calls = spans = 0
+        stages: dict[str, dict[str, int]] = {}
+        for stage, row in rows.items():
+            if row[_WALL] < 0 or row[_CPU] < 0:
+                marks = ["clock"]
                 row[_WALL], row[_CPU] = max(row[_WALL], 0), max(row[_CPU], 0)
-            spans = sum(row[_WALL] for row in rows.values())
+            n, items, points, stage_wall, stage_cpu = row
+            calls += n
+            spans += stage_wall
+            stages[stage] = {"calls": n, "items": items, "points": points, "wall_ns": stage_wall, "cpu_ns": stage_cpu}
+        if frame_wall < spans or frame_cpu < 0:
+            marks = ["clock"]
             frame_wall, frame_cpu = max(frame_wall, spans), max(frame_cpu, 0)
-        calls = sum(row[_CALLS] for row in rows.values())
-        overhead = min(calls * self.span_overhead_ns, frame_wall - spans)
+        overhead = min(calls * self.span_overhead_ns + self.frame_overhead_ns, frame_wall - spans)
         return {
             "schema": SCHEMA,
             "frame": index,
-            "stages": {stage: _booked(row) for stage, row in rows.items()},
+            "stages": stages,
             "wall_ns": frame_wall,
             "cpu_ns": frame_cpu,
             "overhead_ns": overhead,
@@ -104,28 +111,34 @@ class Ledger:
             "marks": marks,
         }
 
-    def _measure_overhead(self, spans: int = 256, rounds: int = 8) -> int:
-        """What one span costs beyond the call that it times [ns]; the least of a few rounds."""
-        least = None
+    def _open(self, stage: str) -> list[int]:
+        row = self._stages[stage] = [0, 0, 0, 0, 0]
+        return row
+
+    def _measure_overhead(self, spans: int = 32, rounds: int = 32) -> tuple[int, int]:
+        """What a span costs beyond the call that it times, and a frame beyond its spans [ns]; the least seen."""
+        least_span, least_frame = [], []
         for _ in range(rounds):
-            start = self._cpu_ns()
-            for _ in range(spans):
-                self.run("", _nothing)
-            booked = self._cpu_ns() - start
-            start = self._cpu_ns()
+            t0 = self._cpu_ns()
             for _ in range(spans):
                 _nothing()
-            plain = self._cpu_ns() - start
-            cost = max(booked - plain, 0) // spans
-            least = cost if least is None else min(least, cost)
-        self._stages.clear()
-        return least or 0
+            t1 = self._cpu_ns()
+            for _ in range(spans):
+                self.run("", _nothing)
+            t2 = self._cpu_ns()
+            self._stages = {stage: [0, 0, 0, 0, 0] for stage in STAGES}
+            t3 = self._cpu_ns()
+            self.close_frame(0)
+            t4 = self._cpu_ns()
+            least_span.append(max((t2 - t1) - (t1 - t0), 0) // spans)
+            least_frame.append(max(t4 - t3, 0))
+        return min(least_span), min(least_frame)
 
 
 class NullLedger:
     """Books nothing."""
 
-    def run(self, stage: str, function: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args)."""
         return function(*args, **kwargs)
 
@@ -135,11 +148,6 @@ class NullLedger:
     def close_frame(self, index: int) -> Line:
         """A line without stages."""
         return {"schema": SCHEMA, "frame": index, "stages": {}}
-
-
-def _booked(row: list[int]) -> dict[str, int]:
-    calls, items, points, wall, cpu = row
-    return {"calls": calls, "items": items, "points": points, "wall_ns": wall, "cpu_ns": cpu}
 
 
 def _nothing() -> None:

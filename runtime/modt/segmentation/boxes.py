@@ -4,42 +4,49 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.types import Float32, Float64, Int
+from modt.segmentation.groups import Groups
+from modt.types import Float32, Float64
 
 HEADINGS = np.deg2rad(np.arange(0, 90, 5.0))
+PAD_M = np.float32(0.05)
+"""Added to each side, so that a thin line has an area to compare."""
 
 
-def minimum_boxes(xyz: Float32, offsets: Int) -> Float64:
-    """(P, 7) upright boxes of least bird's-eye area over a fan of headings.
+def headings(x: Float32, y: Float32, groups: Groups) -> Float64:
+    """(G,) heading of the least rectangle about each group, in [0, 90) degrees [rad].
 
     Args:
-        xyz: (K, 3) points grouped by cluster [m].
-        offsets: (P + 1,) cluster i owns xyz[offsets[i]:offsets[i + 1]].
+        x: (K,) points in the order of the groups [m].
+        y: (K,) the same across [m].
+        groups: what they belong to.
     """
-    starts = offsets[:-1]
-    c, s = np.cos(HEADINGS, dtype=np.float32), np.sin(HEADINGS, dtype=np.float32)
-    along = xyz[:, :1] * c + xyz[:, 1:2] * s
-    across = xyz[:, 1:2] * c - xyz[:, :1] * s
-    a0, a1 = np.minimum.reduceat(along, starts), np.maximum.reduceat(along, starts)
-    b0, b1 = np.minimum.reduceat(across, starts), np.maximum.reduceat(across, starts)
-    best = np.argmin((a1 - a0 + 0.05) * (b1 - b0 + 0.05), axis=1)
-    row = np.arange(len(starts))
-    a0, a1, b0, b1 = (v[row, best].astype(np.float64) for v in (a0, a1, b0, b1))
-    yaw, u, v = HEADINGS[best], (a0 + a1) / 2, (b0 + b1) / 2
-    z0 = np.minimum.reduceat(xyz[:, 2], starts).astype(np.float64)
-    z1 = np.maximum.reduceat(xyz[:, 2], starts).astype(np.float64)
-    box = np.stack(
+    c, s = np.cos(HEADINGS).astype(np.float32), np.sin(HEADINGS).astype(np.float32)
+    along = x[:, None] * c + y[:, None] * s
+    across = y[:, None] * c - x[:, None] * s
+    length = groups.most(along) - groups.least(along)
+    width = groups.most(across) - groups.least(across)
+    best: Float64 = HEADINGS[np.argmin((length + PAD_M) * (width + PAD_M), axis=1)]
+    return best
+
+
+def upright_boxes(x: Float32, y: Float32, z: Float32, groups: Groups, yaw: Float64) -> Float64:
+    """(G, 7) boxes about each group's (K,) points at the heading given, turned so that l >= w."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    c_each, s_each = groups.spread(c.astype(np.float32)), groups.spread(s.astype(np.float32))
+    sides = (x * c_each + y * s_each, y * c_each - x * s_each, z)
+    low = np.stack([groups.least(side) for side in sides]).astype(np.float64)
+    high = np.stack([groups.most(side) for side in sides]).astype(np.float64)
+    (u, v, w), (length, width, tall) = (low + high) / 2, high - low
+    turn = length < width
+    return np.stack(
         [
-            u * np.cos(yaw) - v * np.sin(yaw),
-            u * np.sin(yaw) + v * np.cos(yaw),
-            (z0 + z1) / 2,
-            a1 - a0,
-            b1 - b0,
-            z1 - z0,
-            yaw,
+            u * c - v * s,
+            u * s + v * c,
+            w,
+            np.where(turn, width, length),
+            np.where(turn, length, width),
+            tall,
+            yaw - np.where(turn, np.pi / 2, 0.0),
         ],
         axis=1,
     )
-    turn = box[:, 3] < box[:, 4]
-    box[turn] = box[turn][:, [0, 1, 2, 4, 3, 5, 6]] - [0, 0, 0, 0, 0, 0, np.pi / 2]
-    return box

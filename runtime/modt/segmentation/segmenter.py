@@ -6,10 +6,12 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.boxes import minimum_boxes
-from modt.segmentation.clusters import connected
-from modt.segmentation.ground import height_above_ground
-from modt.types import Float32, Proposals
+from modt.segmentation.boxes import headings, upright_boxes
+from modt.segmentation.clusters import RootGrid
+from modt.segmentation.columns import Columns
+from modt.segmentation.ground import Ground
+from modt.segmentation.groups import Groups
+from modt.types import NONE, Bool, Float32, Int, Proposals
 
 EDGE_M = 0.3
 """A proposal this near the edge of the field of view counts as cut by it."""
@@ -26,39 +28,56 @@ class Segmenter:
 
     def __init__(self, config: SegmentationConfig, sensor: SensorConfig, fov: FieldOfView) -> None:
         self.config, self.sensor, self.fov = config, sensor, fov
+        self.ground = Ground(sensor, config)
+        self.grid = RootGrid(config.cell_m, sensor.max_range_m)
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none for an empty sweep."""
-        near, far = self.sensor.min_range_m, self.sensor.max_range_m
-        rho2 = points[:, 0] ** 2 + points[:, 1] ** 2
-        visible = np.flatnonzero((rho2 > near * near) & (rho2 < far * far) & self.fov.contains(points))
-        if not len(visible):
-            return Proposals.empty()
-        height = height_above_ground(points[visible], self.sensor, self.config)
-        raised = visible[(height > self.config.ground_tolerance_m) & (height < self.config.max_height_m)]
+        looked_at = None if self.fov.full else np.flatnonzero(self.fov.contains(points))
+        sweep = Columns.of(points if looked_at is None else points[looked_at])
+        raised = np.flatnonzero(self._raised(sweep))
         if not len(raised):
             return Proposals.empty()
-        cluster, n = connected(points[raised, :2], self.config.cell_m, far + 1.0)
-        return self._proposals(points, raised, cluster, n)
+        index = raised if looked_at is None else looked_at[raised]
+        return self._proposals(sweep.take(raised), index)
 
-    def _proposals(self, points: Float32, raised: np.ndarray, cluster: np.ndarray, n: int) -> Proposals:
-        """Drop what is too small or too large to be an object, and box the rest."""
-        keep = np.bincount(cluster, minlength=n) >= self.config.min_points
-        order = np.argsort(cluster, kind="stable")
-        order = order[keep[cluster[order]]]
-        if not len(order):
+    def _raised(self, sweep: Columns) -> Bool:
+        """(N,) within range, above the ground and no higher than objects reach."""
+        height = self.ground.height(sweep, self.sensor.height_m or 1.73)
+        near, far = np.float32(np.sqrt(self.sensor.min_range_m)), np.float32(np.sqrt(self.sensor.max_range_m))
+        inside = (sweep.root > near) & (sweep.root < far)
+        raised: Bool = inside & (height > self.config.ground_tolerance_m) & (height < self.config.max_height_m)
+        return raised
+
+    def _proposals(self, raised: Columns, index: Int) -> Proposals:
+        """The clusters of what is raised that could be objects, and their boxes."""
+        cells = self.grid.cells(raised)
+        x, y = raised.x[cells.sample], raised.y[cells.sample]
+        cluster = self._sized(self.grid.join(cells), np.bincount(cells.of_point), x, y)
+        n = int(cluster.max(initial=NONE)) + 1
+        if not n:
             return Proposals.empty()
-        members, cluster = raised[order], cluster[order]
-        starts = np.flatnonzero(np.diff(cluster, prepend=-1))
-        offsets = np.append(starts, len(cluster))
-        xyz = points[members, :3]
-        box = minimum_boxes(xyz, offsets)
-        proper = (box[:, 3] <= self.config.max_extent_m) & (box[:, 5] >= self.config.min_height_m)
-        inside = np.repeat(proper, np.diff(offsets))
-        members, xyz, box = members[inside], xyz[inside], box[proper]
-        if not len(box):
-            return Proposals.empty()
-        offsets = np.append(0, np.cumsum(np.diff(offsets)[proper]))
-        centroid = np.add.reduceat(xyz, offsets[:-1], axis=0, dtype=np.float64) / np.diff(offsets)[:, None]
-        edge = np.minimum.reduceat(self.fov.depth(xyz), offsets[:-1]) < EDGE_M
-        return Proposals(members, offsets, centroid, box, edge, np.zeros(len(box), np.bool_))
+        corners = Groups.of(cluster, n)
+        yaw = headings(x[corners.rows], y[corners.rows], corners)
+        groups = Groups.of(cluster[cells.of_point], n)
+        own = raised.take(groups.rows)
+        box = upright_boxes(own.x, own.y, own.z, groups, yaw)
+        centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
+        truncated = groups.least(self.fov.depth(np.stack([own.x, own.y, own.z], axis=1))) < EDGE_M
+        return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, np.zeros(n, np.bool_))
+
+    def _sized(self, cluster: Int, count: Int, x: Float32, y: Float32) -> Int:
+        """(C,) cluster of each cell anew: those of improper size are NONE, the others numbered without gaps."""
+        n = int(cluster.max()) + 1
+        proper = np.bincount(cluster, count, n) >= self.config.min_points
+        extent = [_extent(v, cluster, n) for v in (x, y)]
+        proper &= np.hypot(*extent) < self.config.max_extent_m
+        number = np.where(proper, np.cumsum(proper) - 1, NONE)
+        return number[cluster]
+
+
+def _extent(values: Float32, group: Int, n: int) -> Float32:
+    low, high = np.full(n, np.inf, np.float32), np.full(n, -np.inf, np.float32)
+    np.minimum.at(low, group, values)
+    np.maximum.at(high, group, values)
+    return high - low

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from modt.geometry import Camera, corners, transform
-from modt.sinks.output import LineFile
+from modt.sinks.output import LineFile, writing
 from modt.types import NONE, FrameResult, ObjectClass
 
 NAMES = {ObjectClass.CAR: "Car", ObjectClass.PEDESTRIAN: "Pedestrian", ObjectClass.CYCLIST: "Cyclist"}
@@ -31,7 +31,8 @@ class KittiResults:
     """
 
     def __init__(self, path: Path, camera: Camera | None) -> None:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
         self._lines = LineFile(path)
         self._camera = camera or NOMINAL
 

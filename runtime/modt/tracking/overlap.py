@@ -67,7 +67,7 @@ def _crossings(p: Float64, q: Float64) -> tuple[Float64, Bool]:
     offset = q[:, None] - p[:, :, None]
     d, e = d[:, :, None], e[:, None]
     denominator = d[..., 0] * e[..., 1] - d[..., 1] * e[..., 0]
-    parallel: Bool = np.abs(denominator) < TINY
+    parallel = np.less(np.abs(denominator), TINY)
     denominator = np.where(parallel, 1.0, denominator)
     t = (offset[..., 0] * e[..., 1] - offset[..., 1] * e[..., 0]) / denominator
     u = (offset[..., 0] * d[..., 1] - offset[..., 1] * d[..., 0]) / denominator

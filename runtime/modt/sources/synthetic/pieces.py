@@ -62,13 +62,13 @@ class Pieces:
         return self._with(rotation=R @ self.rotation, centre=centre)
 
     def _with(self, **columns: Float32 | Int) -> Self:
-        return type(self)(*(columns.get(f.name, getattr(self, f.name)) for f in fields(self)))  # type: ignore[arg-type]
+        return type(self)(*(columns.get(f.name, getattr(self, f.name)) for f in fields(self)))
 
     @classmethod
     def join(cls, groups: Iterable[Self]) -> Self:
         """All of them, in order."""
         listed = list(groups) or [cls.none()]
-        return cls(*(np.concatenate([getattr(g, f.name) for g in listed]) for f in fields(cls)))  # type: ignore[arg-type]
+        return cls(*(np.concatenate([getattr(g, f.name) for g in listed]) for f in fields(cls)))
 
     @classmethod
     def none(cls) -> Self:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.sources.synthetic.materials import LOSS, REFLECTIVITY
 from modt.sources.synthetic.sensors import SensorModel
@@ -21,10 +22,10 @@ class Receiver:
         self.sensor = sensor
         self.bias = rng.normal(0.0, sensor.beam_sigma_m, (sensor.shape[0], 1)).astype(np.float32)
         self.gain = rng.normal(1.0, 0.08, (sensor.shape[0], 1)).astype(np.float32)
-        self.secant = np.sqrt(1 + sensor.tangent[:, None] ** 2)
+        self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
 
     def receive(
-        self, distance: Float32, material: Int, group: Int, rng: np.random.Generator
+        self, distance: Float32, material: Int, group: NDArray[np.int32], rng: np.random.Generator
     ) -> tuple[Float32, Float32, Bool]:
         """Distance [m, horizontal], intensity [0, 1] and whether there is a return, of every ray.
 
@@ -46,12 +47,14 @@ class Receiver:
         lost = LOSS[material] + np.float32(sensor.misfire)
         heard = met & (chance > lost + (1 - lost) / (1 + signal * signal))
         heard &= (slant > sensor.min_range_m) & (slant < sensor.max_range_m)
-        ranged = near + (self.bias + np.float32(sensor.range_sigma_m) * noise) / self.secant
+        ranged: Float32 = (
+            near + (self.bias + np.float32(sensor.range_sigma_m) * noise).astype(np.float32) / self.secant
+        )
         self._smear(ranged, near, heard, chance)
         bright = np.clip(reflectivity * (np.float32(0.35) + np.float32(0.65) * head_on), 0, 1)
         return ranged, bright, heard
 
-    def _incidence(self, near: Float32, group: Int) -> Float32:
+    def _incidence(self, near: Float32, group: NDArray[np.int32]) -> Float32:
         """Cosine of the angle at which each surface is met, from the slope of the range image along the beam."""
         step = np.float32(self.sensor.azimuth_rad[1] - self.sensor.azimuth_rad[0])
         slope = np.zeros_like(near)

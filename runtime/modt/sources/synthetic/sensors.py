@@ -59,7 +59,7 @@ class SensorModel:
 
 
 def _turning(columns: int) -> Float64:
-    return (np.arange(columns) + 0.5) * (2 * np.pi / columns)
+    return np.linspace(0.0, 2 * np.pi, columns, endpoint=False) + np.pi / columns
 
 
 def _spinner(

@@ -56,6 +56,9 @@ class Simulator:
         self.receiver = Receiver(sensor, np.random.default_rng([seed, 1]))
         self._object_class = np.array([b.kind.object_class for b in world.bodies] + [0], np.int64)
         self._annotated = np.array([i for i, b in enumerate(world.bodies) if b.kind.name], np.int64)
+        self._kinds = tuple(world.bodies[i].kind for i in self._annotated.tolist())
+        self._label = np.array([b.kind.semantic for b in world.bodies], np.int64)
+        self._moving_label = np.array([b.kind.moving for b in world.bodies], np.int64)
 
     def sweep(self, index: int) -> tuple[Frame, Truth]:
         """Frame number index and the truth about it."""
@@ -86,11 +89,8 @@ class Simulator:
 
     def _truth(self, time_s: float, T_world_sensor: Float64, instance: Int, material: Int) -> Truth:
         world = self.world
-        bodies = [world.bodies[i] for i in self._annotated.tolist()]
-        speed = np.array([b.path.speed(time_s) for b in bodies])
-        label = np.zeros(len(world.bodies) + 1, np.int64)
-        for i, b in enumerate(world.bodies):
-            label[i] = b.kind.moving if b.path.speed(time_s) > MOVING_MPS else b.kind.semantic
+        speed = world.poses(time_s)[:, 4]
+        label = np.append(np.where(speed > MOVING_MPS, self._moving_label, self._label), 0)
         own = label[instance]
         boxes = world.boxes(time_s)[self._annotated]
         return Truth(
@@ -98,8 +98,8 @@ class Simulator:
             semantic=np.where(own > 0, own, SEMANTIC[material]).astype(np.int64),
             object_class=self._object_class[instance],
             bodies=self._annotated,
-            kinds=tuple(b.kind for b in bodies),
+            kinds=self._kinds,
             boxes=transform_boxes(inverse(T_world_sensor), boxes),
             points=np.bincount(instance + 1, minlength=len(world.bodies) + 1)[1:][self._annotated],
-            speed_mps=speed,
+            speed_mps=speed[self._annotated],
         )

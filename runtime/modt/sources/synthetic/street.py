@@ -49,8 +49,8 @@ class Layout:
 
     def place(self, x: float, left_m: float, turn: float = 0.0) -> tuple[float, float, float]:
         """x, y and heading of a place left of the middle of the road, turned from its direction."""
-        yaw = float(self.heading(np.float64(x)))
-        y = float(self.middle(np.float64(x)))
+        yaw = float(self.heading(np.array(x)))
+        y = float(self.middle(np.array(x)))
         return x - left_m * np.sin(yaw), y + left_m * np.cos(yaw), yaw + turn
 
     def lane(self, left_m: float, backwards: bool = False) -> Float64:

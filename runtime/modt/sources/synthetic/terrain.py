@@ -39,6 +39,11 @@ class Terrain:
         flat: Int = i * self.height.shape[1] + j
         return flat
 
+    def heights(self, x: Float64, y: Float64) -> Float64:
+        """(n,) height of the ground under each point [m, world]."""
+        at: Float64 = self.height.ravel()[self.cells(x.astype(np.float32), y.astype(np.float32))].astype(np.float64)
+        return at
+
     def height_at(self, x: float, y: float) -> float:
         """Height of the ground [m, world]."""
         cell = self.cells(np.array([x], np.float32), np.array([y], np.float32))

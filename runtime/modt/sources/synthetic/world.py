@@ -12,7 +12,7 @@ from modt.sources.synthetic.kinds import Kind
 from modt.sources.synthetic.motion import Path
 from modt.sources.synthetic.pieces import Pieces
 from modt.sources.synthetic.terrain import Terrain
-from modt.types import Float32, Float64
+from modt.types import Float64
 
 MOVING_MPS = 0.3
 """A body slower than this stands."""
@@ -26,7 +26,6 @@ class Body:
         kind: what it is.
         size: length, width, height of its box [m].
         path: where it is.
-        still: it never moves: its pieces are placed in the world once.
         pieces: its rigid parts, own frame (x ahead, z up, origin on the ground beneath its middle).
     """
 
@@ -51,7 +50,6 @@ class World:
         ego: where the sensor's carrier goes.
         height_m: of the sensor above the ground.
         sway_rad: how far the carrier rolls and pitches.
-        exclude: pieces of bodies nearer to the ego's line than nothing.
     """
 
     def __init__(
@@ -59,10 +57,15 @@ class World:
     ) -> None:
         self.terrain, self.bodies, self.figures = terrain, bodies, figures
         self.ego, self.height_m, self.sway_rad = ego, height_m, sway_rad
-        self._still = Pieces.join(
-            b.pieces.of(i).moved(*self._placement(b, 0.0)) for i, b in enumerate(bodies) if b.still and len(b.pieces)
-        )
-        self._rolling = [(i, b, b.pieces.of(i)) for i, b in enumerate(bodies) if not b.still and len(b.pieces)]
+        self._moving = [i for i, b in enumerate(bodies) if not b.still]
+        self._rest = np.zeros((len(bodies), 5))
+        for i, body in enumerate(bodies):
+            x, y, yaw = body.path.at(0.0)
+            self._rest[i, [0, 1, 3]] = x, y, yaw
+        self._rest[:, 2] = terrain.heights(self._rest[:, 0], self._rest[:, 1])
+        still = Pieces.join(b.pieces.of(i) for i, b in enumerate(bodies) if b.still)
+        self._still = self._placed(still, self._rest)
+        self._rolling = Pieces.join(bodies[i].pieces.of(i) for i in self._moving)
 
     def ego_pose(self, time_s: float) -> Float64:
         """(4, 4) T_world_sensor."""
@@ -77,44 +80,44 @@ class World:
         roll = np.arctan2(bank, 1.6) + self.sway_rad * np.sin(2.1 * time_s + 1.0)
         return se3(rotation_zyx(float(roll), float(pitch), yaw), np.array([x, y, z + self.height_m]))
 
-    def pose(self, body: Body, time_s: float) -> tuple[float, float, float, float]:
-        """x, y, z of a body's foot [m, world] and its heading [rad]."""
-        x, y, yaw = body.path.at(time_s)
-        return x, y, self.terrain.height_at(x, y), yaw
+    def poses(self, time_s: float) -> Float64:
+        """(n, 5) of each body x, y, z of its foot [m, world], heading [rad], speed [m/s]."""
+        out = self._rest.copy()
+        if self._moving:
+            rows = np.array(self._moving)
+            moved = np.array(
+                [(*self.bodies[i].path.at(time_s), self.bodies[i].path.speed(time_s)) for i in self._moving]
+            )
+            out[rows, :2], out[rows, 3:] = moved[:, :2], moved[:, 2:]
+            out[rows, 2] = self.terrain.heights(moved[:, 0], moved[:, 1])
+        return out
 
     def boxes(self, time_s: float) -> Float64:
         """(n, 7) box of each body, world frame."""
-        out = np.zeros((len(self.bodies), 7))
-        for i, body in enumerate(self.bodies):
-            x, y, z, yaw = self.pose(body, time_s)
-            length, width, height = body.size
-            out[i] = x, y, z + height / 2, length, width, height, yaw
-        return out
+        pose = self.poses(time_s)
+        size = np.array([b.size for b in self.bodies]).reshape(-1, 3)
+        foot = pose[:, :3] + size * [0, 0, 0.5]
+        return np.column_stack([foot, size, pose[:, 3]])
 
     def pieces(self, time_s: float, T_world_sensor: Float64, reach_m: float) -> Pieces:
         """Pieces within reach of the sensor at a time, sensor frame."""
-        groups = [self._near(self._still, T_world_sensor, reach_m)]
-        for _, body, parts in self._rolling:
-            groups.append(parts.moved(*self._placement(body, time_s)))
-        if len(self.figures.body):
-            local = self.figures.pieces(time_s)
-            poses = [self._placement(self.bodies[i], time_s) for i in self.figures.body.tolist()]
-            repeat = len(local) // len(poses)
-            R = np.tile(np.stack([p[0] for p in poses]), (repeat, 1, 1))
-            t = np.tile(np.stack([p[1] for p in poses]), (repeat, 1))
-            groups.append(self._near(local.moved(R, t), T_world_sensor, reach_m))
+        poses = self.poses(time_s)
+        moving = Pieces.join([self._rolling, self.figures.pieces(time_s)])
+        near = [self._near(p, T_world_sensor, reach_m) for p in (self._still, self._placed(moving, poses))]
         T = inverse(T_world_sensor)
-        return Pieces.join(groups).moved(T[:3, :3], T[:3, 3])
+        return Pieces.join(near).moved(T[:3, :3], T[:3, 3])
 
     def _near(self, pieces: Pieces, T_world_sensor: Float64, reach_m: float) -> Pieces:
         away = np.hypot(*(pieces.centre[:, :2] - T_world_sensor[:2, 3].astype(np.float32)).T)
         return pieces.take(away < reach_m + np.linalg.norm(pieces.half[:, :2], axis=1))
 
-    def _placement(self, body: Body, time_s: float) -> tuple[Float32, Float32]:
-        x, y, z, yaw = self.pose(body, time_s)
-        c, s = np.cos(yaw), np.sin(yaw)
-        R = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float32)
-        return R, np.array([x, y, z], np.float32)
+    @staticmethod
+    def _placed(pieces: Pieces, poses: Float64) -> Pieces:
+        """The pieces where their bodies are."""
+        c, s = np.cos(poses[:, 3]), np.sin(poses[:, 3])
+        R = np.zeros((len(poses), 3, 3), np.float32)
+        R[:, 0, 0], R[:, 0, 1], R[:, 1, 0], R[:, 1, 1], R[:, 2, 2] = c, -s, s, c, 1
+        return pieces.moved(R[pieces.body], poses[pieces.body, :3])
 
     def _smooth(self, x: float, y: float) -> float:
         offsets = np.array([-0.5, 0.0, 0.5], np.float32)
