@@ -18,17 +18,21 @@ from modt.tracking.followed import Followed
 from modt.tracking.sightings import AXES, Sightings, covered, touching
 from modt.types import NONE, Bool, Float64, Int
 
-ROOM_M = np.array([[0.0, 0.0], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
-"""Greatest length and width of one object of each class; background has none."""
+ROOM_M = np.array([[6.0, 2.7], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
+"""Greatest length and width of one object of each class; what counts as background may be a car not known as one."""
+APART_MPS = 1.5
+"""Parts of one object do not differ so much in velocity."""
 WITHIN = 0.6
 """Part of one that must lie within what is known of the other."""
+SETTLED = 4
+"""Frames after which a velocity says something."""
 UNMEASURED_M2 = 100.0
 """Variance of a place that another part's outline says nothing about."""
 
 
 def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches:
     """The matches, with the larger part of an object given to its eldest track."""
-    elders = np.flatnonzero(tracks.fixed & (tracks.posterior.argmax(axis=1) > 0))
+    elders = np.flatnonzero(tracks.fixed)
     if not len(elders) or not len(sightings):
         return matches
     proposal = np.full(len(tracks), NONE, np.int64)
@@ -63,6 +67,9 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
     size = np.where(proposal == NONE, 0, sightings.count[proposal])
     free = (rival == NONE) | ~tracks.fixed[rival] | (class_[rival] == class_[elder])
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
+    vx, vy = tracks.x[:, 3] * np.cos(tracks.x[:, 2]), tracks.x[:, 3] * np.sin(tracks.x[:, 2])
+    apart = np.hypot(vx[rival] - vx[elder], vy[rival] - vy[elder]) > APART_MPS
+    free &= (rival == NONE) | (tracks.hits[rival] < SETTLED) | ~apart
     larger = free & junior & (rival != elder) & (sightings.count[part] > size[elder])
     i, elder, part = i[larger], elder[larger], part[larger]
     box = tracks.box[elder]
