@@ -88,15 +88,22 @@ class Half:
         return {"file": "half"}
 
 
-def test_points_are_booked_up_to_what_the_network_sees() -> None:
+@pytest.mark.parametrize(("batch", "points"), [(1, 10 + 290 + 400), (2, 2 * 290 + 400), (8, 3 * 400)])
+def test_points_are_booked_as_the_network_is_given_them(batch: int, points: int) -> None:
     ledger = Ledger()
-    offsets = np.array([0, 10, 300, 1000])
-    empty = Proposals.empty()
-    proposals = replace(empty, members=np.arange(1000), offsets=offsets)
-    counted = CountedClassifier(Half(), ledger, max_points=400)
-    which = np.array([0, 2])
-    out = ledger.run("classification", counted.classify, np.zeros((1000, 4), np.float32), proposals, which)
-    assert out.shape == (2, 4)
+    offsets = np.array([0, 10, 710, 1000, 1001])
+    proposals = replace(Proposals.empty(), members=np.arange(1001), offsets=offsets)
+    counted = CountedClassifier(Half(), ledger, max_points=400, batch=batch)
+    which = np.array([0, 1, 2])
+    out = ledger.run("classification", counted.classify, np.zeros((1001, 4), np.float32), proposals, which)
+    assert out.shape == (3, 4)
     row = ledger.close_frame(0)["stages"]["classification"]
-    assert (row["calls"], row["items"], row["points"]) == (1, 2, 410)
+    assert (row["calls"], row["items"], row["points"]) == (1, 3, points)
     assert counted.facts() == {"file": "half"}
+
+
+def test_nothing_to_classify_has_no_points() -> None:
+    ledger = Ledger()
+    counted = CountedClassifier(Half(), ledger, max_points=400, batch=8)
+    counted.classify(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64))
+    assert ledger.close_frame(0)["stages"]["classification"]["points"] == 0

@@ -37,6 +37,21 @@ class Watched:
         return self._classifier.facts()
 
 
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """A track alive.
+
+    Attributes:
+        classified: at least once.
+        seen: in the last frame.
+        life: frames in which it was seen.
+    """
+
+    classified: bool = False
+    seen: bool = True
+    life: int = 0
+
+
 @dataclass
 class Contender:
     """One mode on its way through the stream.
@@ -60,7 +75,7 @@ class Contender:
     energy_lines: list[dict[str, Any]] = field(default_factory=list)
     lives: list[int] = field(default_factory=list)
     _counts: list[tuple[int, ...]] = field(default_factory=list)
-    _known: dict[int, tuple[bool, bool, int]] = field(default_factory=dict)
+    _alive: dict[int, Followed] = field(default_factory=dict)
 
     def step(self, frame: Frame) -> None:
         """One frame; what is counted beside the ledger is counted between its frames."""
@@ -75,14 +90,19 @@ class Contender:
                 self.energy_lines.append(closed)
 
     def begin_turn(self) -> None:
-        """What the others did meanwhile is not this one's time."""
+        """What the others did meanwhile is not this one's time or energy."""
         self.ledger.close_frame(-1)
+        if self.windows is not None:
+            self.windows.close()
+
+    def end_turn(self) -> None:
+        """Read the meters before another one begins."""
+        if self.windows is not None:
+            self.energy_lines.append(self.windows.close())
 
     def finish(self) -> None:
         """The stream has ended: tracks still alive have lived as long as they were seen."""
-        if self.windows is not None:
-            self.energy_lines.append(self.windows.close())
-        self.lives += [seen for _, _, seen in self._known.values()]
+        self.lives += [track.life for track in self._alive.values()]
 
     def counts(self) -> Int:
         """(frames, 8) what each frame counted, columns as COUNTS."""
@@ -98,9 +118,7 @@ class Contender:
         seen = tracks.proposal != NONE
         asked = np.zeros(len(tracks), np.bool_)
         asked[tracks.row_of_proposal(len(result.proposals))[self.watched.which]] = True
-        now, new, first, refound = self._follow(tracks.id, seen, asked)
-        self.lives += [seen_for for id_, (_, _, seen_for) in self._known.items() if id_ not in now]
-        self._known = now
+        new, first, refound = self._follow(tracks.id, seen, asked)
         foreground = seen & (tracks.posterior.argmax(axis=1) != ObjectClass.BACKGROUND)
         row = line["stages"].get(CLASSIFICATION, {})
         self._counts.append(
@@ -116,17 +134,19 @@ class Contender:
             )
         )
 
-    def _follow(self, ids: Int, seen: Bool, asked: Bool) -> tuple[dict[int, tuple[bool, bool, int]], int, int, int]:
-        """Tracks alive with (classified ever, seen now, frames seen); how many are new, first and again classified."""
-        now: dict[int, tuple[bool, bool, int]] = {}
+    def _follow(self, ids: Int, seen: Bool, asked: Bool) -> tuple[int, int, int]:
+        """How many tracks are new, classified for the first time, and classified again after they were lost."""
+        alive: dict[int, Followed] = {}
         new = first = refound = 0
         for id_, is_seen, is_asked in zip(ids.tolist(), seen.tolist(), asked.tolist(), strict=True):
-            known, was_seen, life = self._known.get(id_, (False, True, 0))
-            new += id_ not in self._known
-            first += is_asked and not known
-            refound += is_asked and known and not was_seen
-            now[id_] = (known or is_asked, is_seen, life + is_seen)
-        return now, new, first, refound
+            before = self._alive.get(id_, Followed())
+            new += id_ not in self._alive
+            first += is_asked and not before.classified
+            refound += is_asked and before.classified and not before.seen
+            alive[id_] = Followed(before.classified or is_asked, is_seen, before.life + is_seen)
+        self.lives += [track.life for id_, track in self._alive.items() if id_ not in alive]
+        self._alive = alive
+        return new, first, refound
 
 
 def interleave(stream: Iterable[Frame], contenders: Sequence[Contender], turn: int) -> None:
@@ -147,6 +167,7 @@ def interleave(stream: Iterable[Frame], contenders: Sequence[Contender], turn: i
             contender.begin_turn()
             for frame in block:
                 contender.step(frame)
+            contender.end_turn()
         number += 1
     for contender in contenders:
         contender.finish()
