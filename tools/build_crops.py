@@ -1,6 +1,6 @@
 """Build the data set of crops: the proposals of our own segmentation over labelled scans, labelled by overlap.
 
-    build_crops.py KITTI_ROOT OUT.npz
+    build_crops.py OUT.npz [--kitti ROOT [--paste N]] [--synthetic N]
 
 A proposal is an object if more than half of its points lie in the object's box and it holds more than half of those
 that do. What is neither clearly that nor clearly something else (fragments, merged objects, regions that the
@@ -14,120 +14,140 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 import modt
-from dataset import SHIPPED
-from labelled import CLASS_OF, Scan, inside, object_scans, raw_scans
+from dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC
+from labelled import Scan, object_scans, raw_scans, semantic_scans, synthetic_scans
 from modt import profile
-from modt.classification.crops import Crops, gather
+from modt.classification.crops import gather
 from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Bool, Int, ObjectClass, Proposals
+from paste import library, pasted
 
-CELL_SCALES = (1.0, 0.75, 1.4)
-"""The segmentation as it ships first; the others cluster finer and coarser, for training alone."""
+CELL_SCALES = (0.75, 1.4)
+"""Finer and coarser clusters than those of the segmentation that ships, for training alone."""
 MAX_POINTS = 1200
 MIN_BOX_POINTS, COUNTED_BOX_POINTS = 5, 10
 """An object must show so many points to be trained on, and to be counted as one that should be found."""
 
 
-def label(scan: Scan, proposals: Proposals) -> tuple[Int, Bool, Int]:
-    """Class of each proposal, whether it is unclear, and the box that it shows (NONE where none)."""
+def label(scan: Scan, proposals: Proposals) -> tuple[Int, Bool]:
+    """Class of each proposal, and whether it is unclear."""
     number = proposals.label(len(scan.points))
     size = proposals.count
     kind = np.full(len(proposals), ObjectClass.BACKGROUND, np.int64)
-    box_of = np.full(len(proposals), -1, np.int64)
     left_out = np.bincount(number[scan.unlabelled & (number >= 0)], minlength=len(proposals))
     partial = left_out > 0.5 * size
-    for b, (box, name) in enumerate(zip(scan.boxes, scan.kinds, strict=True)):
-        own = number[inside(scan.points, box)]
-        if len(own) < MIN_BOX_POINTS:
+    for members, of_class in zip(scan.objects, scan.kinds, strict=True):
+        if len(members) < MIN_BOX_POINTS:
             continue
+        own = number[members]
         shared = np.bincount(own[own >= 0], minlength=len(proposals))
         whole = (shared > 0.5 * size) & (shared > 0.5 * len(own))
-        box_of[whole] = b
-        kind[whole] = CLASS_OF.get(name, ObjectClass.BACKGROUND)
+        kind[whole] = of_class
         partial |= (shared > 0.2 * size) & ~whole
         partial[whole] = False
-    return kind, partial, box_of
+    return kind, partial
 
 
 def counted(scan: Scan) -> Int:
     """Classes of the objects that a detector should find in a scan."""
-    visible = [scan.fov.contains(scan.points) & inside(scan.points, box) for box in scan.boxes]
-    return np.array(
-        [
-            CLASS_OF[name]
-            for name, own in zip(scan.kinds, visible, strict=True)
-            if name in CLASS_OF and own.sum() >= COUNTED_BOX_POINTS
-        ],
-        np.int64,
-    )
+    points = [int(scan.fov.contains(scan.points[own]).sum()) for own in scan.objects]
+    kinds = [k for k, n in zip(scan.kinds, points, strict=True) if k and n >= COUNTED_BOX_POINTS]
+    return np.array(kinds, np.int64)
 
 
-def proposals_of(scans: Iterable[Scan], config: ProfileConfig) -> Iterator[tuple[Scan, int, Crops, Int, Bool, Int]]:
+class Writer:
+    """Gathers crops."""
+
+    def __init__(self, config: ProfileConfig) -> None:
+        self.config = config
+        self.columns: dict[str, list[np.ndarray]] = {}
+
+    def add(self, scan: Scan, variant: int, scale: float = 1.0, *, judged: bool = False) -> None:
+        """The proposals of a scan, clusters so much coarser; if judged, its objects count as to be found."""
+        stage = dataclasses.replace(self.config.segmentation, cell_m=self.config.segmentation.cell_m * scale)
+        proposals = Segmenter(stage, self.config.sensor, scan.fov).segment(scan.points)
+        kind, partial = label(scan, proposals)
+        wanted = ~partial & (kind > 0) if variant == PASTED else np.ones(len(proposals), np.bool_)
+        kept = np.flatnonzero(wanted)
+        crops = gather(scan.points, proposals, kept, MAX_POINTS)
+        n = len(kept)
+        row = {"xyz": crops.xyz, "count": crops.count, "label": kind[kept].astype(np.int8), "partial": partial[kept]}
+        row |= {"variant": np.full(n, variant, np.int8)}
+        row |= {"scan": np.array([scan.name] * n, np.str_), "drive": np.array([scan.drive] * n, np.str_)}
+        if judged:
+            truth = counted(scan)
+            row |= {"truth_label": truth.astype(np.int8), "truth_drive": np.array([scan.drive] * len(truth), np.str_)}
+        for key, value in row.items():
+            self.columns.setdefault(key, []).append(value)
+
+    def save(self, path: Path, provenance: dict[str, object]) -> dict[str, object]:
+        """Write it all; returns how many clear crops of each class and variant there are."""
+        table = {key: np.concatenate(parts) for key, parts in self.columns.items()}
+        table["offsets"] = np.append(0, np.cumsum(table.pop("count")))
+        table.setdefault("truth_label", np.zeros(0, np.int8))
+        table.setdefault("truth_drive", np.zeros(0, np.str_))
+        clear = ~table["partial"]
+        tally = {
+            name: np.bincount(table["label"][clear & (table["variant"] == v)], minlength=4).tolist()
+            for name, v in {
+                "shipped": SHIPPED,
+                "clustered": CLUSTERED,
+                "pasted": PASTED,
+                "synthetic": SYNTHETIC,
+            }.items()
+        }
+        provenance |= {"scans": len(np.unique(table["scan"])), "crops": tally, "modt": modt.__version__}
+        provenance |= {"profile": profile.dump(self.config)}
+        np.savez_compressed(path, provenance=np.array(json.dumps(provenance)), **table)
+        return {"sha256": hashlib.sha256(path.read_bytes()).hexdigest(), **tally}
+
+
+def kitti(root: Path) -> Iterator[Scan]:
+    """Every labelled scan that is not of the test drive."""
+    yield from object_scans(root / "object" / "training")
+    yield from raw_scans(root / "raw" / "2011_09_26" / "2011_09_26_drive_0001_sync")
+
+
+def add_kitti(writer: Writer, root: Path, pastes: int, seed: int) -> None:
+    """Real scans, and real objects pasted into them."""
+    scans = list(kitti(root))
     for scan in scans:
-        for variant, scale in enumerate(CELL_SCALES):
-            stage = dataclasses.replace(config.segmentation, cell_m=config.segmentation.cell_m * scale)
-            proposals = Segmenter(stage, config.sensor, scan.fov).segment(scan.points)
-            crops = gather(scan.points, proposals, np.arange(len(proposals)), MAX_POINTS)
-            yield scan, variant, crops, *label(scan, proposals)
+        writer.add(scan, SHIPPED, judged=True)
+        for scale in CELL_SCALES:
+            writer.add(scan, CLUSTERED, scale)
+    for scan in semantic_scans(root / "odometry"):
+        writer.add(scan, CLUSTERED)
+    items = library(scans)
+    rng = np.random.default_rng(seed)
+    hosts: Iterable[Scan] = [scan for scan in scans if len(scan.points) > 60_000]
+    for scan in hosts if pastes else ():
+        for made in pasted(scan, items, pastes, rng):
+            writer.add(made, PASTED)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("root", type=Path, help="KITTI root")
     parser.add_argument("out", type=Path, help="file to write (.npz)")
+    parser.add_argument("--kitti", type=Path, help="KITTI root")
+    parser.add_argument("--paste", type=int, default=0, help="objects to try to paste into each real scan")
+    parser.add_argument("--synthetic", type=int, default=0, help="synthetic worlds")
+    parser.add_argument("--each", type=int, default=8, help="sweeps of each synthetic world")
     parser.add_argument("--profile", default=profile.DEFAULT)
+    parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
-    config = profile.load(args.profile)
-    scans = chain(
-        object_scans(args.root / "object" / "training"),
-        raw_scans(args.root / "raw" / "2011_09_26" / "2011_09_26_drive_0001_sync"),
-    )
-    xyz, count, kind, partial, variant, name, drive, box = [], [], [], [], [], [], [], []
-    truth_label, truth_drive = [], []
-    for scan, v, crops, k, p, b in proposals_of(scans, config):
-        xyz.append(crops.xyz)
-        count.append(crops.count)
-        kind.append(k)
-        partial.append(p)
-        variant.append(np.full(len(k), v))
-        name += [scan.name] * len(k)
-        drive += [scan.drive] * len(k)
-        box.append(b)
-        if v == SHIPPED:
-            truth_label.append(counted(scan))
-            truth_drive += [scan.drive] * len(truth_label[-1])
-    labels = np.concatenate(kind)
-    provenance = {
-        "modt": modt.__version__,
-        "profile": profile.dump(config),
-        "scans": len(set(name)),
-        "drives": len(set(drive)),
-    }
-    np.savez_compressed(
-        args.out,
-        xyz=np.concatenate(xyz),
-        offsets=np.append(0, np.cumsum(np.concatenate(count))),
-        label=labels.astype(np.int8),
-        partial=np.concatenate(partial),
-        variant=np.concatenate(variant).astype(np.int8),
-        box=np.concatenate(box).astype(np.int16),
-        scan=np.array(name),
-        drive=np.array(drive),
-        truth_label=np.concatenate(truth_label).astype(np.int8),
-        truth_drive=np.array(truth_drive),
-        provenance=json.dumps(provenance),
-    )
-    digest = hashlib.sha256(args.out.read_bytes()).hexdigest()
-    clear = ~np.concatenate(partial) & (np.concatenate(variant) == SHIPPED)
-    tally = np.bincount(labels[clear], minlength=len(ObjectClass))
-    print(json.dumps({"sha256": digest, **{c.name.lower(): int(n) for c, n in zip(ObjectClass, tally, strict=True)}}))
+    writer = Writer(profile.load(args.profile))
+    if args.kitti:
+        add_kitti(writer, args.kitti, args.paste, args.seed)
+    for scan in synthetic_scans(range(1, 1 + args.synthetic), args.each):
+        writer.add(scan, SYNTHETIC)
+    asked = {"kitti": bool(args.kitti), "paste": args.paste, "synthetic": args.synthetic, "each": args.each}
+    print(json.dumps(writer.save(args.out, {**asked, "seed": args.seed})))
 
 
 if __name__ == "__main__":

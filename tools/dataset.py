@@ -13,8 +13,9 @@ import numpy as np
 from modt.classification.crops import Crops
 from modt.types import Bool, Int
 
-SHIPPED = 0
-"""Variant of the segmentation that ships; the others are there for training alone."""
+SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
+"""Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
+there for training alone."""
 
 
 @dataclass(frozen=True)

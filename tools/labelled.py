@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from modt.geometry import Camera, FieldOfView, inverse, se3, transform
-from modt.types import Bool, Float32, Float64, ObjectClass
+from modt.sources.synthetic.scenes import SCENES
+from modt.sources.synthetic.stream import SyntheticStream
+from modt.types import Bool, Float32, Float64, Int, ObjectClass
 
 CLASS_OF = {
     "Car": ObjectClass.CAR,
@@ -22,6 +24,18 @@ CLASS_OF = {
 """Whatever else is labelled counts as background, as in the paper."""
 IMAGE_PX = (1242.0, 375.0)
 PAD_M, FOOT_M = 0.15, 0.25
+SEMANTIC_CLASS = {
+    10: ObjectClass.CAR,
+    252: ObjectClass.CAR,
+    30: ObjectClass.PEDESTRIAN,
+    254: ObjectClass.PEDESTRIAN,
+    31: ObjectClass.CYCLIST,
+    253: ObjectClass.CYCLIST,
+    18: ObjectClass.BACKGROUND,
+    258: ObjectClass.BACKGROUND,
+}
+SEMANTIC_UNKNOWN = (0, 1, 13, 15, 16, 20, 32, 99, 255, 256, 257, 259)
+"""Labels that say nothing about the classes: unlabelled, and vehicles that KITTI's object labels name otherwise."""
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
 
@@ -33,17 +47,19 @@ class Scan:
         name: of the scan.
         drive: recording it is part of; scans of one drive are never split between training and validation.
         points: (N, 4) sensor frame.
-        boxes: (B, 7) x, y, z of the middle of the foot, l, w, h, yaw, sensor frame.
-        kinds: label of each box as the data set spells it.
+        objects: indices of the points that show each labelled object.
+        kinds: class of each, BACKGROUND for what is labelled but is none of the classes.
+        boxes: (B, 7) x, y, z of the middle of the foot, l, w, h, yaw, sensor frame, of each; NaN where unknown.
         fov: where labels are complete.
-        unlabelled: (N,) points in regions that the annotators left out.
+        unlabelled: (N,) points of which nothing is known.
     """
 
     name: str
     drive: str
     points: Float32
+    objects: tuple[Int, ...]
+    kinds: tuple[ObjectClass, ...]
     boxes: Float64
-    kinds: tuple[str, ...]
     fov: FieldOfView
     unlabelled: Bool
 
@@ -61,6 +77,22 @@ def inside(points: Float32, box: Float64) -> Bool:
     return within
 
 
+def boxed(
+    name: str,
+    drive: str,
+    points: Float32,
+    boxes: list[list[float]],
+    kinds: list[str],
+    fov: FieldOfView,
+    unlabelled: Bool,
+) -> Scan:
+    """A scan whose objects are known by their boxes."""
+    table = np.array(boxes).reshape(-1, 7)
+    objects = tuple(np.flatnonzero(inside(points, box)) for box in table)
+    classes = tuple(CLASS_OF.get(kind, ObjectClass.BACKGROUND) for kind in kinds)
+    return Scan(name, drive, points, objects, classes, table, fov, unlabelled)
+
+
 def object_scans(folder: Path) -> Iterator[Scan]:
     """Scans of KITTI's object benchmark that lie in a folder with velodyne*/, label_2/ and calib/."""
     table = folder.parent / "training_all_labels" / "frame_to_raw.tsv"
@@ -76,7 +108,9 @@ def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
     """One scan of the object benchmark."""
     camera = object_camera(calib)
     points = np.fromfile(path, np.float32).reshape(-1, 4)
-    boxes, kinds, regions = [], [], []
+    boxes: list[list[float]] = []
+    kinds: list[str] = []
+    regions: list[Float64] = []
     for line in label.read_text(encoding="utf-8").splitlines():
         kind, *text = line.split()
         v = np.array([float(t) for t in text])
@@ -87,15 +121,8 @@ def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
         boxes.append([*foot, v[9], v[8], v[7], -v[13] - np.pi / 2])
         kinds.append(kind)
     fov = FieldOfView.of_camera(camera)
-    return Scan(
-        path.stem,
-        drive,
-        points,
-        np.array(boxes).reshape(-1, 7),
-        tuple(kinds),
-        fov,
-        _in_regions(points, camera, np.array(regions).reshape(-1, 4)),
-    )
+    unlabelled = _in_regions(points, camera, np.array(regions).reshape(-1, 4))
+    return boxed(path.stem, drive, points, boxes, kinds, fov, unlabelled)
 
 
 def object_camera(calib: Path) -> Camera:
@@ -127,15 +154,44 @@ def raw_scans(drive: Path) -> Iterator[Scan]:
         here = [(kind, hwl, poses[frame - f0]) for kind, hwl, f0, poses in tracklets if f0 <= frame < f0 + len(poses)]
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         boxes = [[*pose[:3], hwl[2], hwl[1], hwl[0], pose[3]] for _, hwl, pose in here]
-        yield Scan(
-            f"{drive.name}/{path.stem}",
-            drive.name,
-            points,
-            np.array(boxes).reshape(-1, 7),
-            tuple(kind for kind, _, _ in here),
-            FieldOfView.of_camera(camera),
-            np.zeros(len(points), np.bool_),
-        )
+        name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
+        kinds = [kind for kind, _, _ in here]
+        yield boxed(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
+
+
+def semantic_scans(folder: Path) -> Iterator[Scan]:
+    """Scans with SemanticKITTI labels, all around: folder/*/velodyne, folder/*/labels."""
+    for label in sorted(folder.glob("*/labels/*.label")):
+        path = label.parents[1] / "velodyne" / f"{label.stem}.bin"
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        semantic, instance = np.divmod(np.fromfile(label, np.uint32).astype(np.int64), 1 << 16)[::-1]
+        kinds, objects = [], []
+        for number in np.unique(instance[instance > 0] << 16 | semantic[instance > 0]):
+            kind = SEMANTIC_CLASS.get(int(number & 0xFFFF))
+            own = np.flatnonzero((instance << 16 | semantic) == number)
+            if kind is not None:
+                kinds.append(kind)
+                objects.append(own)
+        unknown = np.isin(semantic, SEMANTIC_UNKNOWN)
+        name = f"odometry/{label.parents[1].name}/{label.stem}"
+        boxes = np.full((len(kinds), 7), np.nan)
+        drive = f"odometry/{label.parents[1].name}"
+        yield Scan(name, drive, points, tuple(objects), tuple(kinds), boxes, FieldOfView(), unknown)
+
+
+def synthetic_scans(seeds: range, each: int) -> Iterator[Scan]:
+    """Sweeps of synthetic worlds, so many of each, a while apart."""
+    for seed in seeds:
+        for scene in sorted(SCENES):
+            stream = SyntheticStream(scene, "hdl-64e", 60.0, seed)
+            for index in np.linspace(0, 599, each).astype(int).tolist():
+                frame, truth = stream.simulator.sweep(index)
+                kinds = tuple(kind.object_class for kind in truth.kinds)
+                objects = tuple(np.flatnonzero(truth.instance == body) for body in truth.bodies)
+                boxes = truth.boxes - np.outer(truth.boxes[:, 5] / 2, np.eye(7)[2])
+                none = np.zeros(len(frame.points), np.bool_)
+                name = f"synthetic/{scene}/{seed}"
+                yield Scan(f"{name}/{index}", name, frame.points, objects, kinds, boxes, FieldOfView(), none)
 
 
 def _raw_camera(date: Path) -> Camera:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -36,12 +37,21 @@ class SyntheticStream:
         sensor: name of the sensor model.
         seconds: how long it takes.
         seed: of the scene, what happens in it and the noise.
+        distort: leave the motion of a turning head in the scans.
 
     Raises:
         MisuseError: an unknown scene or sensor, or a duration that is none.
     """
 
-    def __init__(self, scene: str = "street", sensor: str = "hdl-64e", seconds: float = 10.0, seed: int = 0) -> None:
+    def __init__(
+        self,
+        scene: str = "street",
+        sensor: str = "hdl-64e",
+        seconds: float = 10.0,
+        seed: int = 0,
+        *,
+        distort: bool = False,
+    ) -> None:
         if scene not in SCENES:
             raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
         if not 0 < seconds <= 3600:
@@ -50,9 +60,9 @@ class SyntheticStream:
             raise MisuseError(seed, "no seed", "give a whole number from 0 on")
         model = sensor_model(sensor)
         world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
-        self.simulator = Simulator(world, model, seed)
-        self.faults: list[Fault] = []
+        self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
+        self.faults: list[Fault] = []
         self.info = StreamInfo(
             name=f"{scene}, {sensor}, seed {seed}",
             layout="synthetic",
@@ -71,11 +81,10 @@ class SyntheticStream:
         """The frames, each with the truth about it."""
         return (self.simulator.sweep(i) for i in self._indices)
 
-    def between(self, first: int, last: int | None) -> SyntheticStream:
-        """The frames with first <= index < last; the others are never rendered."""
-        part = copy(self)
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last; the others are not rendered."""
+        part, whole = copy.copy(self), self._indices
         part.faults = []
-        whole = self._indices
-        part._indices = range(max(first, whole.start), min(whole.stop, whole.stop if last is None else last))
+        part._indices = range(max(first, whole.start), whole.stop if last is None else min(last, whole.stop))
         part.info = replace(self.info, n_frames=len(part._indices))
         return part

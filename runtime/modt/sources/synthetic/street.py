@@ -185,6 +185,12 @@ def _people(builder: Builder, way: Layout, side: int) -> None:
 
 def _traffic(builder: Builder, way: Layout, pace_mps: float) -> None:
     rng, seconds = builder.rng, builder.seconds
+    for line, gap in ((way.lane(-way.half_m + 1.35), 8.0), (way.lane(way.half_m - 1.35, True), 0.0)):
+        s = MARGIN_M + gap
+        for _ in range(3):
+            speed = float(rng.uniform(3.0, 5.5))
+            builder.cyclist(Path.steady(line, s, speed, seconds), speed)
+            s += rng.uniform(8.0, 40.0)
     ahead, oncoming = way.lane(-way.half_m * 0.45), way.lane(way.half_m * 0.45, backwards=True)
     s = MARGIN_M + rng.uniform(14.0, 30.0)
     for _ in range(3):
@@ -195,9 +201,3 @@ def _traffic(builder: Builder, way: Layout, pace_mps: float) -> None:
         kind = (kinds.CAR, kinds.VAN, kinds.TRUCK)[rng.choice(3, p=[0.8, 0.14, 0.06])]
         builder.vehicle(kind, Path.steady(oncoming, s, rng.uniform(7.0, 9.0), seconds))
         s += rng.uniform(28.0, 70.0)
-    for line, gap in ((way.lane(-way.half_m + 1.0), 8.0), (way.lane(way.half_m - 1.0, True), 0.0)):
-        s = MARGIN_M + gap
-        for _ in range(3):
-            speed = float(rng.uniform(3.0, 5.5))
-            builder.cyclist(Path.steady(line, s, speed, seconds), speed)
-            s += rng.uniform(8.0, 40.0)
