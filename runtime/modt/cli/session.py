@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from modt import host, profile
-from modt.cli import assemble
+from modt.cli import assemble, metering
 from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
 from modt.evaluation.summary import Summary
@@ -61,10 +61,14 @@ class Session:
         summary = Summary()
         tracks, ledger_lines = self.directory.tracks(), self.directory.ledger()
         sinks: list[Sink] = [tracks, *self._further_sinks()]
+        windows = metering.windows(self.profile.energy, self.core)
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_frame(tracks.last)
             summary.add_ledger(ledger_line)
+            window = windows.add(ledger_line)
+            if window is not None:
+                ledger_lines.write(window)
             tick(result)
 
         budget = self.mode.budget(self.profile)
@@ -75,6 +79,7 @@ class Session:
                 stack.callback(sink.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
+            ledger_lines.write(windows.close())
         elapsed_s = time.monotonic() - began_s
         figures = summary.result() | self._circumstances(summary.frames, elapsed_s)
         self.directory.summarise(figures)
