@@ -49,16 +49,19 @@ class SimulatedMachine:
         return Ledger(lambda: self.now_ns, lambda: self.cpu_ns)
 
     def work(self, seconds: float, joules: float, items: int = 0) -> range:
-        """Computes for a while; the energy comes on top of the idle power."""
+        """Computes for a while; the energy comes on top of the idle power and shows after the next wait."""
         self.cpu_ns += round(seconds * 1e9)
         self.true_J += joules
-        self.wait(seconds)
+        self._pass(seconds)
         return range(items)
 
     def wait(self, seconds: float) -> None:
+        self._pass(seconds)
+        self._show()
+
+    def _pass(self, seconds: float) -> None:
         self.now_ns += round(seconds * 1e9)
         self.true_J += self.idle_W * seconds
-        self._show()
 
     def suspend(self, seconds: float) -> None:
         self.slept_ns += round(seconds * 1e9)

@@ -54,7 +54,7 @@ def test_covariances_stay_covariances(x, P, dt_s):
     Q = kalman.process_noise(x, dt_s, 2 * ones, 0.3 * ones)
     x, P = kalman.predict(x, P, Q, dt_s)
     x, P = kalman.update(x, P, x[:, :2] + 0.1, np.broadcast_to(np.eye(2), (3, 2, 2)))
-    x, P = kalman.observe_speed(x, P, 0 * ones, 0.1 * ones)
+    x, P = kalman.observe_speed(x, P, 0.0, 0.1)
     np.testing.assert_allclose(P, P.transpose(0, 2, 1), atol=1e-9)
     assert np.linalg.eigvalsh(P).min() > -1e-9
 

@@ -1,4 +1,4 @@
-"""`modt`: replay a stream through the method.
+"""`modt`: the command line.
 
 Nothing heavy is imported before the process is confined to its core: NumPy and ONNX Runtime size their thread pools
 as they load.
@@ -12,10 +12,10 @@ import sys
 from collections.abc import Callable, Sequence
 
 from modt import __version__
-from modt.cli import replay
+from modt.cli import replay, simulate
 from modt.errors import ModtError
 
-COMMANDS = (replay,)
+COMMANDS = (replay, simulate)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -13,8 +13,11 @@ from modt.segmentation.ground import Ground
 from modt.segmentation.groups import Groups
 from modt.types import NONE, Bool, Float32, Int, Proposals
 
+MARGIN_M = 6.0
+"""Looked at beyond the edge of the field of view, so that what stands on the edge is segmented whole."""
+
 EDGE_M = 0.3
-"""A proposal this near the edge of the field of view counts as cut by it."""
+"""A proposal this near the end of the margin counts as cut by it."""
 
 
 class Segmenter:
@@ -33,7 +36,7 @@ class Segmenter:
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none for an empty sweep."""
-        looked_at = None if self.fov.full else np.flatnonzero(self.fov.contains(points))
+        looked_at = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -MARGIN_M)
         sweep = Columns.of(points if looked_at is None else points[looked_at])
         raised = np.flatnonzero(self._raised(sweep))
         if not len(raised):
@@ -52,8 +55,9 @@ class Segmenter:
     def _proposals(self, raised: Columns, index: Int) -> Proposals:
         """The clusters of what is raised that could be objects, and their boxes."""
         cells = self.grid.cells(raised)
-        x, y = raised.x[cells.sample], raised.y[cells.sample]
-        cluster = self._sized(self.grid.join(cells), np.bincount(cells.of_point), x, y)
+        x, y, z = (v[cells.sample] for v in (raised.x, raised.y, raised.z))
+        in_view = self.fov.contains(np.stack([x, y, z], axis=1))
+        cluster = self._proper(self.grid.join(cells), np.bincount(cells.of_point), x, y, in_view)
         n = int(cluster.max(initial=NONE)) + 1
         if not n:
             return Proposals.empty()
@@ -63,15 +67,16 @@ class Segmenter:
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
-        truncated = groups.least(self.fov.depth(np.stack([own.x, own.y, own.z], axis=1))) < EDGE_M
+        truncated = groups.least(self.fov.depth(np.stack([own.x, own.y, own.z], axis=1))) < EDGE_M - MARGIN_M
         return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, np.zeros(n, np.bool_))
 
-    def _sized(self, cluster: Int, count: Int, x: Float32, y: Float32) -> Int:
-        """(C,) cluster of each cell anew: those of improper size are NONE, the others numbered without gaps."""
+    def _proper(self, cluster: Int, count: Int, x: Float32, y: Float32, in_view: Bool) -> Int:
+        """(C,) cluster of each cell anew, numbered without gaps; NONE if of improper size or all out of view."""
         n = int(cluster.max()) + 1
         proper = np.bincount(cluster, count, n) >= self.config.min_points
         extent = [_extent(v, cluster, n) for v in (x, y)]
         proper &= np.hypot(*extent) < self.config.max_extent_m
+        proper &= np.bincount(cluster, in_view, n) > 0
         number = np.where(proper, np.cumsum(proper) - 1, NONE)
         return number[cluster]
 

@@ -17,7 +17,7 @@ class Followed(Tracks):
     Columns:
         low, high: (M, 4) outline last seen, along sightings.AXES [m, world].
         foot, top: lowest and highest point last seen [m, world].
-        shown: (M, 2) filter's place when the outline was seen [m, world].
+        shown: (M, 2) place that the outline was taken to show [m, world].
         home: (M, 2) place at which the track was last known to stand [m, world].
         still: the track stands.
         inherited: its class was taken over from a remembered place, not from a classification of its own.

@@ -72,8 +72,8 @@ def update(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, Flo
     return after, I_KH @ P @ I_KH.transpose(0, 2, 1) + K @ R @ K.transpose(0, 2, 1)
 
 
-def observe_speed(x: Float64, P: Float64, speed_mps: Float64, sigma_mps: Float64) -> tuple[Float64, Float64]:
-    """States and covariances after an observed speed (M,) of deviation sigma (M,)."""
+def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) -> tuple[Float64, Float64]:
+    """States and covariances after an observed speed of deviation sigma."""
     K = P[:, :, SPEED] / (P[:, SPEED, SPEED] + sigma_mps**2)[:, None]
     after = x + K * (speed_mps - x[:, SPEED])[:, None]
     after[:, HEADING] = wrap(after[:, HEADING])

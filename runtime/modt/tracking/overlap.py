@@ -57,7 +57,7 @@ def _inside(points: Float64, polygon: Float64) -> Bool:
     edge = np.roll(polygon, -1, axis=1) - polygon
     offset = points[:, :, None] - polygon[:, None]
     cross = edge[:, None, :, 0] * offset[..., 1] - edge[:, None, :, 1] * offset[..., 0]
-    inside: Bool = (cross >= -TINY).all(axis=2)
+    inside: Bool = np.logical_and.reduce(cross >= -TINY, axis=2)
     return inside
 
 

@@ -70,13 +70,16 @@ def sight(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> Sighti
 
 def outlines(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> tuple[Float64, Float64]:
     """(P, 4) least and (P, 4) greatest coordinate of each proposal's points along AXES, world frame [m]."""
-    if not len(proposals):
-        return np.zeros((0, len(DIRECTIONS))), np.zeros((0, len(DIRECTIONS)))
-    toward = AXES.T @ T_world_sensor[:2, :3]  # (4, 3): an axis of the world, as the sensor sees it
-    points = frame.points[proposals.members, :3]
-    along = np.ascontiguousarray((points @ toward.T.astype(np.float32)).T)
-    shift = AXES.T @ T_world_sensor[:2, 3]
+    n = len(proposals)
+    if not n:
+        return np.zeros((0, 4)), np.zeros((0, 4))
+    R = T_world_sensor[:2, :3].astype(np.float32)
+    px, py, pz = frame.points.take(proposals.members, axis=0)[:, :3].T.copy()
+    x, y = (R[k, 0] * px + R[k, 1] * py + R[k, 2] * pz for k in (0, 1))
+    half = np.float32(np.sqrt(0.5))
     starts = proposals.offsets[:-1]
-    low = np.minimum.reduceat(along, starts, axis=1).T + shift
-    high = np.maximum.reduceat(along, starts, axis=1).T + shift
-    return low.astype(np.float64), high.astype(np.float64)
+    low, high = np.empty((n, 4)), np.empty((n, 4))
+    for k, along in enumerate((x, (x + y) * half, y, (y - x) * half)):
+        low[:, k], high[:, k] = np.minimum.reduceat(along, starts), np.maximum.reduceat(along, starts)
+    shift = T_world_sensor[:2, 3] @ AXES
+    return low + shift, high + shift

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +104,7 @@ class Form:
         """
         enter: Float32 = np.full(1, -np.inf, np.float32)
         leave: Float32 = -enter
-        middle: Float32
+        middle: NDArray[Any]
         if self.code & 1:
             for i in range(3):
                 inverse = 1 / direction[i]

@@ -6,14 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.geometry import inverse, transform_boxes
+from modt.geometry import inverse, transform, transform_boxes
 from modt.sources.synthetic.kinds import Kind
 from modt.sources.synthetic.materials import SEMANTIC
 from modt.sources.synthetic.raycast import NOTHING, RayCaster
 from modt.sources.synthetic.returns import Receiver
 from modt.sources.synthetic.sensors import SensorModel
 from modt.sources.synthetic.world import MOVING_MPS, World
-from modt.types import NONE, Float64, Frame, Int
+from modt.types import NONE, Float32, Float64, Frame, Int
+
+SLICES = 64
+"""Slices of a turn within which nothing moves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,10 +51,12 @@ class Simulator:
         world: what there is to see.
         sensor: who sees it.
         seed: of the noise.
+        distort: leave in the scans what the head's turning does while its carrier and the bodies move; without it
+            they are as after its removal.
     """
 
-    def __init__(self, world: World, sensor: SensorModel, seed: int) -> None:
-        self.world, self.sensor, self.seed = world, sensor, seed
+    def __init__(self, world: World, sensor: SensorModel, seed: int, *, distort: bool = False) -> None:
+        self.world, self.sensor, self.seed, self.distort = world, sensor, seed, distort
         self.caster = RayCaster(sensor)
         self.receiver = Receiver(sensor, np.random.default_rng([seed, 1]))
         self._object_class = np.array([b.kind.object_class for b in world.bodies] + [0], np.int64)
@@ -66,6 +71,7 @@ class Simulator:
         time_s = index * self.sensor.period_s
         T_world_sensor = self.world.ego_pose(time_s)
         pieces = self.world.pieces(time_s, T_world_sensor, self.sensor.max_range_m)
+        pieces = pieces.as_met(self.sensor.spot_m, self.sensor.divergence_rad)
         ground, surface = self.world.terrain.cast(self.caster, T_world_sensor)
         image = self.caster.cast(pieces, ground, rng.standard_exponential(self.sensor.shape, np.float32))
         hit = image.piece != NOTHING
@@ -81,11 +87,27 @@ class Simulator:
         points[:, 1] = s * (sin + jitter * cos)
         points[:, 2] = s * self.caster.tangent[row, 0] + self.caster.origin[row, 0]
         points[:, 3] = intensity[row, column]
-        frame = Frame(index, time_s, points, T_world_sensor)
         piece = image.piece[row, column]
         instance = np.full(len(s), NONE, np.int64)
         instance[piece != NOTHING] = pieces.body[piece[piece != NOTHING]]
+        if self.distort:
+            self._distort(points, column, instance, time_s)
+        frame = Frame(index, time_s, points, T_world_sensor)
         return frame, self._truth(time_s, T_world_sensor, instance, material[row, column])
+
+    def _distort(self, points: Float32, column: Int, instance: Int, time_s: float) -> None:
+        """Move each point to where the head saw it from when it turned that way, SLICES to a turn."""
+        world, last = self.world, self.sensor.shape[1]
+        T_world_start = world.ego_pose(time_s)
+        pose = np.vstack([world.poses(time_s), np.zeros(5)])
+        speed, heading = pose[instance, 4], pose[instance, 3]
+        velocity = speed[:, None] * np.stack([np.cos(heading), np.sin(heading), np.zeros_like(heading)], axis=1)
+        part = column * SLICES // last
+        for k in range(SLICES):
+            rows = np.flatnonzero(part == k)
+            late_s = (k + 0.5) / SLICES * self.sensor.period_s
+            seen = transform(T_world_start, points[rows, :3].astype(np.float64)) + late_s * velocity[rows]
+            points[rows, :3] = transform(inverse(world.ego_pose(time_s + late_s)), seen)
 
     def _truth(self, time_s: float, T_world_sensor: Float64, instance: Int, material: Int) -> Truth:
         world = self.world

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import replace
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Fault, StreamInfo
+from modt.sources.synthetic.placement import placed, read_placements
 from modt.sources.synthetic.scenes import SCENES
 from modt.sources.synthetic.sensors import sensor as sensor_model
 from modt.sources.synthetic.simulator import Simulator, Truth
@@ -32,27 +35,40 @@ class SyntheticStream:
     """A drive through a synthetic scene; the same bytes for the same arguments.
 
     Args:
-        scene: name of the scene.
+        scene: name of the scene, or a KITTI label file (.txt) whose objects are placed as they stood.
         sensor: name of the sensor model.
         seconds: how long it takes.
         seed: of the scene, what happens in it and the noise.
+        distort: leave the motion of a turning head in the scans.
 
     Raises:
         MisuseError: an unknown scene or sensor, or a duration that is none.
     """
 
-    def __init__(self, scene: str = "street", sensor: str = "hdl-64e", seconds: float = 10.0, seed: int = 0) -> None:
-        if scene not in SCENES:
-            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
+    def __init__(
+        self,
+        scene: str = "street",
+        sensor: str = "hdl-64e",
+        seconds: float = 10.0,
+        seed: int = 0,
+        *,
+        distort: bool = False,
+    ) -> None:
+        if scene not in SCENES and not scene.endswith(".txt"):
+            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}, or a KITTI label file")
         if not 0 < seconds <= 3600:
             raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
         if seed < 0:
             raise MisuseError(seed, "no seed", "give a whole number from 0 on")
         model = sensor_model(sensor)
-        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
-        self.simulator = Simulator(world, model, seed)
-        self.faults: list[Fault] = []
+        rng = np.random.default_rng([seed, 0])
+        if scene in SCENES:
+            world = SCENES[scene](rng, seconds, model.height_m)
+        else:
+            world = placed(read_placements(Path(scene)), rng, seconds, model.height_m)
+        self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
+        self.faults: list[Fault] = []
         self.info = StreamInfo(
             name=f"{scene}, {sensor}, seed {seed}",
             layout="synthetic",
@@ -71,11 +87,10 @@ class SyntheticStream:
         """The frames, each with the truth about it."""
         return (self.simulator.sweep(i) for i in self._indices)
 
-    def between(self, first: int, last: int | None) -> SyntheticStream:
-        """The frames with first <= index < last; the others are never rendered."""
-        part = copy(self)
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last; the others are not rendered."""
+        part, whole = copy.copy(self), self._indices
         part.faults = []
-        whole = self._indices
-        part._indices = range(max(first, whole.start), min(whole.stop, whole.stop if last is None else last))
+        part._indices = range(max(first, whole.start), whole.stop if last is None else min(last, whole.stop))
         part.info = replace(self.info, n_frames=len(part._indices))
         return part

@@ -35,6 +35,11 @@ class Body:
     pieces: Pieces
 
     @property
+    def footprint(self) -> tuple[float, float]:
+        """Length and width of the ground that it takes up [m]."""
+        return self.size[:2]
+
+    @property
     def still(self) -> bool:
         """Whether it never moves."""
         return len(self.path.xy) == 1
