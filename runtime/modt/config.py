@@ -98,7 +98,7 @@ class SegmentationConfig(StageConfig):
     max_slope_deg: float = _number(12.0, 0.5, 45.0, "deg", "of the ground")
     clearance_m: float = _number(0.25, 0.02, 1.0, "m", "above ground, from where on points make objects")
     max_height_m: float = _number(2.6, 0.3, 20.0, "m", "above ground; what hangs higher joins nothing")
-    cell_m: float = _number(0.095, 0.01, 2.0, "m", "side of a cluster cell at 10 m; grows as the root of range")
+    cell_m: float = _number(0.095, 0.01, 2.0, "m", "side of a cell at 10 m; grows as the square root of range")
     min_points: int = _number(5, 1, 1000, "", "of a proposal")
     max_extent_m: float = _number(13.0, 0.5, 50.0, "m", "longest side of a proposal")
     min_height_m: float = _number(0.2, 0.0, 3.0, "m", "lowest proposal")
@@ -124,7 +124,7 @@ class TrackingConfig(StageConfig):
 class ClassificationConfig(StageConfig):
     """The network and how its input is made (section V-A)."""
 
-    model: str = field(default="pointnet", metadata={"meaning": "name in models/ or path of an .onnx file"})
+    model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
     max_points: int = _number(400, 8, 4096, "", "of a proposal handed to the network")
     batch: int = _number(8, 1, 256, "", "proposals of one network call at most")
 
@@ -145,10 +145,31 @@ class FusionConfig(StageConfig):
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
     )
+    background_alpha: float = _number(0.5, 0.0, 10.0, "", "the same, of what looks like background")
+    prior: tuple[float, float, float] = _per_class(
+        0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
+    )
     bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
     range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")
     extent_ratio: float = _number(0.3, 0.0, 10.0, "", "change of size that makes it independent")
     start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyConfig(StageConfig):
+    """The board: what it draws, assumed where nothing can be measured, and what a calibration found.
+
+    The coefficients are of one window fit: energy = idle_W x time + seg_J x segmentations + class_J x
+    classifications + point_J x points classified.
+    """
+
+    board: str = field(default="unknown", metadata={"meaning": "what the figures are of"})
+    idle_W: float = _number(3.0, 0.0, 1000.0, "W", "drawn while the process waits")
+    busy_W: float = _number(7.0, 0.0, 1000.0, "W", "drawn while it computes on one core")
+    meter: str = field(default="none", metadata={"meaning": "that the coefficients were fitted with"})
+    seg_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one segmentation")
+    class_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one classification")
+    point_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one point classified")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,3 +182,4 @@ class ProfileConfig:
     classification: ClassificationConfig = field(default_factory=ClassificationConfig)
     scheduler: SchedulerConfig = field(default_factory=SchedulerConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    energy: EnergyConfig = field(default_factory=EnergyConfig)

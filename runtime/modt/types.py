@@ -188,6 +188,10 @@ class Tracks:
         """A copy of the rows given, by index or mask."""
         return type(self)(**{name: column[rows] for name, column in self.columns()})
 
+    def copy(self) -> Self:
+        """The same rows, independent of these."""
+        return type(self)(**{name: column.copy() for name, column in self.columns()})
+
     def append(self, other: Self) -> Self:
         """These rows, then the other's."""
         return type(self)(**{n: np.concatenate([c, getattr(other, n)]) for n, c in self.columns()})

@@ -1,1 +1,1 @@
-"""What it costs: ledger, meters, prediction."""
+"""What it costs: ledger, meters, attribution, prediction."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -64,6 +64,13 @@ class Clusters:
     top: Float32
     of_cell: Int
     n: int
+
+    def kept(self, keep: Bool) -> Clusters:
+        """The clusters that an (n,) mask keeps, numbered anew."""
+        if keep.all():
+            return self
+        number = np.append(np.where(keep, np.cumsum(keep) - 1, NONE), NONE)  # the last one is that of NONE
+        return replace(self, of_cell=number[self.of_cell], n=int(keep.sum()))
 
 
 def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:

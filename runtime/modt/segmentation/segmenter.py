@@ -7,16 +7,18 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.boxes import headings, upright_boxes
-from modt.segmentation.clusters import Clusterer
+from modt.segmentation.clusters import Clusterer, Clusters
 from modt.segmentation.columns import Columns
 from modt.segmentation.ground import Ground
 from modt.segmentation.groups import Groups
 from modt.segmentation.height import sensor_height
 from modt.segmentation.occlusion import occluded
-from modt.types import Bool, Float32, Int, Proposals
+from modt.types import NONE, Bool, Float32, Int, Proposals
 
+MARGIN_M = 6.0
+"""Looked at beyond the edge of the field of view, so that what stands on the edge is segmented whole."""
 EDGE_M = 0.3
-"""A proposal this near the edge of the field of view counts as cut by it."""
+"""A proposal this near the end of the margin counts as cut by it."""
 OCCLUDER_M = 0.6
 """What rises this high above ground hides what is behind it."""
 OUTLINE = 64
@@ -41,7 +43,7 @@ class Segmenter:
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none for an empty sweep."""
-        looked_at = None if self.fov.full else np.flatnonzero(self.fov.contains(points))
+        looked_at = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -MARGIN_M)
         sweep = Columns.of(points if looked_at is None else points[looked_at])
         height = self.ground.height(sweep, self.sensor_height.of(sweep))
         raised = np.flatnonzero(self._raised(sweep, height))
@@ -60,21 +62,25 @@ class Segmenter:
     def _proposals(self, raised: Columns, height: Float32, index: Int) -> Proposals:
         """The clusters of what is raised, and their boxes."""
         clusters = self.clusterer.cluster(raised, height)
+        cell = raised.take(clusters.sample)
+        clusters = clusters.kept(self._in_view(clusters, cell))
         if not clusters.n:
             return Proposals.empty()
         outline = Groups.of(clusters.of_cell, clusters.n)
-        x, y = raised.x[clusters.sample], raised.y[clusters.sample]
         few = outline.thinned(OUTLINE)
-        yaw = headings(x[few.rows], y[few.rows], few)
+        yaw = headings(cell.x[few.rows], cell.y[few.rows], few)
         groups = Groups.of(clusters.of_cell[clusters.cell], clusters.n)
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
-        truncated = np.zeros(clusters.n, np.bool_)
-        if not self.fov.full:
-            truncated = groups.least(self.fov.depth(np.stack([own.x, own.y, own.z], axis=1))) < EDGE_M
-        hidden = occluded(x, y, clusters.top > OCCLUDER_M, outline)
+        truncated = outline.least(self.fov.depth(cell.xyz()[outline.rows])) < EDGE_M - MARGIN_M
+        hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
         return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, hidden)
+
+    def _in_view(self, clusters: Clusters, cell: Columns) -> Bool:
+        """(n,) whether any cell of a cluster lies in the field of view."""
+        seen = self.fov.contains(cell.xyz()) & (clusters.of_cell != NONE)
+        return np.bincount(clusters.of_cell[seen], minlength=clusters.n) > 0
 
 
 def _keep_freed_pages() -> None:

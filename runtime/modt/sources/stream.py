@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 from modt.geometry import Camera
 from modt.types import Frame
@@ -60,4 +60,8 @@ class Stream(Protocol):
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames; what had to be left out is added to faults meanwhile."""
+        ...
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The stream cut to the frames with first <= index < last."""
         ...

@@ -1,0 +1,5 @@
+"""`python -m modt`."""
+
+from modt.cli.main import main
+
+raise SystemExit(main())

@@ -1,0 +1,176 @@
+"""Which views are classified, and what is made of them: three objects with one interface (section V-C).
+
+`asks` says which of the tracks that want a class show a view worth classifying, `fuse` takes what the network said
+and tells which tracks are now certain. Both work on the table of tracks in place.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from modt.config import FusionConfig
+from modt.geometry import wrap
+from modt.types import N_CLASSES, NONE, Bool, Float64, Int, Proposals, Tracks
+
+_FLOOR = 1e-4
+"""Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
+
+
+class Fusion(Protocol):
+    """How classifications become the class of a track."""
+
+    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+        """(M,) tracks to classify now.
+
+        Args:
+            tracks: alive.
+            proposals: of this frame.
+            asking: (M,) tracks whose state asks for a class.
+        """
+        ...
+
+    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """(R,) which are certain now; writes the fusion's columns of the tracks.
+
+        Args:
+            tracks: alive.
+            proposals: of this frame.
+            rows: (R,) tracks that were classified.
+            likelihood: (R, 4) what the network said of each.
+        """
+        ...
+
+
+class EveryFrame:
+    """Tracking by detection: whatever is seen is classified, and this frame's word is the class (Fig. 2a)."""
+
+    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+        """Every track with a proposal."""
+        seen: Bool = tracks.proposal != NONE
+        return seen
+
+    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """Takes this view for all there is."""
+        tracks.posterior[rows] = _sane(likelihood)
+        tracks.views[rows] = 1
+        _remember(tracks, proposals, rows)
+        return np.ones(len(rows), np.bool_)
+
+
+class FirstView:
+    """Efficient: the first classification is final (Table I)."""
+
+    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+        """The tracks that have no class."""
+        asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
+        return asks
+
+    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """Settles the class."""
+        tracks.posterior[rows] = _sane(likelihood)
+        tracks.views[rows] = 1
+        tracks.fixed[rows] = True
+        _remember(tracks, proposals, rows)
+        return np.ones(len(rows), np.bool_)
+
+
+class KeyViews:
+    """Accurate: the views that are independent of the last one are multiplied (Equations 4 to 6, Table II).
+
+    A view counts as independent by its number of points, by the direction and the distance from which it is taken or
+    by its extent. A new track is classified at first sight; what that says settles its class if it is distinct, and
+    is else forgotten at the starting frame, since far and partial first views mislead (Fig. 11).
+
+    The network's word is a posterior under the frequency of the classes among proposals, the prior; Equation 6
+    multiplies likelihoods, so each further view is divided by the prior, lest that be counted once a view.
+
+    Args:
+        config: thresholds of independence and certainty.
+    """
+
+    def __init__(self, config: FusionConfig) -> None:
+        self.config = config
+        self._alpha = np.array([config.background_alpha, *config.alpha])
+        objects = np.array(config.prior)
+        prior = np.maximum(np.append(1.0 - objects.sum(), objects), _FLOOR)
+        self._log_prior = np.log(prior / prior.sum())
+
+    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+        """Those asking that were never classified or show an independent view."""
+        asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
+        rows = np.flatnonzero(asks)
+        first = tracks.key_points[rows] == 0
+        started = tracks.age[rows] >= self.config.start_frame
+        fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
+        asks[rows] = first | (started & fresh)
+        return asks
+
+    def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
+        """(R,) whether the view of each track differs enough from its last key observation (Equation 4)."""
+        limit, own = self.config, tracks.proposal[rows]
+        box = proposals.box[own]
+        likely = np.argmax(tracks.posterior[rows], axis=1)
+        bearing, distance = _view(tracks, proposals, rows)
+        change = _relative(proposals.count[own], tracks.key_points[rows])
+        nearer = _relative(distance, tracks.key_range[rows])
+        grown = _relative(box[:, 3:6], tracks.key_extent[rows]).max(axis=1, initial=0.0)
+        turned = np.abs(wrap(bearing - tracks.key_bearing[rows]))
+        independent: Bool = (
+            (change > self._alpha[likely])
+            | (turned > np.deg2rad(limit.bearing_deg))
+            | (nearer > limit.range_ratio)
+            | (grown > limit.extent_ratio)
+        )
+        return independent
+
+    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """Multiplies the view into the posterior, in logarithms (Equation 6), and fixes what is certain."""
+        view = np.log(_sane(likelihood))
+        fused = tracks.views[rows] > 0
+        past = np.where(fused[:, None], np.log(_sane(tracks.posterior[rows])) - self._log_prior, 0.0)
+        posterior = _normal(past + view)
+        certain: Bool = posterior.max(axis=1) >= self.config.threshold
+        tracks.posterior[rows] = posterior
+        tracks.fixed[rows] |= certain
+        tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
+        _remember(tracks, proposals, rows)
+        return certain
+
+
+def _sane(probability: Float64) -> Float64:
+    """Rows that are distributions, no entry below the floor; a row that is none (NaN, all zero) says nothing."""
+    finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0)
+    total = finite.sum(axis=1, keepdims=True)
+    share = np.divide(finite, total, out=np.full_like(finite, 1.0 / N_CLASSES), where=total > 0)
+    floored = np.maximum(share, _FLOOR)
+    sane: Float64 = floored / floored.sum(axis=1, keepdims=True)
+    return sane
+
+
+def _normal(log_weight: Float64) -> Float64:
+    """Rows of log weights as distributions."""
+    return _sane(np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf)))
+
+
+def _relative(now: Float64 | Int, before: Float64 | Int) -> Float64:
+    change: Float64 = np.abs(now - before) / np.maximum(before, 1e-3)
+    return change
+
+
+def _view(tracks: Tracks, proposals: Proposals, rows: Int) -> tuple[Float64, Float64]:
+    """(R,) direction of the line of sight in the world [rad], and distance [m].
+
+    The tracks hold their proposals' boxes in the world frame, so the two yaws of a box differ by the sensor's own.
+    """
+    box = proposals.box[tracks.proposal[rows]]
+    sensor_yaw = wrap(tracks.box[rows, 6] - box[:, 6])
+    return wrap(np.arctan2(box[:, 1], box[:, 0]) + sensor_yaw), np.hypot(box[:, 0], box[:, 1])
+
+
+def _remember(tracks: Tracks, proposals: Proposals, rows: Int) -> None:
+    own = tracks.proposal[rows]
+    tracks.key_bearing[rows], tracks.key_range[rows] = _view(tracks, proposals, rows)
+    tracks.key_points[rows] = proposals.count[own]
+    tracks.key_extent[rows] = proposals.box[own, 3:6]

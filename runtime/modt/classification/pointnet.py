@@ -1,0 +1,122 @@
+"""The classifier: a PointNet run by ONNX Runtime on the calling thread (section III-B, sizes of section V-A)."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+
+import numpy as np
+import onnxruntime as ort
+from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
+
+from modt import assets
+from modt.classification.crops import canonical, gather
+from modt.config import ClassificationConfig, SensorConfig
+from modt.errors import MisuseError
+from modt.types import N_CLASSES, Float32, Float64, Int, Proposals
+
+_UNUSABLE = (
+    ort_errors.Fail,
+    ort_errors.InvalidArgument,
+    ort_errors.InvalidGraph,
+    ort_errors.InvalidProtobuf,
+    ort_errors.ModelLoaded,
+    ort_errors.NotImplemented,
+    ort_errors.RuntimeException,
+)
+
+
+class PointNet:
+    """P(class | points) of proposals.
+
+    A proposal costs what its own points cost: crops of like size share a call, so that little is padded, and a
+    call is small enough for its features to stay in the cache.
+
+    Args:
+        config: the model and the sizes of a call.
+        sensor: how high it stands.
+
+    Attributes:
+        path: the model file.
+        sha256: its hash, which its card (the file beside it that ends in .md) must name.
+
+    Raises:
+        MisuseError: no such model, not the one that its card describes, no ONNX, or not (batch, points, 3) to
+            (batch, 4).
+    """
+
+    def __init__(self, config: ClassificationConfig, sensor: SensorConfig) -> None:
+        self.config = config
+        self.height_m = sensor.height_m or SensorConfig().height_m or 0.0
+        self.path = assets.find("models", config.model, ".onnx")
+        self.sha256 = _checked_hash(self.path)
+        self._session = _session(self.path)
+        self._input = self._session.get_inputs()[0].name
+
+    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
+        """(R, 4) probability of each class for each of the proposals given, in their order.
+
+        Args:
+            points: (N, 4) of the frame.
+            proposals: its segments.
+            which: (R,) those to classify.
+        """
+        crops = canonical(gather(points, proposals, which, self.config.max_points), self.height_m)
+        out = np.empty((len(crops), N_CLASSES))
+        by_size = np.argsort(crops.count, kind="stable")
+        for first in range(0, len(crops), self.config.batch):
+            rows = by_size[first : first + self.config.batch]
+            out[rows] = self.infer(crops.padded(rows))
+        return out
+
+    def facts(self) -> dict[str, str]:
+        """The model's file and hash, for the record of a run."""
+        return {"file": self.path.name, "sha256": self.sha256}
+
+    def infer(self, batch: Float32) -> Float32:
+        """(b, 4) network output of a (b, n, 3) canonical batch."""
+        (output,) = self._session.run(None, {self._input: batch})
+        probability: Float32 = output
+        return probability
+
+
+def _session(path: Path) -> ort.InferenceSession:
+    """A session that uses the calling thread alone: a waiting thread pool would burn the core between frames."""
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.execution_mode = ort.ExecutionMode.ORT_SEQUENTIAL
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.add_session_config_entry("session.inter_op.allow_spinning", "0")
+    options.log_severity_level = 4
+    try:
+        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except _UNUSABLE as error:
+        cause = str(error).splitlines()[0]
+        raise MisuseError(path, f"no ONNX model ({cause})", "give one made by tools/export_pointnet.py") from None
+    shapes = [tuple(end.shape) for end in (*session.get_inputs(), *session.get_outputs())]
+    if len(shapes) != 2 or not _fits(shapes[0], (None, None, 3)) or not _fits(shapes[1], (None, N_CLASSES)):
+        raise MisuseError(
+            path,
+            f"takes and gives {' and '.join(map(str, shapes))}",
+            f"give a model of (batch, points, 3) to (batch, {N_CLASSES})",
+        )
+    return session
+
+
+def _fits(shape: tuple[int | str | None, ...], wanted: tuple[int | None, ...]) -> bool:
+    return len(shape) == len(wanted) and all(
+        a == b if b is not None else not isinstance(a, int) for a, b in zip(shape, wanted, strict=True)
+    )
+
+
+def _checked_hash(path: Path) -> str:
+    try:
+        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
+        card = path.with_suffix(".md")
+        named = re.search(r"sha256\W+([0-9a-f]{64})", card.read_text(encoding="utf-8")) if card.is_file() else None
+    except (OSError, UnicodeDecodeError) as error:
+        raise MisuseError(path, f"cannot be read ({error})", "make model and card readable") from None
+    if named and named[1] != sha256:
+        raise MisuseError(path, f"is not the model of {card.name} (sha256 {sha256})", "restore the model or its card")
+    return sha256

@@ -1,0 +1,120 @@
+"""Where the parts are put together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from modt.classification.costed import CostedClassifier
+from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.pointnet import PointNet
+from modt.classification.scheduler import LinearCost, Scheduler
+from modt.config import ProfileConfig
+from modt.energy.counted import CountedClassifier
+from modt.energy.ledger import StageLedger
+from modt.errors import MisuseError
+from modt.geometry import FieldOfView
+from modt.pipeline import Fusion, Pipeline
+from modt.profile import DEFAULT
+from modt.segmentation.segmenter import Segmenter
+from modt.sources.recognise import open_stream
+from modt.sources.stream import Stream
+from modt.sources.synthetic.stream import SyntheticStream
+from modt.tracking.states import ACCURATE, EFFICIENT, StateMachine
+from modt.tracking.tracker import Tracker
+from modt.types import UNLIMITED, Budget
+
+EMBEDDED_SECONDS = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What a user asks for; each field is an option of `modt replay`."""
+
+    path: Path | None = None
+    mode: str = "accurate"
+    profile: str = DEFAULT
+    fov: str = "full"
+    frames: tuple[int, int | None] = (0, None)
+    rate_hz: float | None = None
+    labels: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One way of the method over the same stages.
+
+    Attributes:
+        machine: the states that a track goes through.
+        fusion: which views are classified and what becomes of them.
+        budget: what a frame may spend.
+    """
+
+    machine: StateMachine
+    fusion: Callable[[ProfileConfig], Fusion]
+    budget: Callable[[ProfileConfig], Budget]
+
+
+def _profile_budget(profile: ProfileConfig) -> Budget:
+    return Budget(profile.scheduler.calls_per_frame, profile.scheduler.cpu_ms_per_frame)
+
+
+MODES = {
+    "conventional": Mode(EFFICIENT, lambda profile: EveryFrame(), lambda profile: UNLIMITED),
+    "efficient": Mode(EFFICIENT, lambda profile: FirstView(), _profile_budget),
+    "accurate": Mode(ACCURATE, lambda profile: KeyViews(profile.fusion), _profile_budget),
+}
+"""Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
+
+
+def stream(request: Request) -> Stream:
+    """The stream asked for, the embedded one where no path is given.
+
+    Raises:
+        MisuseError: the path is no stream.
+    """
+    if request.path is None:
+        whole: Stream = SyntheticStream("street", "hdl-64e", EMBEDDED_SECONDS, seed=0)
+    else:
+        whole = open_stream(request.path)
+    cut = whole.between(*request.frames)
+    if cut.info.n_frames == 0:
+        first, last = request.frames
+        asked = f"{first}:{'' if last is None else last}"
+        raise MisuseError(whole.info.name, f"no frames in {asked}", f"it holds {whole.info.n_frames} frames")
+    return cut
+
+
+def field_of_view(request: Request, stream: Stream) -> FieldOfView:
+    """The part of space to look at.
+
+    Raises:
+        MisuseError: the camera's is asked for and the stream has none.
+    """
+    if request.fov == "full":
+        return FieldOfView()
+    if stream.info.camera is None:
+        missing = next((n for n in stream.info.notes if "camera" in n), "it has no calibration")
+        raise MisuseError(stream.info.name, missing, "restore the calibration, or use --fov full")
+    return FieldOfView.of_camera(stream.info.camera)
+
+
+def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
+    """The stages of a mode.
+
+    Raises:
+        MisuseError: the model cannot be used.
+    """
+    cost = LinearCost(profile.classification.max_points)
+    limits = profile.classification
+    network = CostedClassifier(PointNet(limits, profile.sensor), cost, time.thread_time_ns)
+    return Pipeline(
+        segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
+        tracker=Tracker(profile.tracking, mode.machine),
+        fusion=mode.fusion(profile),
+        scheduler=Scheduler(cost),
+        classifier=CountedClassifier(network, ledger, limits.max_points, limits.batch),
+        ledger=ledger,
+    )

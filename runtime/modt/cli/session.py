@@ -1,0 +1,147 @@
+"""One replay from its first to its last file."""
+
+from __future__ import annotations
+
+import re
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from modt import host, profile
+from modt.cli import assemble, metering
+from modt.cli.progress import Tick
+from modt.energy.ledger import Ledger
+from modt.evaluation.summary import Summary
+from modt.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
+from modt.sinks.kitti import KittiResults
+from modt.sinks.labels import PointLabels
+from modt.sinks.run_directory import RunDirectory
+from modt.sinks.sink import Sink
+from modt.types import FrameResult
+
+HELPER_SHARE = 0.01
+"""CPU time of other threads, as a share of the loop's, up to which the process counts as single-threaded."""
+
+
+class Session:
+    """Puts a replay together, runs it, and leaves a run directory behind.
+
+    Args:
+        request: what was asked for.
+        out: the run directory, None for one named after stream and mode.
+        core: the core that the process is confined to, None for any.
+        command: as it was typed.
+
+    Raises:
+        MisuseError: a part of the request cannot be met.
+        ModtError: the run directory cannot be written.
+    """
+
+    def __init__(self, request: assemble.Request, out: Path | None, core: int | None, command: list[str]) -> None:
+        self.request, self.core = request, core
+        self.profile = profile.load(request.profile)
+        self.mode = assemble.MODES[request.mode]
+        self.stream = assemble.stream(request)
+        self.pipeline = assemble.pipeline(
+            self.mode, self.profile, assemble.field_of_view(request, self.stream), Ledger()
+        )
+        self.stop = Stop()
+        self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
+        self.directory = RunDirectory(out or Path("runs") / f"{self._stream_name()}-{request.mode}")
+        self._describe(command)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know before it starts."""
+        kept = [f"an earlier run is kept as {self.directory.kept}"] if self.directory.kept else []
+        return [*self.stream.info.notes, *kept]
+
+    def run(self, tick: Tick) -> dict[str, Any]:
+        """Drive the stream through; returns the summary that was written."""
+        summary = Summary()
+        tracks, ledger_lines = self.directory.tracks(), self.directory.ledger()
+        sinks: list[Sink] = [tracks, *self._further_sinks()]
+        windows = metering.windows(self.profile.energy, self.core)
+
+        def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
+            summary.add_frame(tracks.last)
+            summary.add_ledger(ledger_line)
+            window = windows.add(ledger_line)
+            if window is not None:
+                ledger_lines.write(window)
+            tick(result)
+
+        budget = self.mode.budget(self.profile)
+        began_s = time.monotonic()
+        with ExitStack() as stack:
+            stack.callback(ledger_lines.close)
+            for sink in sinks:
+                stack.callback(sink.close)
+            stack.enter_context(self.stop.on_signals())
+            drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
+            ledger_lines.write(windows.close())
+        elapsed_s = time.monotonic() - began_s
+        figures = summary.result() | self._circumstances(summary.frames, elapsed_s)
+        self.directory.summarise(figures)
+        return figures
+
+    def _further_sinks(self) -> list[Sink]:
+        info, path = self.stream.info, self.directory.path
+        labels: list[Sink] = [PointLabels(path / "labels")] if self.request.labels else []
+        return [KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera), *labels]
+
+    def _stream_name(self) -> str:
+        return re.sub(r"[^\w.]+", "-", self.stream.info.name)
+
+    def _describe(self, command: list[str]) -> None:
+        info = self.stream.info
+        facts = {
+            "schema": "modt.run/1",
+            "command": command,
+            "stream": {
+                "name": info.name,
+                "layout": info.layout,
+                "path": str(self.request.path.resolve()) if self.request.path else None,
+                "frames": info.n_frames,
+                "notes": list(info.notes),
+            },
+            "mode": self.request.mode,
+            "fov": self.request.fov,
+            "core": self.core,
+            "versions": host.versions(),
+            "model": self.pipeline.classifier.facts(),
+            "host": host.description(),
+            "profile": profile.dump(self.profile),
+        }
+        self.directory.describe(profile.to_yaml(facts))
+
+    def _circumstances(self, frames: int, elapsed_s: float) -> dict[str, Any]:
+        """What the figures were taken under."""
+        threads, faults = host.thread_report(), self.stream.faults
+        idle_beside = threads.others_cpu_s <= HELPER_SHARE * threads.main_cpu_s
+        one_core = self.core is not None and threads.cores == (self.core,) and idle_beside
+        return {
+            "run": {
+                "stream": self.stream.info.name,
+                "mode": self.request.mode,
+                "fov": self.request.fov,
+                "elapsed_s": elapsed_s,
+                "frames_per_s": frames / elapsed_s,
+                "real_time_factor": frames * self.stream.info.period_s / elapsed_s,
+                "stopped_by": self.stop.signal,
+                **self.pace.report(),
+            },
+            "host": {
+                "core": self.core,
+                "one_core_verified": one_core,
+                "threads": threads.threads,
+                "other_threads_cpu_s": threads.others_cpu_s,
+                "peak_rss_mb": host.peak_rss_mb(),
+            },
+            "faults": {
+                "count": len(faults),
+                "skipped": sum(f.skipped for f in faults),
+                "first": f"{faults[0].subject}: {faults[0].cause}" if faults else None,
+            },
+        }

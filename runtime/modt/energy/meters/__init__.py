@@ -1,0 +1,1 @@
+"""Energy meters: what a machine can say about the power it draws."""

@@ -1,0 +1,57 @@
+"""The summary as a short table a person can read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def summary_table(summary: dict[str, Any]) -> str:
+    """A few lines: what was done, what it cost, what it saved."""
+    run = summary.get("run", {})
+    tracks, objects = summary["tracks"], summary["foreground_tracks"]
+    lines = [
+        f"{run.get('stream', 'run')}: {summary['frames']} frames, mode {run.get('mode', '?')}, "
+        f"field of view {run.get('fov', '?')}",
+        "",
+        f"  proposals          {summary['proposals']:>9}   {_number(summary['proposals_per_frame'])} a frame",
+        f"  tracks             {tracks['count']:>9}   N_go {_number(tracks['N_go'])} frames",
+        f"    of objects       {objects['count']:>9}   N_go {_number(objects['N_go'])} frames",
+        f"  classified         {summary['classifications']:>9}   of "
+        f"{summary['classifications_by_tracking_by_detection']} by tracking-by-detection: "
+        f"beta {_percent(summary['beta'])}",
+        f"  deferred           {summary['deferred']:>9}   by the budget, asked again a frame later",
+        "",
+        f"  {'stage':<16}{'calls':>8}{'items':>9}{'cpu ms':>9}{'wall ms':>9}{'p95':>8}{'p99':>8}{'max':>8}   a frame",
+    ]
+    for name, stage in summary["stages"].items():
+        wall, cpu = stage["wall_ms"], stage["cpu_ms"]
+        lines.append(
+            f"  {name:<16}{stage['calls']:>8}{stage['items']:>9}{cpu['mean']:>9.2f}{wall['mean']:>9.2f}"
+            f"{wall['p95']:>8.2f}{wall['p99']:>8.2f}{wall['max']:>8.2f}"
+        )
+    total_cpu = sum(s["cpu_ms"]["mean"] for s in summary["stages"].values())
+    total_wall = sum(s["wall_ms"]["mean"] for s in summary["stages"].values())
+    lines += [f"  {'all':<16}{'':>8}{'':>9}{total_cpu:>9.2f}{total_wall:>9.2f}", ""]
+    if "frames_per_s" in run:
+        lines.append(f"  {run['frames_per_s']:.1f} frames/s, {run['real_time_factor']:.1f} x real time")
+    if "host" in summary:
+        lines.append(_host_line(summary["host"]))
+    faults = summary.get("faults", {})
+    if faults.get("count"):
+        lines.append(f"  {faults['count']} faulty scans, {faults['skipped']} of them skipped: {faults['first']}")
+    return "\n".join(lines)
+
+
+def _host_line(host: dict[str, Any]) -> str:
+    core = "any core" if host["core"] is None else f"core {host['core']}"
+    verified = "verified" if host["one_core_verified"] else "NOT kept to one core"
+    beside = f"{host['threads']} threads, {host['other_threads_cpu_s']:.2f} s of CPU beside the loop"
+    return f"  {core} ({verified}; {beside}), peak memory {host['peak_rss_mb']:.0f} MB"
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{100 * value:.1f} %"

@@ -1,0 +1,88 @@
+"""KITTI tracking results: foreground objects in the camera's coordinates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from modt.geometry import Camera, corners, transform
+from modt.sinks.output import LineFile, writing
+from modt.types import NONE, FrameResult, ObjectClass
+
+NAMES = {ObjectClass.CAR: "Car", ObjectClass.PEDESTRIAN: "Pedestrian", ObjectClass.CYCLIST: "Cyclist"}
+
+NOMINAL = Camera(
+    P_image_sensor=np.zeros((3, 4)),
+    T_camera_sensor=np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]),
+    width_px=0.0,
+    height_px=0.0,
+)
+"""Stands in where there is no camera: its axes at the sensor's place, no image."""
+
+
+class KittiResults:
+    """Writes kitti/NNNN.txt: frame, id, type, box in the image, size, place, heading, score.
+
+    Args:
+        path: of the file.
+        camera: that the results refer to; without one the axes are a camera's at the place of the sensor, and the
+            box in the image is -1 throughout.
+    """
+
+    def __init__(self, path: Path, camera: Camera | None) -> None:
+        with writing(path):
+            path.parent.mkdir(parents=True, exist_ok=True)
+        self._lines = LineFile(path)
+        self._camera = camera or NOMINAL
+
+    def write(self, result: FrameResult) -> None:
+        """Append the frame's objects: tracks of a foreground class that are seen.
+
+        Raises:
+            ModtError: the file cannot be written.
+        """
+        tracks = result.tracks
+        class_ = tracks.posterior.argmax(axis=1)
+        rows = np.flatnonzero((tracks.proposal != NONE) & (class_ != ObjectClass.BACKGROUND))
+        if not len(rows):
+            return
+        boxes = result.proposals.box[tracks.proposal[rows]]
+        cut = result.proposals.truncated[tracks.proposal[rows]]
+        T = self._camera.T_camera_sensor
+        foot = transform(T, boxes[:, :3] - np.array([0, 0, 0.5]) * boxes[:, 5:6])
+        ahead = np.stack([np.cos(boxes[:, 6]), np.sin(boxes[:, 6]), np.zeros(len(boxes))], axis=1) @ T[:3, :3].T
+        turn = np.arctan2(-ahead[:, 2], ahead[:, 0])
+        alpha = turn - np.arctan2(foot[:, 0], foot[:, 2])
+        alpha = (alpha + np.pi) % (2 * np.pi) - np.pi
+        image = self._image_boxes(boxes)
+        text = "".join(
+            f"{result.frame.index} {tracks.id[row]} {NAMES[ObjectClass(class_[row])]} "
+            f"{int(cut[k])} -1 {alpha[k]:.4f} "
+            f"{' '.join(f'{v:.2f}' for v in image[k])} "
+            f"{boxes[k, 5]:.3f} {boxes[k, 4]:.3f} {boxes[k, 3]:.3f} "
+            f"{foot[k, 0]:.3f} {foot[k, 1]:.3f} {foot[k, 2]:.3f} {turn[k]:.4f} {tracks.posterior[row].max():.6f}\n"
+            for k, row in enumerate(rows)
+        )
+        self._lines.write(text)
+
+    def close(self) -> None:
+        """No more will come."""
+        self._lines.close()
+
+    def _image_boxes(self, boxes: np.ndarray) -> np.ndarray:
+        """(n, 4) left, top, right, bottom [pixel]; -1 for what lies behind the camera."""
+        ground = corners(boxes)
+        z = boxes[:, 2, None] + np.array([-0.5, 0.5]) * boxes[:, 5, None]
+        eight = np.concatenate(
+            [np.concatenate([ground, np.repeat(z[:, k, None, None], 4, axis=1)], axis=2) for k in (0, 1)], axis=1
+        )
+        P = self._camera.P_image_sensor
+        uvw = eight @ P[:, :3].T + P[:, 3]
+        out = np.full((len(boxes), 4), -1.0)
+        ahead = (uvw[..., 2] > 0.1).all(axis=1)
+        uv = uvw[ahead, :, :2] / uvw[ahead, :, 2:]
+        limit = np.array([self._camera.width_px, self._camera.height_px]) - 1
+        out[ahead, :2] = np.clip(uv.min(axis=1), 0, limit)
+        out[ahead, 2:] = np.clip(uv.max(axis=1), 0, limit)
+        return out

@@ -1,0 +1,118 @@
+"""KITTI calibration files: the left colour camera and the inertial unit, as seen from the sensor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.geometry import Camera, inverse, se3
+from modt.types import Float64
+
+IMAGE_PX = (1242.0, 375.0)
+"""Size of the rectified image where the calibration does not say."""
+
+
+def read_table(path: Path) -> dict[str, Float64]:
+    """Rows of numbers by their key; rows that hold no numbers are left out.
+
+    Raises:
+        MisuseError: the file cannot be read.
+    """
+    table: dict[str, Float64] = {}
+    try:
+        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError as error:
+        raise MisuseError(path, f"cannot be read ({error.strerror})", "restore the calibration file") from None
+    for line in lines:
+        key, _, values = line.replace(":", " ", 1).partition(" ")
+        try:
+            table[key] = np.array(values.split(), dtype=np.float64)
+        except ValueError:
+            continue
+    return table
+
+
+def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys: str) -> Float64:
+    """The matrix under the first of the keys that is there.
+
+    Raises:
+        MisuseError: there is none, or it has another size.
+    """
+    for key in keys:
+        if key in table:
+            if table[key].size != shape[0] * shape[1]:
+                cause = f"{key} holds {table[key].size} numbers, not {shape[0] * shape[1]}"
+                raise MisuseError(path, cause, "restore the calibration file")
+            return table[key].reshape(shape)
+    raise MisuseError(path, f"no {' or '.join(keys)}", "restore the calibration file")
+
+
+def rigid(table: dict[str, Float64], path: Path) -> Float64:
+    """(4, 4) transform of a raw calibration's R and T."""
+    return se3(matrix(table, path, (3, 3), "R"), matrix(table, path, (3, 1), "T")[:, 0])
+
+
+def homogeneous(top: Float64) -> Float64:
+    """(4, 4) of a (3, 3) or (3, 4) matrix."""
+    out = np.eye(4)
+    out[:3, : top.shape[1]] = top
+    return out
+
+
+def camera(P: Float64, R_rect: Float64, T_camera_sensor: Float64, size_px: tuple[float, float] = IMAGE_PX) -> Camera:
+    """The camera with projection P (3, 4), rectifying rotation R_rect (3, 3) and pose T_camera_sensor (4, 4)."""
+    T = homogeneous(R_rect) @ T_camera_sensor
+    return Camera(P @ T, T, size_px[0], size_px[1])
+
+
+def camera_of_raw(path: Path) -> Camera:
+    """Left colour camera of a recording day, from its calib_cam_to_cam.txt and the calib_velo_to_cam.txt beside it.
+
+    Raises:
+        MisuseError: a file or a row is missing.
+    """
+    table = read_table(path)
+    size = table.get("S_rect_02", np.array(IMAGE_PX))
+    to_camera = path.with_name("calib_velo_to_cam.txt")
+    return camera(
+        matrix(table, path, (3, 4), "P_rect_02"),
+        matrix(table, path, (3, 3), "R_rect_00"),
+        rigid(read_table(to_camera), to_camera),
+        (float(size[0]), float(size[1])),
+    )
+
+
+def camera_of_sequence(path: Path) -> Camera:
+    """Left colour camera of one calibration file of the tracking, object or odometry layout.
+
+    Raises:
+        MisuseError: the file or a row is missing.
+    """
+    table = read_table(path)
+    R_rect = np.eye(3)  # odometry's Tr leads to the rectified camera already
+    if "R0_rect" in table or "R_rect" in table:
+        R_rect = matrix(table, path, (3, 3), "R0_rect", "R_rect")
+    T = homogeneous(matrix(table, path, (3, 4), "Tr_velo_to_cam", "Tr_velo_cam", "Tr"))
+    return camera(matrix(table, path, (3, 4), "P2"), R_rect, T)
+
+
+def T_imu_sensor_of_raw(folder: Path) -> Float64:
+    """(4, 4) sensor to inertial unit, from calib_imu_to_velo.txt.
+
+    Raises:
+        MisuseError: the file or a row is missing.
+    """
+    path = folder / "calib_imu_to_velo.txt"
+    return inverse(rigid(read_table(path), path))
+
+
+def T_imu_sensor_of_sequence(path: Path) -> Float64:
+    """(4, 4) sensor to inertial unit of a tracking or object calibration file.
+
+    Raises:
+        MisuseError: the file or the row is missing.
+    """
+    table = read_table(path)
+    return inverse(homogeneous(matrix(table, path, (3, 4), "Tr_imu_to_velo", "Tr_imu_velo")))

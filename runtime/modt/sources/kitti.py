@@ -1,0 +1,178 @@
+"""KITTI's folder layouts: raw drives, tracking and odometry sequences, bare folders of scans."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.geometry import Camera, inverse
+from modt.sources import calibration, oxts
+from modt.sources.scan_stream import ScanReference, ScanStream
+from modt.sources.stream import StreamInfo
+from modt.types import Float64
+
+PERIOD_S = 0.1
+
+Poses = dict[int, Float64]
+"""T_world_sensor by frame."""
+
+
+def raw_drive(drive: Path) -> ScanStream:
+    """A raw drive, .../2011_09_26_drive_0005_sync, its day's calibration beside it.
+
+    Raises:
+        MisuseError: it holds no scans, or a file that is there is broken.
+    """
+    notes: list[str] = []
+    camera = _camera(calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
+    poses = _poses_of_raw(drive, notes)
+    stamps = _raw_stamps(drive / "velodyne_points" / "timestamps.txt", notes)
+    return _stream(drive.name, "KITTI raw drive", drive / "velodyne_points" / "data", camera, poses, stamps, notes)
+
+
+def tracking_sequence(scans: Path) -> ScanStream:
+    """A sequence of the tracking layout, .../training/velodyne/0005, with calib/, oxts/ beside velodyne/.
+
+    Raises:
+        MisuseError: it holds no scans, or a file that is there is broken.
+    """
+    root, number = scans.parent.parent, scans.name
+    notes: list[str] = []
+    calib = root / "calib" / f"{number}.txt"
+    camera = _camera(calibration.camera_of_sequence, calib, notes)
+    records = root / "oxts" / f"{number}.txt"
+    poses: Poses = {}
+    if not records.is_file():
+        notes.append(f"{records} is missing: no ego-motion")
+    elif not calib.is_file():
+        notes.append(f"{calib} is missing: no ego-motion without its Tr_imu_velo")
+    else:
+        T_imu_sensor = calibration.T_imu_sensor_of_sequence(calib)
+        poses = dict(enumerate(oxts.poses(oxts.read_sequence(records)) @ T_imu_sensor))
+    return _stream(f"tracking {number}", "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number))
+
+
+def odometry_sequence(sequence: Path) -> ScanStream:
+    """A sequence of the odometry layout, .../sequences/00, with calib.txt, times.txt and poses where there are.
+
+    Raises:
+        MisuseError: it holds no scans, or a file that is there is broken.
+    """
+    notes: list[str] = []
+    calib = sequence / "calib.txt"
+    camera = _camera(calibration.camera_of_sequence, calib, notes)
+    places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
+    found = next((p for p in places if p.is_file()), None)
+    poses: Poses = {}
+    if found is None or camera is None:
+        notes.append(f"{places[0] if found is None else calib} is missing: no ego-motion")
+    else:
+        T_camera_sensor = camera.T_camera_sensor
+        camera_poses = [calibration.homogeneous(row.reshape(3, 4)) for row in _numbers(found, columns=12)]
+        poses = {i: inverse(T_camera_sensor) @ T @ T_camera_sensor for i, T in enumerate(camera_poses)}
+    times = sequence / "times.txt"
+    stamps: dict[int, float] = {}
+    if times.is_file():
+        stamps = dict(enumerate(_numbers(times, columns=1)[:, 0].tolist()))
+    else:
+        notes.append(f"{times} is missing: frames {PERIOD_S} s apart")
+    return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
+
+
+def scan_folder(folder: Path) -> ScanStream:
+    """A bare folder of .bin scans, in the order of their names.
+
+    Raises:
+        MisuseError: it holds none.
+    """
+    notes = ["a bare folder: no calibration, no ego-motion, frames 0.1 s apart"]
+    return _stream(folder.name, "folder of scans", folder, None, {}, {}, notes)
+
+
+def _stream(
+    name: str,
+    layout: str,
+    data: Path,
+    camera: Camera | None,
+    poses: Poses,
+    stamps: dict[int, float],
+    notes: list[str],
+    sequence: int = 0,
+) -> ScanStream:
+    files = sorted(data.glob("*.bin"))
+    if not files:
+        raise MisuseError(data, "no .bin scans", "give a folder that holds them")
+    numbered = all(f.stem.isdigit() for f in files)
+    indices = [int(f.stem) for f in files] if numbered else list(range(len(files)))
+    gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
+    if gaps:
+        notes.append(f"{len(gaps)} frames are missing (the first is {gaps[0]})")
+    if poses:
+        lost = [i for i in indices if i not in poses]
+        if lost:
+            notes.append(f"{len(lost)} frames without a pose keep the pose before them (the first is {lost[0]})")
+        poses = _held(poses, indices)
+    scans = [
+        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i)) for i, f in zip(indices, files, strict=True)
+    ]
+    if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
+        notes.append(f"time stamps run backwards: frames {PERIOD_S} s apart instead")
+        scans = [ScanReference(s.index, s.path, s.index * PERIOD_S, s.T_world_sensor) for s in scans]
+    info = StreamInfo(name, layout, sequence, len(scans), PERIOD_S, camera, bool(poses), tuple(notes))
+    return ScanStream(info, scans)
+
+
+def _held(poses: Poses, indices: list[int]) -> Poses:
+    """A pose for every frame: its own, or the last one before it, or else the first there is."""
+    known = np.array(sorted(poses))
+    at = np.maximum(np.searchsorted(known, indices, side="right") - 1, 0)
+    return {i: poses[int(known[k])] for i, k in zip(indices, at, strict=True)}
+
+
+def _poses_of_raw(drive: Path, notes: list[str]) -> Poses:
+    records = sorted((drive / "oxts" / "data").glob("*.txt"))
+    calib = drive.parent / "calib_imu_to_velo.txt"
+    if not records or not calib.is_file():
+        notes.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: no ego-motion")
+        return {}
+    T_imu_sensor = calibration.T_imu_sensor_of_raw(drive.parent)
+    T_world_imu = oxts.poses(np.stack([oxts.read_record(r)[: len(oxts.FIELDS)] for r in records]))
+    return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
+
+
+def _raw_stamps(path: Path, notes: list[str]) -> dict[int, float]:
+    """Seconds since the first stamp, by frame."""
+    if not path.is_file():
+        notes.append(f"{path} is missing: frames {PERIOD_S} s apart")
+        return {}
+    try:
+        whole = [
+            (datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp(), float(f"0.{fraction or 0}"))
+            for second, _, fraction in (line.partition(".") for line in path.read_text().splitlines() if line)
+        ]
+    except ValueError:
+        notes.append(f"{path} is no list of time stamps: frames {PERIOD_S} s apart")
+        return {}
+    return {i: round(second - whole[0][0] + fraction - whole[0][1], 9) for i, (second, fraction) in enumerate(whole)}
+
+
+def _camera(read: Callable[[Path], Camera], calib: Path, notes: list[str]) -> Camera | None:
+    if not calib.is_file():
+        notes.append(f"{calib} is missing: no camera, hence no --fov camera")
+        return None
+    return read(calib)
+
+
+def _numbers(path: Path, columns: int) -> Float64:
+    try:
+        table = np.loadtxt(path, dtype=np.float64, ndmin=2)
+    except (OSError, ValueError) as error:
+        raise MisuseError(path, f"no table of numbers ({error})", "restore it, or remove it") from None
+    if table.shape[1] != columns:
+        raise MisuseError(path, f"{table.shape[1]} columns, not {columns}", "restore it, or remove it")
+    return table

@@ -1,0 +1,65 @@
+"""Dead reckoning from OXTS records, as KITTI's development kit defines it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.geometry import inverse, rotation_zyx, se3
+from modt.types import Float64
+
+EARTH_RADIUS_M = 6378137.0
+FIELDS = ("lat", "lon", "alt", "roll", "pitch", "yaw")
+
+
+def poses(records: Float64) -> Float64:
+    """(n, 4, 4) T_world_imu of (n, 6 or more) records: lat, lon [deg], alt [m], roll, pitch, yaw [rad].
+
+    Mercator coordinates scaled at the first latitude; the world is where the first record stands.
+    """
+    lat, lon, alt, roll, pitch, yaw = records[:, :6].T
+    scale = np.cos(np.deg2rad(lat[0]))
+    x = scale * EARTH_RADIUS_M * np.deg2rad(lon)
+    y = scale * EARTH_RADIUS_M * np.log(np.tan(np.deg2rad(90.0 + lat) / 2))
+    T_mercator_imu = np.stack(
+        [
+            se3(rotation_zyx(*angles), np.array(place))
+            for angles, place in zip(np.c_[roll, pitch, yaw], np.c_[x, y, alt], strict=True)
+        ]
+    )
+    relative: Float64 = inverse(T_mercator_imu[0]) @ T_mercator_imu
+    return relative
+
+
+def read_record(path: Path) -> Float64:
+    """(30,) numbers of a raw drive's record.
+
+    Raises:
+        MisuseError: missing or not a record.
+    """
+    try:
+        numbers = np.array(path.read_text(encoding="ascii").split(), dtype=np.float64)
+    except (OSError, ValueError):
+        raise MisuseError(path, "no OXTS record", "restore it, or run without oxts/") from None
+    record: Float64 = _checked(numbers[None], path)[0]
+    return record
+
+
+def read_sequence(path: Path) -> Float64:
+    """(n, 30) records of a tracking sequence, one a line.
+
+    Raises:
+        MisuseError: not such a file.
+    """
+    try:
+        return _checked(np.loadtxt(path, dtype=np.float64, ndmin=2), path)
+    except (OSError, ValueError):
+        raise MisuseError(path, "no OXTS records", "restore it, or remove it to run without ego-motion") from None
+
+
+def _checked(records: Float64, path: Path) -> Float64:
+    if records.shape[1] < len(FIELDS) or not np.isfinite(records[:, : len(FIELDS)]).all():
+        raise MisuseError(path, f"OXTS record without {', '.join(FIELDS)}", "restore it, or run without oxts/")
+    return records

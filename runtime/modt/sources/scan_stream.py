@@ -1,0 +1,71 @@
+"""A stream of scan files, whatever folder layout they came from."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+from modt.errors import ModtError, ScanError
+from modt.sources.scan_file import read_scan
+from modt.sources.stream import Fault, StreamInfo
+from modt.types import Float64, Frame
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class ScanReference:
+    """A scan still on disk.
+
+    Attributes:
+        index: frame number.
+        path: the file.
+        stamp_s: its time [s].
+        T_world_sensor: (4, 4) pose, None where unknown.
+    """
+
+    index: int
+    path: Path
+    stamp_s: float
+    T_world_sensor: Float64 | None
+
+
+class ScanStream:
+    """Frames from scan files; a scan that cannot be used is counted, logged and skipped.
+
+    Args:
+        info: what is known beforehand.
+        scans: the files in the order of time.
+    """
+
+    def __init__(self, info: StreamInfo, scans: list[ScanReference]) -> None:
+        self.info = replace(info, n_frames=len(scans))
+        self.scans = scans
+        self.faults: list[Fault] = []
+
+    def __iter__(self) -> Iterator[Frame]:
+        used = 0
+        for scan in self.scans:
+            try:
+                points, broken = read_scan(scan.path)
+            except ScanError as error:
+                self._fault(scan, error.cause, skipped=True)
+                continue
+            if broken:
+                self._fault(scan, f"{broken} points are not finite and count as no return", skipped=False)
+            used += 1
+            yield Frame(scan.index, scan.stamp_s, points, scan.T_world_sensor)
+        if self.scans and not used:
+            cause = f"none of its {len(self.scans)} scans can be used ({self.faults[0].cause})"
+            raise ModtError(self.info.name, cause, "give a stream of float32 x, y, z, reflectance scans")
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The scans with first <= index < last, none of the others is read."""
+        return type(self)(self.info, [s for s in self.scans if s.index >= first and (last is None or s.index < last)])
+
+    def _fault(self, scan: ScanReference, cause: str, *, skipped: bool) -> None:
+        self.faults.append(Fault(scan.index, str(scan.path), cause, skipped))
+        log.warning("%s: %s%s", scan.path, cause, "; frame skipped" if skipped else "")

@@ -1,0 +1,77 @@
+"""From what the rays meet to what a sensor reports: noise, losses, partial returns and brightness."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modt.sources.synthetic.materials import LOSS, REFLECTIVITY
+from modt.sources.synthetic.sensors import SensorModel
+from modt.types import Bool, Float32, Int
+
+
+class Receiver:
+    """The receiving half of a sensor.
+
+    Args:
+        sensor: its model.
+        rng: for the constant errors of its beams.
+    """
+
+    def __init__(self, sensor: SensorModel, rng: np.random.Generator) -> None:
+        self.sensor = sensor
+        self.bias = rng.normal(0.0, sensor.beam_sigma_m, (sensor.shape[0], 1)).astype(np.float32)
+        self.gain = rng.normal(1.0, 0.08, (sensor.shape[0], 1)).astype(np.float32)
+        self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
+
+    def receive(
+        self, distance: Float32, material: Int, group: NDArray[np.int32], rng: np.random.Generator
+    ) -> tuple[Float32, Float32, Bool]:
+        """Distance [m, horizontal], intensity [0, 1] and whether there is a return, of every ray.
+
+        Args:
+            distance: (B, A) horizontal distance met [m], infinite where nothing was.
+            material: (B, A) of the surface met.
+            group: (B, A) which surface it is, to tell an edge from a slope.
+            rng: of this sweep.
+        """
+        sensor = self.sensor
+        chance = rng.random(distance.shape, dtype=np.float32)
+        noise = rng.standard_normal(distance.shape, dtype=np.float32)
+        met = np.isfinite(distance)
+        near = np.where(met, distance, np.float32(1e4))
+        head_on = self._incidence(near, group)
+        reflectivity = REFLECTIVITY[material] * self.gain * (1 + np.float32(0.15) * noise[:, ::-1])
+        slant = near * self.secant
+        signal = reflectivity * head_on * np.float32(10 * sensor.detect_m**2) / (slant * slant)
+        lost = LOSS[material] + np.float32(sensor.misfire)
+        heard = met & (chance > lost + (1 - lost) / (1 + signal * signal))
+        heard &= (slant > sensor.min_range_m) & (slant < sensor.max_range_m)
+        ranged: Float32 = (
+            near + (self.bias + np.float32(sensor.range_sigma_m) * noise).astype(np.float32) / self.secant
+        )
+        self._smear(ranged, near, heard, chance)
+        bright = np.clip(reflectivity * (np.float32(0.75) + np.float32(0.25) * head_on), 0, 1)
+        return ranged, bright, heard
+
+    def _incidence(self, near: Float32, group: NDArray[np.int32]) -> Float32:
+        """Cosine of the angle at which each surface is met, from the slope of the range image along the beam."""
+        step = np.float32(self.sensor.azimuth_rad[1] - self.sensor.azimuth_rad[0])
+        slope = np.zeros_like(near)
+        np.subtract(near[:, 1:], near[:, :-1], out=slope[:, 1:])
+        same = np.zeros(near.shape, np.bool_)
+        np.equal(group[:, 1:], group[:, :-1], out=same[:, 1:])
+        slope /= near * step
+        level = 1 / np.sqrt(1 + slope * slope)
+        ground = group < 0
+        tangent = np.abs(self.sensor.tangent[:, None]) / self.secant
+        return np.where(ground, tangent + np.float32(0.02), np.where(same, level, np.float32(0.7))).astype(np.float32)
+
+    def _smear(self, ranged: Float32, near: Float32, heard: Bool, chance: Float32) -> None:
+        """Where a beam is split by an edge, some returns mix both surfaces."""
+        gap = near[:, 1:] - near[:, :-1]
+        share = np.float32(self.sensor.smear)
+        edge = (np.abs(gap) > 0.2) & (np.abs(gap) < 2.5) & (chance[:, 1:] > 1 - share) & heard[:, 1:] & heard[:, :-1]
+        row, column = np.nonzero(edge)
+        mix = (chance[row, column + 1] - (1 - share)) / share
+        ranged[row, column + 1] -= mix * gap[row, column]

@@ -1,0 +1,187 @@
+"""Cars, vans, trucks and bicycles, built to order from random proportions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.sources.synthetic.materials import Material
+from modt.sources.synthetic.pieces import Pieces, box, cylinder, limb, wedge
+from modt.types import Float64
+
+Size = tuple[float, float, float]
+
+
+def car(rng: np.random.Generator, size: Size) -> Pieces:
+    """A passenger car of (length, width, height): hatchback, saloon or estate by chance."""
+    length, width, height = size
+    clear, belt = rng.uniform(0.17, 0.24), height * rng.uniform(0.58, 0.64)
+    paint = Material.CAR_DARK if rng.random() < 0.35 else Material.CAR_PAINT
+    nose = belt - rng.uniform(0.12, 0.25)
+    bonnet = rng.uniform(0.24, 0.3) * length
+    boot = rng.choice([0.04, 0.12, 0.2]) * length
+    body_height = belt - clear
+    middle = clear + body_height / 2
+    hull = wedge(
+        (0.0, 0.0, middle),
+        (length, 0.97 * width, body_height),
+        paint,
+        [
+            (belt - nose, 0.0, bonnet, (belt - nose) * (length / 2 - bonnet) + bonnet * body_height / 2),
+            (1.0, 0.0, -0.35, length / 2 + 0.35 * body_height * 0.2),
+            (-1.0, 0.0, -0.35, length / 2 + 0.35 * body_height * 0.2),
+        ],
+    )
+    front, rear = length / 2 - bonnet + 0.1, -length / 2 + boot
+    cabin_height = height - belt + 0.02
+    half = cabin_height / 2
+    rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.25, 0.8), rng.uniform(0.2, 0.32)
+    long = front - rear
+    cabin = wedge(
+        ((front + rear) / 2, 0.0, belt + half - 0.02),
+        (long, 0.94 * width, cabin_height),
+        Material.GLASS,
+        [
+            (cabin_height, 0.0, rake, cabin_height * long / 2 - rake * half),
+            (-cabin_height, 0.0, tail, cabin_height * long / 2 - tail * half),
+            (0.0, 1.0, tuck, 0.47 * width - tuck * half),
+            (0.0, -1.0, tuck, 0.47 * width - tuck * half),
+        ],
+    )
+    lid_length = max(long - rake - tail, 0.5) * 0.98
+    lid = box(
+        ((front - rake + rear + tail) / 2, 0.0, height - 0.04),
+        (lid_length, 0.94 * width - 2 * tuck * cabin_height + 0.02, 0.09),
+        paint,
+    )
+    return Pieces.join(
+        [
+            hull,
+            cabin,
+            lid,
+            _pillars(rng, front, rear, belt, height, width, tuck, paint),
+            _wheels(rng, length, width, rng.uniform(0.3, 0.34)),
+            _mirrors(front, belt, width, paint),
+        ]
+    )
+
+
+def van(rng: np.random.Generator, size: Size) -> Pieces:
+    """A delivery van or people carrier."""
+    length, width, height = size
+    clear = rng.uniform(0.2, 0.3)
+    paint = Material.CAR_PAINT if rng.random() < 0.8 else Material.CAR_DARK
+    tall = height - clear
+    slope, start = rng.uniform(0.3, 0.7), rng.uniform(0.45, 0.55)
+    hull = wedge(
+        (0.0, 0.0, clear + tall / 2),
+        (length, 0.97 * width, tall),
+        paint,
+        [
+            (1.0, 0.0, slope, length / 2 + slope * tall * (start - 0.5)),
+            (1.0, 0.0, 2.2, length / 2 - 0.9 + 2.2 * tall / 2),
+            (0.0, 1.0, 0.08, 0.485 * width - 0.08 * tall * 0.1),
+            (0.0, -1.0, 0.08, 0.485 * width - 0.08 * tall * 0.1),
+        ],
+    )
+    return Pieces.join(
+        [hull, _wheels(rng, length, width, 0.34), _mirrors(length * 0.28, height * 0.55, width, paint)]
+    )
+
+
+def truck(rng: np.random.Generator, size: Size) -> Pieces:
+    """A lorry: cab, box and wheels."""
+    length, width, height = size
+    cab = rng.uniform(1.7, 2.2)
+    cab_height = min(height, rng.uniform(2.5, 3.0))
+    load = length - cab - 0.4
+    parts = [
+        wedge(
+            (length / 2 - cab / 2, 0.0, 0.5 + (cab_height - 0.5) / 2),
+            (cab, 0.96 * width, cab_height - 0.5),
+            Material.CAR_PAINT,
+            [(1.0, 0.0, 0.15, cab / 2)],
+        ),
+        box((-length / 2 + load / 2, 0.0, 1.0 + (height - 1.0) / 2), (load, width, height - 1.0), Material.CAR_PAINT),
+        box((-0.2, 0.0, 0.8), (0.9 * length, 0.8, 0.3), Material.METAL),
+    ]
+    return Pieces.join([*parts, _wheels(rng, length, width, 0.48)])
+
+
+def bicycle(rng: np.random.Generator) -> Pieces:
+    """A bicycle, standing or ridden; x ahead, origin on the ground between the wheels."""
+    radius, base = 0.34, rng.uniform(0.98, 1.08)
+    parts = []
+    for x in (-base / 2, base / 2):
+        wheel = cylinder((x, 0.0, radius), radius, 0.04, Material.METAL, axis=1)
+        wheel.density[:] = 9.0
+        parts.append(wheel)
+    seat, head, crank = (-0.22, 0.0, 0.9), (0.36, 0.0, 0.92), (0.02, 0.0, 0.3)
+    rear, front = (-base / 2, 0.0, radius), (base / 2, 0.0, radius)
+    tubes = [
+        (crank, seat),
+        (crank, head),
+        ((-0.15, 0.0, 0.75), head),
+        (rear, crank),
+        (rear, (-0.15, 0.0, 0.75)),
+        (head, front),
+    ]
+    parts += [limb(a, b, 0.025, Material.METAL) for a, b in tubes]
+    parts.append(limb((0.4, -0.28, 1.0), (0.4, 0.28, 1.0), 0.025, Material.RUBBER))
+    parts.append(box((-0.24, 0.0, 0.93), (0.25, 0.15, 0.07), Material.RUBBER))
+    if rng.random() < 0.35:
+        parts.append(box((-0.5, 0.0, 0.82), (0.38, 0.35, 0.3), Material.RUBBER))
+    return Pieces.join(parts)
+
+
+def car_size(rng: np.random.Generator) -> Size:
+    """Sizes as they are spread in the KITTI object labels: cars of 3.9 by 1.63 by 1.53 m, correlated."""
+    scale = rng.normal(0.0, 1.0)
+    return (
+        float(np.clip(3.9 + 0.38 * scale + 0.15 * rng.normal(), 3.0, 5.0)),
+        float(np.clip(1.63 + 0.06 * scale + 0.06 * rng.normal(), 1.42, 1.9)),
+        float(np.clip(1.51 + 0.02 * scale + 0.1 * rng.normal(), 1.3, 1.9)),
+    )
+
+
+def van_size(rng: np.random.Generator) -> Size:
+    """Vans of 5.1 by 1.9 by 2.2 m."""
+    scale = rng.normal(0.0, 1.0)
+    return (
+        float(np.clip(5.0 + 0.6 * scale, 4.0, 7.0)),
+        float(np.clip(1.9 + 0.08 * scale + 0.08 * rng.normal(), 1.65, 2.2)),
+        float(np.clip(2.15 + 0.2 * scale + 0.15 * rng.normal(), 1.75, 2.8)),
+    )
+
+
+def truck_size(rng: np.random.Generator) -> Size:
+    """Lorries of 9 by 2.6 by 3.3 m."""
+    return float(rng.uniform(6.5, 12.0)), float(rng.uniform(2.3, 2.7)), float(rng.uniform(2.8, 3.8))
+
+
+def _wheels(rng: np.random.Generator, length: float, width: float, radius: float) -> Pieces:
+    x = length * rng.uniform(0.29, 0.32)
+    places: Float64 = np.array([[i * x, j * (width / 2 - 0.1)] for i in (-1, 1) for j in (-1, 1)])
+    return Pieces.join(cylinder((px, py, radius), radius, 0.22, Material.RUBBER, axis=1) for px, py in places)
+
+
+def _mirrors(x: float, z: float, width: float, paint: int) -> Pieces:
+    return Pieces.join(box((x - 0.35, s * (width / 2 + 0.05), z + 0.05), (0.12, 0.16, 0.14), paint) for s in (-1, 1))
+
+
+def _pillars(
+    rng: np.random.Generator,
+    front: float,
+    rear: float,
+    belt: float,
+    height: float,
+    width: float,
+    tuck: float,
+    paint: int,
+) -> Pieces:
+    """The painted posts of the cabin's sides."""
+    bottom, top = 0.46 * width, 0.46 * width - tuck * (height - belt)
+    x = (front + rear) / 2 + rng.uniform(-0.2, 0.2)
+    places = [(x, x), (rear + 0.35, rear + 0.55)]
+    return Pieces.join(
+        limb((a, s * bottom, belt), (b, s * top, height - 0.05), 0.06, paint) for s in (-1, 1) for a, b in places
+    )

@@ -1,0 +1,125 @@
+"""Which proposal belongs to which track."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from modt.config import TrackingConfig
+from modt.tracking.followed import Followed
+from modt.tracking.overlap import iou_3d
+from modt.tracking.sightings import Sightings
+from modt.types import Float64, Int
+
+FORBIDDEN = 1e6
+"""Cost of a pair that may not be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Pairs of a track and a proposal; no row and no proposal occurs twice.
+
+    Attributes:
+        rows: (K,) of the tracks.
+        proposals: (K,) of this frame.
+        place: (K, 2) where each proposal puts its track [m, world].
+        R: (K, 2, 2) covariance of that place [m2].
+    """
+
+    rows: Int
+    proposals: Int
+    place: Float64
+    R: Float64
+
+
+class Association(Protocol):
+    """Finds the proposals of the tracks."""
+
+    def match(self, tracks: Followed, sightings: Sightings) -> Matches:
+        """Pairs of predicted tracks and this frame's sightings."""
+        ...
+
+    def birthplace(self, sightings: Sightings) -> Float64:
+        """(P, 2) where a track begins that a sighting is the first of [m, world]."""
+        ...
+
+
+def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
+    """Indices of the candidate pairs that a least-cost assignment keeps.
+
+    Pairs that nobody contests are kept as they are; the Hungarian algorithm decides the rest, on the rows and
+    columns that they concern.
+
+    Args:
+        rows: (K,) first index of each candidate pair.
+        columns: (K,) second index; no pair occurs twice.
+        cost: (K,) of each, below limit.
+        limit: cost of leaving a row or a column without a partner.
+    """
+    if not len(rows):
+        return np.zeros(0, np.int64)
+    alone = (np.bincount(rows)[rows] == 1) & (np.bincount(columns)[columns] == 1)
+    contested = np.flatnonzero(~alone)
+    if not len(contested):
+        return np.arange(len(rows))
+    r, i = np.unique(rows[contested], return_inverse=True)
+    c, j = np.unique(columns[contested], return_inverse=True)
+    matrix = np.full((len(r), len(c)), limit)
+    which = np.full((len(r), len(c)), -1, np.int64)
+    matrix[i, j], which[i, j] = np.minimum(cost[contested], limit), contested
+    chosen = which[linear_sum_assignment(matrix)]
+    return np.sort(np.concatenate([np.flatnonzero(alone), chosen[chosen >= 0]]))
+
+
+class PaperAssociation:
+    """The paper's cost (section III-B), gated by T_DA; a proposal lies where its points lie on average.
+
+    The paper writes the cost as alpha (1 - I) - beta N - gamma S with N and S *differences* of point number and
+    size: taken literally, a worse match would cost less. Both are read as penalties here. I is the intersection
+    over union of the boxes' volumes, S the sum of the differences of length, width and height [m].
+    """
+
+    def __init__(self, config: TrackingConfig) -> None:
+        self.config = config
+
+    def match(self, tracks: Followed, sightings: Sightings) -> Matches:
+        """Pairs whose cost is at most T_DA."""
+        rows, columns = self._near(tracks, sightings)
+        cost = self.cost(tracks, sightings, rows, columns)
+        low = cost <= self.config.t_da
+        rows, columns, cost = rows[low], columns[low], cost[low]
+        keep = assign(rows, columns, cost, FORBIDDEN)
+        variance = self.config.position_sigma_m**2
+        R = np.broadcast_to(np.eye(2) * variance, (len(keep), 2, 2))
+        return Matches(rows[keep], columns[keep], sightings.centroid[columns[keep]], R)
+
+    def cost(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Float64:
+        """(K,) cost of the pairs."""
+        a, b = tracks.box[rows].copy(), sightings.box[columns]
+        a[:, :2] += tracks.x[rows, :2] - tracks.shown[rows]  # the last box, carried along the prediction
+        points = np.abs(tracks.points[rows] - sightings.count[columns])
+        size = np.abs(a[:, 3:6] - b[:, 3:6]).sum(axis=1)
+        penalty: Float64 = (
+            self.config.alpha * (1 - iou_3d(a, b)) + self.config.beta * points + self.config.gamma * size
+        )
+        return penalty
+
+    def birthplace(self, sightings: Sightings) -> Float64:
+        """Mean of the points."""
+        return sightings.centroid
+
+    def _near(self, tracks: Followed, sightings: Sightings) -> tuple[Int, Int]:
+        """Pairs whose boxes could touch: without overlap no pair can pass, unless alpha is below T_DA."""
+        centre = tracks.box[:, :2] + tracks.x[:, :2] - tracks.shown
+        offset = centre[:, None] - sightings.box[None, :, :2]
+        if self.config.alpha <= self.config.t_da:
+            near = np.ones(offset.shape[:2], np.bool_)
+        else:
+            reach = np.hypot(tracks.box[:, 3], tracks.box[:, 4])[:, None]
+            reach = (reach + np.hypot(sightings.box[:, 3], sightings.box[:, 4])) / 2
+            near = (offset**2).sum(axis=2) < reach**2
+        rows, columns = np.nonzero(near)
+        return rows, columns

@@ -1,0 +1,123 @@
+"""The extended Kalman filter of a track (Equation 1), for all tracks at once.
+
+State x = [x, y, heading, speed] in the world: m, m, rad, m/s. Only the place is observed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.geometry import wrap
+from modt.types import Float64
+
+X, Y, HEADING, SPEED = range(4)
+
+
+def motion(x: Float64, dt_s: float) -> Float64:
+    """(M, 4) F(x): constant heading and speed for dt_s (Equation 1)."""
+    moved = x.copy()
+    moved[:, X] += dt_s * np.cos(x[:, HEADING]) * x[:, SPEED]
+    moved[:, Y] += dt_s * np.sin(x[:, HEADING]) * x[:, SPEED]
+    return moved
+
+
+def motion_jacobian(x: Float64, dt_s: float) -> Float64:
+    """(M, 4, 4) derivative of F at x."""
+    F = np.broadcast_to(np.eye(4), (len(x), 4, 4)).copy()
+    c, s = np.cos(x[:, HEADING]), np.sin(x[:, HEADING])
+    F[:, X, HEADING], F[:, X, SPEED] = -dt_s * s * x[:, SPEED], dt_s * c
+    F[:, Y, HEADING], F[:, Y, SPEED] = dt_s * c * x[:, SPEED], dt_s * s
+    return F
+
+
+def process_noise(x: Float64, dt_s: float, acceleration: Float64, turn: Float64) -> Float64:
+    """(M, 4, 4) what an acceleration [m/s2] and a rate of turn [rad/s], white within dt_s, add to the covariance.
+
+    Across its heading a track can be pushed as hard as along it while it stands: then the heading says nothing.
+    """
+    c, s = np.cos(x[:, HEADING]), np.sin(x[:, HEADING])
+    G = np.zeros((len(x), 4, 2))
+    G[:, X, 0], G[:, Y, 0] = dt_s**2 / 2 * c, dt_s**2 / 2 * s
+    G[:, SPEED, 0] = dt_s
+    G[:, HEADING, 1] = dt_s
+    G *= np.stack([acceleration, turn], axis=1)[:, None, :]
+    Q: Float64 = G @ G.transpose(0, 2, 1)
+    drift = (dt_s**2 / 2 * acceleration) ** 2
+    Q[:, X, X] += drift * s * s
+    Q[:, Y, Y] += drift * c * c
+    Q[:, X, Y] -= drift * c * s
+    Q[:, Y, X] -= drift * c * s
+    return Q
+
+
+def predict(x: Float64, P: Float64, Q: Float64, dt_s: float) -> tuple[Float64, Float64]:
+    """States and covariances dt_s later."""
+    F = motion_jacobian(x, dt_s)
+    return motion(x, dt_s), F @ P @ F.transpose(0, 2, 1) + Q
+
+
+def innovation(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, Float64]:
+    """(M, 2) what the observed places z [m] add, and its (M, 2, 2) covariance, R (M, 2, 2) being theirs."""
+    return z - x[:, :2], P[:, :2, :2] + R
+
+
+def update(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, Float64]:
+    """States and covariances after the observed places z (M, 2) of covariance R (M, 2, 2)."""
+    nu, S = innovation(x, P, z, R)
+    K = P[:, :, :2] @ inverse_2x2(S)
+    after = x + (K @ nu[:, :, None])[:, :, 0]
+    after[:, HEADING] = wrap(after[:, HEADING])
+    I_KH = np.broadcast_to(np.eye(4), P.shape).copy()
+    I_KH[:, :, :2] -= K
+    return after, I_KH @ P @ I_KH.transpose(0, 2, 1) + K @ R @ K.transpose(0, 2, 1)
+
+
+def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) -> tuple[Float64, Float64]:
+    """States and covariances after an observed speed of deviation sigma."""
+    K = P[:, :, SPEED] / (P[:, SPEED, SPEED] + sigma_mps**2)[:, None]
+    after = x + K * (speed_mps - x[:, SPEED])[:, None]
+    after[:, HEADING] = wrap(after[:, HEADING])
+    squeezed: Float64 = P - K[:, :, None] * P[:, SPEED][:, None, :]
+    return after, (squeezed + squeezed.transpose(0, 2, 1)) / 2
+
+
+def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64]:
+    """Turn the heading of tracks that stand to where they seem to go.
+
+    At speed zero every heading says the same, and the filter's linearisation would see motion along one of them
+    only: the heading may be chosen, and what is known along it and across it turns with it.
+    """
+    turn = heading_rad - x[:, HEADING]
+    c, s = np.cos(turn), np.sin(turn)
+    T = np.broadcast_to(np.eye(4), P.shape).copy()
+    T[:, X, X], T[:, X, Y], T[:, Y, X], T[:, Y, Y] = c, -s, s, c
+    out = x.copy()
+    out[:, HEADING] = wrap(heading_rad)
+    return out, T @ P @ T.transpose(0, 2, 1)
+
+
+def turn_about(x: Float64, P: Float64) -> tuple[Float64, Float64]:
+    """The same motion with a speed that is not negative."""
+    sign = np.where(x[:, SPEED] < 0, -1.0, 1.0)
+    out, cov = x.copy(), P.copy()
+    out[:, SPEED] *= sign
+    out[:, HEADING] = np.where(sign < 0, wrap(x[:, HEADING] + np.pi), x[:, HEADING])
+    cov[:, SPEED, :] *= sign[:, None]
+    cov[:, :, SPEED] *= sign[:, None]
+    return out, cov
+
+
+def inverse_2x2(S: Float64) -> Float64:
+    """(M, 2, 2) inverses."""
+    a, b, c, d = S[:, 0, 0], S[:, 0, 1], S[:, 1, 0], S[:, 1, 1]
+    adjugate = np.stack([np.stack([d, -b], axis=1), np.stack([-c, a], axis=1)], axis=1)
+    inverse: Float64 = adjugate / (a * d - b * c)[:, None, None]
+    return inverse
+
+
+def mahalanobis_squared(nu: Float64, S: Float64) -> Float64:
+    """(M,) nu' S^-1 nu of residuals (M, 2) and covariances (M, 2, 2)."""
+    a, b, d = S[:, 0, 0], S[:, 0, 1], S[:, 1, 1]
+    dx, dy = nu[:, 0], nu[:, 1]
+    out: Float64 = (d * dx * dx - 2 * b * dx * dy + a * dy * dy) / (a * d - b * b)
+    return out

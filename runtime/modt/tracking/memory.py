@@ -1,0 +1,80 @@
+"""Background that is remembered: what was learnt about a place outlives the track that learnt it.
+
+The rule. A proposal that no track claims, and whose outline lies for the greater part within that of something
+classified as background which stood there - a track alive (it was part of it before it split off) or one deleted
+since - takes over that class. It keeps it until it leaves the place; then its class is asked for like any other's.
+
+The bound. The last CAPACITY places are kept, the oldest making room.
+
+The risk. A pedestrian who stood before a wall, as one segment with it, is background until about half a metre away
+from where the two parted. Heights are compared too, so that what stands higher than the place did is asked for.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.tracking.followed import Followed
+from modt.tracking.sightings import Sightings, covered, touching
+from modt.types import Bool, Int
+
+CAPACITY = 2048
+"""Places kept."""
+COVER = 0.6
+"""Part of a proposal's outline that must lie within that of the place."""
+RISE_M = 0.5
+"""How far a proposal may rise above what stood at its place."""
+
+
+class NoMemory:
+    """Nothing is remembered: every new proposal asks."""
+
+    def keep(self, tracks: Followed, rows: Int) -> None:
+        """Forget them."""
+
+    def recall(self, tracks: Followed, rows: Int, sightings: Sightings, which: Int) -> Bool:
+        """(n,) of the sightings named, none."""
+        return np.zeros(len(which), np.bool_)
+
+
+class BackgroundMemory:
+    """Outlines of background that stood still, in the world frame.
+
+    Args:
+        capacity: places kept.
+    """
+
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self._low, self._high = np.full((capacity, 4), np.inf), np.full((capacity, 4), -np.inf)
+        self._top = np.full(capacity, -np.inf)
+        self._next = self._filled = 0
+
+    def __len__(self) -> int:
+        return self._filled
+
+    def keep(self, tracks: Followed, rows: Int) -> None:
+        """Remember the places of tracks that end: background all of them, and at rest."""
+        slots = (self._next + np.arange(len(rows))) % len(self._top)
+        self._low[slots], self._high[slots] = tracks.low[rows], tracks.high[rows]
+        self._top[slots] = tracks.top[rows]
+        self._next = int(self._next + len(rows)) % len(self._top)
+        self._filled = min(self._filled + len(rows), len(self._top))
+
+    def recall(self, tracks: Followed, rows: Int, sightings: Sightings, which: Int) -> Bool:
+        """(n,) of the sightings named, which appear where background stood.
+
+        Args:
+            tracks: alive.
+            rows: of those that are background at rest.
+            sightings: of this frame.
+            which: (n,) those that no track claims.
+        """
+        n = self._filled
+        low = np.concatenate([self._low[:n], tracks.low[rows]])
+        high = np.concatenate([self._high[:n], tracks.high[rows]])
+        top = np.concatenate([self._top[:n], tracks.top[rows]])
+        i, j = touching(sightings.low[which], sightings.high[which], low, high)
+        within = covered(sightings.low[which[i]], sightings.high[which[i]], low[j], high[j]) >= COVER
+        known = np.zeros(len(which), np.bool_)
+        known[i[within & (sightings.top[which[i]] < top[j] + RISE_M)]] = True
+        return known

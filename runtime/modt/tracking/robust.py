@@ -1,0 +1,115 @@
+"""The association that tracks live by: what survives a change of view, gated by the filter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.config import TrackingConfig
+from modt.tracking import kalman
+from modt.tracking.association import Matches, assign
+from modt.tracking.followed import Followed
+from modt.tracking.sightings import AXES, Sightings, touching
+from modt.types import Bool, Float64, Int
+
+SOFT_M = 0.3
+"""Lengths are compared with this added: a difference of a few returns says nothing."""
+GATE = 16.0
+"""Greatest squared Mahalanobis distance of a pair: one true pair in three thousand lies beyond."""
+JUMP_M = 0.2
+"""Outlines jump by this much beyond the filter's noise, as parts of an object come into view and go."""
+LIMIT = 10.0
+"""Cost of leaving a track without a proposal."""
+W_SIZE, W_OVERLAP, W_HEIGHT, W_COUNT = 2.0, 3.0, 2.0, 0.5
+
+
+class RobustAssociation:
+    """Matches outlines, not centres.
+
+    What is seen of an object changes with the view: its far side appears, a pole hides its rear, the field of view
+    cuts it. Along each of four axes an outline has two ends; one of them usually stays, and the smaller of the two
+    shifts from where the filter expects them is taken for the object's own.
+
+    Args:
+        config: deviation of a measured place.
+    """
+
+    def __init__(self, config: TrackingConfig) -> None:
+        self.config = config
+
+    def match(self, tracks: Followed, sightings: Sightings) -> Matches:
+        """Pairs within the gate; then, among what is left, those that overlap although they changed their shape."""
+        low, high = carried(tracks)
+        R = self.noise(sightings)
+        rows, columns = self._near(tracks, low, high, sightings)
+        shift, size, overlap, cover = compare(low[rows], high[rows], sightings.low[columns], sightings.high[columns])
+        S = tracks.P[rows][:, :2, :2] + R[columns] + JUMP_M**2 * np.eye(2)
+        distance = kalman.mahalanobis_squared(shift, S)
+        height = np.abs(tracks.top[rows] - sightings.top[columns])
+        foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
+        count = np.abs(np.log(tracks.points[rows] / sightings.count[columns]))
+        shape = W_SIZE * size + W_OVERLAP * (1 - overlap) + W_HEIGHT * (height + foot) / 2 + W_COUNT * count
+        cost = distance / 2 + shape
+        first = np.flatnonzero((distance < GATE) & (cost < LIMIT))
+        first = first[assign(rows[first], columns[first], cost[first], LIMIT)]
+        left = _left(rows, rows[first], len(tracks)) & _left(columns, columns[first], len(sightings))
+        second = np.flatnonzero(left & (cover > 0.3))
+        second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
+        kept = np.concatenate([first, second])
+        place = tracks.x[rows[kept], :2] + shift[kept]
+        loose = np.maximum(1.0, distance[kept] / 4)  # the tails are heavy: what lies far off says less
+        return Matches(rows[kept], columns[kept], place, R[columns[kept]] * loose[:, None, None])
+
+    def birthplace(self, sightings: Sightings) -> Float64:
+        """Middle of the outline."""
+        return sightings.place
+
+    def noise(self, sightings: Sightings) -> Float64:
+        """(P, 2, 2) covariance of a place: ends of outlines jitter by the spacing of returns, and more where cut."""
+        extent = (sightings.high - sightings.low).mean(axis=1)
+        sigma = 0.06 + 0.001 * sightings.range_m + 0.03 * np.minimum(extent, 3.0)
+        sigma = np.where(sightings.cut, 1.5 * sigma, sigma)
+        R: Float64 = np.square(sigma)[:, None, None] * np.eye(2)
+        return R
+
+    def _near(self, tracks: Followed, low: Float64, high: Float64, sightings: Sightings) -> tuple[Int, Int]:
+        """Pairs whose outlines come near enough along x and along y."""
+        reach = (0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1])))[:, None]
+        return touching(low - reach, high + reach, sightings.low, sightings.high)
+
+
+def carried(tracks: Followed) -> tuple[Float64, Float64]:
+    """(M, 4) low and high ends of the outlines last seen, where the filter expects them now."""
+    moved = (tracks.x[:, :2] - tracks.shown) @ AXES
+    return tracks.low + moved, tracks.high + moved
+
+
+def compare(
+    low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64
+) -> tuple[Float64, Float64, Float64, Float64]:
+    """How outlines b (K, 4) lie to outlines a (K, 4), row by row.
+
+    Returns:
+        shift: (K, 2) from a to b [m], by the end that moved less along each axis.
+        size: (K,) mean difference of the logarithms of their lengths.
+        overlap: (K,) intersection over union.
+        cover: (K,) intersection over the smaller of the two.
+    """
+    ahead, behind = high_b - high_a, low_b - low_a
+    least = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
+    shift = least @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    length_a, length_b = high_a - low_a, high_b - low_b
+    size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).mean(axis=1)
+    pad = SOFT_M / 3
+    common = np.maximum(np.minimum(high_a, high_b) - np.maximum(low_a, low_b) + pad, 0.0)
+    squares = [(length + pad)[:, :2] * (length + pad)[:, 2:] for length in (length_a, length_b)]
+    shared = common[:, :2] * common[:, 2:]  # in the upright square, and in the one on its corner
+    overlap = (shared / (squares[0] + squares[1] - shared)).min(axis=1)
+    cover = (shared / np.minimum(*squares)).min(axis=1)
+    return shift, size, overlap, cover
+
+
+def _left(all_: Int, taken: Int, n: int) -> Bool:
+    """(K,) which of the indices were not taken."""
+    free = np.ones(n, np.bool_)
+    free[taken] = False
+    return free[all_]

@@ -1,0 +1,106 @@
+"""What a frame's proposals show, in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.geometry import transform, transform_boxes
+from modt.types import Bool, Float64, Frame, Int, Proposals
+
+DIRECTIONS = np.deg2rad([0.0, 45.0, 90.0, 135.0])
+"""Bearings of the axes along which an outline is measured, world frame [rad]."""
+PAD_M = 0.15
+"""Outlines jitter by this much."""
+AXES = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """The proposals of a frame in the world; P rows.
+
+    Attributes:
+        box: (P, 7) world frame.
+        centroid: (P, 2) mean of the points [m].
+        low, high: (P, 4) outline: least and greatest coordinate of the points along each of AXES [m].
+        foot, top: (P,) heights of the lowest and the highest point [m].
+        count: (P,) points.
+        range_m: (P,) distance from the sensor.
+        cut: (P,) the outline is cut short by the field of view or by something in front.
+        eye: (2,) where the sensor stands [m].
+    """
+
+    box: Float64
+    centroid: Float64
+    low: Float64
+    high: Float64
+    foot: Float64
+    top: Float64
+    count: Int
+    range_m: Float64
+    cut: Bool
+    eye: Float64
+
+    def __len__(self) -> int:
+        return len(self.box)
+
+    @property
+    def place(self) -> Float64:
+        """(P, 2) middle of the outline along x and y [m]."""
+        middle: Float64 = (self.low[:, [0, 2]] + self.high[:, [0, 2]]) / 2
+        return middle
+
+
+def sight(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> Sightings:
+    """The proposals of a frame, taken to the world by T_world_sensor (4, 4)."""
+    low, high = outlines(frame, proposals, T_world_sensor)
+    box = transform_boxes(T_world_sensor, proposals.box)
+    return Sightings(
+        box=box,
+        centroid=transform(T_world_sensor, proposals.centroid)[:, :2],
+        low=low,
+        high=high,
+        foot=box[:, 2] - box[:, 5] / 2,
+        top=box[:, 2] + box[:, 5] / 2,
+        count=proposals.count,
+        range_m=np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]),
+        cut=proposals.truncated | proposals.occluded,
+        eye=T_world_sensor[:2, 3],
+    )
+
+
+def touching(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> tuple[Int, Int]:
+    """Pairs of outlines (n, 4) and (k, 4) that overlap along x and along y, as two arrays of indices."""
+    near = np.ones((len(low_a), len(low_b)), np.bool_)
+    for axis in (0, 2):
+        near &= low_a[:, axis].astype(np.float32)[:, None] <= high_b[:, axis].astype(np.float32)
+        near &= high_a[:, axis].astype(np.float32)[:, None] >= low_b[:, axis].astype(np.float32)
+    found = np.flatnonzero(near)
+    i, j = np.divmod(found, max(len(low_b), 1))
+    return i, j
+
+
+def covered(low: Float64, high: Float64, low_place: Float64, high_place: Float64) -> Float64:
+    """(k,) part of each outline (k, 4) within its place (k, 4): the lesser for the two squares that hold them."""
+    common = np.minimum(high, high_place + PAD_M) - np.maximum(low, low_place - PAD_M)
+    part = np.maximum(common, 0.0) / np.maximum(high - low, PAD_M)
+    least: Float64 = np.minimum(part[:, 0] * part[:, 2], part[:, 1] * part[:, 3])
+    return least
+
+
+def outlines(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> tuple[Float64, Float64]:
+    """(P, 4) least and (P, 4) greatest coordinate of each proposal's points along AXES, world frame [m]."""
+    n = len(proposals)
+    if not n:
+        return np.zeros((0, 4)), np.zeros((0, 4))
+    R = T_world_sensor[:2, :3].astype(np.float32)
+    px, py, pz = frame.points.take(proposals.members, axis=0)[:, :3].T.copy()
+    x, y = (R[k, 0] * px + R[k, 1] * py + R[k, 2] * pz for k in (0, 1))
+    half = np.float32(np.sqrt(0.5))
+    starts = proposals.offsets[:-1]
+    low, high = np.empty((n, 4)), np.empty((n, 4))
+    for k, along in enumerate((x, (x + y) * half, y, (y - x) * half)):
+        low[:, k], high[:, k] = np.minimum.reduceat(along, starts), np.maximum.reduceat(along, starts)
+    shift = T_world_sensor[:2, 3] @ AXES
+    return low + shift, high + shift

@@ -1,0 +1,247 @@
+"""The tracking stage: predict, associate, update, births and deaths (sections III-B, IV-B and V-B)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.config import TrackingConfig
+from modt.geometry import inverse, se3
+from modt.tracking import kalman
+from modt.tracking.association import Association, Matches, PaperAssociation
+from modt.tracking.egomotion import Registration
+from modt.tracking.followed import Followed
+from modt.tracking.kinship import reunite
+from modt.tracking.memory import BackgroundMemory, NoMemory
+from modt.tracking.robust import RobustAssociation
+from modt.tracking.sightings import AXES, Sightings, sight
+from modt.tracking.states import Happening, StateMachine
+from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
+
+UNKNOWN_HEADING_RAD = np.pi
+"""Deviation of the heading of a new track: it says nothing."""
+STILL_M = 0.5
+"""What stays this near to where it was stands still."""
+HOME_GAIN = 0.1
+"""How fast home follows: a view that changes, or odometry that drifts, is no motion."""
+STILL_SIGMA_MPS = 1.0
+"""How surely what stands still has no speed, per frame."""
+SLOW_MPS = 0.5
+"""What is slower than this has stopped."""
+FORGET = 0.98
+"""What is kept, a frame, of an extent that is not seen again."""
+AGILITY = np.array([0.25, 1.5, 0.75, 1.0])
+"""Process noise of each class relative to what is assumed of an unknown one."""
+
+
+def association_of(config: TrackingConfig) -> Association:
+    """The association that a configuration names."""
+    return PaperAssociation(config) if config.association == "paper" else RobustAssociation(config)
+
+
+def rigid(T: Float64) -> Float64:
+    """(4, 4) nearest rigid transform: a pose that is its predecessor's product would drift from being one."""
+    U, _, Vt = np.linalg.svd(T[:3, :3])
+    return se3(U @ Vt, T[:3, 3])
+
+
+class Tracker:
+    """Follows every proposal from frame to frame.
+
+    Args:
+        config: its parameters.
+        machine: the table that drives the states, EFFICIENT or ACCURATE.
+        association: how proposals find their tracks; by default as the configuration says.
+        memory: what is kept of background that is gone; by default nothing with the paper's association.
+    """
+
+    def __init__(
+        self,
+        config: TrackingConfig,
+        machine: StateMachine,
+        association: Association | None = None,
+        memory: NoMemory | BackgroundMemory | None = None,
+    ) -> None:
+        self.config, self.machine = config, machine
+        self.association = association or association_of(config)
+        self.memory = memory or (BackgroundMemory() if config.association == "robust" else NoMemory())
+        self._registration = Registration()
+        self._tracks = Followed.blank()
+        self._next_id = 0
+        self._stamp_s: float | None = None
+        self._T_world_sensor = np.eye(4)
+        self._T_last_now = np.eye(4)
+
+    @property
+    def tracks(self) -> Tracks:
+        """The live table."""
+        return self._tracks
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Name of each value of tracks.state."""
+        return self.machine.names
+
+    @property
+    def T_world_sensor(self) -> Float64:
+        """(4, 4) pose that the last frame was placed by."""
+        return self._T_world_sensor
+
+    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
+        """Take a frame's proposals to the tracks; afterwards every proposal belongs to exactly one of them.
+
+        Returns:
+            The live table: stages that come after write their columns into it.
+        """
+        sightings = self._sight(frame, proposals)
+        self._predict(frame.stamp_s)
+        matches = reunite(self._tracks, sightings, self.association.match(self._tracks, sightings))
+        self._update(matches, sightings)
+        self._rest(matches.rows)
+        self._miss(matches.rows)
+        self._doubt()
+        self._bear(matches, sightings)
+        self._bury()
+        return self._tracks
+
+    def asking(self) -> Bool:
+        """(M,) tracks with a proposal whose state asks for a class."""
+        asks: Bool = self.machine.asks[self._tracks.state] & (self._tracks.proposal != NONE)
+        return asks
+
+    def settle(self, rows: Int, certain: Bool) -> None:
+        """Tell the machine which tracks were classified: rows (R,), and which of them are certain now (R,).
+
+        Tracks whose state does not ask are left as they are (a mode that classifies everything does so without
+        the machine).
+        """
+        certain = np.asarray(certain, np.bool_)
+        asked = self.machine.asks[self._tracks.state[rows]]
+        rows, certain = rows[asked], certain[asked]
+        happening = np.where(certain, Happening.CLASSIFIED, self._undecided(rows))
+        self._tracks.state[rows] = self.machine.meet(self._tracks.state[rows], happening)
+
+    def _undecided(self, rows: Int) -> Int:
+        """What a classification without certainty is to each row: Table I knows no doubt."""
+        answers = self.machine.answer[self._tracks.state[rows], Happening.UNDECIDED] != NONE
+        return np.where(answers, Happening.UNDECIDED, Happening.CLASSIFIED)
+
+    def _predict(self, stamp_s: float) -> None:
+        """Equation 1, over the time since the last frame."""
+        dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
+        self._stamp_s = stamp_s
+        t = self._tracks
+        agility = np.where(t.fixed, AGILITY[t.posterior.argmax(axis=1)], 1.0)
+        acceleration = agility * self.config.acceleration_sigma_mps2
+        turn = agility * self.config.turn_sigma_radps
+        t.x, t.P = kalman.predict(t.x, t.P, kalman.process_noise(t.x, dt_s, acceleration, turn), dt_s)
+
+    def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
+        """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
+        before = self._T_world_sensor
+        if frame.T_world_sensor is not None:
+            after, sightings = frame.T_world_sensor, sight(frame, proposals, frame.T_world_sensor)
+        else:
+            after = before @ self._T_last_now
+            sightings = sight(frame, proposals, after)
+            after = rigid(self._registration.correct(self._tracks, sightings) @ after)
+            sightings = sight(frame, proposals, after)
+        self._T_world_sensor, self._T_last_now = after, inverse(before) @ after
+        return sightings
+
+    def _update(self, matches: Matches, sightings: Sightings) -> None:
+        """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""
+        t, rows = self._tracks, matches.rows
+        x, P = t.x[rows], t.P[rows]
+        slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
+        step = matches.place - x[:, :2]
+        heading = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
+        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, matches.R)
+        t.x[rows], t.P[rows] = kalman.turn_about(x, P)
+        t.state[rows] = self.machine.meet(t.state[rows], Happening.ASSOCIATED)
+        t.missed[rows] = 0
+        t.hits[rows] += 1
+        self._show(t, rows, matches.proposals, sightings, matches.place)
+
+    def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
+        """Note what was seen of the tracks."""
+        tracks.shown[rows] = place
+        low, high = (a[proposals] - place @ AXES for a in (sightings.low, sightings.high))
+        tracks.hull_low[rows] = np.minimum(low, FORGET * tracks.hull_low[rows] + (1 - FORGET) * low)
+        tracks.hull_high[rows] = np.maximum(high, FORGET * tracks.hull_high[rows] + (1 - FORGET) * high)
+        tracks.proposal[rows] = proposals
+        tracks.box[rows] = sightings.box[proposals]
+        tracks.points[rows] = sightings.count[proposals]
+        tracks.low[rows], tracks.high[rows] = sightings.low[proposals], sightings.high[proposals]
+        tracks.foot[rows], tracks.top[rows] = sightings.foot[proposals], sightings.top[proposals]
+
+    def _rest(self, rows: Int) -> None:
+        """What stays where it was has no speed; what has stopped is at home where it is."""
+        t = self._tracks
+        stopped = rows[(t.x[rows, kalman.SPEED] < SLOW_MPS) & ~t.still[rows] & (t.hits[rows] > 3)]
+        t.home[stopped] = t.x[stopped, :2]
+        away = np.hypot(*(t.x[rows, :2] - t.home[rows]).T)
+        t.still[rows] = (away < STILL_M) & (t.hits[rows] > 2)
+        near = rows[away < STILL_M]
+        t.home[near] += HOME_GAIN * (t.x[near, :2] - t.home[near])
+        t.x[near], t.P[near] = kalman.observe_speed(t.x[near], t.P[near], 0.0, STILL_SIGMA_MPS)
+
+    def _miss(self, matched: Int) -> None:
+        """Tracks without a proposal coast."""
+        t = self._tracks
+        t.age += 1
+        missing = np.ones(len(t), np.bool_)
+        missing[matched] = False
+        t.proposal[missing] = NONE
+        t.missed[missing] += 1
+        t.state[missing] = self.machine.meet(t.state[missing], Happening.UNASSOCIATED)
+
+    def _doubt(self) -> None:
+        """A class inherited from a place does not hold away from it."""
+        t = self._tracks
+        away = np.hypot(*(t.x[:, :2] - t.home).T) > STILL_M
+        rows = np.flatnonzero(t.inherited & away & (t.proposal != NONE))
+        t.state[rows] = self.machine.meet(t.state[rows], Happening.DOUBTED)
+        t.inherited[rows] = t.fixed[rows] = False
+        t.posterior[rows] = 1.0 / N_CLASSES
+
+    def _bear(self, matches: Matches, sightings: Sightings) -> None:
+        """A track for every proposal that found none; a2, or a1 and a5 where its place is remembered."""
+        free = np.ones(len(sightings), np.bool_)
+        free[matches.proposals] = False
+        born = np.flatnonzero(free)
+        if not len(born):
+            return
+        known = self.memory.recall(self._tracks, np.flatnonzero(self._scenery()), sightings, born)
+        new = Followed.blank(len(born))
+        new.id[:] = self._next_id + np.arange(len(born))
+        self._next_id += len(born)
+        new.state[:] = self.machine.proposal
+        new.state[known] = self.machine.meet(new.state[known], Happening.ASSOCIATED)
+        new.state[known] = self.machine.meet(new.state[known], Happening.INHERITS_CLASS)
+        new.state[~known] = self.machine.meet(new.state[~known], Happening.UNASSOCIATED)
+        new.inherited[:] = new.fixed[:] = known
+        new.posterior[known] = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
+        new.x[:, :2] = self.association.birthplace(sightings)[born]  # speed and heading begin at zero
+        place, speed = self.config.position_sigma_m, self.config.initial_speed_sigma_mps
+        new.P[:] = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
+        new.age[:] = new.hits[:] = 1
+        new.home[:] = new.x[:, :2]
+        new.hull_low[:], new.hull_high[:] = np.inf, -np.inf
+        self._show(new, np.arange(len(born)), born, sightings, new.x[:, :2])
+        self._tracks = self._tracks.append(new)
+
+    def _bury(self) -> None:
+        """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered."""
+        t = self._tracks
+        expired = t.missed > self.config.max_missed
+        if not expired.any():
+            return
+        t.state[expired] = self.machine.meet(t.state[expired], Happening.EXPIRED)
+        self.memory.keep(t, np.flatnonzero(expired & self._scenery()))
+        self._tracks = t.take(~expired)
+
+    def _scenery(self) -> Bool:
+        """(M,) background, for certain, that stands still."""
+        t = self._tracks
+        scenery: Bool = t.fixed & t.still & (t.posterior.argmax(axis=1) == ObjectClass.BACKGROUND)
+        return scenery

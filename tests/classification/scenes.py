@@ -1,0 +1,32 @@
+"""Proposals and tracks made up for tests."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.types import Float32, Proposals, Tracks
+
+
+def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposals]:
+    """A frame of blobs with so many points each, 5 to 50 m away, between points that belong to nothing."""
+    n = len(counts)
+    bearing, distance = rng.uniform(-3, 3, n), rng.uniform(5, 50, n)
+    centre = np.c_[distance * np.cos(bearing), distance * np.sin(bearing), np.full(n, -1.0)]
+    total = sum(counts)
+    xyz = rng.normal(0, 0.5, (total, 3)) + np.repeat(centre, counts, axis=0)
+    points = np.zeros((2 * total, 4), np.float32)
+    members = np.sort(rng.choice(2 * total, total, replace=False))
+    points[members, :3] = xyz
+    box = np.c_[centre, np.full((n, 3), 1.5), np.zeros(n)].reshape(n, 7)
+    none = np.zeros(n, np.bool_)
+    return points, Proposals(members, np.append(0, np.cumsum(counts)).astype(np.int64), centre, box, none, none)
+
+
+def seen(proposals: Proposals) -> Tracks:
+    """A new track for each proposal; the world frame is the sensor frame."""
+    n = len(proposals)
+    tracks = Tracks.blank(n)
+    tracks.id, tracks.proposal = np.arange(n), np.arange(n)
+    tracks.points, tracks.box = proposals.count.copy(), proposals.box.copy()
+    tracks.age[:], tracks.hits[:] = 1, 1
+    return tracks

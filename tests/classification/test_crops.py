@@ -1,0 +1,84 @@
+"""The network's input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.classification.crops import Crops, canonical, gather
+from modt.types import Proposals
+from tests.classification.scenes import blobs
+
+COUNTS = st.lists(st.integers(1, 60), min_size=1, max_size=6)
+
+
+def canonical_one(xyz: np.ndarray, height_m: float) -> np.ndarray:
+    """Slow reference: one crop, step by step."""
+    x, y = xyz[:, :2].mean(axis=0)
+    bearing = np.arctan2(y, x)
+    turn = np.array([[np.cos(bearing), np.sin(bearing)], [-np.sin(bearing), np.cos(bearing)]])
+    local = xyz[:, :2] @ turn.T
+    local -= (local.min(axis=0) + local.max(axis=0)) / 2
+    return np.c_[local, xyz[:, 2] + height_m]
+
+
+@given(counts=COUNTS, seed=st.integers(0, 1000))
+def test_canonical_agrees_with_the_reference(counts: list[int], seed: int) -> None:
+    points, proposals = blobs(counts, np.random.default_rng(seed))
+    crops = canonical(gather(points, proposals, np.arange(len(counts)), 1000), 1.73)
+    for i in range(len(counts)):
+        members = proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]]
+        expected = canonical_one(points[members, :3].astype(np.float64), 1.73)
+        np.testing.assert_allclose(crops.xyz[crops.offsets[i] : crops.offsets[i + 1]], expected, atol=2e-4)
+
+
+@given(angle=st.floats(-3.1, 3.1), seed=st.integers(0, 100))
+def test_a_crop_looks_alike_from_anywhere_in_the_sweep(angle: float, seed: int) -> None:
+    points, proposals = blobs([30, 5], np.random.default_rng(seed))
+    c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
+    turned = points.copy()
+    turned[:, 0], turned[:, 1] = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
+    rows = np.arange(2)
+    np.testing.assert_allclose(
+        canonical(gather(turned, proposals, rows, 100), 1.0).xyz,
+        canonical(gather(points, proposals, rows, 100), 1.0).xyz,
+        atol=1e-3,
+    )
+
+
+def test_gather_keeps_the_order_asked_for() -> None:
+    points, proposals = blobs([3, 4, 5], np.random.default_rng(0))
+    crops = gather(points, proposals, np.array([2, 0]), 100)
+    assert crops.count.tolist() == [5, 3]
+    np.testing.assert_array_equal(crops.xyz[:5], points[proposals.members[7:], :3])
+
+
+@given(own=st.integers(1, 500), most=st.integers(1, 100))
+def test_a_large_proposal_is_thinned_evenly_and_always_alike(own: int, most: int) -> None:
+    points, proposals = blobs([own], np.random.default_rng(own))
+    crops = gather(points, proposals, np.array([0]), most)
+    kept = [int(np.flatnonzero((points[proposals.members, :3] == p).all(axis=1))[0]) for p in crops.xyz]
+    assert len(kept) == min(own, most)
+    assert len(set(kept)) == len(kept)
+    steps = np.diff(kept)
+    assert len(steps) == 0 or steps.max() - steps.min() <= 1
+
+
+@given(counts=COUNTS)
+def test_padding_repeats_own_points_and_nothing_else(counts: list[int]) -> None:
+    points, proposals = blobs(counts, np.random.default_rng(1))
+    crops = gather(points, proposals, np.arange(len(counts)), 100)
+    batch = crops.padded(np.arange(len(counts)))
+    assert batch.shape == (len(counts), max(counts), 3)
+    for i, own in enumerate(batch):
+        expected = crops.xyz[crops.offsets[i] : crops.offsets[i + 1]]
+        assert {tuple(p) for p in own} == {tuple(p) for p in expected}
+
+
+@pytest.mark.parametrize("height_m", [0.5, 1.73])
+def test_no_proposals_make_no_crops(height_m: float) -> None:
+    empty = gather(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64), 100)
+    assert len(canonical(empty, height_m)) == 0
+    assert isinstance(empty, Crops)

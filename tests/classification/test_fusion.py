@@ -1,0 +1,191 @@
+"""Which views are asked for, and what they add up to."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from modt.classification.fusion import EveryFrame, FirstView, Fusion, KeyViews
+from modt.config import FusionConfig
+from modt.types import NONE, Float64, Proposals, Tracks
+from tests.classification.scenes import blobs, seen
+
+PAPER = FusionConfig(prior=(0.25, 0.25, 0.25), start_frame=1)
+ALL = (EveryFrame(), FirstView(), KeyViews(FusionConfig()), KeyViews(PAPER))
+
+
+def scene(counts: tuple[int, ...] = (50, 50)) -> tuple[Proposals, Tracks]:
+    _, proposals = blobs(list(counts), np.random.default_rng(3))
+    return proposals, seen(proposals)
+
+
+def moved(proposals: Proposals, **columns: np.ndarray) -> Proposals:
+    return dataclasses.replace(proposals, **columns)
+
+
+@pytest.mark.parametrize("fusion", ALL)
+@given(
+    views=st.lists(
+        arrays(np.float64, (2, 4), elements=st.floats(allow_nan=True, allow_infinity=True)), min_size=1, max_size=8
+    )
+)
+def test_whatever_the_network_says_the_posterior_stays_one(fusion: Fusion, views: list[Float64]) -> None:
+    proposals, tracks = scene()
+    rows = np.arange(2)
+    for view in views:
+        fusion.fuse(tracks, proposals, rows, view)
+        tracks.age += 1
+        assert np.isfinite(tracks.posterior).all()
+        assert (tracks.posterior > 0).all()
+        np.testing.assert_allclose(tracks.posterior.sum(axis=1), 1.0)
+
+
+@given(
+    arrays(np.float64, (5, 4), elements=st.floats(0.05, 1.0)),
+    arrays(np.float64, (3,), elements=st.floats(0.02, 0.3)),
+)
+def test_key_views_multiply_as_equation_6_says(views: Float64, prior: Float64) -> None:
+    views = views / views.sum(axis=1, keepdims=True)
+    config = FusionConfig(prior=(prior[0], prior[1], prior[2]), start_frame=1, threshold=1.0)
+    proposals, tracks = scene((50,))
+    fusion = KeyViews(config)
+    full = np.append(1 - prior.sum(), prior)
+    expected = full.copy()
+    for view in views:
+        fusion.fuse(tracks, proposals, np.array([0]), view[None])
+        expected = expected * view / full  # slow reference: P(X) times each P(X|Y) / P(X)
+        expected /= expected.sum()
+        if expected.min() < 1e-3:
+            return  # the floor has a word from here on
+        np.testing.assert_allclose(tracks.posterior[0], expected, rtol=1e-6)
+    assert tracks.views[0] == len(views)
+
+
+def test_no_class_is_ruled_out_for_good() -> None:
+    proposals, tracks = scene((50,))
+    fusion = KeyViews(PAPER)
+    for _ in range(50):
+        fusion.fuse(tracks, proposals, np.array([0]), np.array([[1.0, 0.0, 0.0, 0.0]]))
+    for _ in range(3):
+        fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.01, 0.97, 0.01, 0.01]]))
+    assert tracks.posterior[0].argmax() == 1
+
+
+def test_every_frame_asks_for_whatever_is_seen() -> None:
+    proposals, tracks = scene()
+    tracks.fixed[:] = True
+    tracks.proposal[1] = NONE
+    assert EveryFrame().asks(tracks, proposals, np.zeros(2, np.bool_)).tolist() == [True, False]
+
+
+def test_first_view_is_final() -> None:
+    proposals, tracks = scene()
+    fusion = FirstView()
+    asking = np.array([True, True])
+    assert fusion.asks(tracks, proposals, asking).all()
+    certain = fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
+    assert certain.all()
+    assert fusion.asks(tracks, proposals, asking).tolist() == [False, True]
+
+
+def test_a_distinct_first_view_settles_the_class_at_once() -> None:
+    proposals, tracks = scene()
+    fusion = KeyViews(FusionConfig())
+    view = np.array([[0.98, 0.01, 0.005, 0.005], [0.5, 0.3, 0.1, 0.1]])
+    assert fusion.fuse(tracks, proposals, np.arange(2), view).tolist() == [True, False]
+    assert tracks.fixed.tolist() == [True, False]
+    assert tracks.views.tolist() == [1, 0]
+
+
+def test_an_early_view_is_forgotten_at_the_starting_frame() -> None:
+    proposals, tracks = scene((50,))
+    fusion, asking = KeyViews(FusionConfig(start_frame=3)), np.array([True])
+    misled, clear = np.array([[0.1, 0.1, 0.7, 0.1]]), np.array([[0.2, 0.6, 0.1, 0.1]])
+    fusion.fuse(tracks, proposals, np.array([0]), misled)
+    np.testing.assert_allclose(tracks.posterior[0], misled[0], rtol=1e-6)
+    tracks.age[:] = 2
+    assert not fusion.asks(tracks, proposals, asking).any()
+    tracks.age[:] = 3
+    assert fusion.asks(tracks, proposals, asking).all()
+    fusion.fuse(tracks, proposals, np.array([0]), clear)
+    np.testing.assert_allclose(tracks.posterior[0], clear[0], rtol=1e-6)
+
+
+def after_a_view(config: FusionConfig) -> tuple[KeyViews, Proposals, Tracks]:
+    proposals, tracks = scene((50,))
+    fusion = KeyViews(config)
+    fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.2, 0.6, 0.1, 0.1]]))
+    tracks.age[:] = config.start_frame
+    return fusion, proposals, tracks
+
+
+def asks(fusion: KeyViews, tracks: Tracks, proposals: Proposals) -> bool:
+    tracks.box = proposals.box.copy()
+    return bool(fusion.asks(tracks, proposals, np.array([True]))[0])
+
+
+def test_the_same_view_is_no_new_observation() -> None:
+    fusion, proposals, tracks = after_a_view(PAPER)
+    assert not asks(fusion, tracks, proposals)
+
+
+@pytest.mark.parametrize(("points", "independent"), [(50, False), (59, False), (62, True), (38, True)])
+def test_a_change_of_points_beyond_alpha_is_one(points: int, independent: bool) -> None:
+    fusion, proposals, tracks = after_a_view(PAPER)
+    assert asks(fusion, tracks, moved(proposals, offsets=np.array([0, points]))) == independent
+
+
+def test_alpha_is_that_of_the_likeliest_class() -> None:
+    config = dataclasses.replace(PAPER, alpha=(0.9, 0.1, 0.9))
+    fusion, proposals, tracks = after_a_view(config)
+    more = moved(proposals, offsets=np.array([0, 60]))
+    assert not asks(fusion, tracks, more)
+    tracks.posterior[0] = [0.2, 0.2, 0.5, 0.1]
+    assert asks(fusion, tracks, more)
+
+
+@pytest.mark.parametrize(("degrees", "independent"), [(10, False), (30, True), (-30, True), (355, False)])
+def test_a_change_of_bearing_is_one(degrees: float, independent: bool) -> None:
+    fusion, proposals, tracks = after_a_view(PAPER)
+    box = proposals.box.copy()
+    angle = np.deg2rad(degrees)
+    c, s = np.cos(angle), np.sin(angle)
+    box[:, :2] = box[:, :2] @ np.array([[c, s], [-s, c]])
+    assert asks(fusion, tracks, moved(proposals, box=box)) == independent
+
+
+def test_a_turning_sensor_does_not_change_the_view() -> None:
+    fusion, proposals, tracks = after_a_view(PAPER)
+    box = proposals.box.copy()
+    angle = np.deg2rad(60)
+    c, s = np.cos(angle), np.sin(angle)
+    box[:, :2] = box[:, :2] @ np.array([[c, s], [-s, c]])
+    box[:, 6] += angle  # the object turns with its bearing in the sensor frame, and stays put in the world
+    assert not fusion.asks(tracks, moved(proposals, box=box), np.array([True]))[0]
+
+
+@pytest.mark.parametrize(("factor", "independent"), [(1.1, False), (1.3, True), (0.7, True)])
+def test_a_change_of_range_is_one(factor: float, independent: bool) -> None:
+    fusion, proposals, tracks = after_a_view(PAPER)
+    box = proposals.box * ([factor] * 2 + [1.0] * 5)
+    assert asks(fusion, tracks, moved(proposals, box=box)) == independent
+
+
+@pytest.mark.parametrize(("factor", "independent"), [(1.2, False), (1.5, True), (0.5, True)])
+def test_a_change_of_extent_is_one(factor: float, independent: bool) -> None:
+    fusion, proposals, tracks = after_a_view(PAPER)
+    box = proposals.box * np.array([1, 1, 1, 1, 1, factor, 1])
+    assert asks(fusion, tracks, moved(proposals, box=box)) == independent
+
+
+@pytest.mark.parametrize("fusion", ALL)
+def test_no_tracks_are_no_trouble(fusion: Fusion) -> None:
+    proposals = Proposals.empty()
+    tracks = seen(proposals)
+    assert len(fusion.asks(tracks, proposals, np.zeros(0, np.bool_))) == 0
+    assert len(fusion.fuse(tracks, proposals, np.zeros(0, np.int64), np.zeros((0, 4)))) == 0

@@ -1,0 +1,152 @@
+"""The network: exact whatever the batch, and particular about its model file."""
+
+from __future__ import annotations
+
+import shutil
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+
+from export_pointnet import graph
+from modt import assets
+from modt.classification.pointnet import PointNet
+from modt.config import ClassificationConfig, SensorConfig
+from modt.errors import MisuseError
+from modt.types import Float32, Float64, Proposals
+from tests.classification.scenes import blobs
+
+SIZES = (3, 32, 64, 512, 256, 128, 4)
+SENSOR = SensorConfig()
+Layers = list[tuple[Float32, Float32]]
+
+
+def random_layers(seed: int) -> Layers:
+    rng = np.random.default_rng(seed)
+    return [
+        (
+            (rng.normal(size=(a, b)) * np.sqrt(2 / a)).astype(np.float32),
+            rng.normal(0, 0.3, b).astype(np.float32),
+        )
+        for a, b in pairwise(SIZES)
+    ]
+
+
+def textbook(layers: Layers, xyz: Float32) -> Float64:
+    """Slow reference: one crop, bias and ReLU on every point before the maximum, in double precision."""
+    h = xyz.astype(np.float64)
+    for weight, bias in layers[:3]:
+        h = np.maximum(h @ weight + bias, 0)
+    h = h.max(axis=0)
+    for weight, bias in layers[3:-1]:
+        h = np.maximum(h @ weight + bias, 0)
+    weight, bias = layers[-1]
+    z = h @ weight + bias
+    e = np.exp(z - z.max())
+    softmax: Float64 = e / e.sum()
+    return softmax
+
+
+def save(folder: Path, layers: Layers, **options: bool) -> Path:
+    path = folder / "net.onnx"
+    path.write_bytes(graph(layers, **options).SerializeToString(deterministic=True))
+    return path
+
+
+def network(model: str | Path, **options: int) -> PointNet:
+    return PointNet(ClassificationConfig(model=str(model), **options), SENSOR)
+
+
+@pytest.fixture(scope="module")
+def shipped() -> PointNet:
+    return network(ClassificationConfig().model)
+
+
+@pytest.mark.parametrize("pool_first", [True, False])
+def test_the_exported_graph_agrees_with_the_textbook(tmp_path: Path, pool_first: bool) -> None:
+    layers = random_layers(1)
+    net = network(save(tmp_path, layers, pool_first=pool_first))
+    rng = np.random.default_rng(2)
+    for points in (1, 2, 5, 50, 400, 1000):
+        batch = rng.normal(0, 1.5, (3, points, 3)).astype(np.float32)
+        expected = [textbook(layers, crop) for crop in batch]
+        np.testing.assert_allclose(net.infer(batch), expected, atol=1e-4)
+
+
+def test_company_and_order_change_nothing(shipped: PointNet) -> None:
+    points, proposals = blobs([5, 300, 17, 17, 90, 1, 450, 33, 60, 8, 12], np.random.default_rng(0))
+    rows = np.arange(len(proposals))
+    together = shipped.classify(points, proposals, rows)
+    alone = np.concatenate([shipped.classify(points, proposals, rows[i : i + 1]) for i in rows])
+    np.testing.assert_allclose(together, alone, atol=1e-5)
+    np.testing.assert_allclose(shipped.classify(points, proposals, rows[::-1]), together[::-1], atol=1e-5)
+
+
+def test_two_calls_give_the_same_bytes(shipped: PointNet) -> None:
+    points, proposals = blobs([40, 7, 200], np.random.default_rng(0))
+    first = shipped.classify(points, proposals, np.arange(3))
+    assert first.tobytes() == shipped.classify(points, proposals, np.arange(3)).tobytes()
+
+
+def test_rows_are_distributions(shipped: PointNet) -> None:
+    points, proposals = blobs([40, 7, 200, 5], np.random.default_rng(4))
+    out = shipped.classify(points, proposals, np.arange(4))
+    assert out.shape == (4, 4)
+    assert (out >= 0).all()
+    np.testing.assert_allclose(out.sum(axis=1), 1.0, atol=1e-5)
+
+
+def test_no_proposals_give_no_rows(shipped: PointNet) -> None:
+    out = shipped.classify(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64))
+    assert out.shape == (0, 4)
+
+
+@pytest.mark.parametrize("name", [path.stem for path in sorted(assets.folder("models").glob("*.onnx"))])
+def test_every_model_has_a_card_that_names_its_hash_and_licence(name: str) -> None:
+    net = network(name)
+    card = net.path.with_suffix(".md").read_text(encoding="utf-8")
+    assert net.sha256 in card
+    assert "licence:" in card
+
+
+def test_an_unknown_model_is_misuse() -> None:
+    with pytest.raises(MisuseError, match="pointnet-kitti"):
+        network("no-such-model")
+
+
+def test_another_file_than_the_card_describes_is_misuse(tmp_path: Path, shipped: PointNet) -> None:
+    model = save(tmp_path, random_layers(0))
+    shutil.copy(shipped.path.with_suffix(".md"), model.with_suffix(".md"))
+    with pytest.raises(MisuseError, match=r"net\.onnx: is not the model of net\.md"):
+        network(model)
+
+
+def test_a_model_without_a_card_is_taken_at_its_word(tmp_path: Path) -> None:
+    assert len(network(save(tmp_path, random_layers(0))).sha256) == 64
+
+
+@pytest.mark.parametrize("content", [b"", b"no model", b"\x08\x07\x12\x00"])
+def test_a_file_that_is_no_model_is_misuse(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "net.onnx"
+    path.write_bytes(content)
+    with pytest.raises(MisuseError, match=r"net\.onnx") as caught:
+        network(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("width", [(4, 4), (3, 5)])
+def test_a_model_of_other_shapes_is_misuse(tmp_path: Path, width: tuple[int, int]) -> None:
+    model = graph(random_layers(0))
+    model.graph.input[0].type.tensor_type.shape.dim[2].dim_value = width[0]
+    model.graph.output[0].type.tensor_type.shape.dim[1].dim_value = width[1]
+    del model.graph.node[:]
+    flat = onnx.helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0)
+    weight = onnx.numpy_helper.from_array(np.zeros(width, np.float32), "w")
+    model.graph.initializer.append(weight)
+    model.graph.node.extend([flat, onnx.helper.make_node("MatMul", ["pooled", "w"], ["probability"])])
+    path = tmp_path / "net.onnx"
+    path.write_bytes(model.SerializeToString())
+    with pytest.raises(MisuseError, match="takes and gives"):
+        network(path)

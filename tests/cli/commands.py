@@ -1,0 +1,29 @@
+"""Running the commands as a user would."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+RUNTIME = Path(__file__).resolve().parents[2] / "runtime"
+
+
+def environment() -> dict[str, str]:
+    """This one's, with the checkout's package in it."""
+    return {**os.environ, "PYTHONPATH": str(RUNTIME), "PYTHONWARNINGS": "error", "PYTHONUNBUFFERED": "1"}
+
+
+def modt(*arguments: object, cwd: Path, module: str = "modt.cli.main", **options) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end."""
+    command = [sys.executable, "-m", module, *map(str, arguments)]
+    options = {"capture_output": True, "text": True, "env": environment(), "cwd": cwd, **options}
+    return subprocess.run(command, check=False, **options)
+
+
+def begin(*arguments: object, cwd: Path) -> subprocess.Popen[str]:
+    """Start a command and leave it running."""
+    command = [sys.executable, "-m", "modt.cli.main", *map(str, arguments)]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment(), cwd=cwd)

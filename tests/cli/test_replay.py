@@ -1,0 +1,252 @@
+"""`modt replay` from the outside: what it leaves, what it says, how it ends."""
+
+import json
+import os
+import resource
+import signal
+import time
+
+import numpy as np
+import pytest
+import yaml
+
+from modt import profile
+from modt.evaluation.summary import summarise
+from modt.sinks.records import read_records
+from modt.sinks.tracks import SCHEMA
+from modt.types import CLASS_NAMES
+
+from ..sources import layouts
+from .commands import begin, modt
+
+MODES = ("conventional", "efficient", "accurate")
+FRAMES = 6
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """A replay of the embedded stream in every mode."""
+    root = tmp_path_factory.mktemp("runs")
+    done = {}
+    for mode in MODES:
+        done[mode] = modt("replay", "--mode", mode, "--frames", f"0:{FRAMES}", "--labels", "--out", mode, cwd=root)
+        assert done[mode].returncode == 0, done[mode].stderr
+    return root, done
+
+
+def tracks(run):
+    return list(read_records(run / "tracks.jsonl", SCHEMA))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_run_leaves_what_the_formats_say(runs, mode):
+    root, _ = runs
+    names = sorted(p.name for p in (root / mode).iterdir())
+    assert names == ["kitti", "labels", "ledger.jsonl", "run.yaml", "summary.json", "tracks.jsonl"]
+    frames = tracks(root / mode)
+    assert [f["frame"] for f in frames] == list(range(FRAMES))
+    for frame in frames:
+        owned = [t["proposal"] for t in frame["tracks"] if t["proposal"] is not None]
+        assert sorted(owned) == list(range(frame["proposals"]))  # every proposal has one track
+        assert len({t["id"] for t in frame["tracks"]}) == len(frame["tracks"])
+        for t in frame["tracks"]:
+            assert sum(t["posterior"]) == pytest.approx(1, abs=1e-5)
+            assert t["class"] == CLASS_NAMES[int(np.argmax(t["posterior"]))]
+            assert (t["box"] is None) == (t["proposal"] is None) == (t["missed"] > 0)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_labels_name_proposals_and_classes(runs, mode):
+    root, _ = runs
+    for frame in tracks(root / mode):
+        label = np.fromfile(root / mode / "labels" / f"{frame['frame']:06d}.label", np.uint32)
+        of = {t["proposal"] + 1: t for t in frame["tracks"] if t["proposal"] is not None}
+        numbers, counts = np.unique(label >> 16, return_counts=True)
+        shown = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
+        assert set(shown) - {0} == set(of)
+        assert all(shown[n] == t["points"] for n, t in of.items())
+        classes = dict(zip((label >> 16).tolist(), (label & 0xFFFF).tolist(), strict=True))
+        assert all(CLASS_NAMES[classes[n]] == t["class"] for n, t in of.items())
+
+
+def test_conventional_classifies_everything_and_the_others_less(runs):
+    root, _ = runs
+    figures = {mode: json.loads((root / mode / "summary.json").read_text()) for mode in MODES}
+    assert figures["conventional"]["beta"] == 1.0
+    assert figures["efficient"]["beta"] < 0.6
+    assert figures["accurate"]["beta"] < 0.8
+    assert figures["conventional"]["proposals"] == figures["efficient"]["proposals"]
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_summary_is_what_the_records_say(runs, mode):
+    root, _ = runs
+    written = json.loads((root / mode / "summary.json").read_text())
+    again = summarise(root / mode)
+    assert {k: written[k] for k in again} == again
+    assert sum(f["classified"] for f in tracks(root / mode)) == written["classifications"]
+
+
+def test_the_run_keeps_to_one_core(runs):
+    root, _ = runs
+    host = json.loads((root / "accurate" / "summary.json").read_text())["host"]
+    assert host["core"] == max(os.sched_getaffinity(0))
+    assert host["one_core_verified"] is True
+
+
+def test_run_yaml_holds_what_it_was_made_with(runs):
+    root, _ = runs
+    facts = yaml.safe_load((root / "accurate" / "run.yaml").read_text())
+    assert facts["schema"] == "modt.run/1"
+    assert facts["mode"] == "accurate"
+    assert len(facts["model"]["sha256"]) == 64
+    assert {"python", "modt", "numpy", "onnxruntime"} <= set(facts["versions"])
+    assert profile.parse(profile.to_yaml(facts["profile"])) == profile.load()
+
+
+def test_the_summary_is_printed_and_no_bar_in_a_pipe(runs):
+    _, done = runs
+    out = done["accurate"].stdout
+    for word in ("N_go", "beta", "segmentation", "verified", "results in accurate"):
+        assert word in out
+    assert "%|" not in done["accurate"].stderr
+
+
+def test_two_runs_are_the_same_byte_for_byte(runs):
+    root, _ = runs
+    done = modt("replay", "--frames", f"0:{FRAMES}", "--labels", "--quiet", "--out", "again", cwd=root)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    for name in ("tracks.jsonl", "kitti/0000.txt", "labels/000003.label"):
+        assert (root / "again" / name).read_bytes() == (root / "accurate" / name).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere"], ["nowhere", "no such file"]),
+        (["."], ["no stream"]),
+        (["--profile", "none"], ["none", "hdl-64e"]),
+        (["--profile", "bad.yaml"], ["bad.yaml:2", "cell_m", "out of range"]),
+        (["--profile", "model.yaml"], ["no-such.onnx", "no such file"]),
+        (["--profile", "fake.yaml"], ["fake.onnx"]),
+        (["--core", "4096"], ["core 4096", "--core none"]),
+        (["--frames", "900:901"], ["no frames in 900:901"]),
+        (["scans", "--fov", "camera"], ["no calibration", "--fov full"]),
+        (["--out", "a-file"], ["a-file", "is a file"]),
+        (["--out", "foreign"], ["foreign", "no run"]),
+    ],
+)
+def test_misuse_is_one_line_and_status_2(tmp_path, arguments, words):
+    (tmp_path / "bad.yaml").write_text("segmentation:\n  cell_m: -3\n")
+    (tmp_path / "model.yaml").write_text("classification:\n  model: ./no-such.onnx\n")
+    (tmp_path / "fake.yaml").write_text("classification:\n  model: ./fake.onnx\n")
+    (tmp_path / "fake.onnx").write_bytes(b"not a network")
+    (tmp_path / "a-file").write_text("mine")
+    (tmp_path / "foreign").mkdir()
+    (tmp_path / "foreign" / "thesis").write_text("mine")
+    layouts.bare(tmp_path)
+    done = modt("replay", *arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    lines = [line for line in done.stderr.splitlines() if line.startswith("modt: ")]
+    assert "Traceback" not in done.stderr
+    assert all(word in lines[-1] for word in words), done.stderr
+
+
+@pytest.mark.parametrize("option", [["--frames", "5:2"], ["--frames", "x"], ["--rate", "0"], ["--core", "two"]])
+def test_options_out_of_range_are_misuse(tmp_path, option):
+    done = modt("replay", *option, cwd=tmp_path)
+    assert done.returncode == 2
+    assert option[0] in done.stderr
+
+
+def test_bad_scans_are_counted_and_the_rest_goes_on(tmp_path):
+    folder = layouts.bare(tmp_path)
+    (folder / "000001.bin").write_bytes(b"cut")
+    done = modt("replay", folder, "--out", "run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert [f["frame"] for f in tracks(tmp_path / "run")] == [0, 2]
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["faults"]["skipped"] == 1
+    assert "truncated" in done.stderr
+    assert "1 of them skipped" in done.stdout
+
+
+def test_a_stream_of_bad_scans_fails(tmp_path):
+    folder = layouts.bare(tmp_path)
+    for path in folder.glob("*.bin"):
+        path.write_bytes(b"cut")
+    done = modt("replay", folder, "--out", "run", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "none of its 3 scans" in done.stderr.splitlines()[-1]
+
+
+def test_frames_without_a_proposal_are_frames_like_any_other(tmp_path):
+    folder = layouts.bare(tmp_path)
+    (folder / "000000.bin").write_bytes(np.zeros((40, 4), np.float32).tobytes())
+    done = modt("replay", folder, "--out", "run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert tracks(tmp_path / "run")[0]["proposals"] == 0
+
+
+def test_a_full_disk_is_one_line_and_what_was_recorded_stays(tmp_path):
+    def small_files():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+
+    done = modt("replay", "--frames", "0:30", "--out", "run", cwd=tmp_path, preexec_fn=small_files)
+    assert done.returncode == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "free" in done.stderr.splitlines()[-1]
+    kept = tracks(tmp_path / "run")
+    assert [f["frame"] for f in kept] == list(range(len(kept)))
+    assert kept
+
+
+def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
+    done = modt("replay", "--frames", "0:2", "--out", "/proc/modt", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "/proc/modt" in done.stderr.splitlines()[-1]
+
+
+def wait_for_frames(run, n):
+    """Until the run has recorded that many frames."""
+    for _ in range(600):
+        path = run / "tracks.jsonl"
+        if path.exists() and path.read_bytes().count(b"\n") >= n:
+            return
+        time.sleep(0.1)
+    raise AssertionError("no frames came")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_the_run_well(tmp_path, number):
+    process = begin("replay", "--rate", "10", "--out", "run", cwd=tmp_path)
+    wait_for_frames(tmp_path / "run", 2)
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert "Traceback" not in errors
+    assert signal.Signals(number).name in errors.splitlines()[-1]
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["frames"] == len(tracks(tmp_path / "run"))
+    assert summary["run"]["stopped_by"] == signal.Signals(number).name
+
+
+def test_a_killed_run_stays_readable(tmp_path):
+    process = begin("replay", "--rate", "10", "--out", "run", cwd=tmp_path)
+    wait_for_frames(tmp_path / "run", 2)
+    process.kill()
+    process.communicate()
+    assert summarise(tmp_path / "run")["frames"] >= 2
+    done = modt("report", "run", cwd=tmp_path, module="modt.cli.profile")
+    assert done.returncode == 0, done.stderr
+    assert "beta" in done.stdout
+
+
+@pytest.mark.kitti
+def test_a_real_drive_in_the_cameras_view(drive_0005, tmp_path):
+    done = modt("replay", drive_0005, "--fov", "camera", "--frames", "0:12", "--out", "run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    frames = tracks(tmp_path / "run")
+    assert len(frames) == 12
+    assert 15 < np.mean([f["proposals"] for f in frames]) < 120
+    heard = {t["class"] for t in frames[-1]["tracks"]}
+    assert "car" in heard

@@ -1,0 +1,27 @@
+"""What every test may use."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, settings
+
+settings.register_profile("modt", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
+settings.load_profile("modt")
+
+
+@pytest.fixture(scope="session")
+def kitti_root() -> Path:
+    """Real data in KITTI's layout."""
+    root = os.environ.get("KITTI_ROOT")
+    if not root:
+        pytest.skip("KITTI_ROOT is not set: no real data here")
+    return Path(root)
+
+
+@pytest.fixture(scope="session")
+def drive_0005(kitti_root: Path) -> Path:
+    """A whole raw drive."""
+    return kitti_root / "raw" / "2011_09_26" / "2011_09_26_drive_0005_sync"

@@ -1,0 +1,69 @@
+"""What every source promises, whichever it is."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from modt.sources.recognise import open_stream
+from modt.sources.synthetic.stream import SyntheticStream
+
+from ..sources import layouts
+
+SOURCES = {
+    "raw": lambda root: open_stream(layouts.raw_drive(root)),
+    "tracking": lambda root: open_stream(layouts.tracking(root)),
+    "odometry": lambda root: open_stream(layouts.odometry(root)),
+    "bare": lambda root: open_stream(layouts.bare(root)),
+    "street": lambda root: SyntheticStream("street", "hdl-64e", 0.4, seed=3),
+    "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
+}
+
+
+@pytest.fixture(params=SOURCES, name="stream")
+def a_stream(request, tmp_path):
+    return SOURCES[request.param](tmp_path)
+
+
+def test_frames_are_what_frames_are(stream):
+    frames = list(stream)
+    assert len(frames) == stream.info.n_frames
+    for frame in frames:
+        assert frame.points.dtype == np.float32
+        assert frame.points.ndim == 2
+        assert frame.points.shape[1] == 4
+        assert np.isfinite(frame.points).all()
+        assert frame.points[:, 3].min() >= 0
+        assert frame.points[:, 3].max() <= 1
+        assert (frame.T_world_sensor is not None) is stream.info.has_poses
+        if frame.T_world_sensor is not None:
+            R = frame.T_world_sensor[:3, :3]
+            np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-6)
+
+
+def test_time_and_index_go_forward(stream):
+    frames = list(stream)
+    assert all(b.stamp_s >= a.stamp_s and b.index > a.index for a, b in itertools.pairwise(frames))
+
+
+def test_a_stream_gives_the_same_frames_again(stream):
+    for a, b in zip(stream, stream, strict=True):
+        assert (a.index, a.stamp_s) == (b.index, b.stamp_s)
+        assert a.points.tobytes() == b.points.tobytes()
+
+
+def test_a_part_is_those_frames_of_the_whole(stream):
+    whole = {f.index: f for f in stream}
+    part = stream.between(1, 3)
+    assert part.info.n_frames == 2
+    for frame in part:
+        assert frame.points.tobytes() == whole[frame.index].points.tobytes()
+    assert [f.index for f in part] == [1, 2]
+    assert stream.info.n_frames == len(whole)  # the whole is not changed by it
+    assert part.between(2, None).info.n_frames == 1
+    assert stream.between(50, None).info.n_frames == 0
+
+
+def test_nothing_is_wrong_with_a_good_stream(stream):
+    list(stream)
+    assert stream.faults == []

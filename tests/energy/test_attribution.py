@@ -1,0 +1,147 @@
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from simulated import SimulatedMachine
+
+from modt.energy.attribution import CLASS, SEG, TERMS, ByCoefficients, ByCpuTime, Fit, FitError, burst, fit
+from modt.energy.conditions import Conditions
+from modt.energy.meters.powercap import find_powercap
+from modt.energy.windows import Windows
+
+TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
+NOISE = 0.1
+
+
+def drive(machine: SimulatedMachine, windows: int, noise: float, faults: bool) -> list[dict[str, Any]]:
+    random = machine.random
+    ledger = machine.ledger()
+    recorder = Windows(find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys))
+    lines = []
+    for _ in range(windows):
+        if faults and not machine.zone.is_dir():
+            machine.appear()
+        elif faults and random.random() < 0.1:
+            machine.vanish()
+        frames, load = int(random.integers(1, 9)), int(random.integers(0, 60))
+        luck = 1 + noise * random.standard_normal()
+        for _ in range(frames):
+            ledger.run("segmentation", machine.work, 0.01, luck * TRUE["seg_J"])
+            items, points = load, load * int(random.integers(20, 400))
+            joules = luck * (TRUE["class_J"] * items + TRUE["point_J"] * points)
+            ledger.run("classification", machine.work, 0.01, joules, items)
+            ledger.count("classification", points=points)
+        seconds = random.uniform(1.0, 2.0)
+        machine.true_J += luck * TRUE["idle_W"] * seconds
+        machine.wait(seconds - 0.02 * frames)
+        line = recorder.add(ledger.close_frame(0))
+        assert line is not None
+        lines.append(line)
+    return lines
+
+
+def covered(result: Fit) -> dict[str, bool]:
+    return {c.name: c.low <= TRUE[c.name] <= c.high for c in result.coefficients}
+
+
+def trial(sys: Path, seed: int, windows: int = 40) -> tuple[Fit, list[dict[str, Any]]]:
+    """A calibration whose counter passes its range on the way."""
+    machine = SimulatedMachine(sys, idle_W=0.0, wrap_uJ=2_500_000_000, step_uJ=61.035, seed=seed)
+    machine.true_J = 2450.0
+    machine.wait(0.0)
+    lines = drive(machine, windows, NOISE, faults=True)
+    return fit(lines, np.random.default_rng(seed)), lines
+
+
+def test_noiseless_windows_give_the_coefficients_back(tmp_path: Path) -> None:
+    machine = SimulatedMachine(tmp_path, idle_W=0.0, wrap_uJ=10_000_000_000)
+    result = fit(drive(machine, 40, noise=0.0, faults=False), np.random.default_rng(0))
+    for coefficient in result.coefficients:
+        assert coefficient.value == pytest.approx(TRUE[coefficient.name], rel=1e-3)
+    assert result.explained > 0.99999
+    assert result.windows == 40
+
+
+def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: Path) -> None:
+    hits = dict.fromkeys(TRUE, 0)
+    wraps = lost = 0
+    for seed in range(100):
+        result, lines = trial(tmp_path / str(seed), seed)
+        wraps += sum("wrap" in line["marks"] for line in lines)
+        lost += sum("lost" in line["marks"] for line in lines)
+        assert result.windows + result.dropped == len(lines)
+        for c in result.coefficients:
+            hits[c.name] += c.low <= TRUE[c.name] <= c.high
+            assert c.low < c.value < c.high
+    assert min(hits.values()) >= 90
+    assert wraps > 50
+    assert lost > 100
+
+
+def test_an_interval_is_worth_something(tmp_path: Path) -> None:
+    result, _ = trial(tmp_path, seed=1, windows=120)
+    assert result["seg_J"].high - result["seg_J"].low < TRUE["seg_J"]
+    assert result["idle_W"].high - result["idle_W"].low < TRUE["idle_W"]
+
+
+def line_of(energy_J: float | None, frames: int, load: int = 0, **more: Any) -> dict[str, Any]:
+    row = {"calls": frames, "items": 0, "points": 0, "wall_ns": 0, "cpu_ns": 300_000_000}
+    stages = {
+        "segmentation": row,
+        "classification": {**row, "items": load, "points": 9 * load, "cpu_ns": 100_000_000},
+    }
+    base = {"energy_J": energy_J, "wall_ns": 10**9, "process_ns": 500_000_000, "stages": stages, "marks": []}
+    return {**base, **more}
+
+
+def test_loads_that_vary_together_are_refused() -> None:
+    lines = [line_of(3.0 + n, n, 10 * n) for n in range(1, 20)]
+    with pytest.raises(FitError, match="varied together"):
+        fit(lines, np.random.default_rng(0))
+
+
+def test_load_that_is_missing_is_named() -> None:
+    lines = [line_of(3.0 + n, n) for n in range(1, 20)]
+    with pytest.raises(FitError, match="class_J, point_J"):
+        fit(lines, np.random.default_rng(0))
+
+
+def test_too_few_windows_are_refused() -> None:
+    with pytest.raises(FitError, match="at least 8"):
+        fit([line_of(None, 1), line_of(3.0, 1, marks=["suspended"]), line_of(3.0, 1)], np.random.default_rng(0))
+
+
+def test_bursts_agree_with_the_truth(tmp_path: Path) -> None:
+    machine = SimulatedMachine(tmp_path, idle_W=3.0)
+    ledger = machine.ledger()
+    recorder = Windows(find_powercap(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
+    lines = []
+    for _ in range(5):
+        for _ in range(50):
+            ledger.run("segmentation", machine.work, 0.02, TRUE["seg_J"])
+        machine.wait(0.0)
+        line = recorder.add(ledger.close_frame(0))
+        assert line is not None
+        lines.append(line)
+    assert burst(lines, 3.0, SEG) == pytest.approx(TRUE["seg_J"], rel=1e-3)
+    assert burst(lines, 3.0, CLASS) is None
+
+
+@pytest.mark.parametrize("split", [ByCpuTime(3.0), ByCoefficients({"idle_W": 3.0, "seg_J": 0.1, "class_J": 0.01})])
+@given(energy_J=st.floats(0, 20), frames=st.integers(0, 9), load=st.integers(0, 9))
+def test_parts_add_up_to_the_window(split: Any, energy_J: float, frames: int, load: int) -> None:
+    parts = split.split(line_of(energy_J, frames, load))
+    assert sum(parts.values()) == pytest.approx(energy_J)
+
+
+def test_cpu_time_shares_what_is_above_idling() -> None:
+    parts = ByCpuTime(3.0).split(line_of(5.0, 1))
+    assert parts == pytest.approx({"idle": 3.0, "segmentation": 1.2, "classification": 0.4, "unattributed": 0.4})
+    assert ByCpuTime(3.0).split(line_of(None, 1)) == {}
+
+
+def test_terms_count_what_they_are_named_for() -> None:
+    assert [term.count(line_of(1.0, 2, 3)) for term in TERMS] == [1.0, 2.0, 3.0, 27.0]

@@ -1,0 +1,268 @@
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from simulated import write_files, write_zone
+
+from modt.energy.meters.battery import find_batteries
+from modt.energy.meters.discovery import Discovery, discover
+from modt.energy.meters.hwmon import find_hwmon
+from modt.energy.meters.meter import Kind, MeterLostError, Quantity, Scope
+from modt.energy.meters.model import ModelMeter
+from modt.energy.meters.pmic import find_pmic, rail_power_W
+from modt.energy.meters.powercap import find_powercap
+from modt.errors import MisuseError
+
+PMIC = """ 3V7_WL_SW_A current(0)=0.08784000A
+   VDD_CORE_A current(7)=2.10000000A
+  3V7_WL_SW_V volt(8)=3.70000000V
+   VDD_CORE_V volt(15)=0.80000000V
+      EXT5V_V volt(24)=5.10000000V
+       BATT_V volt(25)=0.00000000V
+"""
+
+
+def model() -> ModelMeter:
+    return ModelMeter(idle_W=3.0, busy_W=7.0, wall_ns=lambda: 2_000_000_000, cpu_ns=lambda: 500_000_000)
+
+
+def powercap(sys: Path) -> Path:
+    return sys / "class" / "powercap"
+
+
+def look(sys: Path) -> Discovery:
+    return discover(model(), sys, vcgencmd="no-such-command")
+
+
+def server(sys: Path) -> None:
+    """Two sockets with subzones, a memory-mapped twin and the platform counter."""
+    write_zone(powercap(sys) / "intel-rapl:0", "package-0", energy_uJ=5_000_000)
+    write_zone(powercap(sys) / "intel-rapl:0:0", "core", energy_uJ=3_000_000)
+    write_zone(powercap(sys) / "intel-rapl:0:1", "dram", energy_uJ=1_000_000)
+    write_zone(powercap(sys) / "intel-rapl:1", "package-1", energy_uJ=7_000_000)
+    write_zone(powercap(sys) / "intel-rapl:2", "psys", energy_uJ=20_000_000)
+    write_zone(powercap(sys) / "intel-rapl-mmio:0", "package-0", energy_uJ=5_000_001)
+
+
+def test_packages_are_added_up_and_nothing_that_overlaps_them(tmp_path: Path) -> None:
+    server(tmp_path)
+    best = look(tmp_path).best
+    assert [meter.facts.name for meter in best.meters] == [
+        "powercap intel-rapl:0 (package-0)",
+        "powercap intel-rapl:1 (package-1)",
+    ]
+    assert sum(meter.read() for meter in best.meters) == pytest.approx(12.0)
+
+
+def test_every_zone_left_out_says_why(tmp_path: Path) -> None:
+    server(tmp_path)
+    why = {c.name: c.why_not for c in find_powercap(tmp_path)}
+    assert why["powercap intel-rapl:0:0 (core)"] == "counted by intel-rapl:0"
+    assert why["powercap intel-rapl-mmio:0 (package-0)"] == "the same package again"
+    assert why["powercap intel-rapl:2 (psys)"] == ""
+
+
+def test_platform_counter_is_a_choice_of_its_own(tmp_path: Path) -> None:
+    server(tmp_path)
+    chosen = look(tmp_path).choose("psys")
+    assert len(chosen.meters) == 1
+    assert chosen.meters[0].facts.scope is Scope.BOARD
+    assert chosen.meters[0].read() == pytest.approx(20.0)
+
+
+def test_facts_of_a_counter_come_from_its_files(tmp_path: Path) -> None:
+    write_zone(powercap(tmp_path) / "intel-rapl:0", "package-0", wrap_uJ=65_532_610_987)
+    facts = look(tmp_path).best.meters[0].facts
+    assert facts.wrap_J == pytest.approx(65_532.610987)
+    assert (facts.quantity, facts.kind, facts.unit) == (Quantity.ENERGY, Kind.MEASURED, "uJ")
+
+
+@pytest.mark.parametrize("content", [None, "", "garbage"])
+def test_unreadable_range_means_no_known_wrap(tmp_path: Path, content: str | None) -> None:
+    zone = powercap(tmp_path) / "intel-rapl:0"
+    write_zone(zone, "package-0", wrap_uJ=None)
+    if content is not None:
+        (zone / "max_energy_range_uj").write_text(content)
+    assert look(tmp_path).best.meters[0].facts.wrap_J is None
+
+
+@pytest.fixture
+def plain_user() -> Iterator[Path]:
+    """A tree that an unprivileged user may enter, and such a user's rights."""
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        root.chmod(0o755)
+        yield root
+        if os.getuid() == 0:
+            os.seteuid(0)
+
+
+def test_counter_for_root_alone_is_listed_with_its_remedy(plain_user: Path) -> None:
+    write_zone(powercap(plain_user) / "intel-rapl:0", "package-0")
+    (powercap(plain_user) / "intel-rapl:0" / "energy_uj").chmod(0)
+    if os.getuid() == 0:
+        os.seteuid(65534)
+    found = look(plain_user)
+    rapl = next(c for c in found.candidates if c.name == "RAPL packages")
+    assert not rapl.usable
+    assert "Permission denied" in rapl.why_not
+    assert "CAP_DAC_READ_SEARCH" in rapl.remedy
+    assert found.best.facts is not None
+    assert found.best.facts.kind is Kind.ESTIMATED
+    with pytest.raises(MisuseError, match="Permission denied"):
+        found.choose("rapl")
+
+
+def test_scmi_gives_power_to_integrate(tmp_path: Path) -> None:
+    write_files(powercap(tmp_path) / "arm-scmi:0", name="soc", power_uw=4_250_000)
+    best = look(tmp_path).best
+    assert best.meters[0].read() == pytest.approx(4.25)
+    assert best.meters[0].facts.kind is Kind.INTEGRATED
+
+
+def jetson(sys: Path) -> Path:
+    return write_files(
+        sys / "class" / "hwmon" / "hwmon3",
+        name="ina3221",
+        in1_label="VDD_IN",
+        in1_input=5040,
+        curr1_input=1200,
+        in2_label="VDD_CPU_GPU_CV",
+        in2_input=5032,
+        curr2_input=400,
+        in3_label="VDD_SOC",
+        in3_enable=0,
+        in3_input=5032,
+        curr3_input=300,
+        in7_label="sum of shunt voltages",
+        in7_input=100,
+        curr4_input=1900,
+        in4_input=2,
+    )
+
+
+def test_rails_are_listed_one_by_one_and_never_added(tmp_path: Path) -> None:
+    jetson(tmp_path)
+    found = [c for c in find_hwmon(tmp_path) if c.usable]
+    watts = {c.name: [m.read() for m in c.meters] for c in found}
+    assert watts["hwmon ina3221 VDD_IN"] == [pytest.approx(5.040 * 1.2)]
+    assert watts["hwmon ina3221 VDD_CPU_GPU_CV"] == [pytest.approx(5.032 * 0.4)]
+    assert not any("VDD_SOC" in name for name in watts)
+    assert look(tmp_path).choose("VDD_IN").meters[0].facts.scope is Scope.BOARD
+
+
+def test_power_that_the_chip_computes_is_preferred(tmp_path: Path) -> None:
+    write_files(
+        tmp_path / "class" / "hwmon" / "hwmon0",
+        name="ina226",
+        in1_input=5000,
+        curr1_input=900,
+        power1_input=4_600_000,
+    )
+    (candidate,) = find_hwmon(tmp_path)
+    assert candidate.meters[0].read() == pytest.approx(4.6)
+    assert candidate.meters[0].facts.unit == "uW"
+
+
+def test_amd_sockets_are_added_up_without_their_cores(tmp_path: Path) -> None:
+    write_files(
+        tmp_path / "class" / "hwmon" / "hwmon0",
+        name="amd_energy",
+        energy1_label="Ecore000",
+        energy1_input=1_000_000,
+        energy2_label="Esocket0",
+        energy2_input=8_000_000,
+        energy3_label="Esocket1",
+        energy3_input=9_000_000,
+    )
+    best = look(tmp_path).best
+    assert best.name == "AMD sockets"
+    assert sum(m.read() for m in best.meters) == pytest.approx(17.0)
+
+
+def test_chip_of_another_kind_is_no_meter(tmp_path: Path) -> None:
+    write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="nct6775", in1_input=5000, curr1_input=900)
+    (candidate,) = find_hwmon(tmp_path)
+    assert not candidate.usable
+    assert "INA" in candidate.remedy
+
+
+def test_battery_counts_only_while_it_discharges(tmp_path: Path) -> None:
+    folder = write_files(
+        tmp_path / "class" / "power_supply" / "BAT0",
+        type="Battery",
+        status="Discharging",
+        voltage_now=11_400_000,
+        current_now=-1_500_000,
+    )
+    (battery,) = find_batteries(tmp_path)
+    assert battery.meters[0].read() == pytest.approx(17.1)
+    assert battery.meters[0].facts.scope is Scope.ROBOT
+    (folder / "status").write_text("Charging\n")
+    (battery,) = find_batteries(tmp_path)
+    assert not battery.usable
+    assert battery.remedy == "unplug the charger"
+    with pytest.raises(MeterLostError, match="charging"):
+        battery.meters[0].read()
+
+
+def test_battery_of_a_mouse_is_not_the_robots(tmp_path: Path) -> None:
+    write_files(tmp_path / "class" / "power_supply" / "hid-1", type="Battery", scope="Device", status="Discharging")
+    write_files(tmp_path / "class" / "power_supply" / "AC", type="Mains", online=1)
+    (none,) = find_batteries(tmp_path)
+    assert not none.usable
+
+
+def test_pmic_adds_the_rails_that_have_both_figures() -> None:
+    assert rail_power_W(PMIC) == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
+    with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
+        rail_power_W("error=2 error_msg=Invalid arguments")
+
+
+def script(folder: Path, body: str) -> str:
+    path = folder / "vcgencmd"
+    path.write_text(f"#!/bin/sh\n{body}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
+def test_pmic_is_read_through_its_command(tmp_path: Path) -> None:
+    (tmp_path / "adc").write_text(PMIC)
+    (pmic,) = find_pmic(script(tmp_path, f"[ $1 = pmic_read_adc ] && cat {tmp_path}/adc"))
+    assert pmic.usable
+    assert pmic.meters[0].read() == pytest.approx(rail_power_W(PMIC))
+    (tmp_path / "adc").unlink()
+    with pytest.raises(MeterLostError):
+        pmic.meters[0].read()
+
+
+def test_pmic_that_refuses_says_so(tmp_path: Path) -> None:
+    (pmic,) = find_pmic(script(tmp_path, "echo 'VCHI initialization failed' >&2; exit 255"))
+    assert not pmic.usable
+    assert "VCHI initialization failed" in pmic.why_not
+
+
+def test_model_is_what_is_left_on_a_bare_machine(tmp_path: Path) -> None:
+    found = look(tmp_path)
+    assert found.best.meters[0].read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
+    assert found.best.facts is not None
+    assert found.best.facts.kind is Kind.ESTIMATED
+    unusable = [c for c in found.candidates if not c.usable]
+    assert len(unusable) == 4
+    assert all(c.why_not and c.remedy for c in unusable)
+
+
+def test_unknown_meter_is_refused_with_the_names(tmp_path: Path) -> None:
+    with pytest.raises(MisuseError, match="model 3 W idle"):
+        look(tmp_path).choose("wattmeter")
+
+
+def test_the_best_is_counted_then_integrated_then_estimated(tmp_path: Path) -> None:
+    server(tmp_path)
+    jetson(tmp_path)
+    kinds = [c.facts.kind for c in look(tmp_path).candidates if c.usable and c.facts]
+    order = [Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED]
+    assert kinds == sorted(kinds, key=order.index)
+    assert kinds[0] is Kind.MEASURED

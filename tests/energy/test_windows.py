@@ -1,0 +1,191 @@
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from simulated import SimulatedMachine, write_files
+
+from modt.energy.conditions import Conditions
+from modt.energy.ledger import Ledger
+from modt.energy.meters.hwmon import find_hwmon
+from modt.energy.meters.meter import Facts, Kind, MeterLostError, Quantity, Scope
+from modt.energy.meters.powercap import find_powercap
+from modt.energy.windows import SCHEMA, Tape, Windows
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> SimulatedMachine:
+    return SimulatedMachine(tmp_path)
+
+
+def windows_of(machine: SimulatedMachine, least_s: float = 1.0) -> Windows:
+    meters = find_powercap(machine.sys)[0].meters
+    return Windows(meters, machine.clocks, Conditions(0, machine.sys), least_s)
+
+
+def second(machine: SimulatedMachine, ledger: Ledger, windows: Windows, frame: int = 0) -> dict[str, Any]:
+    """A second of work: one frame that fills one window."""
+    ledger.run("segmentation", machine.work, 0.25, 0.5, 3)
+    machine.wait(0.75)
+    line = windows.add(ledger.close_frame(frame))
+    assert line is not None
+    return line
+
+
+def test_a_window_holds_its_energy_and_its_work(machine: SimulatedMachine) -> None:
+    ledger, windows = machine.ledger(), windows_of(machine)
+    line = second(machine, ledger, windows, frame=7)
+    assert line["schema"] == SCHEMA
+    assert line["frames"] == [7, 7, 1]
+    assert line["energy_J"] == pytest.approx(3.0 + 0.5, abs=2 * 61e-6)
+    assert line["kind"] == "measured"
+    assert line["stages"]["segmentation"] == {
+        "calls": 1,
+        "items": 3,
+        "points": 0,
+        "wall_ns": 250_000_000,
+        "cpu_ns": 250_000_000,
+    }
+    assert line["process_ns"] == 250_000_000
+    assert line["conditions"] == {"governor": "performance", "frequency_MHz": 2600.0, "temperature_C": None}
+    assert line["marks"] == []
+
+
+def test_no_meter_is_read_before_a_second_has_passed(machine: SimulatedMachine) -> None:
+    ledger, windows = machine.ledger(), windows_of(machine)
+    machine.wait(0.9)
+    assert windows.add(ledger.close_frame(0)) is None
+    machine.wait(0.1)
+    line = windows.add(ledger.close_frame(1))
+    assert line is not None
+    assert line["frames"] == [0, 1, 2]
+
+
+def test_counter_that_starts_again_is_followed(tmp_path: Path) -> None:
+    machine = SimulatedMachine(tmp_path, wrap_uJ=2_000_000_000, idle_W=900.0)
+    ledger, windows = machine.ledger(), windows_of(machine)
+    lines = [second(machine, ledger, windows, k) for k in range(20)]
+    assert sum("wrap" in line["marks"] for line in lines) == 9
+    assert [line["energy_J"] for line in lines] == [pytest.approx(900.5, abs=1e-3)] * 20
+
+
+def test_window_as_long_as_a_turn_of_the_counter_is_not_believed(tmp_path: Path) -> None:
+    machine = SimulatedMachine(tmp_path, wrap_uJ=500_000_000)
+    line = second(machine, machine.ledger(), windows_of(machine))
+    assert line["energy_J"] is None
+    assert line["kind"] == "unavailable"
+    assert "ambiguous" in line["marks"]
+
+
+def test_counter_without_known_range_drops_the_sample_when_it_goes_back(machine: SimulatedMachine) -> None:
+    (machine.zone / "max_energy_range_uj").unlink()
+    ledger, windows = machine.ledger(), windows_of(machine)
+    machine.true_J = 0.0
+    assert (second(machine, ledger, windows)["energy_J"], second(machine, ledger, windows)["marks"]) == (None, [])
+
+
+def test_counter_set_back_is_no_wrap(machine: SimulatedMachine) -> None:
+    ledger, windows = machine.ledger(), windows_of(machine)
+    machine.true_J = 0.5e-6 * machine.wrap_uJ
+    second(machine, ledger, windows)
+    machine.true_J -= 10_000.0
+    line = second(machine, ledger, windows)
+    assert (line["energy_J"], line["marks"]) == (None, ["reset"])
+
+
+def test_meter_that_vanishes_is_marked_and_taken_up_again(machine: SimulatedMachine) -> None:
+    ledger, windows = machine.ledger(), windows_of(machine)
+    second(machine, ledger, windows)
+    machine.vanish()
+    lost = [second(machine, ledger, windows) for _ in range(2)]
+    machine.appear()
+    back, good = second(machine, ledger, windows), second(machine, ledger, windows)
+    assert [(line["energy_J"], line["kind"], line["marks"]) for line in lost] == [(None, "unavailable", ["lost"])] * 2
+    assert (back["energy_J"], back["marks"]) == (None, ["back"])
+    assert good["energy_J"] == pytest.approx(3.5, abs=1e-3)
+
+
+def test_suspended_machine_is_marked_and_its_window_dropped(machine: SimulatedMachine) -> None:
+    ledger, windows = machine.ledger(), windows_of(machine)
+    machine.suspend(3600.0)
+    line = second(machine, ledger, windows)
+    assert line["energy_J"] is None
+    assert "suspended" in line["marks"]
+    assert second(machine, ledger, windows)["energy_J"] == pytest.approx(3.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("seconds", [-86_400.0, 3600.0])
+def test_calendar_that_is_set_changes_no_figure(machine: SimulatedMachine, seconds: float) -> None:
+    ledger, windows = machine.ledger(), windows_of(machine)
+    machine.step_calendar(seconds)
+    line = second(machine, ledger, windows)
+    assert line["marks"] == ["clock-step"]
+    assert line["wall_ns"] == 1_000_000_000
+    assert line["energy_J"] == pytest.approx(3.5, abs=1e-3)
+
+
+def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
+    machine = SimulatedMachine(tmp_path)
+    rail = write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="ina226", power1_input=4_000_000, in1_input=5000,
+                       curr1_input=800)  # fmt: skip
+    windows = Windows(find_hwmon(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
+    ledger = machine.ledger()
+    (rail / "power1_input").write_text("6000000\n")
+    line = second(machine, ledger, windows)
+    assert (line["energy_J"], line["kind"]) == (pytest.approx(5.0), "integrated")
+    (rail / "power1_input").write_text("-20000\n")
+    line = second(machine, ledger, windows)
+    assert (line["energy_J"], line["marks"]) == (pytest.approx(3.0), ["negative"])
+
+
+def test_without_a_meter_energy_is_unavailable(machine: SimulatedMachine) -> None:
+    windows = Windows((), machine.clocks, Conditions(0, machine.sys))
+    line = second(machine, machine.ledger(), windows)
+    assert (line["energy_J"], line["kind"]) == (None, "unavailable")
+
+
+@settings(max_examples=40)
+@given(st.lists(st.tuples(st.floats(0, 0.6), st.floats(0, 0.6), st.integers(0, 4)), max_size=8))
+def test_the_parts_of_every_window_are_the_whole(
+    tmp_path_factory: Any, frames: list[tuple[float, float, int]]
+) -> None:
+    machine = SimulatedMachine(tmp_path_factory.mktemp("sys"))
+    ledger, windows = machine.ledger(), windows_of(machine)
+    start, lines = machine.now_ns, []
+    for index, (busy, idle, items) in enumerate(frames):
+        ledger.run("tracking", machine.work, busy, busy, items)
+        machine.wait(idle)
+        lines.append(windows.add(ledger.close_frame(index)))
+    lines.append(windows.close())
+    closed = [line for line in lines if line is not None]
+    for line in closed:
+        spans = sum(row["wall_ns"] for row in line["stages"].values())
+        assert spans + line["overhead_ns"] + line["idle_ns"] == line["wall_ns"]
+        assert line["idle_ns"] >= 0
+    assert sum(line["wall_ns"] for line in closed) == machine.now_ns - start
+    assert sum(line["frames"][2] for line in closed) == len(frames)
+    assert [line["window"] for line in closed] == list(range(len(closed)))
+
+
+class Readings:
+    """A counter that shows what it is told to; None: it cannot be read."""
+
+    def __init__(self, values: list[float | None], wrap_J: float | None) -> None:
+        self.values = iter(values)
+        self.facts = Facts("test", Quantity.ENERGY, "J", 0.0, 0.0, wrap_J, 100.0, Scope.CPU, Kind.MEASURED, "none")
+
+    def read(self) -> float:
+        value = next(self.values)
+        if value is None:
+            raise MeterLostError("gone")
+        return value
+
+
+@given(st.lists(st.one_of(st.none(), st.floats(0, 1000)), min_size=1), st.one_of(st.none(), st.floats(1000, 2000)))
+def test_energy_is_never_negative_whatever_the_counter_shows(values: list[float | None], wrap: float | None) -> None:
+    tape = Tape(Readings(values, wrap))
+    for value in values:
+        energy_J, marks = tape.advance(1.0)
+        assert energy_J is None or 0 <= energy_J <= 100.0
+        assert (value is None) == (marks == ["lost"])

@@ -1,0 +1,78 @@
+"""The summary's figures from hand-made records."""
+
+import pytest
+
+from modt.evaluation.summary import Summary, TrackLives, summarise
+from modt.evaluation.table import summary_table
+from modt.sinks.records import JsonLines
+from modt.sinks.tracks import frame_record
+
+from ..results import CAR, result
+
+
+def ledger_line(frame, ms):
+    stages = {
+        "segmentation": {"calls": 1, "items": 2, "wall_ns": ms * 10**6, "cpu_ns": ms * 10**6},
+        "classification": {"calls": 1, "items": 1, "wall_ns": 10**6, "cpu_ns": 10**6},
+    }
+    return {"schema": "modt.ledger/1", "frame": frame, "stages": stages}
+
+
+FRAMES = [
+    result(0, [5, 5], {0: 1, 1: 2}, {1: CAR}, classified=2),
+    result(1, [5, 5], {0: 1, 1: 2}, {1: CAR}, classified=0),
+    result(2, [5, 5], {0: 1, 1: 3}, {1: CAR}, lost=(2,), classified=1),
+    result(3, [5], {0: 1}, {1: CAR}),
+]
+
+
+def whole():
+    summary = Summary()
+    for r in FRAMES:
+        summary.add_frame(frame_record(r))
+        summary.add_ledger(ledger_line(r.frame.index, 1 + r.frame.index))
+    return summary.result()
+
+
+def test_figures():
+    figures = whole()
+    assert (figures["frames"], figures["proposals"], figures["classifications"]) == (4, 7, 3)
+    assert figures["beta"] == pytest.approx(3 / 7)
+    # Track 1 is seen 4 times, 2 twice (lost frames do not count), 3 once.
+    assert figures["tracks"] == {"count": 3, "N_go": pytest.approx(7 / 3)}
+    assert figures["foreground_tracks"] == {"count": 1, "N_go": 4.0}
+    assert figures["energy_counts"] == {"E_seg": 4, "E_class": 4}
+    assert figures["stages"]["segmentation"]["cpu_ms"]["mean"] == pytest.approx(2.5)
+    assert figures["stages"]["segmentation"]["wall_ms"]["max"] == pytest.approx(4.0)
+
+
+def test_files_give_the_same_figures_as_the_live_run(tmp_path):
+    tracks, ledger = JsonLines(tmp_path / "tracks.jsonl"), JsonLines(tmp_path / "ledger.jsonl")
+    for r in FRAMES:
+        tracks.write(frame_record(r))
+        ledger.write(ledger_line(r.frame.index, 1 + r.frame.index))
+    tracks.close()
+    ledger.close()
+    assert summarise(tmp_path) == whole()
+
+
+def test_nothing_gives_no_ratio():
+    figures = Summary().result()
+    assert figures["beta"] is None
+    assert figures["tracks"] == {"count": 0, "N_go": None}
+    assert "0 frames" in summary_table(figures)
+
+
+def test_only_the_living_are_remembered():
+    lives = TrackLives()
+    for i in range(50):
+        lives.add([{"id": i, "proposal": 0, "class": "background"}])
+    assert len(lives._alive) == 1
+    assert lives.totals(foreground_only=False) == (50, 50)
+
+
+def test_the_table_names_what_it_prints():
+    text = summary_table(whole())
+    for word in ("proposals", "N_go", "beta", "42.9 %", "segmentation", "classification"):
+        assert word in text
+    assert max(map(len, text.splitlines())) <= 100

@@ -1,0 +1,47 @@
+"""Made-up frame results, for tests of what comes after the pipeline."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.types import NONE, Frame, FrameResult, Proposals, Tracks
+
+STATES = ("unmatched", "tracked", "lost")
+
+
+def proposals(counts: list[int], boxes: np.ndarray | None = None) -> Proposals:
+    """Proposals of that many points each, taken from the frame's first points in order."""
+    p = len(counts)
+    offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
+    made = np.tile([10.0, 0, -1, 4, 2, 1.5, 0], (p, 1)) + np.arange(p)[:, None] * [0, 3.0, 0, 0, 0, 0, 0]
+    box = made if boxes is None else boxes
+    return Proposals(
+        np.arange(offsets[-1]), offsets, box[:, :3].copy(), box, np.zeros(p, np.bool_), np.zeros(p, np.bool_)
+    )
+
+
+def result(
+    index: int,
+    counts: list[int],
+    owners: dict[int, int],
+    posteriors: dict[int, list[float]] | None = None,
+    *,
+    n_points: int = 40,
+    lost: tuple[int, ...] = (),
+    classified: int = 0,
+) -> FrameResult:
+    """A frame in which track owners[proposal] holds each proposal, and the lost ones hold none."""
+    ids = [*owners.values(), *lost]
+    tracks = Tracks.blank(len(ids))
+    tracks.id[:] = ids
+    tracks.proposal[:] = [*owners, *[NONE] * len(lost)]
+    tracks.state[:] = [1] * len(owners) + [2] * len(lost)
+    for id_, posterior in (posteriors or {}).items():
+        tracks.posterior[tracks.id == id_] = posterior
+    points = np.arange(n_points * 4, dtype=np.float32).reshape(-1, 4)
+    frame = Frame(index, index / 10, points)
+    return FrameResult(frame, proposals(counts), tracks, STATES, classified, 0)
+
+
+CAR = [0.1, 0.7, 0.1, 0.1]
+PEDESTRIAN = [0.1, 0.1, 0.7, 0.1]

@@ -1,0 +1,56 @@
+"""KITTI tracking results, read back by the benchmark's definitions."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.geometry import corners
+from modt.sinks.kitti import KittiResults
+
+from ..results import CAR, proposals, result
+from ..test_geometry import forward_camera
+
+
+def written(tmp_path, frame_result, camera):
+    sink = KittiResults(tmp_path / "kitti" / "0000.txt", camera)
+    sink.write(frame_result)
+    sink.close()
+    return [line.split() for line in (tmp_path / "kitti" / "0000.txt").read_text().splitlines()]
+
+
+def test_only_foreground_that_is_seen_is_written(tmp_path):
+    rows = written(tmp_path, result(4, [5, 5], {0: 1, 1: 2}, {1: CAR, 3: CAR}, lost=(3,)), forward_camera())
+    assert len(rows) == 1
+    assert rows[0][:3] == ["4", "1", "Car"]
+    assert len(rows[0]) == 18
+
+
+@given(
+    x=st.floats(5, 40),
+    y=st.floats(-5, 5),
+    yaw=st.floats(-3.1, 3.1),
+    size=st.tuples(st.floats(1, 5), st.floats(0.5, 2), st.floats(0.5, 2)),
+)
+def test_the_benchmark_sees_the_same_box(tmp_path_factory, x, y, yaw, size):
+    box = np.array([[x, y, -0.5, *size, yaw]])
+    shown = result(0, [5], {0: 1}, {1: CAR})
+    shown = type(shown)(shown.frame, proposals([5], box), shown.tracks, shown.state_names, 0, 0)
+    row = written(tmp_path_factory.mktemp("k"), shown, forward_camera())[0]
+    h, w, length, cx, cy, cz, ry = map(float, row[10:17])
+    # The benchmark's corners: x right, z forward, the box turned by ry about the downward axis.
+    local = np.array([[length, w], [length, -w], [-length, -w], [-length, w]]) / 2
+    right = np.cos(ry) * local[:, 0] + np.sin(ry) * local[:, 1] + cx
+    ahead = -np.sin(ry) * local[:, 0] + np.cos(ry) * local[:, 1] + cz
+    found = sorted(map(tuple, np.round(np.stack([ahead, -right], axis=1), 1)))
+    expected = sorted(map(tuple, np.round(corners(box)[0], 1)))
+    np.testing.assert_allclose(found, expected, atol=0.11)
+    assert np.isclose(cy, 0.5 + h / 2, atol=1e-2)  # the foot, downwards from the camera
+    left, top, right_px, bottom = map(float, row[6:10])
+    assert 0 <= left <= right_px <= 199
+    assert 0 <= top <= bottom <= 99
+
+
+def test_without_a_camera_the_axes_stand_and_the_image_does_not(tmp_path):
+    row = written(tmp_path, result(0, [5], {0: 1}, {1: CAR}), None)[0]
+    assert row[6:10] == ["-1.00"] * 4
+    assert np.allclose([float(v) for v in row[13:16]], [0, 1.75, 10])

@@ -1,0 +1,112 @@
+"""JSON Lines: whole lines or none, read back as written."""
+
+import subprocess
+import sys
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.errors import MisuseError, ModtError
+from modt.sinks.records import JsonLines, read_records
+
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(), inner, max_size=3),
+    max_leaves=8,
+)
+record = st.dictionaries(st.text().filter(lambda k: k != "schema"), json_values, max_size=4)
+
+
+@given(st.lists(record, max_size=5))
+def test_what_is_written_is_read(tmp_path_factory, records):
+    path = tmp_path_factory.getbasetemp() / "r.jsonl"
+    lines = JsonLines(path)
+    written = [{"schema": "s/1", **r} for r in records]
+    for r in written:
+        lines.write(r)
+    assert list(read_records(path, "s/1")) == written  # while it is still open
+    lines.close()
+
+
+@given(cut=st.integers(0, 200))
+def test_a_file_cut_anywhere_keeps_its_whole_lines(tmp_path_factory, cut):
+    path = tmp_path_factory.getbasetemp() / "cut.jsonl"
+    lines = JsonLines(path)
+    for i in range(6):
+        lines.write({"schema": "s/1", "i": i, "text": "x" * i})
+    lines.close()
+    content = path.read_bytes()[:cut]
+    path.write_bytes(content)
+    whole = content.count(b"\n")
+    read = [r["i"] for r in read_records(path, "s/1")]
+    assert read[:whole] == list(range(whole))
+    assert len(read) <= whole + 1  # a last line may lack nothing but its end
+
+
+@pytest.mark.parametrize(
+    ("content", "where"),
+    [
+        ('{"schema":"s/1"}\nnonsense\n', ":2: no JSON"),
+        ('{"schema":"s/2"}\n', ":1: schema is 's/2'"),
+        ("[1]\n", ":1: schema is None"),
+    ],
+)
+def test_what_is_no_record_is_named_with_its_line(tmp_path, content, where):
+    path = tmp_path / "r.jsonl"
+    path.write_text(content)
+    with pytest.raises(MisuseError, match=where):
+        list(read_records(path, "s/1"))
+
+
+def test_a_missing_file_is_one_clear_error(tmp_path):
+    with pytest.raises(MisuseError, match="cannot be read"):
+        list(read_records(tmp_path / "none", "s/1"))
+
+
+def test_not_a_number_is_refused_before_it_reaches_the_file(tmp_path):
+    lines = JsonLines(tmp_path / "r.jsonl")
+    with pytest.raises(ValueError, match="JSON"):
+        lines.write({"x": float("nan")})
+    lines.close()
+    assert (tmp_path / "r.jsonl").read_bytes() == b""
+
+
+def test_a_full_device_is_one_clear_error():
+    from pathlib import Path
+
+    lines = JsonLines(Path("/dev/full"))
+    with pytest.raises(ModtError, match="No space left"):
+        lines.write({"schema": "s/1"})
+    lines.close()
+
+
+FULL = """
+import resource, pathlib, sys
+from modt.errors import ModtError
+from modt.sinks.records import JsonLines
+resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
+lines = JsonLines(pathlib.Path(sys.argv[1]))
+try:
+    for i in range(100):
+        lines.write({"schema": "s/1", "i": i, "fill": "x" * 90})
+except ModtError as error:
+    print(error)
+"""
+
+
+def test_a_line_that_does_not_fit_is_taken_back(tmp_path):
+    path = tmp_path / "r.jsonl"
+    done = subprocess.run([sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True)
+    assert "too large" in done.stdout
+    assert str(path) in done.stdout
+    content = path.read_bytes()
+    assert content.endswith(b"\n")
+    read = [r["i"] for r in read_records(path, "s/1")]
+    assert read == list(range(len(read)))
+    assert len(read) >= 5
+
+
+def test_a_folder_that_is_not_there_is_one_clear_error(tmp_path):
+    with pytest.raises(ModtError, match="No such file"):
+        JsonLines(tmp_path / "none" / "r.jsonl")

@@ -1,0 +1,165 @@
+"""Layouts are told from what lies there, and what is missing is named."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from modt.errors import MisuseError, ModtError
+from modt.sources.recognise import open_stream
+
+from . import layouts
+
+
+@pytest.mark.parametrize(
+    ("build", "layout", "poses", "camera"),
+    [
+        (layouts.raw_drive, "KITTI raw drive", True, True),
+        (layouts.tracking, "KITTI tracking", True, True),
+        (layouts.odometry, "KITTI odometry", True, True),
+        (layouts.bare, "folder of scans", False, False),
+    ],
+)
+def test_each_layout_is_recognised(tmp_path, build, layout, poses, camera):
+    stream = open_stream(build(tmp_path))
+    assert stream.info.layout == layout
+    assert stream.info.has_poses is poses
+    assert (stream.info.camera is not None) is camera
+    frames = list(stream)
+    assert [f.index for f in frames] == list(range(len(frames)))
+    assert all((f.T_world_sensor is not None) is poses for f in frames)
+
+
+@pytest.mark.parametrize("inner", ["velodyne_points", "velodyne_points/data"])
+def test_a_raw_drive_is_found_from_inside(tmp_path, inner):
+    assert open_stream(layouts.raw_drive(tmp_path) / inner).info.layout == "KITTI raw drive"
+
+
+def test_an_odometry_sequence_is_found_from_its_scans(tmp_path):
+    assert open_stream(layouts.odometry(tmp_path) / "velodyne").info.layout == "KITTI odometry"
+
+
+def test_odometry_poses_are_brought_to_the_sensor(tmp_path):
+    frames = list(open_stream(layouts.odometry(tmp_path)))
+    np.testing.assert_allclose(frames[2].T_world_sensor[:3, 3], [6, 0, 0], atol=1e-12)
+    assert frames[1].stamp_s == 0.104
+
+
+def test_tracking_poses_come_from_oxts(tmp_path):
+    stream = open_stream(layouts.tracking(tmp_path))
+    assert stream.info.sequence == 3
+    np.testing.assert_allclose(list(stream)[2].T_world_sensor[:3, 3], [0, 4, 0], atol=1e-4)
+
+
+def test_stamps_count_from_the_first(tmp_path):
+    stamps = [f.stamp_s for f in open_stream(layouts.raw_drive(tmp_path))]
+    np.testing.assert_allclose(stamps, [0, 0.1, 0.2, 0.3], atol=1e-9)
+
+
+def test_missing_frames_leave_gaps_and_a_note(tmp_path):
+    stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
+    assert [f.index for f in stream] == [0, 1, 4]
+    assert any("2 frames are missing" in note for note in stream.info.notes)
+    assert [round(f.stamp_s, 6) for f in stream] == [0, 0.1, 0.4]
+
+
+@pytest.mark.parametrize(
+    ("lost", "named"),
+    [
+        ("calib_cam_to_cam.txt", "no camera"),
+        ("calib_imu_to_velo.txt", "no ego-motion"),
+        ("2011_09_26_drive_9999_sync/oxts", "no ego-motion"),
+        ("2011_09_26_drive_9999_sync/velodyne_points/timestamps.txt", "0.1 s apart"),
+    ],
+)
+def test_what_is_missing_is_named_and_the_rest_works(tmp_path, lost, named):
+    drive = layouts.raw_drive(tmp_path)
+    gone = drive.parent / lost
+    shutil.rmtree(gone) if gone.is_dir() else gone.unlink()
+    stream = open_stream(drive)
+    assert any(named in note and gone.name in note for note in stream.info.notes), stream.info.notes
+    assert len(list(stream)) == 4
+
+
+def test_broken_calibration_is_an_error_with_its_file(tmp_path):
+    drive = layouts.raw_drive(tmp_path)
+    (drive.parent / "calib_velo_to_cam.txt").write_text("R: 1 2 3\n")
+    with pytest.raises(MisuseError, match=r"calib_velo_to_cam.*R holds 3 numbers"):
+        open_stream(drive)
+
+
+def test_broken_oxts_is_an_error_with_its_file(tmp_path):
+    drive = layouts.raw_drive(tmp_path)
+    (drive / "oxts" / "data" / f"{2:010d}.txt").write_text("49.0 8.4 nonsense")
+    with pytest.raises(MisuseError, match=r"0000000002\.txt"):
+        open_stream(drive)
+
+
+def test_frames_without_a_pose_keep_the_one_before(tmp_path):
+    drive = layouts.raw_drive(tmp_path)
+    (drive / "oxts" / "data" / f"{2:010d}.txt").unlink()
+    frames = list(open_stream(drive))
+    np.testing.assert_array_equal(frames[2].T_world_sensor, frames[1].T_world_sensor)
+    assert not np.allclose(frames[3].T_world_sensor, frames[2].T_world_sensor)
+
+
+def test_bad_scans_are_counted_and_skipped(tmp_path, caplog):
+    drive = layouts.raw_drive(tmp_path)
+    data = drive / "velodyne_points" / "data"
+    (data / f"{1:010d}.bin").write_bytes(b"short")
+    broken = layouts.scan(2)
+    broken[0, 0] = np.nan
+    (data / f"{2:010d}.bin").write_bytes(broken.tobytes())
+    stream = open_stream(drive)
+    assert [f.index for f in stream] == [0, 2, 3]
+    assert [(f.frame, f.skipped) for f in stream.faults] == [(1, True), (2, False)]
+    assert "truncated" in caplog.text
+    assert "not finite" in caplog.text
+
+
+def test_a_stream_without_one_good_scan_fails(tmp_path):
+    folder = layouts.bare(tmp_path)
+    for path in folder.glob("*.bin"):
+        path.write_bytes(b"")
+    with pytest.raises(ModtError, match="none of its 3 scans"):
+        list(open_stream(folder))
+
+
+def test_between_reads_only_its_part(tmp_path):
+    stream = open_stream(layouts.raw_drive(tmp_path)).between(1, 3)
+    assert stream.info.n_frames == 2
+    assert [f.index for f in stream] == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("make", "cause"),
+    [
+        (lambda root: root / "nowhere", "no such file"),
+        (lambda root: root, "no stream"),
+        (lambda root: (root / "a.bin").write_bytes(b"") or root / "a.bin", "no stream"),
+        (lambda root: layouts.raw_drive(root).parent.parent, "several streams.*drive_9999"),
+    ],
+    ids=["missing", "empty", "a file", "a root"],
+)
+def test_what_is_no_stream_says_so(tmp_path, make, cause):
+    with pytest.raises(MisuseError, match=cause):
+        open_stream(make(tmp_path))
+
+
+def test_a_raw_drive_without_scans_is_named(tmp_path):
+    drive = layouts.raw_drive(tmp_path)
+    shutil.rmtree(drive / "velodyne_points")
+    with pytest.raises(MisuseError, match="velodyne_points"):
+        open_stream(drive)
+
+
+@pytest.mark.kitti
+def test_a_real_drive(drive_0005):
+    stream = open_stream(drive_0005)
+    assert stream.info.n_frames == 154
+    assert stream.info.notes == ()
+    last = stream.scans[-1].T_world_sensor
+    # The drive covers 69 m of street; its end is where the inertial unit says.
+    assert 60 < np.linalg.norm(last[:3, 3] - stream.scans[0].T_world_sensor[:3, 3]) < 70
+    first = next(iter(stream))
+    assert len(first.points) > 100_000

@@ -1,0 +1,87 @@
+"""Scan files, good and bad."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.errors import ScanError
+from modt.sources.scan_file import read_scan, sanitised
+
+GOOD = np.array([[1, 2, 3, 0.5], [4, 5, 6, 0.25]], np.float32)
+
+
+def write(path, points):
+    path.write_bytes(np.ascontiguousarray(points, np.float32).tobytes())
+    return path
+
+
+def test_a_good_scan_is_read_as_it_is(tmp_path):
+    points, bad = read_scan(write(tmp_path / "0.bin", GOOD))
+    assert bad == 0
+    assert points.dtype == np.float32
+    np.testing.assert_array_equal(points, GOOD)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("column", range(4))
+def test_points_that_are_not_finite_keep_their_row_at_the_origin(tmp_path, value, column):
+    broken = GOOD.copy()
+    broken[0, column] = value
+    points, bad = read_scan(write(tmp_path / "0.bin", broken))
+    assert bad == 1
+    np.testing.assert_array_equal(points, [[0, 0, 0, 0], GOOD[1]])
+
+
+def test_reflectance_in_bytes_is_scaled(tmp_path):
+    scan = GOOD.copy()
+    scan[:, 3] = [255, 51]
+    points, _ = read_scan(write(tmp_path / "0.bin", scan))
+    np.testing.assert_allclose(points[:, 3], [1.0, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("content", "cause"),
+    [
+        (b"", "empty"),
+        (GOOD.tobytes()[:-3], "truncated"),
+        (np.full((100, 4), 5e3, np.float32).tobytes(), "columns"),
+        (np.tile(np.float32([1, 2, -3]), 400).tobytes(), "columns"),
+    ],
+    ids=["empty", "truncated", "far", "three columns"],
+)
+def test_a_bad_scan_says_what_is_wrong_with_it(tmp_path, content, cause):
+    path = tmp_path / "0.bin"
+    path.write_bytes(content)
+    with pytest.raises(ScanError, match=cause) as caught:
+        read_scan(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_missing_scan_is_an_error_of_that_scan(tmp_path):
+    with pytest.raises(ScanError, match="cannot be read"):
+        read_scan(tmp_path / "none.bin")
+
+
+@given(st.binary(max_size=400))
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_any_bytes_are_finite_points_or_one_clear_error(tmp_path_factory, content):
+    path = tmp_path_factory.getbasetemp() / "fuzz.bin"
+    path.write_bytes(content)
+    try:
+        points, bad = read_scan(path)
+    except ScanError:
+        return
+    assert len(points) == len(content) // 16
+    assert 0 <= bad <= len(points)
+    assert np.isfinite(points).all()
+    assert (points[:, 3] >= 0).mean() >= 0.98
+
+
+def test_two_infinities_that_cancel_are_found():
+    points = GOOD.copy()
+    points[:, 0] = [np.inf, -np.inf]
+    with np.errstate(invalid="ignore"):
+        clean, bad = sanitised(points, "scan")
+    assert bad == 2
+    assert np.isfinite(clean).all()

@@ -1,0 +1,86 @@
+"""models/ and profiles/ are found from a checkout, an editable install and a wheel alike."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from modt import assets
+from modt.errors import MisuseError
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+PROBE = """
+import pathlib
+import modt
+from modt import assets, profile
+print(pathlib.Path(modt.__file__).parent)
+print(sorted(p.name for kind in ("models", "profiles") for p in assets.folder(kind).iterdir()))
+profile.load()
+"""
+
+
+def probe(python: str, *, path: Path | None = None, cwd: Path) -> tuple[str, str]:
+    """Where modt is imported from, and the files it finds."""
+    env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    if path is not None:
+        env["PYTHONPATH"] = str(path)
+    done = subprocess.run([python, "-c", PROBE], check=False, capture_output=True, text=True, env=env, cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    package, files = done.stdout.splitlines()
+    return package, files
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory) -> str:
+    """What a checkout finds."""
+    package, files = probe(sys.executable, path=CHECKOUT / "runtime", cwd=tmp_path_factory.getbasetemp())
+    assert package == str(CHECKOUT / "runtime" / "modt")
+    assert "hdl-64e.yaml" in files
+    return files
+
+
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory) -> Path:
+    """A fresh environment that sees this one's libraries, but not this one's modt."""
+    folder = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
+    site = next((folder / "lib").glob("python3*")) / "site-packages"
+    import numpy
+
+    (site / "libraries.pth").write_text(str(Path(numpy.__file__).parents[1]) + "\n")
+    return folder
+
+
+def install(environment: Path, *what: str) -> None:
+    """Install with this environment's pip, from what is on this machine alone."""
+    python = environment / "bin" / "python"
+    command = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--no-deps", "--no-index"]
+    quiet = ["--disable-pip-version-check", "--no-build-isolation", "--ignore-installed"]
+    subprocess.run([*command, *quiet, *what], check=True, capture_output=True, text=True)
+
+
+@pytest.mark.install
+def test_from_a_wheel(expected, environment, tmp_path):
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path), str(CHECKOUT)]
+    subprocess.run(build, check=True, capture_output=True)
+    install(environment, str(next(tmp_path.glob("*.whl"))))
+    package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path)
+    assert package.startswith(str(environment))
+    assert files == expected
+
+
+@pytest.mark.install
+def test_from_an_editable_install(expected, environment, tmp_path):
+    install(environment, "--editable", str(CHECKOUT))
+    package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path)
+    assert package == str(CHECKOUT / "runtime" / "modt")
+    assert files == expected
+
+
+def test_what_is_not_there_lists_what_is(tmp_path):
+    with pytest.raises(MisuseError, match="hdl-64e"):
+        assets.find("profiles", "nothing", ".yaml")
+    with pytest.raises(MisuseError, match="no such file"):
+        assets.find("profiles", str(tmp_path / "x.yaml"), ".yaml")

@@ -1,0 +1,86 @@
+"""Rigid transforms, boxes and the field of view."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from modt.geometry import (
+    Camera,
+    FieldOfView,
+    corners,
+    inverse,
+    rotation_zyx,
+    se3,
+    transform,
+    transform_boxes,
+    wrap,
+    yaw_of,
+)
+
+angle = st.floats(-10, 10)
+metre = st.floats(-100, 100)
+pose = st.builds(
+    lambda r, p, y, t: se3(rotation_zyx(r, p, y), np.array(t)), angle, angle, angle, st.tuples(metre, metre, metre)
+)
+planar = st.builds(lambda y, t: se3(rotation_zyx(0, 0, y), np.array(t)), angle, st.tuples(metre, metre, metre))
+boxes = arrays(np.float64, (3, 7), elements=st.floats(0.1, 20))
+
+
+@given(angle)
+def test_wrap_is_the_same_direction_in_the_principal_range(a):
+    w = float(wrap(np.array(a)))
+    assert -np.pi <= w < np.pi
+    assert np.allclose([np.cos(w), np.sin(w)], [np.cos(a), np.sin(a)])
+
+
+@given(angle, angle, angle)
+def test_rotation_is_the_product_of_its_turns(roll, pitch, yaw):
+    whole = rotation_zyx(roll, pitch, yaw)
+    parts = rotation_zyx(0, 0, yaw) @ rotation_zyx(0, pitch, 0) @ rotation_zyx(roll, 0, 0)
+    assert np.allclose(whole, parts)
+    assert np.isclose(np.linalg.det(whole), 1)
+
+
+@given(pose)
+def test_inverse_undoes(T):
+    assert np.allclose(T @ inverse(T), np.eye(4), atol=1e-9)
+
+
+@given(planar, boxes)
+def test_corners_of_a_moved_box_are_the_moved_corners(T, box):
+    before = np.concatenate([corners(box), np.repeat(box[:, None, 2:3], 4, axis=1)], axis=2)
+    moved = transform(T, before.reshape(-1, 3)).reshape(3, 4, 3)[..., :2]
+    assert np.allclose(corners(transform_boxes(T, box)), moved, atol=1e-6)
+
+
+@given(boxes)
+def test_corners_enclose_the_area(box):
+    c = corners(box)
+    x, y = c[..., 0], c[..., 1]
+    area = 0.5 * np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1))
+    assert np.allclose(area, box[:, 3] * box[:, 4])
+
+
+def test_yaw_of_a_turn():
+    assert np.isclose(yaw_of(se3(rotation_zyx(0.1, -0.1, 0.7), np.zeros(3))), 0.7)
+
+
+def forward_camera() -> Camera:
+    """100 pixels of focal length, 200 wide: 45 degrees to each side."""
+    T = np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+    K = np.array([[100.0, 0, 100, 0], [0, 100, 50, 0], [0, 0, 1, 0]])
+    return Camera(K @ T, T, 200, 100)
+
+
+def test_field_of_view_of_a_camera_is_its_wedge():
+    fov = FieldOfView.of_camera(forward_camera())
+    xyz = np.array([[10, 0, 0], [10, 9.9, 0], [10, 10.1, 0], [10, -9.9, 5], [10, -10.1, 5], [-10, 0, 0]])
+    assert fov.contains(xyz).tolist() == [True, True, False, True, False, False]
+    assert np.isclose(fov.depth(xyz)[0], 10 / np.sqrt(2))
+
+
+@given(arrays(np.float32, (5, 4), elements=st.floats(-50, 50, width=32)))
+def test_full_circle_contains_everything(points):
+    assert FieldOfView().contains(points).all()
+    assert FieldOfView().full

@@ -1,0 +1,123 @@
+"""Pace, stop and the order of things in the loop."""
+
+import os
+import signal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.energy.ledger import NullLedger
+from modt.loop import FixedPeriod, FullSpeed, Stop, drive
+from modt.sinks.sink import NullLines
+from modt.types import UNLIMITED
+
+from .results import result
+
+
+class Time:
+    """A clock that only sleeping and working move."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.now += seconds
+
+
+def starts(work, period=0.1):
+    time = Time()
+    pace = FixedPeriod(period, time, time.sleep)
+    out = []
+    for seconds in work:
+        pace.wait()
+        out.append(time.now - 100.0)
+        time.now += seconds
+    return out, pace
+
+
+def test_frames_start_at_absolute_deadlines():
+    out, pace = starts([0.03, 0.09, 0.0, 0.05])
+    assert out == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert pace.report()["missed_deadlines"] == 0
+
+
+def test_a_stall_is_counted_and_no_burst_follows():
+    out, pace = starts([0.35, 0.01, 0.01, 0.01])
+    assert out == pytest.approx([0.0, 0.35, 0.45, 0.55])
+    assert pace.missed == 2
+
+
+def test_a_small_overrun_is_made_up_for():
+    out, pace = starts([0.12, 0.01, 0.01])
+    assert out == pytest.approx([0.0, 0.12, 0.2])
+    assert pace.missed == 0
+    assert pace.report()["max_lateness_ms"] == pytest.approx(20)
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
+def test_frames_never_start_early_nor_in_a_burst(work):
+    out, pace = starts(work)
+    assert all(
+        b - a >= 0.1 - max(0, a % 0.1) - 1e-6 or b - a >= w for a, b, w in zip(out, out[1:], work, strict=False)
+    )
+    assert len(out) == len(work)
+    assert min(pace.lateness_s) >= -1e-9
+
+
+def test_full_speed_never_waits():
+    FullSpeed().wait()
+    assert FullSpeed().report() == {"rate_hz": None}
+
+
+class Pipe:
+    ledger = NullLedger()
+
+    def __init__(self):
+        self.seen = []
+
+    def step(self, frame, budget):
+        self.seen.append((frame.index, budget))
+        return result(frame.index, [3], {0: 1})
+
+
+class Kept:
+    def __init__(self):
+        self.indices = []
+
+    def write(self, r):
+        self.indices.append(r.frame.index)
+
+    def close(self):
+        pass
+
+
+def test_every_frame_reaches_every_sink_and_the_observer():
+    pipe, sinks, observed = Pipe(), [Kept(), Kept()], []
+    frames = [result(i, [], {}).frame for i in range(4)]
+    done = drive(
+        frames, pipe, sinks, NullLines(), UNLIMITED, FullSpeed(), Stop(), lambda r, line: observed.append(line)
+    )
+    assert done == 4
+    assert [s.indices for s in sinks] == [[0, 1, 2, 3]] * 2
+    assert [line["frame"] for line in observed] == [0, 1, 2, 3]
+    assert pipe.seen == [(i, UNLIMITED) for i in range(4)]
+
+
+def test_a_signal_ends_the_loop_after_the_frame_in_hand():
+    pipe, sink = Pipe(), Kept()
+    frames = [result(i, [], {}).frame for i in range(9)]
+
+    def interrupt(r, line):
+        if r.frame.index == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with Stop().on_signals() as stop:
+        done = drive(frames, pipe, [sink], NullLines(), UNLIMITED, FullSpeed(), stop, interrupt)
+    assert done == 3
+    assert sink.indices == [0, 1, 2]
+    assert stop.signal == "SIGINT"

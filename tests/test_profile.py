@@ -1,0 +1,97 @@
+"""Profiles: strict, bounded, and back again."""
+
+import dataclasses
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt import assets, profile
+from modt.config import ProfileConfig, SegmentationConfig, StageConfig, ValueRangeError
+from modt.errors import MisuseError
+
+
+@pytest.mark.parametrize("path", sorted(assets.folder("profiles").glob("*.yaml")), ids=lambda p: p.stem)
+def test_every_profile_that_comes_along_loads(path):
+    assert isinstance(profile.load(path.stem), ProfileConfig)
+    assert profile.load(str(path)) == profile.load(path.stem)
+
+
+def test_an_empty_profile_is_the_default():
+    assert profile.parse("") == ProfileConfig()
+
+
+def test_dump_and_parse_are_inverse():
+    config = profile.parse("fusion: {threshold: 0.9, alpha: [0.1, 0.2, 0.3]}\nsensor: {height_m: null}\n")
+    assert config.fusion.alpha == (0.1, 0.2, 0.3)
+    assert config.sensor.height_m is None
+    assert profile.parse(profile.to_yaml(profile.dump(config))) == config
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("sensr: {}\n", ["p.yaml:1", "unknown key 'sensr'", "'sensor'"]),
+        ("sensor:\n  height_m: 1.0\n  heigth: 2\n", ["p.yaml:3", "'heigth'", "'height_m'"]),
+        ("segmentation:\n  min_points: 5\n  cell_m: 99\n", ["p.yaml:3", "cell_m", "out of range"]),
+        ("segmentation:\n  min_points: 2.5\n", ["p.yaml:2", "min_points", "whole number"]),
+        ("segmentation:\n  min_points: true\n", ["p.yaml:2", "min_points"]),
+        ("tracking:\n  association: magic\n", ["p.yaml:2", "'magic'", "paper"]),
+        ("fusion:\n  alpha: [1, 2]\n", ["p.yaml:2", "alpha", "3 values"]),
+        ("fusion:\n  threshold: high\n", ["p.yaml:2", "threshold"]),
+        ("fusion: 3\n", ["p.yaml:1", "no mapping"]),
+        ("a: [1\n", ["p.yaml:", "no YAML"]),
+        ("sensor: {}\nsensor: {}\n", ["p.yaml:2", "twice"]),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(text, parts):
+    with pytest.raises(MisuseError) as caught:
+        profile.parse(text, "p.yaml")
+    message = str(caught.value)
+    assert "\n" not in message
+    assert all(part in message for part in parts), message
+
+
+@given(st.text(max_size=60))
+def test_any_text_is_a_profile_or_one_clear_error(text):
+    try:
+        parsed = profile.parse(text)
+    except MisuseError:
+        return
+    assert isinstance(parsed, ProfileConfig)
+
+
+def test_a_profile_that_is_not_there_lists_those_that_are():
+    with pytest.raises(MisuseError, match="hdl-64e"):
+        profile.load("no-such-sensor")
+    with pytest.raises(MisuseError, match="no such file"):
+        profile.load("there/is/none.yaml")
+
+
+def test_an_unreadable_profile_is_one_clear_error(tmp_path):
+    path = tmp_path / "binary.yaml"
+    path.write_bytes(b"\xff\xfe\x00\xd8")
+    with pytest.raises(MisuseError, match="cannot be read"):
+        profile.load(str(path))
+
+
+def test_every_value_declares_bounds_and_meaning():
+    for stage in dataclasses.fields(ProfileConfig):
+        for f in dataclasses.fields(stage.default_factory):
+            assert f.metadata.get("meaning"), f"{stage.name}.{f.name}"
+
+
+def test_configuration_made_in_code_is_checked_too():
+    with pytest.raises(ValueRangeError, match="cell_m"):
+        SegmentationConfig(cell_m=-1.0)
+
+
+def test_stages_are_frozen():
+    assert issubclass(SegmentationConfig, StageConfig)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        SegmentationConfig().cell_m = 1.0
+
+
+def test_dump_is_plain_data():
+    assert yaml.safe_load(yaml.safe_dump(profile.dump(ProfileConfig()))) == profile.dump(ProfileConfig())

@@ -1,0 +1,57 @@
+"""The tables that stages share."""
+
+import dataclasses
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.types import N_CLASSES, NONE, Proposals, Tracks
+
+from .results import proposals
+
+
+@given(st.lists(st.integers(1, 9), max_size=6))
+def test_labels_and_counts_agree(counts):
+    found = proposals(counts)
+    n = sum(counts) + 3
+    label = found.label(n)
+    assert found.count.tolist() == counts
+    assert np.bincount(label + 1, minlength=len(counts) + 1).tolist() == [3, *counts]
+
+
+def test_no_proposals():
+    empty = Proposals.empty()
+    assert len(empty) == 0
+    assert empty.label(4).tolist() == [NONE] * 4
+
+
+@given(st.integers(0, 5), st.integers(0, 5))
+def test_tracks_grow_and_shrink_in_every_column(m, n):
+    a, b = Tracks.blank(m), Tracks.blank(n)
+    a.id[:], b.id[:] = np.arange(m), 100 + np.arange(n)
+    both = a.append(b)
+    assert len(both) == m + n
+    assert all(len(column) == m + n for _, column in both.columns())
+    assert both.take(both.id >= 100).id.tolist() == b.id.tolist()
+    assert {name for name, _ in both.columns()} == {f.name for f in dataclasses.fields(Tracks)}
+
+
+def test_a_blank_track_knows_nothing():
+    blank = Tracks.blank(2)
+    assert blank.posterior.tolist() == [[1 / N_CLASSES] * N_CLASSES] * 2
+    assert blank.proposal.tolist() == [NONE, NONE]
+    assert not blank.fixed.any()
+
+
+def test_a_copy_is_independent():
+    first = Tracks.blank(1)
+    second = first.copy()
+    second.id[0] = 7
+    assert first.id[0] == NONE
+
+
+def test_rows_by_proposal():
+    tracks = Tracks.blank(3)
+    tracks.proposal[:] = [2, NONE, 0]
+    assert tracks.row_of_proposal(4).tolist() == [2, NONE, 0, NONE]

@@ -1,0 +1,38 @@
+"""Frames made of boxes full of points, for the tracker's tests."""
+
+import numpy as np
+
+from modt.types import Frame, Proposals
+
+
+def frame_of(boxes, index=0, T_world_sensor=None, points=60, seed=0, period_s=0.1):
+    """A frame whose proposals are boxes (P, 7) filled with points; points may be a number for each."""
+    boxes = np.asarray(boxes, np.float64).reshape(-1, 7)
+    rng = np.random.default_rng([seed, index])
+    counts = np.broadcast_to(points, len(boxes))
+    clouds = [cloud(b, n, rng) for b, n in zip(boxes, counts, strict=True)]
+    xyz = np.concatenate([np.zeros((0, 3)), *clouds])
+    offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+    frame = Frame(
+        index,
+        index * period_s,
+        np.concatenate([xyz, np.zeros((len(xyz), 1))], axis=1).astype(np.float32),
+        T_world_sensor,
+    )
+    flags = np.zeros(len(boxes), np.bool_)
+    centroid = np.array([c.mean(axis=0) for c in clouds]).reshape(-1, 3)
+    return frame, Proposals(np.arange(len(xyz)), offsets, centroid, boxes, flags, flags)
+
+
+def cloud(box, n, rng):
+    """(n, 3) points that reach every side of the box."""
+    u = rng.uniform(-0.5, 0.5, (n, 3))
+    for k in range(3):
+        u[2 * k, k], u[2 * k + 1, k] = -0.5, 0.5
+    local = u * box[3:6]
+    c, s = np.cos(box[6]), np.sin(box[6])
+    return local @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + box[:3]
+
+
+def box(x, y, l=4.0, w=1.8, h=1.5, yaw=0.0, z=-1.0):  # noqa: E741
+    return [x, y, z, l, w, h, yaw]

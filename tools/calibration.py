@@ -1,0 +1,63 @@
+"""Confidences that mean what they say: a temperature and an offset a class, fitted on held-out logits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import log_softmax, softmax
+
+from modt.types import N_CLASSES, Float32, Float64, Int
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """probability = softmax(logits / temperature + offset)."""
+
+    temperature: float
+    offset: Float64
+
+    @classmethod
+    def none(cls) -> Calibration:
+        """Leaves everything as it is."""
+        return cls(1.0, np.zeros(N_CLASSES))
+
+    def apply(self, logits: Float64) -> Float64:
+        """(R, 4) probabilities of logits."""
+        probability: Float64 = softmax(logits / self.temperature + self.offset, axis=1)
+        return probability
+
+    def folded(self, last: tuple[Float32, Float32]) -> tuple[Float32, Float32]:
+        """The last layer with this in it."""
+        weight, bias = last
+        return (
+            (weight / self.temperature).astype(np.float32),
+            (bias / self.temperature + self.offset).astype(np.float32),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a report."""
+        return {"temperature": round(self.temperature, 4), "offset": [round(float(v), 4) for v in self.offset]}
+
+
+def fit(logits: Float64, label: Int) -> Calibration:
+    """Maximum likelihood on held-out logits; the offsets carry how common each class is among proposals."""
+
+    def loss(theta: Float64) -> float:
+        z = log_softmax(logits * np.exp(-theta[0]) + np.append(0.0, theta[1:]), axis=1)
+        prior = 0.05 * float(np.sum(theta**2)) / len(label)
+        return prior - float(z[np.arange(len(label)), label].mean())
+
+    found = minimize(loss, np.zeros(N_CLASSES), method="L-BFGS-B")
+    return Calibration(float(np.exp(found.x[0])), np.append(0.0, found.x[1:]))
+
+
+def expected_error(probability: Float64, label: Int, bins: int = 15) -> float:
+    """Expected calibration error of the top class: mean gap between confidence and accuracy over equal bins."""
+    confidence, right = probability.max(axis=1), probability.argmax(axis=1) == label
+    which = np.minimum((confidence * bins).astype(np.int64), bins - 1)
+    n = np.bincount(which, minlength=bins)
+    gap = np.bincount(which, confidence, bins) - np.bincount(which, right, bins)
+    return round(float(np.abs(gap).sum() / max(n.sum(), 1)), 4)

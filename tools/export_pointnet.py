@@ -1,0 +1,136 @@
+"""Export trained weights to ONNX, with a card (extra [train]).
+
+    export_pointnet.py TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
+
+Two identities make the exported graph cheap without changing a digit that matters: the maximum commutes with adding a
+bias and with ReLU, so both come after it, on one row instead of one a point; and it is idempotent, so that the point
+axis may be as long as a proposal has points. Batch and point axes are dynamic.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+from onnx import TensorProto, helper, numpy_helper
+
+from modt.types import CLASS_NAMES, Float32
+
+Layers = list[tuple[Float32, Float32]]
+N_SHARED = 3
+OPSET, IR = 17, 8
+
+
+def load_layers(path: Path) -> Layers:
+    """(in, out) weight and (out,) bias of each layer of a weights.npz."""
+    with np.load(path) as file:
+        return [(file[f"weight{i}"], file[f"bias{i}"]) for i in range(len(file.files) // 2)]
+
+
+def graph(layers: Layers, *, pool_first: bool = True) -> onnx.ModelProto:
+    """The network; with pool_first False the textbook order, bias and ReLU on every point."""
+    nodes, value = [], "points"
+    initial: list[TensorProto] = []
+
+    def add(op: str, *extra: str, **attributes: Any) -> None:
+        nonlocal value
+        result = f"v{len(nodes)}"
+        nodes.append(helper.make_node(op, [value, *extra], [result], **attributes))
+        value = result
+
+    for i, (weight, bias) in enumerate(layers):
+        initial.append(numpy_helper.from_array(weight, f"weight{i}"))
+        initial.append(numpy_helper.from_array(bias, f"bias{i}"))
+        last_shared = i == N_SHARED - 1
+        add("MatMul", f"weight{i}")
+        if last_shared and pool_first:
+            add("ReduceMax", axes=[1], keepdims=0)
+        add("Add", f"bias{i}")
+        add("Softmax", axis=-1) if i == len(layers) - 1 else add("Relu")
+        if last_shared and not pool_first:
+            add("ReduceMax", axes=[1], keepdims=0)
+    nodes[-1].output[0] = "probability"
+    ends = (
+        [helper.make_tensor_value_info("points", TensorProto.FLOAT, ["batch", "points", 3])],
+        [helper.make_tensor_value_info("probability", TensorProto.FLOAT, ["batch", len(CLASS_NAMES)])],
+    )
+    model = helper.make_model(
+        helper.make_graph(nodes, "pointnet", *ends, initial),
+        opset_imports=[helper.make_opsetid("", OPSET)],
+        ir_version=IR,
+        producer_name="modt",
+    )
+    onnx.checker.check_model(model, full_check=True)
+    return model
+
+
+def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str) -> str:
+    """What a user must know of a model."""
+    lines = [
+        f"# {name}",
+        "",
+        "PointNet of section V-A of the paper (n x 3; 32, 64, 512 shared; maximum; 256, 128, 4), ONNX, float32.",
+        "",
+        f"- sha256: {sha256}",
+        f"- licence: {licence}",
+        f"- classes: {', '.join(CLASS_NAMES)}",
+        "- input: the proposal's own points (at most 400), x along and y across the line of sight from the middle of",
+        "  their extent [m], z above the ground on which the sensor stands [m]; no reflectance",
+        "- output: probability of each class, softmax with the calibration folded in",
+        f"- data: {data}",
+        f"- crops: sha256 {report['crops_sha256']}; {report['provenance']['scans']} scans",
+        f"- training: tools/train_pointnet.py, seed {report['seed']}, {report['epochs']} epochs, "
+        f"torch {report['torch']}, {report['cpu_s']} s on one core",
+        f"- calibration: temperature {report['calibration']['temperature']}, "
+        f"class offsets {report['calibration']['offset']}",
+        "",
+    ]
+    if "cross_validation" in report:
+        lines += ["## Out of fold (drives never split)", "", *_scores(report["cross_validation"])]
+    return "\n".join(lines)
+
+
+def _scores(scores: dict[str, Any]) -> list[str]:
+    precision, objects = scores["average_precision"], scores["objects"]
+    rows = [f"| {c} | {objects[c]} | {100 * precision[c]:.1f} % |" for c in CLASS_NAMES[1:]]
+    called = [
+        f"| {c} | " + " | ".join(map(str, row)) + " |"
+        for c, row in zip(CLASS_NAMES, scores["confusion"], strict=True)
+    ]
+    return [
+        "Average precision over proposals; an object that the segmentation missed is a false negative.",
+        "",
+        "| class | objects | AP |",
+        "|---|---|---|",
+        *rows,
+        "",
+        f"Expected calibration error {scores['ece']} (before calibration {scores['ece_uncalibrated']}).",
+        "",
+        "| true, called | " + " | ".join(CLASS_NAMES) + " |",
+        "|---|" + "---|" * len(CLASS_NAMES),
+        *called,
+        "",
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("trained", type=Path, help="folder that tools/train_pointnet.py wrote")
+    parser.add_argument("out", type=Path, help="model to write (.onnx); its card goes beside it (.md)")
+    parser.add_argument("--data", required=True, help="what it was trained on, for the card")
+    parser.add_argument("--licence", required=True)
+    args = parser.parse_args()
+    model = graph(load_layers(args.trained / "weights.npz")).SerializeToString(deterministic=True)
+    args.out.write_bytes(model)
+    report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
+    text = card(args.out.stem, hashlib.sha256(model).hexdigest(), report, args.data, args.licence)
+    args.out.with_suffix(".md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+"""Train the PointNet on a data set of crops; seeded and resumable (extra [train]).
+
+    train_pointnet.py CROPS.npz OUT_DIR [--epochs N] [--folds K] [--seed S]
+
+Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json: loss curve, and with --folds the
+out-of-fold average precision, confusion and calibration (drives are never split between folds). The temperature and
+class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
+An epoch is as many draws as there are clear crops; the paper's settings are 40 epochs (weak) and 100 (converged).
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.random import Generator
+
+from augment import Beams, augment, limit
+from calibration import Calibration, expected_error, fit
+from dataset import SHIPPED, Dataset, load
+from modt.classification.crops import Crops, canonical
+from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
+from network import PointNet
+from scores import average_precision, confusion
+
+SENSOR_HEIGHT_M = 1.73
+SHARE = np.array([0.46, 0.24, 0.16, 0.14])
+"""Of each class in a batch: objects are rare, and background has many faces."""
+BATCH, POINTS, MOST_POINTS = 128, 128, 400
+"""Crops of a step, points of each, and points that are augmented at most."""
+
+
+def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
+    """Canonical crops for the network."""
+    seen = canonical(crops, SENSOR_HEIGHT_M)
+    return torch.from_numpy(seen.xyz), torch.from_numpy(seen.count)
+
+
+def draw(data: Dataset, pools: list[Int], rng: Generator) -> Int:
+    """Rows of one batch: classes by their share, crops of a class alike."""
+    number = rng.multinomial(BATCH, SHARE / SHARE.sum())
+    return np.concatenate([rng.choice(pool, k) for pool, k in zip(pools, number, strict=True)])
+
+
+def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -> tuple[PointNet, list[float]]:
+    """A network trained on these rows, and its loss every 50 steps; taken up again where state was left."""
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    net = PointNet()
+    optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
+    criterion = torch.nn.CrossEntropyLoss(label_smoothing=0.02)
+    pools = [rows[data.label[rows] == c] for c in range(N_CLASSES)]
+    losses: list[float] = []
+    first = 0
+    if state is not None and state.exists():
+        held = torch.load(state, weights_only=False)
+        net.load_state_dict(held["net"])
+        optimiser.load_state_dict(held["optimiser"])
+        schedule.load_state_dict(held["schedule"])
+        torch.set_rng_state(held["torch"])
+        rng.bit_generator.state = held["numpy"]
+        losses, first = held["losses"], held["step"]
+    running = 0.0
+    for step in range(first, steps):
+        chosen = draw(data, pools, rng)
+        crops = limit(augment(limit(data.take(chosen), MOST_POINTS, rng), Beams(), rng), POINTS, rng)
+        loss = criterion(net(*tensors(crops)), torch.from_numpy(data.label[chosen]))
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
+        optimiser.step()
+        schedule.step()
+        running += float(loss.detach()) / 50
+        if (step + 1) % 50 == 0:
+            losses.append(round(running, 4))
+            running = 0.0
+        if state is not None and ((step + 1) % 200 == 0 or step + 1 == steps):
+            held = {"net": net.state_dict(), "optimiser": optimiser.state_dict(), "schedule": schedule.state_dict()}
+            held |= {"torch": torch.get_rng_state(), "numpy": rng.bit_generator.state}
+            torch.save(held | {"losses": losses, "step": step + 1}, state)
+    return net.eval(), losses
+
+
+@torch.no_grad()
+def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
+    """(R, 4) of these rows, as they are."""
+    rng = np.random.default_rng(0)
+    parts = [net(*tensors(limit(data.take(rows[i : i + BATCH]), POINTS, rng))) for i in range(0, len(rows), BATCH)]
+    return torch.cat(parts).double().numpy()
+
+
+def folds(data: Dataset, k: int) -> Int:
+    """Fold of each drive, objects of the rare classes spread evenly."""
+    drives = int(max(data.drive.max(), data.truth_drive.max())) + 1
+    weight = np.zeros((drives, N_CLASSES))
+    np.add.at(weight, (data.truth_drive, data.truth_label), 1.0)
+    weight /= weight.sum(axis=0).clip(1)
+    load_of, fold = np.zeros((k, N_CLASSES)), np.zeros(drives, np.int64)
+    for drive in np.argsort(-weight.max(axis=1), kind="stable"):
+        fold[drive] = np.argmin((load_of + weight[drive]).max(axis=1) + load_of.sum(axis=1) * 1e-3)
+        load_of[fold[drive]] += weight[drive]
+    return fold
+
+
+def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
+    """Out-of-fold calibration and scores; missed objects count as false negatives."""
+    fold = folds(data, k)
+    judged = np.flatnonzero(data.variant == SHIPPED)
+    out = np.zeros((len(judged), N_CLASSES))
+    for i in range(k):
+        rows = np.flatnonzero(~data.partial & (fold[data.drive] != i))
+        net, _ = train(data, rows, steps, seed + i, None)
+        mine = np.flatnonzero(fold[data.drive[judged]] == i)
+        out[mine] = logits(net, data, judged[mine])
+    label, clear = data.label[judged], ~data.partial[judged]
+    calibration = fit(out[clear], label[clear])
+    probability = calibration.apply(out)
+    found = np.bincount(data.truth_label, minlength=N_CLASSES)
+    return calibration, {
+        "average_precision": average_precision(probability, label, found),
+        "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], found[1:], strict=True)},
+        "confusion": confusion(probability[clear], label[clear]),
+        "ece": expected_error(probability[clear], label[clear]),
+        "ece_uncalibrated": expected_error(Calibration.none().apply(out[clear]), label[clear]),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("crops", type=Path)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--epochs", type=int, default=40)
+    parser.add_argument("--fold-epochs", type=int, help="of each fold's network; as many as --epochs without it")
+    parser.add_argument("--folds", type=int, default=0, help="cross-validate first; 0: leave that out")
+    parser.add_argument("--seed", type=int, default=1)
+    args = parser.parse_args()
+    torch.set_num_threads(1)
+    torch.use_deterministic_algorithms(True)
+    data = load(args.crops)
+    args.out.mkdir(parents=True, exist_ok=True)
+    clear = np.flatnonzero(~data.partial)
+    per_epoch = len(clear) / BATCH
+    started = time.process_time()
+    report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "crops_sha256": data.sha256}
+    report |= {"provenance": data.provenance, "torch": torch.__version__}
+    calibration = Calibration.none()
+    if args.folds:
+        steps = round(per_epoch * (args.fold_epochs or args.epochs) * (1 - 1 / args.folds))
+        calibration, report["cross_validation"] = cross_validate(data, args.folds, steps, args.seed)
+        print(json.dumps(report["cross_validation"]))
+    net, losses = train(data, clear, round(per_epoch * args.epochs), args.seed, args.out / "state.pt")
+    report |= {"loss": losses, "calibration": calibration.as_dict(), "cpu_s": round(time.process_time() - started)}
+    layers = net.layers()
+    layers[-1] = calibration.folded(layers[-1])
+    np.savez(
+        args.out / "weights.npz",
+        **{
+            f"{kind}{i}": a for i, pair in enumerate(layers) for kind, a in zip(("weight", "bias"), pair, strict=True)
+        },
+    )
+    (args.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps({"loss": losses[-1:], "cpu_s": report["cpu_s"]}))
+
+
+if __name__ == "__main__":
+    main()
