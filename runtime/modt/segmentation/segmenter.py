@@ -17,6 +17,8 @@ from modt.types import NONE, Bool, Float32, Int, Proposals
 
 MARGIN_M = 6.0
 """Looked at beyond the edge of the field of view, so that what stands on the edge is segmented whole."""
+SLACK_M = 1.0
+"""Of an object that lies in view the sensor may see only what is this far out of it."""
 EDGE_M = 0.3
 """A proposal this near the end of the margin counts as cut by it."""
 OCCLUDER_M = 0.6
@@ -73,13 +75,14 @@ class Segmenter:
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
-        truncated = outline.least(self.fov.depth(cell.xyz()[outline.rows])) < EDGE_M - MARGIN_M
+        inside_m: Float32 = self.fov.depth(cell.xyz())[outline.rows].astype(np.float32)
+        truncated = outline.least(inside_m) < EDGE_M - MARGIN_M
         hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
         return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, hidden)
 
     def _in_view(self, clusters: Clusters, cell: Columns) -> Bool:
-        """(n,) whether any cell of a cluster lies in the field of view."""
-        seen = self.fov.contains(cell.xyz()) & (clusters.of_cell != NONE)
+        """(n,) whether a cluster reaches into the field of view, or nearly."""
+        seen = (self.fov.depth(cell.xyz()) > -SLACK_M) & (clusters.of_cell != NONE)
         return np.bincount(clusters.of_cell[seen], minlength=clusters.n) > 0
 
 
