@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.config import FusionConfig
 from modt.geometry import wrap
-from modt.types import N_CLASSES, NONE, Bool, Float64, Int, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
 _FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
