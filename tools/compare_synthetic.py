@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from collections import defaultdict
 from collections.abc import Iterable
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +38,12 @@ def figures(scans: Iterable[Scan]) -> dict[str, str]:
         p = scan.points
         rho, z = np.hypot(p[:, 0], p[:, 1]), p[:, 2]
         sums["points a sweep"].append(len(p))
-        for near, far in zip(RINGS[:-1], RINGS[1:], strict=True):
+        for near, far in pairwise(RINGS):
             ring = (rho >= near) & (rho < far)
             sums[f"points {near}-{far} m, low (z < -1.3 m)"].append(float((ring & (z < -1.3)).sum()))
-            sums[f"points {near}-{far} m, up to 0.9 m over ground"].append(float((ring & (z > -1.3) & (z < 0.9)).sum()))
+            sums[f"points {near}-{far} m, up to 0.9 m over ground"].append(
+                float((ring & (z > -1.3) & (z < 0.9)).sum())
+            )
         sums["points beyond 50 m"].append(float((rho > 50).sum()))
         sums["points above 0.9 m over the sensor"].append(float((z > 0.9).sum()))
         sums["reflectance, median"].append(float(np.median(p[:, 3])))

@@ -35,5 +35,3 @@ def synthetic_scans(
         for i in indices:
             frame, truth = simulator.sweep(i)
             yield scan_of(frame, truth, f"{name}/{i:06d}", name, camera=camera)
-
-

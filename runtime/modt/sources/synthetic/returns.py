@@ -51,7 +51,7 @@ class Receiver:
             near + (self.bias + np.float32(sensor.range_sigma_m) * noise).astype(np.float32) / self.secant
         )
         self._smear(ranged, near, heard, chance)
-        bright = np.clip(reflectivity * (np.float32(0.35) + np.float32(0.65) * head_on), 0, 1)
+        bright = np.clip(reflectivity * (np.float32(0.75) + np.float32(0.25) * head_on), 0, 1)
         return ranged, bright, heard
 
     def _incidence(self, near: Float32, group: NDArray[np.int32]) -> Float32:

@@ -71,6 +71,7 @@ class Simulator:
         time_s = index * self.sensor.period_s
         T_world_sensor = self.world.ego_pose(time_s)
         pieces = self.world.pieces(time_s, T_world_sensor, self.sensor.max_range_m)
+        pieces = pieces.as_met(self.sensor.spot_m, self.sensor.divergence_rad)
         ground, surface = self.world.terrain.cast(self.caster, T_world_sensor)
         image = self.caster.cast(pieces, ground, rng.standard_exponential(self.sensor.shape, np.float32))
         hit = image.piece != NOTHING
