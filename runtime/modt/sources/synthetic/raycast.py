@@ -70,9 +70,10 @@ class Form:
     @classmethod
     def codes(cls, pieces: Pieces) -> Int:
         """(n,) code of each piece."""
-        rounded = (pieces.quadric > 0).sum(axis=1)
+        rounded = (pieces.quadric > 0).any(axis=1)
+        boxed = (pieces.quadric * np.square(pieces.half) < np.float32(0.999)).any(axis=1)
         cut = pieces.cuts[:, :, :3].any(axis=2).sum(axis=1)
-        codes: Int = (rounded < 3) + 2 * (rounded > 0) + 4 * np.isfinite(pieces.density) + 8 * cut
+        codes: Int = boxed + 2 * rounded + 4 * np.isfinite(pieces.density) + 8 * cut
         return codes
 
     @property
