@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 
 import numpy as np
 
 from modt.sources.synthetic.materials import Material
 from modt.sources.synthetic.pieces import CUTS, SOLID, Pieces
-from modt.types import Float64, Int
+from modt.types import Bool, Float64, Int
 
 
 class Posture(IntEnum):
@@ -49,6 +49,10 @@ class Figures:
     stride: Float64
     coat: Float64
     pack: Float64
+
+    def take(self, rows: Int | Bool) -> Figures:
+        """The figures given, by index or mask."""
+        return Figures(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
     def pieces(self, time_s: float) -> Pieces:
         """Their pieces at a time, each figure in its own frame (x ahead, z up, origin on the ground)."""
