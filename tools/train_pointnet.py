@@ -31,8 +31,8 @@ from scores import average_precision, confusion
 SENSOR_HEIGHT_M = 1.73
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
-BATCH, POINTS = 256, 128
-MOST_LEARNT = 400
+BATCH, POINTS, MOST_POINTS = 128, 128, 400
+"""Crops of a step, points of each, and points that are augmented at most."""
 
 
 def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
@@ -53,7 +53,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
     rng = np.random.default_rng(seed)
     net = PointNet()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 4e-3, total_steps=steps, pct_start=0.15)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
     criterion = torch.nn.CrossEntropyLoss(label_smoothing=0.02)
     pools = [rows[data.label[rows] == c] for c in range(N_CLASSES)]
     losses: list[float] = []
@@ -69,7 +69,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
     running = 0.0
     for step in range(first, steps):
         chosen = draw(data, pools, rng)
-        crops = limit(augment(data.take(chosen), Beams(), rng), POINTS, rng)
+        crops = limit(augment(limit(data.take(chosen), MOST_POINTS, rng), Beams(), rng), POINTS, rng)
         loss = criterion(net(*tensors(crops)), torch.from_numpy(data.label[chosen]))
         optimiser.zero_grad()
         loss.backward()
@@ -91,9 +91,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
 def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     """(R, 4) of these rows, as they are."""
     rng = np.random.default_rng(0)
-    parts = [
-        net(*tensors(limit(data.take(rows[i : i + BATCH]), MOST_LEARNT, rng))) for i in range(0, len(rows), BATCH)
-    ]
+    parts = [net(*tensors(limit(data.take(rows[i : i + BATCH]), POINTS, rng))) for i in range(0, len(rows), BATCH)]
     return torch.cat(parts).double().numpy()
 
 
