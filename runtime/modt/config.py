@@ -155,6 +155,23 @@ class FusionConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyConfig(StageConfig):
+    """The board: what it draws, assumed where nothing can be measured, and what a calibration found.
+
+    The coefficients are of one window fit: energy = idle_W x time + seg_J x segmentations + class_J x
+    classifications + point_J x points classified.
+    """
+
+    board: str = field(default="unknown", metadata={"meaning": "what the figures are of"})
+    idle_W: float = _number(3.0, 0.0, 1000.0, "W", "drawn while the process waits")
+    busy_W: float = _number(7.0, 0.0, 1000.0, "W", "drawn while it computes on one core")
+    meter: str = field(default="none", metadata={"meaning": "that the coefficients were fitted with"})
+    seg_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one segmentation")
+    class_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one classification")
+    point_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one point classified")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileConfig:
     """All of it: a sensor and a board, as a profile file describes them."""
 
@@ -164,3 +181,4 @@ class ProfileConfig:
     classification: ClassificationConfig = field(default_factory=ClassificationConfig)
     scheduler: SchedulerConfig = field(default_factory=SchedulerConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    energy: EnergyConfig = field(default_factory=EnergyConfig)

@@ -12,6 +12,7 @@ from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import ProfileConfig
+from modt.energy.counted import CountedClassifier
 from modt.energy.ledger import StageLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
@@ -107,12 +108,13 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
         MisuseError: the model cannot be used.
     """
     cost = LinearCost(profile.classification.max_points)
-    network = PointNet(profile.classification, profile.sensor)
+    limits = profile.classification
+    network = CostedClassifier(PointNet(limits, profile.sensor), cost, time.thread_time_ns)
     return Pipeline(
         segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
         tracker=Tracker(profile.tracking, mode.machine),
         fusion=mode.fusion(profile),
         scheduler=Scheduler(cost),
-        classifier=CostedClassifier(network, cost, time.thread_time_ns),
+        classifier=CountedClassifier(network, ledger, limits.max_points, limits.batch),
         ledger=ledger,
     )

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import time
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from modt import host, profile
-from modt.cli import assemble
+from modt.cli import assemble, metering
 from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
 from modt.evaluation.summary import Summary
@@ -61,10 +62,14 @@ class Session:
         summary = Summary()
         tracks, ledger_lines = self.directory.tracks(), self.directory.ledger()
         sinks: list[Sink] = [tracks, *self._further_sinks()]
+        windows = metering.windows(self.profile.energy, self.core)
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_frame(tracks.last)
             summary.add_ledger(ledger_line)
+            window = windows.add(ledger_line)
+            if window is not None:
+                ledger_lines.write(window)
             tick(result)
 
         budget = self.mode.budget(self.profile)
@@ -75,6 +80,7 @@ class Session:
                 stack.callback(sink.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
+            ledger_lines.write(windows.close())
         elapsed_s = time.monotonic() - began_s
         figures = summary.result() | self._circumstances(summary.frames, elapsed_s)
         self.directory.summarise(figures)
@@ -86,7 +92,7 @@ class Session:
         return [KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera), *labels]
 
     def _stream_name(self) -> str:
-        return "".join(c if c.isalnum() or c in "._-" else "-" for c in self.stream.info.name)
+        return re.sub(r"[^\w.]+", "-", self.stream.info.name)
 
     def _describe(self, command: list[str]) -> None:
         info = self.stream.info

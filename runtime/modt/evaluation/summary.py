@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.pipeline import CLASSIFICATION, SEGMENTATION
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, TRACKS
@@ -124,7 +125,7 @@ def summarise(run: Path) -> dict[str, Any]:
     summary = Summary()
     for record in read_records(run / TRACKS, FRAME_SCHEMA):
         summary.add_frame(record)
-    for record in read_records(run / LEDGER, LEDGER_SCHEMA):
+    for record in read_records(run / LEDGER, LEDGER_SCHEMA, beside={ENERGY_SCHEMA}):
         summary.add_ledger(record)
     return summary.result()
 

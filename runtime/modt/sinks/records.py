@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +33,13 @@ class JsonLines:
         self._lines.close()
 
 
-def read_records(path: Path, schema: str) -> Iterator[dict[str, Any]]:
+def read_records(path: Path, schema: str, beside: Collection[str] = ()) -> Iterator[dict[str, Any]]:
     """Records of a file, in order; a last line cut short by a killed run is left out.
 
     Args:
         path: a file that JsonLines wrote, complete or still growing.
         schema: the schema's name that every record must bear.
+        beside: schemas of other records in the file, which are passed over.
 
     Raises:
         MisuseError: missing, unreadable, or not of this schema; it names the line.
@@ -53,8 +54,10 @@ def read_records(path: Path, schema: str) -> Iterator[dict[str, Any]]:
                         raise MisuseError(f"{path}:{number}", "no JSON", "give a file that modt wrote") from None
                     log.warning("%s:%d: last line cut short, left out", path, number)
                     return
-                if not isinstance(record, dict) or record.get("schema") != schema:
-                    found = record.get("schema") if isinstance(record, dict) else None
+                found = record.get("schema") if isinstance(record, dict) else None
+                if found in beside:
+                    continue
+                if found != schema:
                     remedy = f"this version reads {schema}"
                     raise MisuseError(f"{path}:{number}", f"schema is {found!r}", remedy)
                 yield record

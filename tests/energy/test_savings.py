@@ -1,0 +1,109 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.energy.counted import CountedClassifier
+from modt.energy.ledger import Ledger
+from modt.energy.prediction import PaperModel
+from modt.energy.savings import Counts, Model, UnitCosts, predict
+from modt.types import Float32, Float64, Int, Proposals
+
+COSTS = UnitCosts(seg=5e-3, track=1e-3, class_call=1e-4, class_item=2e-4, class_point=1e-6)
+
+
+def baseline(frames: int = 100, n: int = 40) -> Counts:
+    total = frames * n
+    return Counts(frames, total, total // 10, 100, total, total, 0, total * 100, frames)
+
+
+def efficient(tracks: int = 200, reached: int = 200, classified: int = 200, refound: int = 0) -> Counts:
+    return Counts(100, 4000, 400, tracks, reached, classified, refound, classified * 60, min(classified, 100))
+
+
+@given(st.floats(1e-4, 1.0), st.floats(1e-5, 0.1), st.integers(1, 60), st.integers(1, 400))
+def test_neutral_parameters_are_the_papers_equation(seg: float, item: float, n: int, tracks: int) -> None:
+    base = replace(baseline(n=n), points=0)
+    run = replace(base, tracks=tracks, classified_tracks=tracks, classified=tracks)
+    found = predict(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0))
+    paper = PaperModel(seg, item, n_obj=1.0, n_bg=n - 1.0, n_go=run.n_go)
+    assert found.model.gamma == pytest.approx(paper.gamma)
+    assert found.paper.gamma == pytest.approx(paper.gamma)
+    assert found.short_form_error == pytest.approx(paper.short_form_error)
+
+
+counts = st.builds(
+    lambda tracks, reached, repeats, refound, points: replace(
+        efficient(tracks, min(reached, tracks), min(reached, tracks) + repeats + refound, refound), points=points
+    ),
+    st.integers(1, 4000), st.integers(0, 4000), st.integers(0, 500), st.integers(0, 50), st.integers(0, 10**6),
+)  # fmt: skip
+
+
+@given(counts, st.floats(1e-6, 1e-2), st.floats(0, 1e-2), st.floats(0, 100))
+def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: float, measured: float) -> None:
+    found = predict(baseline(), run, replace(COSTS, seg=seg), choose, 2 * choose)
+    assert found.gamma_short + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
+    explained = found.explain(measured)
+    assert found.gamma_short + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
+    assert explained[-1].gamma == measured
+
+
+@given(counts)
+def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
+    base = baseline()
+    found = predict(base, run, COSTS, 1e-4, 3e-4)
+    per_frame = COSTS.seg + COSTS.track
+    assert found.model.e1 == pytest.approx(per_frame + 1e-4 + COSTS.classification(base) / base.frames)
+    if run.classified:
+        assert found.model.e2 == pytest.approx(per_frame + 3e-4 + COSTS.classification(run) / run.frames)
+    assert found.model.views == pytest.approx(run.classified / run.tracks)
+
+
+def test_more_views_save_less() -> None:
+    once = predict(baseline(), efficient(), COSTS)
+    often = predict(baseline(), efficient(classified=900), COSTS)
+    again = predict(baseline(), efficient(classified=900, refound=300), COSTS)
+    assert often.model.gamma < once.model.gamma
+    assert often.model.gamma == pytest.approx(again.model.gamma)
+    assert again.terms[3].name == "views after a track was lost"
+    assert again.terms[3].change < 0 == once.terms[3].change
+
+
+def test_empty_runs_save_nothing() -> None:
+    nothing = Counts(0, 0, 0, 0, 0, 0, 0, 0, 0)
+    found = predict(nothing, nothing, COSTS)
+    assert found.model.gamma == pytest.approx(1.0)
+    assert (nothing.beta, nothing.n_go, nothing.n, nothing.n_obj) == (1.0, 1.0, 0.0, 0.0)
+    assert Model(0, 0, 0, 1).gamma == 1.0
+
+
+class Half:
+    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
+        return np.full((len(which), 4), 0.25)
+
+    def facts(self) -> dict[str, str]:
+        return {"file": "half"}
+
+
+@pytest.mark.parametrize(("batch", "points"), [(1, 10 + 290 + 400), (2, 2 * 290 + 400), (8, 3 * 400)])
+def test_points_are_booked_as_the_network_is_given_them(batch: int, points: int) -> None:
+    ledger = Ledger()
+    offsets = np.array([0, 10, 710, 1000, 1001])
+    proposals = replace(Proposals.empty(), members=np.arange(1001), offsets=offsets)
+    counted = CountedClassifier(Half(), ledger, max_points=400, batch=batch)
+    which = np.array([0, 1, 2])
+    out = ledger.run("classification", counted.classify, np.zeros((1001, 4), np.float32), proposals, which)
+    assert out.shape == (3, 4)
+    row = ledger.close_frame(0)["stages"]["classification"]
+    assert (row["calls"], row["items"], row["points"]) == (1, 3, points)
+    assert counted.facts() == {"file": "half"}
+
+
+def test_nothing_to_classify_has_no_points() -> None:
+    ledger = Ledger()
+    counted = CountedClassifier(Half(), ledger, max_points=400, batch=8)
+    counted.classify(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64))
+    assert ledger.close_frame(0)["stages"]["classification"]["points"] == 0
