@@ -5,7 +5,8 @@
 Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json: loss curve, and with --folds the
 out-of-fold average precision, confusion and calibration (drives are never split between folds). The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
-An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are 40 epochs (weak) and 100 (converged).
+An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
+40 epochs (weak) and 100 (converged).
 """
 
 from __future__ import annotations
