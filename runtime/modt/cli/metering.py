@@ -7,6 +7,7 @@ import time
 from modt.config import EnergyConfig
 from modt.energy.conditions import Conditions
 from modt.energy.meters.discovery import Discovery, discover
+from modt.energy.meters.meter import Kind
 from modt.energy.meters.model import ModelMeter
 from modt.energy.windows import Clocks, Windows
 
@@ -23,3 +24,9 @@ def windows(config: EnergyConfig, core: int | None, meter: str | None = None) ->
         MisuseError: the one named is not usable.
     """
     return Windows(meters(config).choose(meter).meters, Clocks(), Conditions(core or 0))
+
+
+def is_estimated(config: EnergyConfig, meter: str | None = None) -> bool:
+    """Whether nothing better than the model is to be had, or was asked for."""
+    facts = meters(config).choose(meter).facts
+    return facts is None or facts.kind is Kind.ESTIMATED

@@ -84,14 +84,23 @@ def unit_costs(varied: Evidence) -> UnitCosts:
 
 
 def saving(baseline: Evidence, run: Evidence, varied: Evidence, random: np.random.Generator) -> Saving:
-    """Predicts with the costs of the varied run, which is neither of the two, and compares."""
+    """Predicts with the costs of the varied run, which is neither of the two, and compares.
+
+    Args:
+        baseline: tracking-by-detection, F frames.
+        run: the proposed pipeline on the same F frames.
+        varied: the same frames once or several times over, under varied load.
+        random: draws the frames of the intervals.
+    """
+    n = len(baseline.counts)
+    passes = len(varied.counts) // n
 
     def both(frames: Int) -> tuple[Prediction, float]:
-        a, b, costs = baseline.take(frames), run.take(frames), unit_costs(varied.take(frames))
+        a, b = baseline.take(frames), run.take(frames)
+        costs = unit_costs(varied.take((frames + n * np.arange(passes)[:, None]).ravel()))
         prediction = predict(total(a.counts), total(b.counts), costs, _choosing(a), _choosing(b))
         return prediction, float(a.cost.sum() / b.cost.sum())
 
-    n = len(baseline.counts)
     prediction, measured = both(np.arange(n))
     drawn = [both(_blocks(n, random)) for _ in range(RESAMPLES)]
     predicted_all = np.array([p.model.gamma for p, _ in drawn])

@@ -109,7 +109,7 @@ def terrain(
     grade = rng.uniform(-0.02, 0.02, 2) * (1.0, 0.5)
     height += np.float32(grade[0]) * x[:, None] + np.float32(grade[1]) * y
     surface = np.where(carriage, Material.ASPHALT, np.where(walk, Material.PAVING, Material.GRASS))
-    return Terrain(np.array(low, np.float64), CELL_M, height, surface.astype(np.int64))
+    return Terrain(np.array(low, np.float64), CELL_M, height, surface.astype(np.uint8))
 
 
 def _lumps(rng: np.random.Generator, rows: int, columns: int) -> Float32:

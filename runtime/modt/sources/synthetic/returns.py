@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from modt.sources.synthetic.materials import LOSS, REFLECTIVITY
 from modt.sources.synthetic.sensors import SensorModel
-from modt.types import Bool, Float32, Int
+from modt.types import Bool, Float32
 
 
 class Receiver:
@@ -25,7 +25,7 @@ class Receiver:
         self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
 
     def receive(
-        self, distance: Float32, material: Int, group: NDArray[np.int32], rng: np.random.Generator
+        self, distance: Float32, material: NDArray[np.uint8], group: NDArray[np.int32], rng: np.random.Generator
     ) -> tuple[Float32, Float32, Bool]:
         """Distance [m, horizontal], intensity [0, 1] and whether there is a return, of every ray.
 
