@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.columns import Columns
-from modt.segmentation.grids import Int32, RootGrid
+from modt.segmentation.grids import RootGrid
 from modt.types import NONE, Bool, Float32, Int
 
 GAP_M = 0.3
@@ -33,8 +33,8 @@ class Cells:
         root: (C,) square root of its range [sqrt(m)].
     """
 
-    row: Int32
-    column: Int32
+    row: Int
+    column: Int
     low: Float32
     high: Float32
     root: Float32
@@ -59,7 +59,7 @@ class Clusters:
         n: how many there are, numbered from 0.
     """
 
-    cell: Int32
+    cell: Int
     sample: Int
     top: Float32
     of_cell: Int
@@ -75,17 +75,12 @@ class Clusters:
 
 def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
     """(C,) component of each cell: those that touch at a side or a corner, and in height, belong together."""
-    place = cells.row * np.int32(grid.side) + cells.column
-    ahead = np.array([1, grid.side - 1, grid.side, grid.side + 1], np.int32)
-    beside = grid.look_up(place, ahead).ravel()
-    link = np.flatnonzero(beside >= 0)
-    one, other = link // len(ahead), beside[link]
+    one, other = grid.beside(cells.row * grid.side + cells.column)
     gap = np.maximum(cells.low[one], cells.low[other]) - np.minimum(cells.high[one], cells.high[other])
     bound = np.float32(GAP_M) + np.float32(GAP_BEAMS * beam_rad) * np.square(cells.root)
-    near = gap < bound[one]
-    ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(place))))
-    links = other[near]
-    graph = csr_array((np.ones(len(links)), links, ends), shape=(len(place), len(place)))
+    near = np.flatnonzero(gap < bound[one])
+    links = (np.ones(len(near)), (one[near], other[near]))
+    graph = coo_array(links, shape=(len(cells), len(cells)))
     component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
     return component
 
@@ -113,7 +108,7 @@ class Clusterer:
         """Clusters of (K,) points, K > 0, of a height above ground [m]."""
         place = self.fine.place(points)
         sample, cell = self.fine.occupy(place)
-        row, column = np.divmod(place[sample], np.int32(self.fine.side))
+        row, column = np.divmod(place[sample], self.fine.side)
         cells = Cells(row, column, *_bounds(height, cell, len(sample)), points.root[sample])
         count, x, y = np.bincount(cell), points.x[sample], points.y[sample]
 
@@ -130,9 +125,9 @@ class Clusterer:
     def _joined_coarsely(self, fine: Cells) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell which it is a quarter of."""
         side = self.coarse.side
-        place = (fine.row // 2) * np.int32(side) + fine.column // 2
+        place = (fine.row // 2) * side + fine.column // 2
         sample, coarse = self.coarse.occupy(place)
-        row, column = np.divmod(place[sample], np.int32(side))
+        row, column = np.divmod(place[sample], side)
         low, high = _bounds(fine.low, coarse, len(sample))[0], _bounds(fine.high, coarse, len(sample))[1]
         return join(self.coarse, Cells(row, column, low, high, fine.root[sample]), self.beam_rad)[coarse]
 
@@ -147,7 +142,7 @@ class Clusterer:
         return proper
 
 
-def _bounds(values: Float32, group: Int32 | Int, n: int) -> tuple[Float32, Float32]:
+def _bounds(values: Float32, group: Int, n: int) -> tuple[Float32, Float32]:
     """(n,) least and greatest value of each group, infinite where it is empty."""
     low, high = np.full(n, np.inf, np.float32), np.full(n, -np.inf, np.float32)
     np.minimum.at(low, group, values)

@@ -45,7 +45,7 @@ class Ground:
         supported = self._follow(lowest, sensor_height_m)
         known = np.where(supported, lowest, np.float32(-sensor_height_m))
         surface = _across(_along(known, supported, self.grid.range_m))
-        height: Float32 = points.z - surface.ravel()[cell]
+        height: Float32 = points.z - surface.ravel().take(cell)
         return height
 
     def _lowest(self, points: Columns, cell: Int, sensor_height_m: float) -> Float32:

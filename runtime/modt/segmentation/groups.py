@@ -51,8 +51,8 @@ class Groups:
         return type(self)(self.rows[kept], np.append(0, np.cumsum(-(-self.count // every))))
 
     def spread(self, values: NDArray[T]) -> NDArray[T]:
-        """(K,) a value a group given to each of its rows."""
-        return np.repeat(values, self.count)
+        """(..., K) values (..., G) of the groups given to each of their rows."""
+        return np.repeat(values, self.count, axis=-1)
 
     def least(self, values: NDArray[T]) -> NDArray[T]:
         """(..., G) least of (..., K) values in each group."""

@@ -23,7 +23,7 @@ EDGE_M = 0.3
 """A proposal this near the end of the margin counts as cut by it."""
 OCCLUDER_M = 0.6
 """What rises this high above ground hides what is behind it."""
-OUTLINE = 64
+OUTLINE = 48
 """Cells of a cluster, at most, that decide on its heading."""
 
 
