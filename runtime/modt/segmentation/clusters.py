@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from modt.config import SegmentationConfig, SensorConfig
@@ -79,8 +79,8 @@ def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
     gap = np.maximum(cells.low[one], cells.low[other]) - np.minimum(cells.high[one], cells.high[other])
     bound = np.float32(GAP_M) + np.float32(GAP_BEAMS * beam_rad) * np.square(cells.root)
     near = np.flatnonzero(gap < bound[one])
-    links = (np.ones(len(near)), (one[near], other[near]))
-    graph = coo_array(links, shape=(len(cells), len(cells)))
+    ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(cells))))
+    graph = csr_array((np.ones(len(near)), other[near], ends), shape=(len(cells), len(cells)))
     component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
     return component
 

@@ -93,10 +93,10 @@ class RootGrid:
         return sample, cell
 
     def beside(self, place: Int) -> tuple[Int, Int]:
-        """Pairs of cells, by number, that touch at a side or a corner: each pair once, in any order of places."""
+        """Pairs of cells, by number, that touch at a side or a corner: each pair once, ordered by the first."""
         self._number[place] = np.arange(len(place), dtype=np.int32)
-        ahead = (1, self.side - 1, self.side, self.side + 1)
-        found = np.concatenate([self._number.take(place + step) for step in ahead])
+        ahead = np.array([1, self.side - 1, self.side, self.side + 1])
+        found = self._number.take((place[:, None] + ahead).ravel())
         self._number[place] = NONE
         pair = np.flatnonzero(found != NONE)
-        return pair % len(place), found[pair].astype(np.int64)
+        return pair >> 2, found[pair].astype(np.int64)

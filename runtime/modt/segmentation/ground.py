@@ -83,15 +83,16 @@ class Ground:
 def _along(ground: Float32, supported: Bool, range_m: Float32) -> Float32:
     """The surface with its gaps filled by straight lines along each ray, level beyond the last support."""
     rings, sectors = ground.shape
+    supported = supported.copy()
     supported[0] = True
-    ring = np.arange(rings)[:, None]
-    before = np.maximum.accumulate(np.where(supported, ring, 0), axis=0)
-    after = np.minimum.accumulate(np.where(supported, ring, rings)[::-1], axis=0)[::-1]
-    after = np.where(after == rings, before, after)
-    ray = np.arange(sectors)
-    low, high = ground[before, ray], ground[after, ray]
-    span = np.maximum(range_m[after] - range_m[before], np.float32(1e-3))
-    line: Float32 = low + (high - low) * ((range_m[:, None] - range_m[before]) / span)
+    cell = np.arange(rings * sectors).reshape(rings, sectors)
+    before = np.maximum.accumulate(np.where(supported, cell, 0), axis=0)
+    after = np.minimum.accumulate(np.where(supported, cell, cell.size)[::-1], axis=0)[::-1]
+    after = np.where(after == cell.size, before, after)
+    range_of = np.repeat(range_m, sectors)
+    low, near = ground.take(before), range_of.take(before)
+    high, far = ground.take(after), range_of.take(after)
+    line: Float32 = low + (high - low) * ((range_m[:, None] - near) / np.maximum(far - near, np.float32(1e-3)))
     return line
 
 
