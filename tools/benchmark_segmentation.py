@@ -81,10 +81,10 @@ def tree_components(xyz: Float32) -> object:
 
 
 def raised(stage: Segmenter, points: Float32) -> Float32:
-    """(n, 3) points between the clearance and the greatest height of objects."""
+    """(n, 3) points that the stage makes objects of."""
     sweep = Columns.of(points)
     height = stage.ground.height(sweep, stage.sensor_height.of(sweep))
-    return points[(height > stage.config.clearance_m) & (height < stage.config.max_height_m), :3]
+    return points[stage.raised(sweep, height), :3]
 
 
 def cpu_ms(work: Contender, points: Float32) -> float:

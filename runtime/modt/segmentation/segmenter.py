@@ -48,13 +48,13 @@ class Segmenter:
         looked_at = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -MARGIN_M)
         sweep = Columns.of(points if looked_at is None else points[looked_at])
         height = self.ground.height(sweep, self.sensor_height.of(sweep))
-        raised = np.flatnonzero(self._raised(sweep, height))
+        raised = np.flatnonzero(self.raised(sweep, height))
         if not len(raised):
             return Proposals.empty()
         index = raised if looked_at is None else looked_at[raised]
         return self._proposals(sweep.take(raised), height[raised], index)
 
-    def _raised(self, sweep: Columns, height: Float32) -> Bool:
+    def raised(self, sweep: Columns, height: Float32) -> Bool:
         """(N,) within range, clear of the ground and no higher than objects reach."""
         near, far = np.float32(np.sqrt(self.sensor.min_range_m)), np.float32(np.sqrt(self.sensor.max_range_m))
         raised: Bool = (height > self.config.clearance_m) & (height < self.config.max_height_m)
