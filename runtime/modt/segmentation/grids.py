@@ -69,13 +69,16 @@ class RootGrid:
         self.side = 2 * self.centre
         self._number: Int32 = np.full(self.side * self.side, NONE, np.int32)
 
-    def place(self, points: Columns) -> Int:
-        """(K,) place of each point in the grid, row by row."""
+    def row_and_column(self, points: Columns) -> tuple[Int32, Int32]:
+        """(K,) place of each point in the grid."""
         scale = np.float32(1 / self.step) / points.root
-        place = (points.x * scale + np.float32(self.centre)).astype(np.int32)
-        place *= self.side
-        place += (points.y * scale + np.float32(self.centre)).astype(np.int32)
-        return place.astype(np.int64)
+        row = (points.x * scale + np.float32(self.centre)).astype(np.int32)
+        column = (points.y * scale + np.float32(self.centre)).astype(np.int32)
+        return row, column
+
+    def place(self, row: Int32, column: Int32) -> Int:
+        """(K,) the same as one number, row by row."""
+        return (row * np.int32(self.side) + column).astype(np.int64)
 
     def occupy(self, place: Int) -> tuple[Int, Int]:
         """(C,) one point of each occupied cell, its last, and (K,) the cell of each point.

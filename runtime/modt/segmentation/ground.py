@@ -61,20 +61,20 @@ class Ground:
 
     def _follow(self, lowest: Float32, sensor_height_m: float) -> Bool:
         """(rings, SECTORS) cells whose lowest return is ground: a short step a ring, all rays at once."""
-        steepest, gain, noise = np.float32(self.max_slope), np.float32(GAIN), np.float32(NOISE_M)
+        steepest, gain, noise, bridge = (np.float32(v) for v in (self.max_slope, GAIN, NOISE_M, BRIDGE_M))
         ray = np.zeros((4, SECTORS), np.float32)  # of the last ground on each ray
         height, at, slope, bend = ray
         height[:], bend[:] = -sensor_height_m, steepest
         step = np.zeros_like(ray)
         step[3] = BEND
         supported = np.zeros(lowest.shape, np.bool_)
-        for ring in np.flatnonzero(np.isfinite(lowest).any(axis=1)):
-            here = lowest[ring]
-            gap = self.grid.range_m[ring] - at
-            reach = np.minimum(gap, np.float32(BRIDGE_M))
+        for ring in np.flatnonzero(np.isfinite(lowest).any(axis=1)).tolist():
+            here, range_m = lowest[ring], self.grid.range_m[ring]
+            gap = range_m - at
+            reach = np.minimum(gap, bridge)
             rise = here - height
             found = np.less(np.abs(rise - slope * reach), reach * bend + noise, out=supported[ring])
-            step[0], step[1] = here, self.grid.range_m[ring]
+            step[0], step[1] = here, range_m
             step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -steepest), steepest)
             np.copyto(ray, step, where=found)
         return supported

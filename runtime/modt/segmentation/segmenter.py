@@ -23,7 +23,7 @@ EDGE_M = 0.3
 """A proposal this near the end of the margin counts as cut by it."""
 OCCLUDER_M = 0.6
 """What rises this high above ground hides what is behind it."""
-OUTLINE = 48
+OUTLINE = 32
 """Cells of a cluster, at most, that decide on its heading."""
 
 
@@ -65,7 +65,8 @@ class Segmenter:
         """The clusters of what is raised, and their boxes."""
         clusters = self.clusterer.cluster(raised, height)
         cell = raised.take(clusters.sample)
-        clusters = clusters.kept(self._in_view(clusters, cell))
+        if not self.fov.full:
+            clusters = clusters.kept(self._in_view(clusters, cell))
         if not clusters.n:
             return Proposals.empty()
         outline = Groups.of(clusters.of_cell, clusters.n)
@@ -75,8 +76,9 @@ class Segmenter:
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
-        inside_m: Float32 = self.fov.depth(cell.xyz())[outline.rows].astype(np.float32)
-        truncated = outline.least(inside_m) < EDGE_M - MARGIN_M
+        truncated = np.zeros(clusters.n, np.bool_)
+        if not self.fov.full:
+            truncated = outline.least(self.fov.depth(cell.xyz())[outline.rows]) < EDGE_M - MARGIN_M
         hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
         return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, hidden)
 
