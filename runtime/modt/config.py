@@ -83,7 +83,7 @@ class SensorConfig(StageConfig):
     """The sensor as segmentation sees it."""
 
     height_m: float | None = _number(1.73, 0.05, 5.0, "m", "above the ground; none: estimated from the stream")
-    min_range_m: float = _number(2.7, 0.0, 20.0, "m", "nearer points belong to the robot itself")
+    min_range_m: float = _number(2.0, 0.0, 20.0, "m", "nearer points belong to the robot itself")
     max_range_m: float = _number(80.0, 1.0, 400.0, "m", "farther points are left out")
     azimuth_step_deg: float = _number(0.17, 0.01, 5.0, "deg", "between neighbouring returns of a beam")
     elevation_step_deg: float = _number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
@@ -94,10 +94,11 @@ class SensorConfig(StageConfig):
 class SegmentationConfig(StageConfig):
     """Ground, clusters and the sizes of what can be an object (section III-A)."""
 
-    ground_tolerance_m: float = _number(0.2, 0.02, 1.0, "m", "points this near the ground belong to it")
+    ground_tolerance_m: float = _number(0.15, 0.02, 1.0, "m", "points this near the ground belong to it")
     max_slope_deg: float = _number(12.0, 0.5, 45.0, "deg", "of the ground")
+    clearance_m: float = _number(0.25, 0.02, 1.0, "m", "above ground, from where on points make objects")
     max_height_m: float = _number(2.6, 0.3, 20.0, "m", "above ground; what hangs higher joins nothing")
-    cell_m: float = _number(0.095, 0.01, 2.0, "m", "side of a cell at 10 m; grows as the square root of range")
+    cell_m: float = _number(0.105, 0.01, 2.0, "m", "side of a cell at 10 m; grows as the square root of range")
     min_points: int = _number(5, 1, 1000, "", "of a proposal")
     max_extent_m: float = _number(13.0, 0.5, 50.0, "m", "longest side of a proposal")
     min_height_m: float = _number(0.2, 0.0, 3.0, "m", "lowest proposal")
