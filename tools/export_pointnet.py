@@ -35,7 +35,7 @@ def load_layers(path: Path) -> Layers:
 def graph(layers: Layers, *, pool_first: bool = True) -> onnx.ModelProto:
     """The network; with pool_first False the textbook order, bias and ReLU on every point."""
     nodes, value = [], "points"
-    initial = [numpy_helper.from_array(np.array([1], np.int64), "over_points")]
+    initial: list[TensorProto] = []
 
     def add(op: str, *extra: str, **attributes: Any) -> None:
         nonlocal value

@@ -1,11 +1,12 @@
 """Train the PointNet on a data set of crops; seeded and resumable (extra [train]).
 
-    train_pointnet.py CROPS.npz OUT_DIR [--epochs N] [--folds K] [--seed S]
+    train_pointnet.py OUT_DIR CROPS.npz... [--epochs N] [--folds K] [--seed S]
 
 Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json: loss curve, and with --folds the
 out-of-fold average precision, confusion and calibration (drives are never split between folds). The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
-An epoch is as many draws as there are clear crops; the paper's settings are 40 epochs (weak) and 100 (converged).
+An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
+40 epochs (weak) and 100 (converged).
 """
 
 from __future__ import annotations
@@ -31,8 +32,10 @@ from scores import average_precision, confusion
 SENSOR_HEIGHT_M = 1.73
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
-BATCH, POINTS = 256, 128
-MOST_LEARNT = 400
+MIX = np.array([0.3, 0.3, 0.25, 0.15])
+"""Of each variant (shipped, clustered, pasted, synthetic) among the crops of a class, where there are such."""
+BATCH, POINTS, MOST_POINTS = 128, 128, 400
+"""Crops of a step, points of each, and points that are augmented at most."""
 
 
 def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
@@ -41,10 +44,21 @@ def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
     return torch.from_numpy(seen.xyz), torch.from_numpy(seen.count)
 
 
-def draw(data: Dataset, pools: list[Int], rng: Generator) -> Int:
-    """Rows of one batch: classes by their share, crops of a class alike."""
+def odds(data: Dataset, rows: Int) -> list[tuple[Int, Float64]]:
+    """Rows of each class and how likely each is drawn: crops of one class and variant alike."""
+    pools = []
+    for c in range(N_CLASSES):
+        own = rows[data.label[rows] == c]
+        variant = data.variant[own]
+        weight = (MIX / np.bincount(variant, minlength=len(MIX)).clip(1))[variant]
+        pools.append((own, weight / weight.sum()))
+    return pools
+
+
+def draw(pools: list[tuple[Int, Float64]], rng: Generator) -> Int:
+    """Rows of one batch, classes by their share."""
     number = rng.multinomial(BATCH, SHARE / SHARE.sum())
-    return np.concatenate([rng.choice(pool, k) for pool, k in zip(pools, number, strict=True)])
+    return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in zip(pools, number, strict=True)])
 
 
 def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -> tuple[PointNet, list[float]]:
@@ -53,9 +67,9 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
     rng = np.random.default_rng(seed)
     net = PointNet()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 4e-3, total_steps=steps, pct_start=0.15)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
     criterion = torch.nn.CrossEntropyLoss(label_smoothing=0.02)
-    pools = [rows[data.label[rows] == c] for c in range(N_CLASSES)]
+    pools = odds(data, rows)
     losses: list[float] = []
     first = 0
     if state is not None and state.exists():
@@ -68,8 +82,8 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
         losses, first = held["losses"], held["step"]
     running = 0.0
     for step in range(first, steps):
-        chosen = draw(data, pools, rng)
-        crops = limit(augment(data.take(chosen), Beams(), rng), POINTS, rng)
+        chosen = draw(pools, rng)
+        crops = limit(augment(limit(data.take(chosen), MOST_POINTS, rng), Beams(), rng), POINTS, rng)
         loss = criterion(net(*tensors(crops)), torch.from_numpy(data.label[chosen]))
         optimiser.zero_grad()
         loss.backward()
@@ -91,9 +105,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
 def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     """(R, 4) of these rows, as they are."""
     rng = np.random.default_rng(0)
-    parts = [
-        net(*tensors(limit(data.take(rows[i : i + BATCH]), MOST_LEARNT, rng))) for i in range(0, len(rows), BATCH)
-    ]
+    parts = [net(*tensors(limit(data.take(rows[i : i + BATCH]), POINTS, rng))) for i in range(0, len(rows), BATCH)]
     return torch.cat(parts).double().numpy()
 
 
@@ -135,19 +147,19 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("crops", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--epochs", type=int, default=40)
-    parser.add_argument("--fold-epochs", type=int, help="of each fold's network; as many as --epochs without it")
+    parser.add_argument("crops", type=Path, nargs="+")
+    parser.add_argument("--epochs", type=float, default=40)
+    parser.add_argument("--fold-epochs", type=float, help="of each fold's network; as many as --epochs without it")
     parser.add_argument("--folds", type=int, default=0, help="cross-validate first; 0: leave that out")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(1)
     torch.use_deterministic_algorithms(True)
-    data = load(args.crops)
+    data = load(*args.crops)
     args.out.mkdir(parents=True, exist_ok=True)
     clear = np.flatnonzero(~data.partial)
-    per_epoch = len(clear) / BATCH
+    per_epoch = np.count_nonzero(data.variant[clear] == data.variant[clear].min()) / BATCH
     started = time.process_time()
     report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "crops_sha256": data.sha256}
     report |= {"provenance": data.provenance, "torch": torch.__version__}

@@ -107,15 +107,19 @@ class FieldOfView:
         """Whether nothing is cut off."""
         return len(self.planes) == 0
 
-    def depth(self, xyz: Float32 | Float64) -> Float64:
-        """(n,) distance to the nearest bounding plane [m], negative outside, infinite for the full circle."""
-        if self.full:
-            return np.full(len(xyz), np.inf)
-        distance: Float64 = xyz[:, :3] @ self.planes[:, :3].T.astype(xyz.dtype) + self.planes[:, 3]
-        nearest: Float64 = distance.min(axis=1)
+    def depth(self, points: Float32 | Float64) -> Float32 | Float64:
+        """(n,) distance of (n, 3 or more) points to the nearest bounding plane [m], negative outside.
+
+        It is infinite everywhere for the full circle.
+        """
+        nearest = np.full(len(points), np.inf, points.dtype)
+        normals = np.zeros((len(self.planes), points.shape[1]), points.dtype)
+        normals[:, :3] = self.planes[:, :3]
+        for normal, offset in zip(normals, self.planes[:, 3].tolist(), strict=True):  # two planes, not points
+            np.minimum(nearest, points @ normal + points.dtype.type(offset), out=nearest)
         return nearest
 
-    def contains(self, xyz: Float32 | Float64) -> Bool:
-        """(n,) whether each point lies inside."""
-        inside: Bool = self.depth(xyz) > 0
+    def contains(self, points: Float32 | Float64) -> Bool:
+        """(n,) whether each of (n, 3 or more) points lies inside."""
+        inside: Bool = self.depth(points) > 0
         return inside

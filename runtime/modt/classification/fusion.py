@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.config import FusionConfig
 from modt.geometry import wrap
-from modt.types import N_CLASSES, NONE, Bool, Float64, Int, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
 _FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
@@ -142,9 +142,9 @@ class KeyViews:
 def _sane(probability: Float64) -> Float64:
     """Rows that are distributions, no entry below the floor; a row that is none (NaN, all zero) says nothing."""
     finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0)
-    total = finite.sum(axis=1, keepdims=True)
-    share = np.divide(finite, total, out=np.full_like(finite, 1.0 / N_CLASSES), where=total > 0)
-    floored = np.maximum(share, _FLOOR)
+    greatest = finite.max(axis=1, keepdims=True, initial=0.0)
+    relative = np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0)
+    floored = np.maximum(relative / relative.sum(axis=1, keepdims=True), _FLOOR)
     sane: Float64 = floored / floored.sum(axis=1, keepdims=True)
     return sane
 

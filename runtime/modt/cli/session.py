@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from contextlib import ExitStack
 from pathlib import Path
@@ -91,7 +92,7 @@ class Session:
         return [KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera), *labels]
 
     def _stream_name(self) -> str:
-        return "".join(c if c.isalnum() or c in "._-" else "-" for c in self.stream.info.name)
+        return re.sub(r"[^\w.]+", "-", self.stream.info.name)
 
     def _describe(self, command: list[str]) -> None:
         info = self.stream.info

@@ -88,9 +88,9 @@ def _vote(shift: Float64) -> Float64:
     side = int(2 * REACH_M / VOTE_M) + 3
     cell = np.clip(np.rint(shift / VOTE_M).astype(np.int64) + side // 2, 1, side - 2)
     counts = np.bincount(cell[:, 0] * side + cell[:, 1], minlength=side * side).reshape(side, side)
-    around = sum(np.roll(counts, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1))
-    peak = np.array(np.unravel_index(int(np.argmax(around)), around.shape))
-    return (peak - side // 2) * VOTE_M
+    around = np.sum([np.roll(counts, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1)], axis=0)
+    row, column = divmod(int(np.argmax(around)), side)
+    return np.array([row - side // 2, column - side // 2]) * VOTE_M
 
 
 def _mutual(i: Int, j: Int, cost: Float64) -> Int:

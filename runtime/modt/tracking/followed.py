@@ -16,6 +16,7 @@ class Followed(Tracks):
 
     Columns:
         low, high: (M, 4) outline last seen, along sightings.AXES [m, world].
+        hull_low, hull_high: (M, 4) outline of all that was seen of it, slowly forgotten, about its place [m].
         foot, top: lowest and highest point last seen [m, world].
         shown: (M, 2) place that the outline was taken to show [m, world].
         home: (M, 2) place at which the track was last known to stand [m, world].
@@ -25,6 +26,8 @@ class Followed(Tracks):
 
     low: Float64
     high: Float64
+    hull_low: Float64
+    hull_high: Float64
     foot: Float64
     top: Float64
     shown: Float64
@@ -40,6 +43,8 @@ class Followed(Tracks):
             **shared,
             low=np.zeros((m, 4)),
             high=np.zeros((m, 4)),
+            hull_low=np.zeros((m, 4)),
+            hull_high=np.zeros((m, 4)),
             foot=np.zeros(m),
             top=np.zeros(m),
             shown=np.zeros((m, 2)),

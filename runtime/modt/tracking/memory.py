@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from modt.tracking.followed import Followed
-from modt.tracking.sightings import Sightings
-from modt.types import Bool, Float64, Int
+from modt.tracking.sightings import Sightings, covered, touching
+from modt.types import Bool, Int
 
 CAPACITY = 2048
 """Places kept."""
@@ -24,57 +24,57 @@ COVER = 0.6
 """Part of a proposal's outline that must lie within that of the place."""
 RISE_M = 0.5
 """How far a proposal may rise above what stood at its place."""
-PAD_M = 0.15
-"""Outlines jitter by this much."""
 
 
 class NoMemory:
     """Nothing is remembered: every new proposal asks."""
 
-    def keep(self, tracks: Followed) -> None:
+    def keep(self, tracks: Followed, rows: Int) -> None:
         """Forget them."""
 
-    def recall(self, alive: Followed, sightings: Sightings, which: Int) -> Bool:
+    def recall(self, tracks: Followed, rows: Int, sightings: Sightings, which: Int) -> Bool:
         """(n,) of the sightings named, none."""
         return np.zeros(len(which), np.bool_)
 
 
 class BackgroundMemory:
-    """Outlines of background that stood still, in the world frame."""
+    """Outlines of background that stood still, in the world frame.
+
+    Args:
+        capacity: places kept.
+    """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
         self._low, self._high = np.full((capacity, 4), np.inf), np.full((capacity, 4), -np.inf)
         self._top = np.full(capacity, -np.inf)
-        self._next = 0
+        self._next = self._filled = 0
 
-    def keep(self, tracks: Followed) -> None:
+    def __len__(self) -> int:
+        return self._filled
+
+    def keep(self, tracks: Followed, rows: Int) -> None:
         """Remember the places of tracks that end: background all of them, and at rest."""
-        slots = (self._next + np.arange(len(tracks))) % len(self._top)
-        self._low[slots], self._high[slots], self._top[slots] = tracks.low, tracks.high, tracks.top
-        self._next = int(self._next + len(tracks)) % len(self._top)
+        slots = (self._next + np.arange(len(rows))) % len(self._top)
+        self._low[slots], self._high[slots] = tracks.low[rows], tracks.high[rows]
+        self._top[slots] = tracks.top[rows]
+        self._next = int(self._next + len(rows)) % len(self._top)
+        self._filled = min(self._filled + len(rows), len(self._top))
 
-    def recall(self, alive: Followed, sightings: Sightings, which: Int) -> Bool:
+    def recall(self, tracks: Followed, rows: Int, sightings: Sightings, which: Int) -> Bool:
         """(n,) of the sightings named, which appear where background stood.
 
         Args:
-            alive: tracks of background at rest.
+            tracks: alive.
+            rows: of those that are background at rest.
             sightings: of this frame.
             which: (n,) those that no track claims.
         """
-        low = np.concatenate([self._low, alive.low])
-        high = np.concatenate([self._high, alive.high])
-        top = np.concatenate([self._top, alive.top])
-        within = _covered(sightings.low[which], sightings.high[which], low, high) >= COVER
-        known: Bool = (within & (sightings.top[which][:, None] < top + RISE_M)).any(axis=1)
+        n = self._filled
+        low = np.concatenate([self._low[:n], tracks.low[rows]])
+        high = np.concatenate([self._high[:n], tracks.high[rows]])
+        top = np.concatenate([self._top[:n], tracks.top[rows]])
+        i, j = touching(sightings.low[which], sightings.high[which], low, high)
+        within = covered(sightings.low[which[i]], sightings.high[which[i]], low[j], high[j]) >= COVER
+        known = np.zeros(len(which), np.bool_)
+        known[i[within & (sightings.top[which[i]] < top[j] + RISE_M)]] = True
         return known
-
-
-def _covered(low: Float64, high: Float64, low_places: Float64, high_places: Float64) -> Float64:
-    """(n, k) part of each outline (n, 4) within each place (k, 4): the lesser of two squares that hold it."""
-    shared = np.ones((2, len(low), len(low_places)))
-    for axis in range(4):
-        a, b = low[:, axis, None], high[:, axis, None]
-        common = np.minimum(b, high_places[:, axis] + PAD_M) - np.maximum(a, low_places[:, axis] - PAD_M)
-        shared[axis % 2] *= np.maximum(common, 0.0) / np.maximum(b - a, PAD_M)
-    part: Float64 = np.minimum(shared[0], shared[1])
-    return part

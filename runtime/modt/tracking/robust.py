@@ -8,13 +8,19 @@ from modt.config import TrackingConfig
 from modt.tracking import kalman
 from modt.tracking.association import Matches, assign
 from modt.tracking.followed import Followed
-from modt.tracking.sightings import AXES, Sightings
-from modt.types import Bool, Float64, Int
+from modt.tracking.sightings import AXES, Sightings, touching
+from modt.types import Bool, Float64, Int, ObjectClass
 
 SOFT_M = 0.3
 """Lengths are compared with this added: a difference of a few returns says nothing."""
 GATE = 16.0
 """Greatest squared Mahalanobis distance of a pair: one true pair in three thousand lies beyond."""
+JUMP_M = 0.2
+"""Outlines jump by this much beyond the filter's noise, as parts of an object come into view and go."""
+COVER = 0.3
+"""Overlap, of the smaller, of what is paired although it changed its shape."""
+GROWTH = 1.5
+"""An object does not become this many times longer, plus a metre, from one frame to the next."""
 LIMIT = 10.0
 """Cost of leaving a track without a proposal."""
 W_SIZE, W_OVERLAP, W_HEIGHT, W_COUNT = 2.0, 3.0, 2.0, 0.5
@@ -40,7 +46,7 @@ class RobustAssociation:
         R = self.noise(sightings)
         rows, columns = self._near(tracks, low, high, sightings)
         shift, size, overlap, cover = compare(low[rows], high[rows], sightings.low[columns], sightings.high[columns])
-        S = tracks.P[rows][:, :2, :2] + R[columns]
+        S = tracks.P[rows][:, :2, :2] + R[columns] + JUMP_M**2 * np.eye(2)
         distance = kalman.mahalanobis_squared(shift, S)
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
@@ -50,12 +56,20 @@ class RobustAssociation:
         first = np.flatnonzero((distance < GATE) & (cost < LIMIT))
         first = first[assign(rows[first], columns[first], cost[first], LIMIT)]
         left = _left(rows, rows[first], len(tracks)) & _left(columns, columns[first], len(sightings))
-        second = np.flatnonzero(left & (cover > 0.3))
+        second = np.flatnonzero(left & (cover > COVER) & ~self._swallowed(tracks, sightings, rows, columns))
         second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
         kept = np.concatenate([first, second])
         place = tracks.x[rows[kept], :2] + shift[kept]
-        loose = np.where(np.arange(len(kept)) < len(first), 1.0, 9.0)
+        loose = np.maximum(1.0, distance[kept] / 4)  # the tails are heavy: what lies far off says less
         return Matches(rows[kept], columns[kept], place, R[columns[kept]] * loose[:, None, None])
+
+    def _swallowed(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Bool:
+        """(K,) pairs in which an object would become a part of something larger: it waits until they part again."""
+        grown = (sightings.high[columns] - sightings.low[columns]).max(axis=1)
+        known = (tracks.hull_high[rows] - tracks.hull_low[rows]).max(axis=1)
+        scenery = tracks.fixed[rows] & (tracks.posterior[rows].argmax(axis=1) == ObjectClass.BACKGROUND)
+        swallowed: Bool = ~scenery & (grown > GROWTH * known + 1.0)
+        return swallowed
 
     def birthplace(self, sightings: Sightings) -> Float64:
         """Middle of the outline."""
@@ -64,20 +78,15 @@ class RobustAssociation:
     def noise(self, sightings: Sightings) -> Float64:
         """(P, 2, 2) covariance of a place: ends of outlines jitter by the spacing of returns, and more where cut."""
         extent = (sightings.high - sightings.low).mean(axis=1)
-        sigma = 0.1 + 0.004 * sightings.range_m + 0.08 * np.minimum(extent, 4.0)
+        sigma = 0.06 + 0.001 * sightings.range_m + 0.03 * np.minimum(extent, 3.0)
         sigma = np.where(sightings.cut, 1.5 * sigma, sigma)
         R: Float64 = np.square(sigma)[:, None, None] * np.eye(2)
         return R
 
     def _near(self, tracks: Followed, low: Float64, high: Float64, sightings: Sightings) -> tuple[Int, Int]:
         """Pairs whose outlines come near enough along x and along y."""
-        reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
-        near = np.ones((len(tracks), len(sightings)), np.bool_)
-        for axis in (0, 2):
-            near &= (low[:, axis] - reach).astype(np.float32)[:, None] < sightings.high[:, axis].astype(np.float32)
-            near &= (high[:, axis] + reach).astype(np.float32)[:, None] > sightings.low[:, axis].astype(np.float32)
-        rows, columns = np.nonzero(near)
-        return rows, columns
+        reach = (0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1])))[:, None]
+        return touching(low - reach, high + reach, sightings.low, sightings.high)
 
 
 def carried(tracks: Followed) -> tuple[Float64, Float64]:

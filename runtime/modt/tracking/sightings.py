@@ -11,6 +11,8 @@ from modt.types import Bool, Float64, Frame, Int, Proposals
 
 DIRECTIONS = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 """Bearings of the axes along which an outline is measured, world frame [rad]."""
+PAD_M = 0.15
+"""Outlines jitter by this much."""
 AXES = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
 
 
@@ -66,6 +68,25 @@ def sight(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> Sighti
         cut=proposals.truncated | proposals.occluded,
         eye=T_world_sensor[:2, 3],
     )
+
+
+def touching(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> tuple[Int, Int]:
+    """Pairs of outlines (n, 4) and (k, 4) that overlap along x and along y, as two arrays of indices."""
+    near = np.ones((len(low_a), len(low_b)), np.bool_)
+    for axis in (0, 2):
+        near &= low_a[:, axis].astype(np.float32)[:, None] <= high_b[:, axis].astype(np.float32)
+        near &= high_a[:, axis].astype(np.float32)[:, None] >= low_b[:, axis].astype(np.float32)
+    found = np.flatnonzero(near)
+    i, j = np.divmod(found, max(len(low_b), 1))
+    return i, j
+
+
+def covered(low: Float64, high: Float64, low_place: Float64, high_place: Float64) -> Float64:
+    """(k,) part of each outline (k, 4) within its place (k, 4): the lesser for the two squares that hold them."""
+    common = np.minimum(high, high_place + PAD_M) - np.maximum(low, low_place - PAD_M)
+    part = np.maximum(common, 0.0) / np.maximum(high - low, PAD_M)
+    least: Float64 = np.minimum(part[:, 0] * part[:, 2], part[:, 1] * part[:, 3])
+    return least
 
 
 def outlines(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> tuple[Float64, Float64]:

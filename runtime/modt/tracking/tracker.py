@@ -10,9 +10,10 @@ from modt.tracking import kalman
 from modt.tracking.association import Association, Matches, PaperAssociation
 from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
+from modt.tracking.kinship import reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.robust import RobustAssociation
-from modt.tracking.sightings import Sightings, sight
+from modt.tracking.sightings import AXES, Sightings, sight
 from modt.tracking.states import Happening, StateMachine
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
@@ -26,13 +27,15 @@ STILL_SIGMA_MPS = 1.0
 """How surely what stands still has no speed, per frame."""
 SLOW_MPS = 0.5
 """What is slower than this has stopped."""
+FORGET = 0.98
+"""What is kept, a frame, of an extent that is not seen again."""
 AGILITY = np.array([0.25, 1.5, 0.75, 1.0])
 """Process noise of each class relative to what is assumed of an unknown one."""
 
 
 def association_of(config: TrackingConfig) -> Association:
     """The association that a configuration names."""
-    return {"paper": PaperAssociation, "robust": RobustAssociation}[config.association](config)
+    return PaperAssociation(config) if config.association == "paper" else RobustAssociation(config)
 
 
 def rigid(T: Float64) -> Float64:
@@ -91,7 +94,7 @@ class Tracker:
         """
         sightings = self._sight(frame, proposals)
         self._predict(frame.stamp_s)
-        matches = self.association.match(self._tracks, sightings)
+        matches = reunite(self._tracks, sightings, self.association.match(self._tracks, sightings))
         self._update(matches, sightings)
         self._rest(matches.rows)
         self._miss(matches.rows)
@@ -162,6 +165,9 @@ class Tracker:
     def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
         """Note what was seen of the tracks."""
         tracks.shown[rows] = place
+        low, high = (a[proposals] - place @ AXES for a in (sightings.low, sightings.high))
+        tracks.hull_low[rows] = np.minimum(low, FORGET * tracks.hull_low[rows] + (1 - FORGET) * low)
+        tracks.hull_high[rows] = np.maximum(high, FORGET * tracks.hull_high[rows] + (1 - FORGET) * high)
         tracks.proposal[rows] = proposals
         tracks.box[rows] = sightings.box[proposals]
         tracks.points[rows] = sightings.count[proposals]
@@ -205,7 +211,7 @@ class Tracker:
         born = np.flatnonzero(free)
         if not len(born):
             return
-        known = self.memory.recall(self._tracks.take(self._scenery()), sightings, born)
+        known = self.memory.recall(self._tracks, np.flatnonzero(self._scenery()), sightings, born)
         new = Followed.blank(len(born))
         new.id[:] = self._next_id + np.arange(len(born))
         self._next_id += len(born)
@@ -220,6 +226,7 @@ class Tracker:
         new.P[:] = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
         new.age[:] = new.hits[:] = 1
         new.home[:] = new.x[:, :2]
+        new.hull_low[:], new.hull_high[:] = np.inf, -np.inf
         self._show(new, np.arange(len(born)), born, sightings, new.x[:, :2])
         self._tracks = self._tracks.append(new)
 
@@ -230,7 +237,7 @@ class Tracker:
         if not expired.any():
             return
         t.state[expired] = self.machine.meet(t.state[expired], Happening.EXPIRED)
-        self.memory.keep(t.take(expired & self._scenery()))
+        self.memory.keep(t, np.flatnonzero(expired & self._scenery()))
         self._tracks = t.take(~expired)
 
     def _scenery(self) -> Bool:

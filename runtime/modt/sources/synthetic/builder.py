@@ -8,8 +8,9 @@ from modt.sources.synthetic import kinds, vehicles
 from modt.sources.synthetic.clashes import keep_apart
 from modt.sources.synthetic.figures import Figures, Posture
 from modt.sources.synthetic.kinds import Kind
+from modt.sources.synthetic.materials import Material
 from modt.sources.synthetic.motion import Path
-from modt.sources.synthetic.pieces import Pieces
+from modt.sources.synthetic.pieces import Pieces, box
 from modt.sources.synthetic.terrain import Terrain
 from modt.sources.synthetic.world import Body, World
 from modt.types import Float64
@@ -17,6 +18,9 @@ from modt.types import Float64
 EGO_SIZE = (4.6, 1.8, 1.6)
 REACH_UP_M = 2.2
 """Parts of scenery above this are in nobody's way."""
+
+
+BARE_M = 1e-3
 
 
 class Builder:
@@ -36,14 +40,14 @@ class Builder:
         """Something that is not annotated and never moves."""
         self.bodies.append(Body(kinds.SCENERY, _extent(pieces), Path.standing(x, y, heading_rad), pieces))
 
-    def vehicle(self, kind: Kind, path: Path) -> None:
-        """A car, a van or a truck of random proportions."""
-        size, make = {
+    def vehicle(self, kind: Kind, path: Path, size: tuple[float, float, float] | None = None) -> None:
+        """A car, a van or a truck, of random proportions unless its size is given."""
+        usual, make = {
             kinds.CAR: (vehicles.car_size, vehicles.car),
             kinds.VAN: (vehicles.van_size, vehicles.van),
             kinds.TRUCK: (vehicles.truck_size, vehicles.truck),
         }[kind]
-        measured = size(self.rng)
+        measured = size or usual(self.rng)
         self.bodies.append(Body(kind, measured, path, make(self.rng, measured)))
 
     def parked_bicycle(self, x: float, y: float, heading_rad: float) -> None:
@@ -51,9 +55,9 @@ class Builder:
         path = Path.standing(x, y, heading_rad)
         self.bodies.append(Body(kinds.BICYCLE, (1.75, 0.55, 1.05), path, vehicles.bicycle(self.rng)))
 
-    def pedestrian(self, path: Path, speed_mps: float = 0.0) -> None:
+    def pedestrian(self, path: Path, speed_mps: float = 0.0, height: float | None = None) -> None:
         """Someone on foot: walking where a speed is given, else standing."""
-        height = float(np.clip(self.rng.normal(1.74, 0.09), 1.15, 2.0))
+        height = height or float(np.clip(self.rng.normal(1.74, 0.09), 1.15, 2.0))
         stride = 0.24 * height * (0.6 + 0.3 * speed_mps) if speed_mps else 0.0
         rate = np.pi * speed_mps / (2 * stride) if speed_mps else 0.0
         length = 0.45 + 1.4 * stride if speed_mps else 0.5
@@ -61,9 +65,15 @@ class Builder:
         posture = Posture.WALK if speed_mps else Posture.STAND
         self._person(kinds.PEDESTRIAN, (length, breadth, height), path, posture, height, rate, stride, Pieces.none())
 
-    def cyclist(self, path: Path, speed_mps: float) -> None:
+    def sitter(self, path: Path) -> None:
+        """Someone on a seat."""
+        height = float(np.clip(self.rng.normal(1.72, 0.08), 1.5, 1.95))
+        seat = box((-0.02, 0.0, 0.22), (0.42, 0.42, 0.44), Material.WOOD)
+        self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, Posture.SIT, height, 0.0, 0.0, seat)
+
+    def cyclist(self, path: Path, speed_mps: float, height: float | None = None) -> None:
         """Someone on a bicycle."""
-        height = float(np.clip(self.rng.normal(1.74, 0.08), 1.5, 1.95))
+        height = height or float(np.clip(self.rng.normal(1.74, 0.08), 1.5, 1.95))
         size = (1.76, 0.6, 0.93 + 0.3 * height * np.cos(0.55) + 0.24 * height)
         rate = 2 * np.pi * speed_mps / 4.5
         self._person(kinds.CYCLIST, size, path, Posture.RIDE, height, rate, 0.0, vehicles.bicycle(self.rng))
@@ -79,7 +89,7 @@ class Builder:
         stay = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(stay)}
         people = [(number[int(p[0])], *p[1:]) for p in self._people if int(p[0]) in number]
-        columns: Float64 = np.array(people).reshape(-1, 7).T
+        columns: Float64 = np.array(people).reshape(-1, 9).T
         figures = Figures(columns[0].astype(np.int64), columns[1].astype(np.int64), *columns[2:])
         return World(terrain, [self.bodies[i] for i in stay], figures, ego, height_m, sway_rad)
 
@@ -96,7 +106,9 @@ class Builder:
     ) -> None:
         girth = float(np.clip(self.rng.normal(1.0, 0.12), 0.75, 1.35))
         phase = float(self.rng.uniform(0, 2 * np.pi))
-        self._people.append((len(self.bodies), posture, height, girth, phase, rate, stride))
+        coat = self.rng.uniform(0.16, 0.24) if self.rng.random() < 0.35 else BARE_M
+        pack = self.rng.uniform(0.08, 0.16) if self.rng.random() < 0.3 else BARE_M
+        self._people.append((len(self.bodies), posture, height, girth, phase, rate, stride, coat, pack))
         self.bodies.append(Body(kind, size, path, rigid))
 
 

@@ -13,6 +13,9 @@ from modt.types import Bool, Float32, Float64, Int
 CUTS = 4
 """Cutting planes a piece may have beside its box."""
 
+NARROW_M = 0.3
+"""Half the least side of a piece that a beam may graze on both sides."""
+
 SOLID = np.float32(np.inf)
 
 
@@ -61,6 +64,21 @@ class Pieces:
         centre = (R @ self.centre[:, :, None])[:, :, 0] + t
         return self._with(rotation=R @ self.rotation, centre=centre)
 
+    def as_met(self, spot_m: float, divergence_rad: float) -> Self:
+        """The pieces, in the sensor frame, as a beam of some breadth meets them.
+
+        A beam returns from what it only grazes: narrow solid pieces look broader by the radius of the beam.
+        """
+        away = np.linalg.norm(self.centre, axis=1)
+        narrow = (self.half.min(axis=1) < NARROW_M) & ~np.isfinite(self.density)
+        more = np.where(narrow, np.float32(spot_m) + np.float32(divergence_rad) * away, 0)[:, None]
+        with np.errstate(divide="ignore"):
+            semi = 1 / np.sqrt(self.quadric)
+        quadric = np.where(self.quadric > 0, 1 / np.square(semi + more), 0)
+        cuts = self.cuts.copy()
+        cuts[:, :, 3] += more
+        return self._with(half=(self.half + more).astype(np.float32), quadric=quadric.astype(np.float32), cuts=cuts)
+
     def _with(self, **columns: Float32 | Int) -> Self:
         return type(self)(*(columns.get(f.name, getattr(self, f.name)) for f in fields(self)))
 
@@ -105,6 +123,12 @@ def wedge(centre: Triple, size: Triple, material: int, cuts: list[tuple[float, f
     for i, (a, b, c, d) in enumerate(cuts):
         norm = float(np.sqrt(a * a + b * b + c * c))
         made.cuts[0, i] = np.array([a, b, c, d]) / norm
+    return made
+
+
+def rounded(made: Pieces, semi: Triple) -> Pieces:
+    """The same pieces inside an ellipsoid about their middle; an infinite semi-axis [m] does not bound them."""
+    made.quadric[:] = np.array(semi) ** -2.0
     return made
 
 

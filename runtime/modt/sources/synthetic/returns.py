@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from modt.sources.synthetic.materials import LOSS, REFLECTIVITY
 from modt.sources.synthetic.sensors import SensorModel
-from modt.types import Bool, Float32, Int
+from modt.types import Bool, Float32
 
 
 class Receiver:
@@ -25,7 +25,7 @@ class Receiver:
         self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
 
     def receive(
-        self, distance: Float32, material: Int, group: NDArray[np.int32], rng: np.random.Generator
+        self, distance: Float32, material: NDArray[np.uint8], group: NDArray[np.int32], rng: np.random.Generator
     ) -> tuple[Float32, Float32, Bool]:
         """Distance [m, horizontal], intensity [0, 1] and whether there is a return, of every ray.
 
@@ -51,7 +51,7 @@ class Receiver:
             near + (self.bias + np.float32(sensor.range_sigma_m) * noise).astype(np.float32) / self.secant
         )
         self._smear(ranged, near, heard, chance)
-        bright = np.clip(reflectivity * (np.float32(0.35) + np.float32(0.65) * head_on), 0, 1)
+        bright = np.clip(reflectivity * (np.float32(0.75) + np.float32(0.25) * head_on), 0, 1)
         return ranged, bright, heard
 
     def _incidence(self, near: Float32, group: NDArray[np.int32]) -> Float32:

@@ -114,3 +114,14 @@ def bin_(rng: np.random.Generator) -> Pieces:
     if rng.random() < 0.4:
         return cylinder((0.0, 0.0, size[2] / 2), size[0] / 3, size[2], Material.METAL)
     return box((0.0, 0.0, size[2] / 2), size, Material.METAL)
+
+
+def plants(rng: np.random.Generator, length: float, depth: float, n: int) -> Pieces:
+    """Low plants, tufts and stones strewn over a patch of ground."""
+    parts = []
+    for _ in range(n):
+        r = rng.uniform(0.12, 0.45)
+        tall = rng.uniform(0.15, 0.6)
+        x, y = rng.uniform(-0.5, 0.5, 2) * (length, depth)
+        parts.append(ellipsoid((x, y, 0.3 * tall), (r, r, 0.7 * tall), Material.FOLIAGE, rng.uniform(3.0, 8.0)))
+    return Pieces.join(parts)

@@ -6,8 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from modt.sources.synthetic.crossing import crossing
 from modt.sources.synthetic.street import street
 from modt.sources.synthetic.world import World
+from modt.sources.synthetic.yard import hall, yard
 
-SCENES: dict[str, Callable[[np.random.Generator, float, float], World]] = {"street": street}
+SCENES: dict[str, Callable[[np.random.Generator, float, float], World]] = {
+    "street": street,
+    "crossing": crossing,
+    "yard": yard,
+    "hall": hall,
+}
 """Scene by name: made of a random generator, a duration [s] and the height of the sensor [m]."""

@@ -26,6 +26,7 @@ class SensorModel:
         azimuth_sigma_rad: jitter of a firing.
         detect_m: distance at which half of the returns of a dull surface (reflectivity 0.1) met head-on are lost.
         misfire: share of firings lost whatever they meet.
+        spot_m, divergence_rad: radius of a beam where it leaves the sensor, and how it grows with distance.
         smear: share of the returns at a depth edge that lie between both surfaces.
         height_m: usual mounting height above the ground.
         period_s: of a sweep.
@@ -43,6 +44,8 @@ class SensorModel:
     azimuth_sigma_rad: float
     detect_m: float
     misfire: float
+    spot_m: float
+    divergence_rad: float
     smear: float
     height_m: float
     period_s: float = 0.1
@@ -88,6 +91,8 @@ def _spinner(
         azimuth_sigma_rad=0.0003,
         detect_m=detect_m,
         misfire=0.01,
+        spot_m=0.01,
+        divergence_rad=0.0012,
         smear=smear,
         height_m=height_m,
     )
@@ -137,6 +142,8 @@ def solid_state() -> SensorModel:
         azimuth_sigma_rad=0.0002,
         detect_m=120.0,
         misfire=0.005,
+        spot_m=0.005,
+        divergence_rad=0.001,
         smear=0.15,
         height_m=1.0,
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Fault, StreamInfo
+from modt.sources.synthetic.placement import placed, read_placements
 from modt.sources.synthetic.scenes import SCENES
 from modt.sources.synthetic.sensors import sensor as sensor_model
 from modt.sources.synthetic.simulator import Simulator, Truth
@@ -33,7 +35,7 @@ class SyntheticStream:
     """A drive through a synthetic scene; the same bytes for the same arguments.
 
     Args:
-        scene: name of the scene.
+        scene: name of the scene, or a KITTI label file (.txt) whose objects are placed as they stood.
         sensor: name of the sensor model.
         seconds: how long it takes.
         seed: of the scene, what happens in it and the noise.
@@ -52,14 +54,18 @@ class SyntheticStream:
         *,
         distort: bool = False,
     ) -> None:
-        if scene not in SCENES:
-            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
+        if scene not in SCENES and not scene.endswith(".txt"):
+            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}, or a KITTI label file")
         if not 0 < seconds <= 3600:
             raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
         if seed < 0:
             raise MisuseError(seed, "no seed", "give a whole number from 0 on")
         model = sensor_model(sensor)
-        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
+        rng = np.random.default_rng([seed, 0])
+        if scene in SCENES:
+            world = SCENES[scene](rng, seconds, model.height_m)
+        else:
+            world = placed(read_placements(Path(scene)), rng, seconds, model.height_m)
         self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults: list[Fault] = []

@@ -107,7 +107,9 @@ class World:
     def pieces(self, time_s: float, T_world_sensor: Float64, reach_m: float) -> Pieces:
         """Pieces within reach of the sensor at a time, sensor frame."""
         poses = self.poses(time_s)
-        moving = Pieces.join([self._rolling, self.figures.pieces(time_s)])
+        away = np.hypot(*(poses[self.figures.body, :2] - T_world_sensor[:2, 3]).T)
+        people = self.figures.take(away < reach_m).pieces(time_s)
+        moving = Pieces.join([self._rolling, people])
         near = [self._near(p, T_world_sensor, reach_m) for p in (self._still, self._placed(moving, poses))]
         T = inverse(T_world_sensor)
         return Pieces.join(near).moved(T[:3, :3], T[:3, 3])
