@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import argparse
 import time
-from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from modt import host
-from modt.cli.replay import core
+from modt.cli.replay import core, frames
 from modt.errors import ModtError
 from modt.profile import DEFAULT
 
 if TYPE_CHECKING:
     from modt.energy.calibration import Calibration
 
-FRAMES = 40
-"""Kept in memory and worked on over and over."""
 NEVER_S = 1e9
 """Shortest window where windows are closed by hand."""
 
@@ -26,6 +23,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare the command and its options."""
     p = commands.add_parser("calibrate", help="fit what this board's work costs, and write a profile")
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help="stream (default: the embedded one)")
+    p.add_argument("--frames", type=frames, default=(0, 40), metavar="A:B", help="worked on over and over (0:40)")
     p.add_argument("--board", default="this board", metavar="NAME", help="name to write down")
     p.add_argument("--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="default: %(default)s")
     p.add_argument("--profile", default=DEFAULT, metavar="NAME|FILE", help="to start from (default: %(default)s)")
@@ -76,15 +74,15 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import writing
 
     loaded = profile.load(arguments.profile)
-    stream = assemble.stream(assemble.Request(path=arguments.path))
-    frames = list(islice(iter(stream), FRAMES))
-    if not frames:
+    stream = assemble.stream(assemble.Request(path=arguments.path, frames=arguments.frames))
+    scans = list(stream)
+    if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
     chosen = metering.meters(loaded.energy).choose(arguments.meter)
     assert chosen.facts is not None
     ledger, limits = Ledger(), loaded.classification
     work = Work(
-        frames=frames,
+        frames=scans,
         segmenter=Segmenter(loaded.segmentation, loaded.sensor, FieldOfView()),
         classifier=CountedClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch),
         ledger=ledger,

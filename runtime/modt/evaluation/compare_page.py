@@ -28,7 +28,7 @@ def compare_page(tree: dict[str, Any]) -> str:
         for mode, m in modes.items()
     ]
     answers += [
-        (f"{mode}: gamma measured", brief(s["gamma_measured_cpu"].value), holds(s)) for mode, s in savings.items()
+        (f"{mode}: gamma of CPU energy", kinded(s["gamma_measured_cpu"]), holds(s)) for mode, s in savings.items()
     ]
     return page(
         f"Energy of {tree['stream']}",
