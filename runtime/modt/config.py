@@ -124,9 +124,7 @@ class TrackingConfig(StageConfig):
 class BoxTrackingConfig(StageConfig):
     """Tracking of whole boxes that another detector has found, one class at a time."""
 
-    strong_score: float = _number(
-        1.0, -1e3, 1e3, "", "detections of this score begin a track; weaker ones continue one"
-    )
+    strong_score: float = _number(1.0, -1e3, 1e3, "", "detections that begin a track; weaker ones continue one")
     sure_score: float = _number(4.0, -1e3, 1e3, "", "mean score from which a track is reported at once")
     min_hits: int = _number(3, 1, 100, "frames", "detections after which any track is reported")
     max_missed: int = _number(8, 0, 100, "frames", "without a detection before a track is deleted")
@@ -147,7 +145,7 @@ class ClassificationConfig(StageConfig):
     """The network and how its input is made (section V-A)."""
 
     model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
-    max_points: int = _number(400, 8, 4096, "", "of a proposal handed to the network")
+    max_points: int = _number(128, 8, 4096, "", "of a proposal handed to the network")
     batch: int = _number(8, 1, 256, "", "proposals of one network call at most")
 
 

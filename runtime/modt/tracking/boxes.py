@@ -133,7 +133,8 @@ class BoxTracker:
 
     def _renew(self, keep: Bool, born: Int, boxes: Float64, score: Float64) -> None:
         n = len(born)
-        P = np.diag([self.config.position_sigma_m, self.config.position_sigma_m, np.pi, self.config.initial_speed_sigma_mps])
+        place, speed = self.config.position_sigma_m, self.config.initial_speed_sigma_mps
+        P = np.diag([place, place, np.pi, speed])
         x = np.zeros((n, 4))
         x[:, :2] = boxes[born, :2]
         join = np.concatenate
