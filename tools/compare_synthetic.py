@@ -16,13 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from labelled import CLASS_OF, Scan, inside, object_scans
+from labelled import FOOT_M, Scan, object_scans
 from modt import profile
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.sources.synthetic import SyntheticStream
 from modt.types import CLASS_NAMES
-from synthetic_scans import synthetic_scans
+from synthetic_scans import driven
 
 RINGS = (5, 10, 15, 20, 30, 50)
 HEIGHTS = (-2.5, -1.3, -0.5, 0.5, 3.0)
@@ -69,17 +68,17 @@ def figures(scans: Iterable[Scan]) -> dict[str, str]:
 def _objects(scan: Scan, segmenter: Segmenter, sums: dict[str, list[float]], hits: dict[str, list[bool]]) -> None:
     proposals = segmenter.segment(scan.points)
     number = proposals.label(len(scan.points))
-    for box, kind in zip(scan.boxes, scan.kinds, strict=True):
-        if kind not in CLASS_OF or scan.fov.depth(box[None, :3])[0] < 0:
+    for members, kind, box in zip(scan.objects, scan.kinds, scan.boxes, strict=True):
+        own = members[scan.points[members, 2] > box[2] + FOOT_M]
+        if not kind or scan.fov.depth(box[None, :3])[0] < 0:
             continue
-        own = inside(scan.points, box)
-        n, away = int(own.sum()), float(np.hypot(box[0], box[1]))
-        name = CLASS_NAMES[CLASS_OF[kind]]
+        n, away = len(own), float(np.hypot(box[0], box[1]))
+        name = CLASS_NAMES[kind]
         for near, far in zip((0, *RINGS[:-1]), RINGS, strict=True):
             if near <= away < far and n >= 5:
                 sums[f"n points on a {name} at {near:02d}-{far} m, median (count)"].append(n)
         if n >= 20:
-            shared = np.bincount(number[own & (number >= 0)], minlength=len(proposals))
+            shared = np.bincount(number[own][number[own] >= 0], minlength=len(proposals))
             best = int(shared.argmax()) if len(shared) else 0
             overlap = shared[best] / (proposals.count[best] + n - shared[best]) if len(shared) else 0.0
             hits[f"recall of {name}"].append(bool(overlap > 0.5))
@@ -94,13 +93,9 @@ def main() -> None:
     parser.add_argument("--real", type=int, default=106, help="real scans at most")
     args = parser.parse_args()
     real = islice((s for s in object_scans(args.root / "object" / "training") if len(s.points) > 80000), args.real)
-    worlds = (
-        (f"{scene}-{seed}", SyntheticStream(scene, "hdl-64e", 4.0, seed).simulator)
-        for scene in args.scene
-        for seed in range(100, 100 + args.worlds)
-    )
-    step = max(1, 40 // args.sweeps)
-    columns = figures(real), figures(synthetic_scans(worlds, range(0, 40, step)))
+    times_s = np.linspace(0, 3.9, args.sweeps)
+    synthetic = driven(args.scene, range(100, 100 + args.worlds), times_s.tolist(), camera=True)
+    columns = figures(real), figures(synthetic)
     print("| figure | real | synthetic |\n|---|---|---|")
     for key in dict.fromkeys([*columns[0], *columns[1]]):
         print(f"| {key} | {columns[0].get(key, '-')} | {columns[1].get(key, '-')} |")

@@ -149,7 +149,7 @@ class ClassificationConfig(StageConfig):
     """The network and how its input is made (section V-A)."""
 
     model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
-    max_points: int = _number(400, 8, 4096, "", "of a proposal handed to the network")
+    max_points: int = _number(128, 8, 4096, "", "of a proposal handed to the network")
     batch: int = _number(8, 1, 256, "", "proposals of one network call at most")
 
 
@@ -166,6 +166,8 @@ class FusionConfig(StageConfig):
     """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
 
     threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
+    background_threshold: float = _number(0.95, 0.25, 1.0, "", "the same, of background")
+    view_weight: float = _number(1.0, 0.0, 1.0, "", "share of a further view's evidence; 1: as if independent")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
     )
@@ -176,6 +178,10 @@ class FusionConfig(StageConfig):
     bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
     range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")
     extent_ratio: float = _number(0.3, 0.0, 10.0, "", "change of size that makes it independent")
+    reopen_ratio: float | None = _number(
+        4.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
+    )
+    reopen_points: int = _number(60, 0, 10000, "", "a class settled from so many is never doubted")
     start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
 
 

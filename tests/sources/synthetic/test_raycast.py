@@ -53,7 +53,7 @@ def test_windows_leave_out_no_ray_that_hits(seed):
             near = super().windows(pieces)
             n = len(pieces)
             whole = np.tile([0, 16], (n, 1)), np.tile([0, 1808], (n, 1))
-            return type(near)(np.arange(n), *whole, np.zeros(n, np.float32))
+            return type(near)(np.arange(n), *whole, np.zeros(n, np.float32), 1808)
 
     whole = Everywhere(sensor("vlp-16")).cast(pieces, NO_GROUND, np.ones_like(NO_GROUND)).distance
     assert np.isfinite(found).sum() == np.isfinite(whole).sum()

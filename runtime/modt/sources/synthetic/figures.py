@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 
 import numpy as np
 
 from modt.sources.synthetic.materials import Material
 from modt.sources.synthetic.pieces import CUTS, SOLID, Pieces
-from modt.types import Float64, Int
+from modt.types import Bool, Float64, Int
 
 
 class Posture(IntEnum):
@@ -36,6 +36,8 @@ class Figures:
         phase: (n,) of the gait at time 0 [rad].
         rate: (n,) of the gait [rad/s].
         stride: (n,) reach of a step to either side [m].
+        coat: (n,) breadth of a coat or skirt about the hips [m]; next to nothing without one.
+        pack: (n,) depth of a bag on the back [m]; likewise.
     """
 
     body: Int
@@ -45,6 +47,12 @@ class Figures:
     phase: Float64
     rate: Float64
     stride: Float64
+    coat: Float64
+    pack: Float64
+
+    def take(self, rows: Int | Bool) -> Figures:
+        """The figures given, by index or mask."""
+        return Figures(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
     def pieces(self, time_s: float) -> Pieces:
         """Their pieces at a time, each figure in its own frame (x ahead, z up, origin on the ground)."""
@@ -89,6 +97,11 @@ class Figures:
                 (elbow, hand, 0.04 * g, 0.04 * g, Material.SKIN),
             ]
         bars.append((hips - _points(0.0, 0.0, 0.06), neck, 0.125 * g, 0.19 * g, Material.CLOTH))
+        hem = hips + _points(np.where(ride | sit, 0.05, 0.0), 0.0, -0.22 * H * np.where(ride | sit, 0.3, 1.0))
+        bars.append((hem, hips + _points(0.02, 0.0, 0.1), 0.8 * self.coat, self.coat, Material.CLOTH))
+        back = (hips + 2 * neck) / 3 - _points(0.13 * g, 0.0, 0.0)
+        up = 0.2 * (neck - hips) / spine[:, None]
+        bars.append((back - up, back + up, self.pack, np.minimum(1.6 * self.pack, 0.16), Material.CLOTH))
         bars.append((neck - _points(0.0, 0.0, 0.02), head, 0.055 + 0 * g, 0.055 + 0 * g, Material.SKIN))
         skull = np.tile([0.1, 0.08, 0.12], (n, 1))
         return Pieces.join(

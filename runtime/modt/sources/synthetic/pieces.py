@@ -126,6 +126,12 @@ def wedge(centre: Triple, size: Triple, material: int, cuts: list[tuple[float, f
     return made
 
 
+def rounded(made: Pieces, semi: Triple) -> Pieces:
+    """The same pieces inside an ellipsoid about their middle; an infinite semi-axis [m] does not bound them."""
+    made.quadric[:] = np.array(semi) ** -2.0
+    return made
+
+
 def ellipsoid(centre: Triple, semi: Triple, material: int, density: float | None = None) -> Pieces:
     """An ellipsoid by its semi-axes [m]; of foliage where a density [1/m] is given."""
     axes = np.array([semi])

@@ -19,7 +19,7 @@ NOTHING = -1
 
 NEAREST_M = np.float32(0.05)
 
-BATCH_RAYS = 1000
+BATCH_RAYS, CHUNK_RAYS = 1000, 16_384
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +43,14 @@ class Windows:
         piece: (W,) which piece, nearest first.
         rows, columns: (W, 2) first and one past the last.
         near: (W,) least horizontal distance of the piece [m].
+        n_columns: columns of the whole image.
     """
 
     piece: Int
     rows: Int
     columns: Int
     near: Float32
+    n_columns: int
 
     @property
     def area(self) -> Int:
@@ -70,9 +72,10 @@ class Form:
     @classmethod
     def codes(cls, pieces: Pieces) -> Int:
         """(n,) code of each piece."""
-        rounded = (pieces.quadric > 0).sum(axis=1)
+        rounded = (pieces.quadric > 0).any(axis=1)
+        boxed = (pieces.quadric * np.square(pieces.half) < np.float32(0.999)).any(axis=1)
         cut = pieces.cuts[:, :, :3].any(axis=2).sum(axis=1)
-        codes: Int = (rounded < 3) + 2 * (rounded > 0) + 4 * np.isfinite(pieces.density) + 8 * cut
+        codes: Int = boxed + 2 * rounded + 4 * np.isfinite(pieces.density) + 8 * cut
         return codes
 
     @property
@@ -127,6 +130,16 @@ class Form:
 
 def _sum(terms: Iterable[Float32]) -> Float32:
     return reduce(np.add, terms)
+
+
+class _Columns:
+    """Pieces by component, each contiguous, so that what a ray needs is gathered fast."""
+
+    def __init__(self, pieces: Pieces) -> None:
+        self.rotation: Float32 = np.ascontiguousarray(pieces.rotation.transpose(1, 2, 0))
+        self.shift: Float32 = np.ascontiguousarray(-np.einsum("nji,nj->in", pieces.rotation, pieces.centre))
+        self.half: Float32 = np.ascontiguousarray(pieces.half.T)
+        self.quadric: Float32 = np.ascontiguousarray(pieces.quadric.T)
 
 
 class RayCaster:
@@ -189,40 +202,55 @@ class RayCaster:
     def _cast_rays(
         self, pieces: Pieces, codes: Int, windows: Windows, which: Int, depth: Float32, image: RangeImage
     ) -> None:
-        if not len(which):
-            return
-        area, n_columns = windows.area[which], np.diff(windows.columns[which], axis=1)[:, 0]
-        window = np.repeat(which, area)
-        step = np.arange(len(window)) - np.repeat(np.cumsum(area) - area, area)
-        down, right = np.divmod(step, np.repeat(n_columns, area))
-        row, column = windows.rows[window, 0] + down, windows.columns[window, 0] + right
-        ray = row * image.distance.shape[1] + column
+        """Cast windows by form, as many at a time as the cache holds."""
+        table = _Columns(pieces)
+        form_of, area = codes[windows.piece[which]], windows.area[which]
+        for form in np.unique(form_of).tolist():
+            mine = form_of == form
+            group = which[mine]
+            part = np.cumsum(area[mine]) // CHUNK_RAYS
+            for chunk in np.split(group, np.flatnonzero(np.diff(part)) + 1):
+                self._cast_chunk(pieces, table, Form(form), windows, chunk, depth, image)
+
+    def _cast_chunk(
+        self,
+        pieces: Pieces,
+        table: _Columns,
+        form: Form,
+        windows: Windows,
+        chunk: Int,
+        depth: Float32,
+        image: RangeImage,
+    ) -> None:
         nearest, met = image.distance.reshape(-1), image.piece.reshape(-1)
-        open_ = np.flatnonzero(windows.near[window] < nearest[ray])
-        row, column, ray, k = row[open_], column[open_], ray[open_], windows.piece[window[open_]]
-        code = codes[k]
-        hits = []
-        for form in np.unique(codes[windows.piece[which]]).tolist():
-            some = np.flatnonzero(code == form)
-            r, c, q = row[some], column[some], k[some]
-            R, centre = pieces.rotation[q], pieces.centre[q]
-            cos, sin, tangent, origin = self.cos[c], self.sin[c], self.tangent[r, 0], self.origin[r, 0]
-            direction = [R[:, 0, i] * cos + R[:, 1, i] * sin + R[:, 2, i] * tangent for i in range(3)]
-            start = [
-                R[:, 2, i] * (origin - centre[:, 2]) - R[:, 0, i] * centre[:, 0] - R[:, 1, i] * centre[:, 1]
-                for i in range(3)
-            ]
-            kind = Form(form)
-            cuts = pieces.cuts[q].transpose(1, 2, 0) if kind.cuts else ()
-            enter, leave = kind.cross(direction, start, pieces.half[q].T, pieces.quadric[q].T, cuts)
-            if kind.foliage:
-                enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray[some]] / pieces.density[q]
-            hit = np.flatnonzero((enter < leave) & (enter > NEAREST_M))
-            np.minimum.at(nearest, ray[some[hit]], enter[hit])
-            hits.append((ray[some[hit]], enter[hit], q[hit]))
-        for at, enter, q in hits:
-            first = enter == nearest[at]
-            met[at[first]] = q[first]
+        ray, row, column, k = self._pairs(windows, chunk, nearest)
+        cos, sin, tangent, origin = self.cos[column], self.sin[column], self.tangent[row, 0], self.origin[row, 0]
+        R = table.rotation
+        up = [R[2][i][k] for i in range(3)]
+        direction = [R[0][i][k] * cos + R[1][i][k] * sin + up[i] * tangent for i in range(3)]
+        start = [up[i] * origin + table.shift[i][k] for i in range(3)]
+        cuts = pieces.cuts[k].transpose(1, 2, 0) if form.cuts else ()
+        enter, leave = form.cross(direction, start, table.half[:, k], table.quadric[:, k], cuts)
+        if form.foliage:
+            enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / pieces.density[k]
+        hit = np.flatnonzero((enter < leave) & (enter > NEAREST_M) & (enter < nearest[ray]))
+        at, enter = ray[hit], enter[hit]
+        np.minimum.at(nearest, at, enter)
+        first = np.flatnonzero(enter == nearest[at])
+        met[at[first]] = k[hit[first]]
+
+    @staticmethod
+    def _pairs(windows: Windows, chunk: Int, nearest: Float32) -> tuple[Int, Int, Int, Int]:
+        """Ray, row, column and piece of everything in some windows that is not behind what is known already."""
+        area, n_columns = windows.area[chunk], np.diff(windows.columns[chunk], axis=1)[:, 0]
+        which = np.repeat(np.arange(len(chunk)), area)
+        step = np.arange(len(which)) - (np.cumsum(area) - area)[which]
+        down = step // n_columns[which]
+        row = windows.rows[chunk, 0][which] + down
+        column = windows.columns[chunk, 0][which] + step - down * n_columns[which]
+        ray = row * windows.n_columns + column
+        open_ = np.flatnonzero(windows.near[chunk][which] < nearest[ray])
+        return ray[open_], row[open_], column[open_], windows.piece[chunk][which[open_]]
 
     def windows(self, pieces: Pieces) -> Windows:
         """The window of each piece that lies within the sensor's reach and field of view."""
@@ -250,7 +278,7 @@ class RayCaster:
             parts.append(np.stack([which, r0[which], r1[which], c0[which], c1[which]], axis=1))
         part = np.concatenate(parts)
         part = part[np.argsort(near[part[:, 0]], kind="stable")]
-        return Windows(part[:, 0], part[:, 1:3], part[:, 3:5], near[part[:, 0]])
+        return Windows(part[:, 0], part[:, 1:3], part[:, 3:5], near[part[:, 0]], self.sensor.shape[1])
 
     def _row_range(self, bottom: Float32, top: Float32, near: Float32, far: Float32) -> tuple[Int, Int]:
         """Rows whose beams can pass between two heights at those distances."""

@@ -74,26 +74,24 @@ class Simulator:
         pieces = pieces.as_met(self.sensor.spot_m, self.sensor.divergence_rad)
         ground, surface = self.world.terrain.cast(self.caster, T_world_sensor)
         image = self.caster.cast(pieces, ground, rng.standard_exponential(self.sensor.shape, np.float32))
-        hit = image.piece != NOTHING
-        material = surface
-        material[hit] = pieces.material[image.piece[hit]]
+        of_piece = np.append(pieces.material, 0).astype(np.uint8)
+        material = np.where(image.piece != NOTHING, of_piece[image.piece], surface)
         distance, intensity, heard = self.receiver.receive(image.distance, material, image.piece, rng)
-        row, column = np.nonzero(heard)
-        s = distance[row, column]
-        points = np.empty((len(s), 4), np.float32)
+        ray = np.flatnonzero(heard)
+        row, column = np.divmod(ray, self.sensor.shape[1])
+        s = distance.ravel()[ray]
         jitter = rng.standard_normal(len(s), np.float32) * np.float32(self.sensor.azimuth_sigma_rad)
         cos, sin = self.caster.cos[column], self.caster.sin[column]
+        points = np.empty((len(s), 4), np.float32)
         points[:, 0] = s * (cos - jitter * sin)
         points[:, 1] = s * (sin + jitter * cos)
         points[:, 2] = s * self.caster.tangent[row, 0] + self.caster.origin[row, 0]
-        points[:, 3] = intensity[row, column]
-        piece = image.piece[row, column]
-        instance = np.full(len(s), NONE, np.int64)
-        instance[piece != NOTHING] = pieces.body[piece[piece != NOTHING]]
+        points[:, 3] = intensity.ravel()[ray]
+        instance = np.append(pieces.body, NONE)[image.piece.ravel()[ray]]
         if self.distort:
             self._distort(points, column, instance, time_s)
         frame = Frame(index, time_s, points, T_world_sensor)
-        return frame, self._truth(time_s, T_world_sensor, instance, material[row, column])
+        return frame, self._truth(time_s, T_world_sensor, instance, material.ravel()[ray])
 
     def _distort(self, points: Float32, column: Int, instance: Int, time_s: float) -> None:
         """Move each point to where the head saw it from when it turned that way, SLICES to a turn."""

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.sources.synthetic.raycast import RayCaster
 from modt.types import Float32, Float64, Int
 
-STEPS = 4
+UInt8 = NDArray[np.uint8]
+
+STEPS = 3
 """Fixed-point steps from a ray to the ground it meets."""
 
 
@@ -27,15 +30,15 @@ class Terrain:
     corner: Float64
     cell_m: float
     height: Float32
-    surface: Int
+    surface: UInt8
 
     def cells(self, x: Float32, y: Float32) -> Int:
         """Flat index of the cell under each point."""
         scale = np.float32(1 / self.cell_m)
         i = ((x - np.float32(self.corner[0])) * scale).astype(np.int32)
         j = ((y - np.float32(self.corner[1])) * scale).astype(np.int32)
-        np.clip(i, 0, self.height.shape[0] - 1, out=i)
-        np.clip(j, 0, self.height.shape[1] - 1, out=j)
+        np.minimum(np.maximum(i, 0, out=i), self.height.shape[0] - 1, out=i)
+        np.minimum(np.maximum(j, 0, out=j), self.height.shape[1] - 1, out=j)
         flat: Int = i * self.height.shape[1] + j
         return flat
 
@@ -49,14 +52,14 @@ class Terrain:
         cell = self.cells(np.array([x], np.float32), np.array([y], np.float32))
         return float(self.height.ravel()[cell[0]])
 
-    def cast(self, caster: RayCaster, T_world_sensor: Float64) -> tuple[Float32, Int]:
+    def cast(self, caster: RayCaster, T_world_sensor: Float64) -> tuple[Float32, UInt8]:
         """(B, A) horizontal distance to the ground [m], infinite where a ray misses it, and the surface met.
 
         Raised ground beside the road is reached by stepping each ray to the height last found beneath its end.
         """
         sensor = caster.sensor
         distance = np.full(sensor.shape, np.inf, np.float32)
-        surface = np.zeros(sensor.shape, np.int64)
+        surface = np.zeros(sensor.shape, np.uint8)
         R, t = T_world_sensor[:3, :3].astype(np.float32), T_world_sensor[:3, 3]
         low = np.flatnonzero(caster.tangent[:, 0] < 0.05)
         if not len(low):

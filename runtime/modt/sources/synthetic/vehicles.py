@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.sources.synthetic.materials import Material
-from modt.sources.synthetic.pieces import Pieces, box, cylinder, limb, wedge
+from modt.sources.synthetic.pieces import Pieces, box, cylinder, limb, rounded, wedge
 from modt.types import Float64
 
 Size = tuple[float, float, float]
@@ -15,7 +15,7 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
     """A passenger car of (length, width, height): hatchback, saloon or estate by chance."""
     length, width, height = size
     clear, belt = rng.uniform(0.17, 0.24), height * rng.uniform(0.58, 0.64)
-    paint = Material.CAR_DARK if rng.random() < 0.35 else Material.CAR_PAINT
+    paint = (Material.CAR_PAINT, Material.CAR_DARK, Material.CAR_BLACK)[rng.choice(3, p=[0.5, 0.28, 0.22])]
     nose = belt - rng.uniform(0.12, 0.25)
     bonnet = rng.uniform(0.24, 0.3) * length
     boot = rng.choice([0.04, 0.12, 0.2]) * length
@@ -31,12 +31,13 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
             (-1.0, 0.0, -0.35, length / 2 + 0.35 * body_height * 0.2),
         ],
     )
+    hull = rounded(hull, (length / 2, width * rng.uniform(0.8, 1.1), body_height * rng.uniform(1.1, 1.6)))
     front, rear = length / 2 - bonnet + 0.1, -length / 2 + boot
     cabin_height = height - belt + 0.02
     half = cabin_height / 2
     rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.25, 0.8), rng.uniform(0.2, 0.32)
     long = front - rear
-    cabin = wedge(
+    glass = wedge(
         ((front + rear) / 2, 0.0, belt + half - 0.02),
         (long, 0.94 * width, cabin_height),
         Material.GLASS,
@@ -47,18 +48,22 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
             (0.0, -1.0, tuck, 0.47 * width - tuck * half),
         ],
     )
-    lid_length = max(long - rake - tail, 0.5) * 0.98
+    glass = rounded(glass, (long * 0.52, width * rng.uniform(0.75, 1.0), np.inf))
+    glass.density[:] = rng.uniform(0.3, 1.2)
+    lid_length = max(long - rake - tail, 0.5)
     lid = box(
-        ((front - rake + rear + tail) / 2, 0.0, height - 0.04),
-        (lid_length, 0.94 * width - 2 * tuck * cabin_height + 0.02, 0.09),
+        ((front - rake + rear + tail) / 2, 0.0, height - 0.05),
+        (lid_length + 0.15, 0.94 * width - 2 * tuck * cabin_height + 0.04, 0.1),
         paint,
     )
+    lid = rounded(lid, (lid_length * 0.62 + 0.1, 0.62 * width, 0.11))
     return Pieces.join(
         [
             hull,
-            cabin,
+            glass,
             lid,
-            _pillars(rng, front, rear, belt, height, width, tuck, paint),
+            _seats(front - rake, rear + tail, belt, width),
+            _pillars(rng, (front, rear, rake, tail), (belt, height), width, tuck, paint),
             _wheels(rng, length, width, rng.uniform(0.3, 0.34)),
             _mirrors(front, belt, width, paint),
         ]
@@ -83,6 +88,7 @@ def van(rng: np.random.Generator, size: Size) -> Pieces:
             (0.0, -1.0, 0.08, 0.485 * width - 0.08 * tall * 0.1),
         ],
     )
+    hull = rounded(hull, (length * 0.505, width * rng.uniform(0.85, 1.2), np.inf))
     return Pieces.join(
         [hull, _wheels(rng, length, width, 0.34), _mirrors(length * 0.28, height * 0.55, width, paint)]
     )
@@ -168,20 +174,29 @@ def _mirrors(x: float, z: float, width: float, paint: int) -> Pieces:
     return Pieces.join(box((x - 0.35, s * (width / 2 + 0.05), z + 0.05), (0.12, 0.16, 0.14), paint) for s in (-1, 1))
 
 
+def _seats(front: float, rear: float, belt: float, width: float) -> Pieces:
+    """What can be seen through the windows: backs of seats and a dashboard."""
+    rows = [front - 0.75, max(front - 1.7, rear + 0.1)]
+    backs = [box((x, s * 0.22 * width, belt), (0.14, 0.45, 0.7), Material.CLOTH) for x in rows for s in (-1, 1)]
+    return Pieces.join([*backs, box((front + 0.15, 0.0, belt - 0.02), (0.4, 0.8 * width, 0.16), Material.RUBBER)])
+
+
 def _pillars(
     rng: np.random.Generator,
-    front: float,
-    rear: float,
-    belt: float,
-    height: float,
+    ends: tuple[float, float, float, float],
+    rise: tuple[float, float],
     width: float,
     tuck: float,
     paint: int,
 ) -> Pieces:
-    """The painted posts of the cabin's sides."""
+    """The painted posts of the cabin: beside the windscreen, between the doors, at the rear."""
+    front, rear, rake, tail = ends
+    belt, height = rise
     bottom, top = 0.46 * width, 0.46 * width - tuck * (height - belt)
-    x = (front + rear) / 2 + rng.uniform(-0.2, 0.2)
-    places = [(x, x), (rear + 0.35, rear + 0.55)]
+    middle = (front - rake + rear + tail) / 2 + rng.uniform(-0.2, 0.2)
+    places = [(front - 0.1, front - rake), (middle, middle), (rear + 0.15, rear + tail)]
     return Pieces.join(
-        limb((a, s * bottom, belt), (b, s * top, height - 0.05), 0.06, paint) for s in (-1, 1) for a, b in places
+        limb((a, s * bottom, belt), (b, s * top, height - 0.05), r, paint)
+        for s in (-1, 1)
+        for (a, b), r in zip(places, (0.05, 0.06, 0.12), strict=True)
     )

@@ -147,4 +147,4 @@ def _enclose(builder: Builder, half: tuple[float, float], height: float) -> None
 def _floor(rng: np.random.Generator, half: tuple[float, float], material: int, rough_m: float) -> Terrain:
     shape = (int(2 * (half[0] + 5) / CELL_M), int(2 * (half[1] + 5) / CELL_M))
     height = rng.standard_normal(shape, np.float32) * np.float32(rough_m)
-    return Terrain(np.array([-half[0] - 5, -half[1] - 5]), CELL_M, height, np.full(shape, material, np.int64))
+    return Terrain(np.array([-half[0] - 5, -half[1] - 5]), CELL_M, height, np.full(shape, material, np.uint8))
