@@ -48,8 +48,11 @@ def _garden(builder: Builder, road: Road, side: int, x: float, length: float, se
     for _ in range(int(rng.integers(2, 6))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(0.8, deep)))
         builder.scenery(scenery.shrub(rng, rng.uniform(0.5, 1.6)), *spot)
+    for _ in range(int(rng.choice(3, p=[0.5, 0.35, 0.15]))):
+        off = edge + rng.uniform(0.8, deep)
+        builder.scenery(scenery.thicket(rng), *road.place(x + rng.uniform(0, length), side * off, rng.normal(0, 0.5)))
     middle = road.place(x + length / 2, side * (edge + deep / 2))
-    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.1 * length * deep))), *middle)
+    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.06 * length * deep))), *middle)
     for _ in range(int(rng.choice(3, p=[0.5, 0.35, 0.15]))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(1.0, deep)))
         builder.scenery(scenery.tree(rng), *spot)
