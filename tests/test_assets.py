@@ -41,10 +41,10 @@ def expected(tmp_path_factory) -> str:
     return files
 
 
-@pytest.fixture(scope="module")
-def environment(tmp_path_factory) -> Path:
+@pytest.fixture
+def environment(tmp_path) -> Path:
     """A fresh environment that sees this one's libraries, but not this one's modt."""
-    folder = tmp_path_factory.mktemp("environment")
+    folder = tmp_path / "environment"
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder)], check=True)
     site = next((folder / "lib").glob("python3*")) / "site-packages"
     import numpy

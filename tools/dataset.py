@@ -17,6 +17,8 @@ SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
 """Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
 there for training alone."""
 
+APART = ("offsets", "provenance")
+
 
 @dataclass(frozen=True)
 class Dataset:
@@ -25,8 +27,8 @@ class Dataset:
     Attributes:
         crops: all of them, and label, partial, variant, drive: (R,) of each.
         truth_label, truth_drive: of each labelled object, seen by the segmentation or not.
-        provenance: how it was made.
-        sha256: of the file.
+        provenance: how each file was made.
+        sha256: of each file.
     """
 
     crops: Crops
@@ -36,8 +38,8 @@ class Dataset:
     drive: Int
     truth_label: Int
     truth_drive: Int
-    provenance: dict[str, Any]
-    sha256: str
+    provenance: list[dict[str, Any]]
+    sha256: list[str]
 
     def __len__(self) -> int:
         return len(self.label)
@@ -52,19 +54,24 @@ class Dataset:
         )
 
 
-def load(path: Path) -> Dataset:
-    """Read a data set."""
-    with np.load(path) as file:
-        _, drive = np.unique(np.concatenate([file["drive"], file["truth_drive"]]), return_inverse=True)
-        n = len(file["label"])
-        return Dataset(
-            crops=Crops(file["xyz"], file["offsets"]),
-            label=file["label"].astype(np.int64),
-            partial=file["partial"],
-            variant=file["variant"].astype(np.int64),
-            drive=drive[:n],
-            truth_label=file["truth_label"].astype(np.int64),
-            truth_drive=drive[n:],
-            provenance=json.loads(str(file["provenance"])),
-            sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        )
+def load(*paths: Path) -> Dataset:
+    """Read data sets and put them together."""
+    parts = []
+    for path in paths:
+        with np.load(path) as file:
+            parts.append({key: file[key] for key in file.files})
+    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key not in APART}
+    count = np.concatenate([np.diff(part["offsets"]) for part in parts])
+    _, drive = np.unique(np.concatenate([joined["drive"], joined["truth_drive"]]), return_inverse=True)
+    n = len(joined["label"])
+    return Dataset(
+        crops=Crops(joined["xyz"], np.append(0, np.cumsum(count))),
+        label=joined["label"].astype(np.int64),
+        partial=joined["partial"],
+        variant=joined["variant"].astype(np.int64),
+        drive=drive[:n],
+        truth_label=joined["truth_label"].astype(np.int64),
+        truth_drive=drive[n:],
+        provenance=[json.loads(str(part["provenance"])) for part in parts],
+        sha256=[hashlib.sha256(path.read_bytes()).hexdigest() for path in paths],
+    )

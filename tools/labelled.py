@@ -90,7 +90,7 @@ def boxed(
     table = np.array(boxes).reshape(-1, 7)
     objects = tuple(np.flatnonzero(inside(points, box)) for box in table)
     classes = tuple(CLASS_OF.get(kind, ObjectClass.BACKGROUND) for kind in kinds)
-    return Scan(name, drive, points, objects, classes, table, fov, unlabelled)
+    return Scan(name, drive, points, objects, classes, table, fov, unlabelled | ~fov.contains(points))
 
 
 def object_scans(folder: Path) -> Iterator[Scan]:

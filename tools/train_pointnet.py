@@ -1,11 +1,12 @@
 """Train the PointNet on a data set of crops; seeded and resumable (extra [train]).
 
-    train_pointnet.py CROPS.npz OUT_DIR [--epochs N] [--folds K] [--seed S]
+    train_pointnet.py OUT_DIR CROPS.npz... [--epochs N] [--folds K] [--seed S]
 
 Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json: loss curve, and with --folds the
 out-of-fold average precision, confusion and calibration (drives are never split between folds). The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
-An epoch is as many draws as there are clear crops; the paper's settings are 40 epochs (weak) and 100 (converged).
+An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
+40 epochs (weak) and 100 (converged).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from numpy.random import Generator
 
 from augment import Beams, augment, limit
 from calibration import Calibration, expected_error, fit
-from dataset import SHIPPED, Dataset, load
+from dataset import Dataset, load
 from modt.classification.crops import Crops, canonical
 from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
 from network import PointNet
@@ -31,6 +32,8 @@ from scores import average_precision, confusion
 SENSOR_HEIGHT_M = 1.73
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
+MIX = np.array([0.3, 0.3, 0.25, 0.15])
+"""Of each variant (shipped, clustered, pasted, synthetic) among the crops of a class, where there are such."""
 BATCH, POINTS, MOST_POINTS = 128, 128, 400
 """Crops of a step, points of each, and points that are augmented at most."""
 
@@ -41,10 +44,21 @@ def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
     return torch.from_numpy(seen.xyz), torch.from_numpy(seen.count)
 
 
-def draw(data: Dataset, pools: list[Int], rng: Generator) -> Int:
-    """Rows of one batch: classes by their share, crops of a class alike."""
+def odds(data: Dataset, rows: Int) -> list[tuple[Int, Float64]]:
+    """Rows of each class and how likely each is drawn: crops of one class and variant alike."""
+    pools = []
+    for c in range(N_CLASSES):
+        own = rows[data.label[rows] == c]
+        variant = data.variant[own]
+        weight = (MIX / np.bincount(variant, minlength=len(MIX)).clip(1))[variant]
+        pools.append((own, weight / weight.sum()))
+    return pools
+
+
+def draw(pools: list[tuple[Int, Float64]], rng: Generator) -> Int:
+    """Rows of one batch, classes by their share."""
     number = rng.multinomial(BATCH, SHARE / SHARE.sum())
-    return np.concatenate([rng.choice(pool, k) for pool, k in zip(pools, number, strict=True)])
+    return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in zip(pools, number, strict=True)])
 
 
 def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -> tuple[PointNet, list[float]]:
@@ -55,7 +69,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
     criterion = torch.nn.CrossEntropyLoss(label_smoothing=0.02)
-    pools = [rows[data.label[rows] == c] for c in range(N_CLASSES)]
+    pools = odds(data, rows)
     losses: list[float] = []
     first = 0
     if state is not None and state.exists():
@@ -68,7 +82,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
         losses, first = held["losses"], held["step"]
     running = 0.0
     for step in range(first, steps):
-        chosen = draw(data, pools, rng)
+        chosen = draw(pools, rng)
         crops = limit(augment(limit(data.take(chosen), MOST_POINTS, rng), Beams(), rng), POINTS, rng)
         loss = criterion(net(*tensors(crops)), torch.from_numpy(data.label[chosen]))
         optimiser.zero_grad()
@@ -111,7 +125,7 @@ def folds(data: Dataset, k: int) -> Int:
 def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
     """Out-of-fold calibration and scores; missed objects count as false negatives."""
     fold = folds(data, k)
-    judged = np.flatnonzero(data.variant == SHIPPED)
+    judged = np.flatnonzero(data.variant == data.variant.min())  # real scans where there are any
     out = np.zeros((len(judged), N_CLASSES))
     for i in range(k):
         rows = np.flatnonzero(~data.partial & (fold[data.drive] != i))
@@ -121,7 +135,8 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
     label, clear = data.label[judged], ~data.partial[judged]
     calibration = fit(out[clear], label[clear])
     probability = calibration.apply(out)
-    found = np.bincount(data.truth_label, minlength=N_CLASSES)
+    there = np.isin(data.truth_drive, data.drive[judged])
+    found = np.bincount(data.truth_label[there], minlength=N_CLASSES)
     return calibration, {
         "average_precision": average_precision(probability, label, found),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], found[1:], strict=True)},
@@ -133,19 +148,19 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("crops", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--epochs", type=int, default=40)
-    parser.add_argument("--fold-epochs", type=int, help="of each fold's network; as many as --epochs without it")
+    parser.add_argument("crops", type=Path, nargs="+")
+    parser.add_argument("--epochs", type=float, default=40)
+    parser.add_argument("--fold-epochs", type=float, help="of each fold's network; as many as --epochs without it")
     parser.add_argument("--folds", type=int, default=0, help="cross-validate first; 0: leave that out")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(1)
     torch.use_deterministic_algorithms(True)
-    data = load(args.crops)
+    data = load(*args.crops)
     args.out.mkdir(parents=True, exist_ok=True)
     clear = np.flatnonzero(~data.partial)
-    per_epoch = len(clear) / BATCH
+    per_epoch = np.count_nonzero(data.variant[clear] == data.variant[clear].min()) / BATCH
     started = time.process_time()
     report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "crops_sha256": data.sha256}
     report |= {"provenance": data.provenance, "torch": torch.__version__}

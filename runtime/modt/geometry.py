@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from modt.types import Bool, Float32, Float64
+from modt.types import Bool, Float64
+
+Real = TypeVar("Real", np.float32, np.float64)
 
 
 def wrap(angle: Float64) -> Float64:
@@ -107,7 +111,7 @@ class FieldOfView:
         """Whether nothing is cut off."""
         return len(self.planes) == 0
 
-    def depth(self, points: Float32 | Float64) -> Float32 | Float64:
+    def depth(self, points: NDArray[Real]) -> NDArray[Real]:
         """(n,) distance of (n, 3 or more) points to the nearest bounding plane [m], negative outside.
 
         It is infinite everywhere for the full circle.
@@ -119,7 +123,7 @@ class FieldOfView:
             np.minimum(nearest, points @ normal + points.dtype.type(offset), out=nearest)
         return nearest
 
-    def contains(self, points: Float32 | Float64) -> Bool:
+    def contains(self, points: NDArray[Real]) -> Bool:
         """(n,) whether each of (n, 3 or more) points lies inside."""
         inside: Bool = self.depth(points) > 0
         return inside

@@ -21,7 +21,9 @@ def canonical_one(xyz: np.ndarray, height_m: float) -> np.ndarray:
     turn = np.array([[np.cos(bearing), np.sin(bearing)], [-np.sin(bearing), np.cos(bearing)]])
     local = xyz[:, :2] @ turn.T
     local -= (local.min(axis=0) + local.max(axis=0)) / 2
-    return np.c_[local, xyz[:, 2] + height_m]
+    slack = 0.1 + 0.02 * np.hypot(x, y)
+    ground = min(max(xyz[:, 2].min() - 0.3, -height_m - slack), -height_m + slack)
+    return np.c_[local, xyz[:, 2] - ground]
 
 
 @given(counts=COUNTS, seed=st.integers(0, 1000))
@@ -46,6 +48,17 @@ def test_a_crop_looks_alike_from_anywhere_in_the_sweep(angle: float, seed: int) 
         canonical(gather(points, proposals, rows, 100), 1.0).xyz,
         atol=1e-3,
     )
+
+
+@pytest.mark.parametrize(("distance_m", "rise_m", "lowest_m"), [(40.0, 0.8, 0.3), (40.0, -0.8, 0.3), (5.0, 1.0, 1.1)])
+def test_a_slope_lifts_what_is_far_and_what_hangs_near_by_hangs(
+    distance_m: float, rise_m: float, lowest_m: float
+) -> None:
+    xyz = np.random.default_rng(0).uniform(0.0, 1.5, (40, 3)).astype(np.float32)
+    xyz[0, 2] = 0.0
+    xyz += np.array([distance_m - 0.75, -0.75, rise_m - 1.73 + 0.3], np.float32)
+    seen = canonical(Crops(xyz, np.array([0, 40])), 1.73)
+    assert seen.xyz[:, 2].min() == pytest.approx(lowest_m, abs=0.02)
 
 
 def test_gather_keeps_the_order_asked_for() -> None:

@@ -8,6 +8,11 @@ import numpy as np
 
 from modt.types import Float32, Int, Proposals
 
+FOOT_M = 0.3
+"""What stands on the ground shows itself from this height on; what is lower went with the ground."""
+LEVEL_M, SLOPE = 0.1, 0.02
+"""The ground beneath a crop is taken to be within this of the plane the sensor stands on, near by and per range."""
+
 
 @dataclass(frozen=True, slots=True)
 class Crops:
@@ -61,22 +66,27 @@ def canonical(crops: Crops, sensor_height_m: float) -> Crops:
     """Crops as the network sees them: along and across the line of sight from their middle, and above the ground.
 
     The sensor sees the near side of everything, so a crop turned to the line of sight looks alike from wherever in
-    the sweep it comes. The middle is that of its extent, which unlike the mean does not move with the density.
+    the sweep it comes. The middle is that of its extent, which unlike the mean does not move with the density. The
+    ground is where the crop's lowest point says, as far as a gentle slope could have brought it there: near by what
+    hangs is seen to hang, far away a rise of the road lifts no car.
 
     Args:
         crops: points in the sensor frame.
-        sensor_height_m: of the sensor above the ground.
+        sensor_height_m: of the sensor above the ground beneath it.
     """
     if not len(crops):
         return crops
     x, y, z = crops.xyz.astype(np.float32).T
     starts, count = crops.offsets[:-1], crops.count
-    bearing = np.arctan2(np.add.reduceat(y, starts), np.add.reduceat(x, starts))
+    ahead, left = np.add.reduceat(x, starts) / count, np.add.reduceat(y, starts) / count
+    bearing, slack = np.arctan2(left, ahead), LEVEL_M + SLOPE * np.hypot(ahead, left)
+    rise = np.clip(np.minimum.reduceat(z, starts) + sensor_height_m - FOOT_M, -slack, slack)
+    ground = np.repeat(rise - sensor_height_m, count)
     c, s = np.repeat(np.cos(bearing), count), np.repeat(np.sin(bearing), count)
     along, across = c * x + s * y, c * y - s * x
     return Crops(
         np.stack(
-            [along - _middle(along, starts, count), across - _middle(across, starts, count), z + sensor_height_m],
+            [along - _middle(along, starts, count), across - _middle(across, starts, count), z - ground],
             axis=1,
             dtype=np.float32,
         ),

@@ -38,15 +38,24 @@ class CountedClassifier:
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) P(Y|X) of the proposals named, in their order."""
-        self._ledger.count("classification", points=self._points(proposals.count[which]))
+        self._ledger.count(
+            "classification", points=padded_points(proposals.count[which], self._max_points, self._batch)
+        )
         return self._classifier.classify(points, proposals, which)
 
     def facts(self) -> dict[str, str]:
         """The model's file and hash."""
         return self._classifier.facts()
 
-    def _points(self, count: Int) -> int:
-        """Points of which the network computes features, padding included."""
-        size = np.sort(np.minimum(count, self._max_points))
-        ends = np.minimum(np.arange(self._batch, len(size) + self._batch, self._batch), len(size))
-        return int(np.diff(ends, prepend=0) @ size[ends - 1])
+
+def padded_points(count: Int, max_points: int, batch: int) -> int:
+    """Points of which the network computes features, padding included, for proposals of (R,) count points.
+
+    Args:
+        count: points of each proposal.
+        max_points: of a proposal that the network is given.
+        batch: proposals of one network call.
+    """
+    size = np.sort(np.minimum(count, max_points))
+    ends = np.minimum(np.arange(batch, len(size) + batch, batch), len(size))
+    return int(np.diff(ends, prepend=0) @ size[ends - 1])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.energy.savings import Prediction, UnitCosts, predict
+from modt.energy.savings import Beside, Prediction, UnitCosts, predict
 from modt.evaluation.comparison import COUNTS, total
 from modt.pipeline import CLASSIFICATION, FUSION, SCHEDULING, SEGMENTATION, STAGES, TRACKING
 from modt.types import Float64, Int
@@ -84,14 +84,23 @@ def unit_costs(varied: Evidence) -> UnitCosts:
 
 
 def saving(baseline: Evidence, run: Evidence, varied: Evidence, random: np.random.Generator) -> Saving:
-    """Predicts with the costs of the varied run, which is neither of the two, and compares."""
+    """Predicts with the costs of the varied run, which is neither of the two, and compares.
+
+    Args:
+        baseline: tracking-by-detection, F frames.
+        run: the proposed pipeline on the same F frames.
+        varied: the same frames once or several times over, under varied load.
+        random: draws the frames of the intervals.
+    """
+    n = len(baseline.counts)
+    passes = len(varied.counts) // n
 
     def both(frames: Int) -> tuple[Prediction, float]:
-        a, b, costs = baseline.take(frames), run.take(frames), unit_costs(varied.take(frames))
-        prediction = predict(total(a.counts), total(b.counts), costs, _choosing(a), _choosing(b))
+        a, b = baseline.take(frames), run.take(frames)
+        costs = unit_costs(varied.take((frames + n * np.arange(passes)[:, None]).ravel()))
+        prediction = predict(total(a.counts), total(b.counts), costs, _beside(a), _beside(b))
         return prediction, float(a.cost.sum() / b.cost.sum())
 
-    n = len(baseline.counts)
     prediction, measured = both(np.arange(n))
     drawn = [both(_blocks(n, random)) for _ in range(RESAMPLES)]
     predicted_all = np.array([p.model.gamma for p, _ in drawn])
@@ -115,8 +124,9 @@ def interval(n: int, of: Callable[[Int], float], random: np.random.Generator) ->
     return _interval(np.array([of(_blocks(n, random)) for _ in range(RESAMPLES)]))
 
 
-def _choosing(run: Evidence) -> float:
-    return float(run.cost[:, [SCHEDULE, FUSE]].sum(axis=1).mean())
+def _beside(run: Evidence) -> Beside:
+    mean = run.cost.mean(axis=0)
+    return Beside(track=float(mean[TRACK]), choose=float(mean[[SCHEDULE, FUSE]].sum()))
 
 
 def _blocks(n: int, random: np.random.Generator) -> Int:

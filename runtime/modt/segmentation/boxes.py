@@ -8,24 +8,29 @@ from modt.segmentation.groups import Groups
 from modt.types import Float32, Float64
 
 HEADINGS = np.deg2rad(np.arange(0, 90, 5.0))
-PAD_M = np.float32(0.05)
-"""Added to each side, so that a thin line has an area to compare."""
+FAN = np.append(HEADINGS, HEADINGS + np.pi / 2)
+NEAREST_M = np.float32(0.1)
+"""Points closer to a side than this lie on it: the noise of the sensor, and of a car's outline."""
 
 
 def headings(x: Float32, y: Float32, groups: Groups) -> Float64:
-    """(G,) heading of the least rectangle about each group, in [0, 90) degrees [rad].
+    """(G,) heading of the rectangle whose sides each group's points are closest to, in [0, 90) degrees [rad].
+
+    The least area says little about the L that a car shows of itself; the sum of 1 / distance to the nearest side
+    (closeness) finds its legs.
 
     Args:
         x: (K,) points in the order of the groups [m].
         y: (K,) the same across [m].
         groups: what they belong to.
     """
-    c, s = np.cos(HEADINGS).astype(np.float32), np.sin(HEADINGS).astype(np.float32)
-    along = x[:, None] * c + y[:, None] * s
-    across = y[:, None] * c - x[:, None] * s
-    length = groups.most(along) - groups.least(along)
-    width = groups.most(across) - groups.least(across)
-    best: Float64 = HEADINGS[np.argmin((length + PAD_M) * (width + PAD_M), axis=1)]
+    across = np.stack([np.cos(FAN), np.sin(FAN)], axis=1).astype(np.float32) @ np.stack([x, y])
+    own = groups.spread(np.arange(len(groups)))
+    inward = across - groups.least(across)[:, own]
+    np.minimum(inward, groups.most(across)[:, own] - across, out=inward)
+    nearest = np.minimum(inward[: len(HEADINGS)], inward[len(HEADINGS) :])
+    closeness = np.add.reduceat(1 / np.maximum(nearest, NEAREST_M), groups.offsets[:-1], axis=1)
+    best: Float64 = HEADINGS[np.argmax(closeness, axis=0)]
     return best
 
 

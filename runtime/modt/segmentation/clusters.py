@@ -2,79 +2,162 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
+from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.columns import Columns
-from modt.types import NONE, Int
+from modt.segmentation.grids import Int32, RootGrid
+from modt.types import NONE, Bool, Float32, Int
 
-Int32 = NDArray[np.int32]
+GAP_M = 0.3
+"""Cells that touch in the bird's-eye view are joined if no more than this lies between them in height ..."""
+GAP_BEAMS = 2.0
+"""... and this many spacings between beams at their range."""
+STANDS_OUT_M = 0.9
+"""A piece of something vast is an object only if it rises this high above the ground ..."""
+STANDS_OUT_POINTS = 15
+"""... and has this many points."""
 
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """Occupied cells, in the order of their keys.
+    """Occupied cells of a grid.
 
     Attributes:
-        key: (C,) place in the grid.
-        number: (side * side,) number of the cell at each place, NONE where it is empty.
-        of_point: (K,) cell of each point.
-        sample: (C,) one point of each cell, the last.
+        row, column: (C,) place in the grid, in row-major order.
+        low, high: (C,) least and greatest height of its points above ground [m].
+        root: (C,) square root of its range [sqrt(m)].
     """
 
-    key: Int
-    number: Int32
-    of_point: Int32
-    sample: Int
+    row: Int32
+    column: Int32
+    low: Float32
+    high: Float32
+    root: Float32
 
     def __len__(self) -> int:
-        return len(self.key)
+        return len(self.row)
+
+    def take(self, rows: Int) -> Cells:
+        """The cells given."""
+        return Cells(self.row[rows], self.column[rows], self.low[rows], self.high[rows], self.root[rows])
 
 
-class RootGrid:
-    """A square grid over the plane drawn in by the square root of range.
+@dataclass(frozen=True, slots=True)
+class Clusters:
+    """Points gathered into cells, and cells into clusters.
 
-    A point at range r moves to sqrt(r) in its direction. A cell of that plane covers c sqrt(r) across the ray and
-    twice that along it: as the sensor's spacing grows with range, and more so along the ray, so do the cells.
-
-    Args:
-        cell_m: side of a cell across the ray at 10 m.
-        max_range_m: how far it reaches.
+    Attributes:
+        cell: (K,) cell of each point.
+        sample: (C,) one point of each cell, its last.
+        top: (C,) greatest height above ground of each cell's points [m].
+        of_cell: (C,) cluster of each cell, NONE where it could be no object.
+        n: how many there are, numbered from 0.
     """
 
-    def __init__(self, cell_m: float, max_range_m: float) -> None:
-        self.step = cell_m / np.sqrt(10.0)
-        self.centre = int(np.sqrt(max_range_m) / self.step) + 3
-        self.side = 2 * self.centre
+    cell: Int32
+    sample: Int
+    top: Float32
+    of_cell: Int
+    n: int
 
-    def cells(self, points: Columns) -> Cells:
-        """Occupied cells of (K,) points within the range."""
-        scale = np.float32(1 / self.step) / points.root
-        middle = np.float32(self.centre)
-        place = (points.x * scale + middle).astype(np.int32)
-        place *= self.side
-        place += (points.y * scale + middle).astype(np.int32)
-        occupied = np.zeros(self.side * self.side, np.bool_)
-        occupied[place] = True
-        key = np.flatnonzero(occupied)
-        number = np.full(self.side * self.side, NONE, np.int32)
-        number[key] = np.arange(len(key), dtype=np.int32)
-        of_point = number[place]
-        sample = np.empty(len(key), np.int64)
-        sample[of_point] = np.arange(len(points))
-        return Cells(key, number, of_point, sample)
+    def kept(self, keep: Bool) -> Clusters:
+        """The clusters that an (n,) mask keeps, numbered anew."""
+        if keep.all():
+            return self
+        number = np.append(np.where(keep, np.cumsum(keep) - 1, NONE), NONE)  # the last one is that of NONE
+        return replace(self, of_cell=number[self.of_cell], n=int(keep.sum()))
 
-    def join(self, cells: Cells) -> Int:
-        """(C,) cluster of each cell: those that touch at a side or a corner belong together."""
-        ahead = np.array([1, self.side - 1, self.side, self.side + 1])
-        neighbour = cells.number[cells.key[:, None] + ahead]
-        touching = neighbour >= 0
-        ends = np.append(0, np.cumsum(touching.sum(axis=1)))
-        links = neighbour[touching]
-        graph = csr_array((np.ones(len(links)), links, ends), shape=(len(cells), len(cells)))
-        cluster: Int = connected_components(graph, directed=False)[1].astype(np.int64)
-        return cluster
+
+def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
+    """(C,) component of each cell: those that touch at a side or a corner, and in height, belong together."""
+    place = cells.row * np.int32(grid.side) + cells.column
+    ahead = np.array([1, grid.side - 1, grid.side, grid.side + 1], np.int32)
+    beside = grid.look_up(place, ahead).ravel()
+    link = np.flatnonzero(beside >= 0)
+    one, other = link // len(ahead), beside[link]
+    gap = np.maximum(cells.low[one], cells.low[other]) - np.minimum(cells.high[one], cells.high[other])
+    bound = np.float32(GAP_M) + np.float32(GAP_BEAMS * beam_rad) * np.square(cells.root)
+    near = gap < bound[one]
+    ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(place))))
+    links = other[near]
+    graph = csr_array((np.ones(len(links)), links, ends), shape=(len(place), len(place)))
+    component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
+    return component
+
+
+class Clusterer:
+    """Gathers points into clusters that could be objects.
+
+    A first grid joins what is one thing even where it is thinly seen. What grows vast that way (a wall, a hedge, and
+    whoever stands against them) is taken apart again on a grid of half the spacing, of which it keeps what stands
+    out as an object of its own.
+
+    Args:
+        sensor: its range and the spacing of its beams.
+        config: clustering distance and proper sizes.
+    """
+
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
+        step = config.cell_m / np.sqrt(10.0)
+        self.config = config
+        self.beam_rad = float(np.deg2rad(sensor.elevation_step_deg))
+        self.coarse = RootGrid(step, sensor.max_range_m)
+        self.fine = RootGrid(step / 2, sensor.max_range_m)
+
+    def cluster(self, points: Columns, height: Float32) -> Clusters:
+        """Clusters of (K,) points, K > 0, of a height above ground [m]."""
+        place = self.fine.place(points)
+        sample, cell = self.fine.occupy(place)
+        row, column = np.divmod(place[sample], np.int32(self.fine.side))
+        cells = Cells(row, column, *_bounds(height, cell, len(sample)), points.root[sample])
+        count, x, y = np.bincount(cell), points.x[sample], points.y[sample]
+
+        cluster = self._joined_coarsely(cells)
+        extent = _extent(x, y, cluster)
+        parts = np.flatnonzero((extent >= self.config.max_extent_m)[cluster])
+        piece = join(self.fine, cells.take(parts), self.beam_rad)
+        cluster[parts] = piece + len(extent)
+        extents = np.append(extent, _extent(x[parts], y[parts], piece))
+        proper = self._proper(cluster, cells, count, extents, len(extent))
+        number = np.where(proper, np.cumsum(proper) - 1, NONE)
+        return Clusters(cell, sample, cells.high, number[cluster], int(proper.sum()))
+
+    def _joined_coarsely(self, fine: Cells) -> Int:
+        """(C,) cluster of each fine cell: that of the coarse cell which it is a quarter of."""
+        side = self.coarse.side
+        place = (fine.row // 2) * np.int32(side) + fine.column // 2
+        sample, coarse = self.coarse.occupy(place)
+        row, column = np.divmod(place[sample], np.int32(side))
+        low, high = _bounds(fine.low, coarse, len(sample))[0], _bounds(fine.high, coarse, len(sample))[1]
+        return join(self.coarse, Cells(row, column, low, high, fine.root[sample]), self.beam_rad)[coarse]
+
+    def _proper(self, cluster: Int, cells: Cells, count: Int, extent: Float32, n_coarse: int) -> Bool:
+        """(G,) clusters of an object's size; pieces of something vast, numbered from n_coarse, must stand out."""
+        n = len(extent)
+        points = np.bincount(cluster, count, n)
+        low, top = _bounds(cells.low, cluster, n)[0], _bounds(cells.high, cluster, n)[1]
+        proper = (points >= self.config.min_points) & (extent < self.config.max_extent_m)
+        proper &= top - low >= self.config.min_height_m
+        proper[n_coarse:] &= (top[n_coarse:] >= STANDS_OUT_M) & (points[n_coarse:] >= STANDS_OUT_POINTS)
+        return proper
+
+
+def _bounds(values: Float32, group: Int32 | Int, n: int) -> tuple[Float32, Float32]:
+    """(n,) least and greatest value of each group, infinite where it is empty."""
+    low, high = np.full(n, np.inf, np.float32), np.full(n, -np.inf, np.float32)
+    np.minimum.at(low, group, values)
+    np.maximum.at(high, group, values)
+    return low, high
+
+
+def _extent(x: Float32, y: Float32, group: Int) -> Float32:
+    """(G,) diagonal of the upright rectangle about each group, -inf where it is empty [m]."""
+    n = int(group.max(initial=NONE)) + 1
+    (x0, x1), (y0, y1) = _bounds(x, group, n), _bounds(y, group, n)
+    diagonal: Float32 = np.hypot(x1 - x0, y1 - y0)
+    return diagonal

@@ -36,3 +36,7 @@ class Columns:
     def take(self, rows: Int | Bool) -> Self:
         """The rows given, by index or mask."""
         return type(self)(self.x[rows], self.y[rows], self.z[rows], self.root[rows])
+
+    def xyz(self) -> Float32:
+        """(N, 3) positions, a row a point [m]."""
+        return np.stack([self.x, self.y, self.z], axis=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from modt.types import NONE, Float64, Int
 
 Real = NDArray[np.floating[Any]]
+T = TypeVar("T", bound=np.generic)
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,17 +43,26 @@ class Groups:
         """(G,) rows of each group."""
         return np.diff(self.offsets)
 
-    def spread(self, values: Real) -> Real:
-        """(K, ...) a value a group given to each of its rows."""
-        return np.repeat(values, self.count, axis=0)
+    def thinned(self, most: int) -> Self:
+        """Every so manieth row of each group, so that none has more than so many."""
+        every = -(-self.count // most)
+        rank = np.arange(len(self.rows)) - np.repeat(self.offsets[:-1], self.count)
+        kept = rank % np.repeat(every, self.count) == 0
+        return type(self)(self.rows[kept], np.append(0, np.cumsum(-(-self.count // every))))
 
-    def least(self, values: Real) -> Real:
-        """(G, ...) least of (K, ...) values in each group."""
-        return np.minimum.reduceat(values, self.offsets[:-1])
+    def spread(self, values: NDArray[T]) -> NDArray[T]:
+        """(K,) a value a group given to each of its rows."""
+        return np.repeat(values, self.count)
 
-    def most(self, values: Real) -> Real:
-        """(G, ...) greatest of (K, ...) values in each group."""
-        return np.maximum.reduceat(values, self.offsets[:-1])
+    def least(self, values: NDArray[T]) -> NDArray[T]:
+        """(..., G) least of (..., K) values in each group."""
+        least: NDArray[T] = np.minimum.reduceat(values, self.offsets[:-1], axis=-1)
+        return least
+
+    def most(self, values: NDArray[T]) -> NDArray[T]:
+        """(..., G) greatest of (..., K) values in each group."""
+        most: NDArray[T] = np.maximum.reduceat(values, self.offsets[:-1], axis=-1)
+        return most
 
     def mean(self, values: Real) -> Float64:
         """(G,) mean of (K,) values in each group."""

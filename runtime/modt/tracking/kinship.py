@@ -16,7 +16,7 @@ from modt.geometry import corners
 from modt.tracking.association import Matches
 from modt.tracking.followed import Followed
 from modt.tracking.sightings import AXES, Sightings, covered, touching
-from modt.types import NONE, Bool, Float64, Int
+from modt.types import NONE, Bool, Float64, Int, ObjectClass
 
 ROOM_M = np.array([[6.0, 2.7], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
 """Greatest length and width of one object of each class; what counts as background may be a car not known as one."""
@@ -64,8 +64,9 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
     i, part = touching(hull_low, hull_high, sightings.low, sightings.high)
     elder, rival = elders[i], owner[part]
     class_ = tracks.posterior.argmax(axis=1)
+    bulky = class_ <= ObjectClass.CAR  # one is easily taken for the other where little is seen of it
     size = np.where(proposal == NONE, 0, sightings.count[proposal])
-    free = (rival == NONE) | ~tracks.fixed[rival] | (class_[rival] == class_[elder])
+    free = (rival == NONE) | ~tracks.fixed[rival] | (class_[rival] == class_[elder]) | bulky[rival] & bulky[elder]
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
     vx, vy = tracks.x[:, 3] * np.cos(tracks.x[:, 2]), tracks.x[:, 3] * np.sin(tracks.x[:, 2])
     apart = np.hypot(vx[rival] - vx[elder], vy[rival] - vy[elder]) > APART_MPS

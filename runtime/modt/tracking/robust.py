@@ -9,7 +9,7 @@ from modt.tracking import kalman
 from modt.tracking.association import Matches, assign
 from modt.tracking.followed import Followed
 from modt.tracking.sightings import AXES, Sightings, touching
-from modt.types import Bool, Float64, Int
+from modt.types import Bool, Float64, Int, ObjectClass
 
 SOFT_M = 0.3
 """Lengths are compared with this added: a difference of a few returns says nothing."""
@@ -17,6 +17,10 @@ GATE = 16.0
 """Greatest squared Mahalanobis distance of a pair: one true pair in three thousand lies beyond."""
 JUMP_M = 0.2
 """Outlines jump by this much beyond the filter's noise, as parts of an object come into view and go."""
+COVER = 0.3
+"""Overlap, of the smaller, of what is paired although it changed its shape."""
+GROWTH = 1.5
+"""An object does not become this many times longer, plus a metre, from one frame to the next."""
 LIMIT = 10.0
 """Cost of leaving a track without a proposal."""
 W_SIZE, W_OVERLAP, W_HEIGHT, W_COUNT = 2.0, 3.0, 2.0, 0.5
@@ -52,12 +56,20 @@ class RobustAssociation:
         first = np.flatnonzero((distance < GATE) & (cost < LIMIT))
         first = first[assign(rows[first], columns[first], cost[first], LIMIT)]
         left = _left(rows, rows[first], len(tracks)) & _left(columns, columns[first], len(sightings))
-        second = np.flatnonzero(left & (cover > 0.3))
+        second = np.flatnonzero(left & (cover > COVER) & ~self._swallowed(tracks, sightings, rows, columns))
         second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
         kept = np.concatenate([first, second])
         place = tracks.x[rows[kept], :2] + shift[kept]
         loose = np.maximum(1.0, distance[kept] / 4)  # the tails are heavy: what lies far off says less
         return Matches(rows[kept], columns[kept], place, R[columns[kept]] * loose[:, None, None])
+
+    def _swallowed(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Bool:
+        """(K,) pairs in which an object would become a part of something larger: it waits until they part again."""
+        grown = (sightings.high[columns] - sightings.low[columns]).max(axis=1)
+        known = (tracks.hull_high[rows] - tracks.hull_low[rows]).max(axis=1)
+        scenery = tracks.fixed[rows] & (tracks.posterior[rows].argmax(axis=1) == ObjectClass.BACKGROUND)
+        swallowed: Bool = ~scenery & (grown > GROWTH * known + 1.0)
+        return swallowed
 
     def birthplace(self, sightings: Sightings) -> Float64:
         """Middle of the outline."""

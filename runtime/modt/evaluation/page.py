@@ -1,0 +1,95 @@
+"""One self-contained page: text, tables and plots; it reads on a screen, light or dark, and on paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+
+from modt.sinks.output import writing
+
+COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a")
+STYLE = """
+:root{--ink:#1c2430;--soft:#5d6876;--line:#d8dde4;--paper:#fff;--panel:#f6f8fa}
+@media (prefers-color-scheme:dark){:root{--ink:#e4e8ee;--soft:#9aa6b5;--line:#38424f;--paper:#151a21;--panel:#1d242d}}
+*{box-sizing:border-box}
+body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);margin:0 auto;
+max-width:1100px;padding:24px 20px}
+h1{font-size:1.6rem;margin:0}h2{font-size:1.1rem;margin:0 0 .5rem}
+.sub{color:var(--soft);margin:.2rem 0 1.2rem}
+.tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:12px;margin:0 0 20px}
+.tile{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:12px 14px}
+.tile b{display:block;font-size:1.5rem;font-variant-numeric:tabular-nums}
+.tile small{color:var(--soft)}
+.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(440px,100%),1fr));gap:16px;margin:0 0 16px}
+section{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:14px;margin:0 0 16px;
+break-inside:avoid;overflow-x:auto}
+.plots section{margin:0}
+table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
+th,td{padding:4px 10px;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
+th:first-child,td:first-child{text-align:left;white-space:normal}
+th{color:var(--soft);font-weight:600}
+em{font-style:normal;color:var(--soft);font-size:.8em}.tile em{font-size:.8rem;font-weight:400}
+svg{width:100%;height:auto;display:block}
+svg text{font-size:11px;fill:var(--soft)}.end{text-anchor:end}.mid{text-anchor:middle}
+.grid{stroke:var(--line)}.axis{stroke:var(--soft)}polyline{fill:none;stroke-width:2}
+.legend{margin:.3rem 0 0;color:var(--soft);font-size:.85rem}
+.legend span{margin-right:14px;white-space:nowrap}
+.legend i{display:inline-block;width:10px;height:10px;border-radius:2px;margin-right:5px}
+@media print{:root{--ink:#000;--soft:#444;--line:#bbb;--paper:#fff;--panel:#fff}body{max-width:none;padding:0}
+*{-webkit-print-color-adjust:exact;print-color-adjust:exact}.plots{grid-template-columns:1fr 1fr}}
+"""
+
+
+def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
+    """The whole page."""
+    colours = "".join(
+        f".l{k}{{stroke:{c}}}.c{k},.a{k}{{fill:{c}}}.b{k}{{background:{c}}}" for k, c in enumerate(COLOURS)
+    )
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{STYLE}{colours}</style></head><body>"
+        f'<h1>{escape(title)}</h1><p class="sub">{escape(subtitle)}</p>{"".join(blocks)}</body></html>\n'
+    )
+
+
+def tiles(items: Sequence[tuple[str, str, str]]) -> str:
+    """The answers: name, value, what is to be known of it."""
+    cells = (
+        f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
+        for name, value, note in items
+    )
+    return f'<div class="tiles">{"".join(cells)}</div>'
+
+
+def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
+    """A table under a heading; a cell "12 (estimated)" shows the bracket small."""
+    top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
+    body = "".join("<tr>" + "".join(f"<td>{_cell(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    foot = f'<p class="legend">{escape(note)}</p>' if note else ""
+    return f"<section><h2>{escape(title)}</h2><table><tr>{top}</tr>{body}</table>{foot}</section>"
+
+
+def plots(items: Sequence[tuple[str, str, str]]) -> str:
+    """Plots side by side: title, SVG, what is to be seen."""
+    cells = (
+        f'<section><h2>{escape(title)}</h2>{svg}<p class="legend">{escape(note)}</p></section>'
+        for title, svg, note in items
+    )
+    return f'<div class="plots">{"".join(cells)}</div>'
+
+
+def save(path: Path, text: str) -> None:
+    """Write the page.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    with writing(path):
+        path.write_text(text, encoding="utf-8")
+
+
+def _cell(text: str) -> str:
+    value, bracket, kind = text.partition(" (")
+    return escape(value) + (f" <em>({escape(kind)}</em>" if bracket else "")

@@ -1,0 +1,173 @@
+"""The tracker for whole boxes: detections that somebody else has made and classified.
+
+The filter is that of the proposals (Equation 1). What differs is what is known of a detection: its box is a guess at
+the whole object, so its centre is the place, and it comes with a score, so that a weak one may continue a track but
+not begin it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.config import BoxTrackingConfig
+from modt.geometry import wrap
+from modt.tracking import kalman
+from modt.tracking.association import assign
+from modt.types import Bool, Float64, Int
+
+LIMIT = 1.0
+"""Cost of a pair at the edge of the gate."""
+
+
+CONFIGS = {
+    "Car": BoxTrackingConfig(),
+    "Pedestrian": BoxTrackingConfig(
+        acceleration_sigma_mps2=3.0, initial_speed_sigma_mps=3.0, turn_sigma_radps=1.0, min_hits=3, turn_gain=0.5
+    ),
+    "Cyclist": BoxTrackingConfig(acceleration_sigma_mps2=5.0, initial_speed_sigma_mps=8.0, min_hits=3),
+}
+"""How objects of each type move, and how far their detections can be trusted."""
+
+
+def box_config(name: str) -> BoxTrackingConfig:
+    """The configuration for a type of object."""
+    return CONFIGS[name]
+
+
+@dataclass(frozen=True, slots=True)
+class Reported:
+    """The objects of a frame.
+
+    Attributes:
+        id: (K,) of the tracks.
+        box: (K, 7) smoothed, world frame.
+        score: (K,) of the track so far.
+        source: (K,) detection that each was seen as, NONE where it is predicted.
+    """
+
+    id: Int
+    box: Float64
+    score: Float64
+    source: Int
+
+
+class BoxTracker:
+    """Follows the boxes of one class.
+
+    Args:
+        config: its parameters.
+    """
+
+    def __init__(self, config: BoxTrackingConfig) -> None:
+        self.config = config
+        self._next_id = 0
+        self._stamp_s: float | None = None
+        self._start(0)
+
+    def _start(self, n: int) -> None:
+        self._id, self._hits, self._missed = (np.zeros(n, np.int64) for _ in range(3))
+        self._source = np.zeros(n, np.int64)
+        self._x, self._P = np.zeros((n, 4)), np.zeros((n, 4, 4))
+        self._box, self._score = np.zeros((n, 7)), np.zeros(n)
+
+    def follow(self, stamp_s: float, boxes: Float64, score: Float64) -> Reported:
+        """Take a frame's detections to the tracks.
+
+        Args:
+            stamp_s: time of the frame [s].
+            boxes: (D, 7) detections in the world frame.
+            score: (D,) how sure the detector is of each, the higher the surer.
+        """
+        self._predict(stamp_s)
+        strong = score >= self.config.strong_score
+        rows, columns = self._match(boxes, np.arange(len(self._id)), np.flatnonzero(strong))
+        left = np.setdiff1d(np.arange(len(self._id)), rows, assume_unique=True)
+        if len(left) and not strong.all():
+            more, weak = self._match(boxes, left, np.flatnonzero(~strong))
+            rows, columns = np.concatenate([rows, more]), np.concatenate([columns, weak])
+        self._source[:] = -1
+        self._missed += 1
+        if len(rows):
+            self._update(rows, columns, boxes, score)
+        free = strong.copy()
+        free[columns] = False
+        keep = self._missed <= self.config.max_missed
+        if not keep.all() or free.any():
+            self._renew(keep, np.flatnonzero(free), boxes, score)
+        return self._report()
+
+    def _predict(self, stamp_s: float) -> None:
+        dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
+        self._stamp_s = stamp_s
+        if not len(self._id):
+            return
+        ones = np.ones(len(self._id))
+        Q = kalman.process_noise(
+            self._x, dt_s, ones * self.config.acceleration_sigma_mps2, ones * self.config.turn_sigma_radps
+        )
+        self._x, self._P = kalman.predict(self._x, self._P, Q, dt_s)
+
+    def _match(self, boxes: Float64, tracks: Int, detections: Int) -> tuple[Int, Int]:
+        """Rows and detections that belong together."""
+        if not len(tracks) or not len(detections):
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        found = boxes[detections]
+        offset = found[None, :, :2] - self._x[tracks, None, :2]
+        square = (offset**2).sum(axis=2)
+        sigma = self.config.position_sigma_m**2 + (self._P[tracks, 0, 0] + self._P[tracks, 1, 1]) / 2
+        reach = self.config.gate * sigma[:, None] + (self.config.overlap * self._box[tracks, 3:4]) ** 2
+        rise = np.abs(found[None, :, 2] - self._box[tracks, None, 2])
+        turn = np.abs(np.sin(found[None, :, 6] - self._box[tracks, None, 6]))
+        cost = square / reach + 0.2 * rise + 0.1 * turn
+        i, j = np.nonzero(cost < LIMIT)
+        kept = assign(i, j, cost[i, j], LIMIT)
+        return tracks[i[kept]], detections[j[kept]]
+
+    def _update(self, rows: Int, columns: Int, boxes: Float64, score: Float64) -> None:
+        seen = boxes[columns]
+        x, P = self._x[rows], self._P[rows]
+        slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
+        if slow.any():
+            step = seen[:, :2] - x[:, :2]
+            course = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
+            x, P = kalman.face(x, P, course)
+        R = np.broadcast_to(self.config.position_sigma_m**2 * np.eye(2), (len(rows), 2, 2))
+        self._x[rows], self._P[rows] = kalman.turn_about(*kalman.update(x, P, seen[:, :2], R))
+        self._hits[rows] += 1
+        self._missed[rows] = 0
+        self._source[rows] = columns
+        gain = np.maximum(1.0 / self._hits[rows], self.config.smoothing)
+        self._box[rows, 3:6] += gain[:, None] * (seen[:, 3:6] - self._box[rows, 3:6])
+        self._box[rows, 2] += self.config.height_gain * (seen[:, 2] - self._box[rows, 2])
+        turn = wrap(seen[:, 6] - self._box[rows, 6])
+        about = np.abs(turn) > np.pi / 2
+        turn = np.where(about, wrap(turn + np.pi), turn)  # headings that do not flip
+        self._box[rows, 6] = wrap(self._box[rows, 6] + self.config.turn_gain * turn)
+        self._score[rows] += (score[columns] - self._score[rows]) / self._hits[rows]
+
+    def _renew(self, keep: Bool, born: Int, boxes: Float64, score: Float64) -> None:
+        n = len(born)
+        place, speed = self.config.position_sigma_m, self.config.initial_speed_sigma_mps
+        P = np.diag([place, place, np.pi, speed])
+        x = np.zeros((n, 4))
+        x[:, :2] = boxes[born, :2]
+        join = np.concatenate
+        self._id = join([self._id[keep], self._next_id + np.arange(n)])
+        self._next_id += n
+        self._hits = join([self._hits[keep], np.ones(n, np.int64)])
+        self._missed = join([self._missed[keep], np.zeros(n, np.int64)])
+        self._source = join([self._source[keep], born])
+        self._x = join([self._x[keep], x])
+        self._P = join([self._P[keep], np.broadcast_to(P**2, (n, 4, 4))])
+        self._box = join([self._box[keep], boxes[born]])
+        self._score = join([self._score[keep], score[born]])
+
+    def _report(self) -> Reported:
+        sure = (self._hits >= self.config.min_hits) | (self._score > self.config.sure_score)
+        rows = np.flatnonzero(sure & (self._missed <= self.config.report_missed))
+        box = self._box[rows]
+        box[:, :2] = self._x[rows, :2]
+        score = self._score[rows] + self.config.age_bonus * np.log(self._hits[rows])
+        return Reported(self._id[rows], box, score, self._source[rows])
