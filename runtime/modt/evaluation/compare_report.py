@@ -18,7 +18,7 @@ from modt.evaluation.trials import Trial, evidence, pooled, windows_of
 from modt.pipeline import STAGES
 
 SCHEMA = "modt.compare/1"
-COUNTING = "Energy is watts assumed times CPU time: gamma tests the counting and the unit costs, not the physics."
+COUNTING = "Energy is watts assumed times CPU time: this tests counts and unit costs, not the physics."
 PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
 
 
@@ -78,6 +78,7 @@ def compare_tree(
         "modes": {mode: energy[mode] | _work(runs[mode], energy[mode], random) for mode in modes},
         "unit_costs": _costs(unit_costs(priced), baseline, basis),
         "savings": savings,
+        "series_kind": Kind.MEASURED.value,
         "series": {mode: _series(runs[mode], trials[0][mode].lives) for mode in modes},
     }
 

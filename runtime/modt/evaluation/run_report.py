@@ -98,6 +98,10 @@ def run_tree(run: Path) -> dict[str, Any]:
         "saved": saved,
         "marks": sorted({mark for line in [*lines, *windows] for mark in line["marks"]}),
         "series": {
+            "kinds": {
+                **dict.fromkeys(("cpu_ms", "classified", "deferred", "proposals", "lives"), Kind.MEASURED.value),
+                **dict.fromkeys(("net_W", "predicted_cpu_ms"), Kind.ESTIMATED.value),
+            },
             "net_W": board["busy_W"] - board["idle_W"],
             "cpu_ms": {s: (1e3 * cpu_s[:, k]).round(4).tolist() for k, s in enumerate(STAGES)},
             "predicted_cpu_ms": (1e3 * predicted_s).round(4).tolist(),
@@ -174,7 +178,7 @@ def _split(board: dict[str, Any], kind: Kind) -> ByCoefficients | ByCpuTime:
 
 def _circular(energy: dict[str, Any]) -> str:
     if energy["gross_J"].kind is Kind.ESTIMATED:
-        return "Energy is watts assumed times CPU time: gamma tests the counting, not the physics."
+        return "Energy is watts assumed times CPU time: this tests the counting, not the physics."
     return "Energy is the meter's; its split over the stages is estimated."
 
 
