@@ -145,7 +145,7 @@ def main() -> None:
     if args.kitti:
         add_kitti(writer, args.kitti, args.paste, args.seed)
     for scan in synthetic_scans(range(1, 1 + args.synthetic), args.each):
-        writer.add(scan, SYNTHETIC)
+        writer.add(scan, SYNTHETIC, judged=True)
     asked = {"kitti": bool(args.kitti), "paste": args.paste, "synthetic": args.synthetic, "each": args.each}
     print(json.dumps(writer.save(args.out, {**asked, "seed": args.seed})))
 

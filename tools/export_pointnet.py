@@ -79,11 +79,14 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
         f"- sha256: {sha256}",
         f"- licence: {licence}",
         f"- classes: {', '.join(CLASS_NAMES)}",
-        "- input: the proposal's own points (at most 400), x along and y across the line of sight from the middle of",
-        "  their extent [m], z above the ground on which the sensor stands [m]; no reflectance",
+        "- input: the proposal's own points, x along and y across the line of sight from the middle of their extent",
+        "  [m], z above the ground [m]; no reflectance (modt.classification.crops)",
         "- output: probability of each class, softmax with the calibration folded in",
         f"- data: {data}",
-        f"- crops: sha256 {report['crops_sha256']}; {report['provenance']['scans']} scans",
+        *(
+            f"- crops: {made['scans']} scans, {_tally(made)}; sha256 {digest}"
+            for made, digest in zip(report["provenance"], report["crops_sha256"], strict=True)
+        ),
         f"- training: tools/train_pointnet.py, seed {report['seed']}, {report['epochs']} epochs, "
         f"torch {report['torch']}, {report['cpu_s']} s on one core",
         f"- calibration: temperature {report['calibration']['temperature']}, "
@@ -93,6 +96,11 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
     if "cross_validation" in report:
         lines += ["## Out of fold (drives never split)", "", *_scores(report["cross_validation"])]
     return "\n".join(lines)
+
+
+def _tally(made: dict[str, Any]) -> str:
+    """Background, car, pedestrian, cyclist of each variant."""
+    return ", ".join(f"{'/'.join(map(str, n))} {name}" for name, n in made["crops"].items() if sum(n))
 
 
 def _scores(scores: dict[str, Any]) -> list[str]:

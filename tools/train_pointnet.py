@@ -23,7 +23,7 @@ from numpy.random import Generator
 
 from augment import Beams, augment, limit
 from calibration import Calibration, expected_error, fit
-from dataset import SHIPPED, Dataset, load
+from dataset import Dataset, load
 from modt.classification.crops import Crops, canonical
 from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
 from network import PointNet
@@ -125,7 +125,7 @@ def folds(data: Dataset, k: int) -> Int:
 def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
     """Out-of-fold calibration and scores; missed objects count as false negatives."""
     fold = folds(data, k)
-    judged = np.flatnonzero(data.variant == SHIPPED)
+    judged = np.flatnonzero(data.variant == data.variant.min())  # real scans where there are any
     out = np.zeros((len(judged), N_CLASSES))
     for i in range(k):
         rows = np.flatnonzero(~data.partial & (fold[data.drive] != i))
@@ -135,7 +135,8 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
     label, clear = data.label[judged], ~data.partial[judged]
     calibration = fit(out[clear], label[clear])
     probability = calibration.apply(out)
-    found = np.bincount(data.truth_label, minlength=N_CLASSES)
+    there = np.isin(data.truth_drive, data.drive[judged])
+    found = np.bincount(data.truth_label[there], minlength=N_CLASSES)
     return calibration, {
         "average_precision": average_precision(probability, label, found),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], found[1:], strict=True)},

@@ -98,7 +98,7 @@ class SegmentationConfig(StageConfig):
     max_slope_deg: float = _number(12.0, 0.5, 45.0, "deg", "of the ground")
     clearance_m: float = _number(0.25, 0.02, 1.0, "m", "above ground, from where on points make objects")
     max_height_m: float = _number(2.6, 0.3, 20.0, "m", "above ground; what hangs higher joins nothing")
-    cell_m: float = _number(0.095, 0.01, 2.0, "m", "side of a cluster cell at 10 m; grows as the root of range")
+    cell_m: float = _number(0.105, 0.01, 2.0, "m", "side of a cell at 10 m; grows as the square root of range")
     min_points: int = _number(5, 1, 1000, "", "of a proposal")
     max_extent_m: float = _number(13.0, 0.5, 50.0, "m", "longest side of a proposal")
     min_height_m: float = _number(0.2, 0.0, 3.0, "m", "lowest proposal")
@@ -124,19 +124,20 @@ class TrackingConfig(StageConfig):
 class BoxTrackingConfig(StageConfig):
     """Tracking of whole boxes that another detector has found, one class at a time."""
 
-    strong_score: float = _number(1.0, -1e3, 1e3, "", "detections that begin a track; weaker ones continue one")
-    sure_score: float = _number(4.0, -1e3, 1e3, "", "mean score from which a track is reported at once")
-    min_hits: int = _number(3, 1, 100, "frames", "detections after which any track is reported")
+    strong_score: float = _number(0.0, -1e3, 1e3, "", "detections of this score begin a track; weaker ones continue one")
+    sure_score: float = _number(3.0, -1e3, 1e3, "", "mean score from which a track is reported at once")
+    min_hits: int = _number(2, 1, 100, "frames", "detections after which any track is reported")
     max_missed: int = _number(8, 0, 100, "frames", "without a detection before a track is deleted")
-    report_missed: int = _number(1, 0, 100, "frames", "for which a track is reported where it is predicted")
+    report_missed: int = _number(0, 0, 100, "frames", "for which a track is reported where it is predicted")
     gate: float = _number(9.0, 0.1, 1000.0, "", "squared Mahalanobis distance of an association at most")
-    overlap: float = _number(0.3, 0.0, 2.0, "", "part of the length by which a centre may be off besides")
-    position_sigma_m: float = _number(0.3, 0.01, 5.0, "m", "of a detected centre")
-    acceleration_sigma_mps2: float = _number(4.0, 0.01, 50.0, "m/s2", "process noise of the speed")
+    overlap: float = _number(0.7, 0.0, 2.0, "", "part of the length by which a centre may be off besides")
+    position_sigma_m: float = _number(0.1, 0.01, 5.0, "m", "of a detected centre")
+    acceleration_sigma_mps2: float = _number(10.0, 0.01, 50.0, "m/s2", "process noise of the speed")
     turn_sigma_radps: float = _number(0.3, 0.001, 10.0, "rad/s", "process noise of the course")
-    initial_speed_sigma_mps: float = _number(10.0, 0.1, 50.0, "m/s", "of a new track")
-    smoothing: float = _number(0.1, 0.0, 1.0, "", "least weight of a new measurement of size and height")
-    turn_gain: float = _number(0.5, 0.0, 1.0, "", "weight of a new measurement of the heading")
+    initial_speed_sigma_mps: float = _number(20.0, 0.1, 50.0, "m/s", "of a new track")
+    smoothing: float = _number(0.3, 0.0, 1.0, "", "least weight of a new measurement of the size")
+    height_gain: float = _number(0.7, 0.0, 1.0, "", "weight of a new measurement of the height")
+    turn_gain: float = _number(0.7, 0.0, 1.0, "", "weight of a new measurement of the heading")
     age_bonus: float = _number(0.5, 0.0, 10.0, "", "what a track's score gains with the logarithm of its age")
 
 
@@ -145,7 +146,7 @@ class ClassificationConfig(StageConfig):
     """The network and how its input is made (section V-A)."""
 
     model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
-    max_points: int = _number(400, 8, 4096, "", "of a proposal handed to the network")
+    max_points: int = _number(128, 8, 4096, "", "of a proposal handed to the network")
     batch: int = _number(8, 1, 256, "", "proposals of one network call at most")
 
 
@@ -162,6 +163,8 @@ class FusionConfig(StageConfig):
     """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
 
     threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
+    background_threshold: float = _number(0.95, 0.25, 1.0, "", "the same, of background")
+    view_weight: float = _number(1.0, 0.0, 1.0, "", "share of a further view's evidence; 1: as if independent")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
     )
@@ -172,6 +175,10 @@ class FusionConfig(StageConfig):
     bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
     range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")
     extent_ratio: float = _number(0.3, 0.0, 10.0, "", "change of size that makes it independent")
+    reopen_ratio: float | None = _number(
+        4.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
+    )
+    reopen_points: int = _number(60, 0, 10000, "", "a class settled from so many is never doubted")
     start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
 
 

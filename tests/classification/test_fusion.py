@@ -15,7 +15,7 @@ from modt.config import FusionConfig
 from modt.types import NONE, Float64, Proposals, Tracks
 from tests.classification.scenes import blobs, seen
 
-PAPER = FusionConfig(prior=(0.25, 0.25, 0.25), start_frame=1)
+PAPER = FusionConfig(prior=(0.25, 0.25, 0.25), start_frame=1, view_weight=1.0, reopen_ratio=None)
 ALL = (EveryFrame(), FirstView(), KeyViews(FusionConfig()), KeyViews(PAPER))
 
 
@@ -51,7 +51,7 @@ def test_whatever_the_network_says_the_posterior_stays_one(fusion: Fusion, views
 )
 def test_key_views_multiply_as_equation_6_says(views: Float64, prior: Float64) -> None:
     views = views / views.sum(axis=1, keepdims=True)
-    config = FusionConfig(prior=(prior[0], prior[1], prior[2]), start_frame=1, threshold=1.0)
+    config = dataclasses.replace(PAPER, prior=(prior[0], prior[1], prior[2]), threshold=1.0)
     proposals, tracks = scene((50,))
     fusion = KeyViews(config)
     full = np.append(1 - prior.sum(), prior)
@@ -114,6 +114,33 @@ def test_an_early_view_is_forgotten_at_the_starting_frame() -> None:
     assert fusion.asks(tracks, proposals, asking).all()
     fusion.fuse(tracks, proposals, np.array([0]), clear)
     np.testing.assert_allclose(tracks.posterior[0], clear[0], rtol=1e-6)
+
+
+def test_a_class_settled_from_afar_is_looked_at_again_from_near() -> None:
+    _, proposals = blobs([10, 10, 100], np.random.default_rng(0))
+    tracks = seen(proposals)
+    fusion = KeyViews(FusionConfig(reopen_ratio=4.0, reopen_points=60))
+    sure = np.tile([0.99, 0.005, 0.0025, 0.0025], (3, 1))
+    assert fusion.fuse(tracks, proposals, np.arange(3), sure).all()
+    tracks.proposal[1] = NONE
+    near = moved(proposals, offsets=np.array([0, 50, 100, 600]))
+    settled = np.zeros(3, np.bool_)
+    assert fusion.asks(tracks, near, settled).tolist() == [True, False, False]
+    never = KeyViews(FusionConfig(reopen_ratio=None))
+    assert not never.asks(tracks, near, settled).any()
+
+
+def test_a_further_view_counts_by_its_weight() -> None:
+    views = np.array([[0.4, 0.3, 0.2, 0.1], [0.1, 0.6, 0.2, 0.1]])
+    posterior = []
+    for weight in (0.0, 0.5, 1.0):
+        proposals, tracks = scene((50,))
+        fusion = KeyViews(dataclasses.replace(PAPER, view_weight=weight))
+        for view in views:
+            fusion.fuse(tracks, proposals, np.array([0]), view[None])
+        posterior.append(tracks.posterior[0, 1])
+    assert posterior[0] == pytest.approx(0.3)
+    assert posterior[0] < posterior[1] < posterior[2]
 
 
 def after_a_view(config: FusionConfig) -> tuple[KeyViews, Proposals, Tracks]:

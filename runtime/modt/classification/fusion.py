@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.config import FusionConfig
 from modt.geometry import wrap
-from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
+from modt.types import N_CLASSES, NONE, Bool, Float64, Int, Proposals, Tracks
 
 _FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
@@ -84,7 +84,9 @@ class KeyViews:
     is else forgotten at the starting frame, since far and partial first views mislead (Fig. 11).
 
     The network's word is a posterior under the frequency of the classes among proposals, the prior; Equation 6
-    multiplies likelihoods, so each further view is divided by the prior, lest that be counted once a view.
+    multiplies likelihoods, so each further view is divided by the prior, lest that be counted once a view. Views of
+    one object are never wholly independent: a further one may be given less than its full weight. And a class that
+    was settled from afar is looked at again when the object shows several times the points.
 
     Args:
         config: thresholds of independence and certainty.
@@ -96,16 +98,26 @@ class KeyViews:
         objects = np.array(config.prior)
         prior = np.maximum(np.append(1.0 - objects.sum(), objects), _FLOOR)
         self._log_prior = np.log(prior / prior.sum())
+        self._threshold = np.array([config.background_threshold, *[config.threshold] * (N_CLASSES - 1)])
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
-        """Those asking that were never classified or show an independent view."""
-        asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
+        """Those asking that were never classified or show an independent view, and the settled that came close."""
+        seen = tracks.proposal != NONE
+        asks: Bool = asking & ~tracks.fixed & seen
         rows = np.flatnonzero(asks)
         first = tracks.key_points[rows] == 0
         started = tracks.age[rows] >= self.config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
         asks[rows] = first | (started & fresh)
-        return asks
+        return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.fixed))
+
+    def _reopened(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
+        """(M,) which of these rows, settled as they are, show so much more that they are worth another look."""
+        again = np.zeros(len(tracks), np.bool_)
+        if self.config.reopen_ratio is not None:
+            again[rows] = proposals.count[tracks.proposal[rows]] > self.config.reopen_ratio * tracks.key_points[rows]
+            again &= tracks.key_points < self.config.reopen_points
+        return again
 
     def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(R,) whether the view of each track differs enough from its last key observation (Equation 4)."""
@@ -128,10 +140,10 @@ class KeyViews:
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiplies the view into the posterior, in logarithms (Equation 6), and fixes what is certain."""
         view = np.log(_sane(likelihood))
-        fused = tracks.views[rows] > 0
-        past = np.where(fused[:, None], np.log(_sane(tracks.posterior[rows])) - self._log_prior, 0.0)
-        posterior = _normal(past + view)
-        certain: Bool = posterior.max(axis=1) >= self.config.threshold
+        evidence = self.config.view_weight * (view - self._log_prior)
+        fused = (tracks.views[rows] > 0)[:, None]
+        posterior = _normal(np.where(fused, np.log(_sane(tracks.posterior[rows])) + evidence, view))
+        certain: Bool = np.any(posterior >= self._threshold, axis=1)
         tracks.posterior[rows] = posterior
         tracks.fixed[rows] |= certain
         tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)

@@ -1,0 +1,164 @@
+"""The tools that make data and models."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from augment import Beams, augment, limit
+from build_crops import label
+from calibration import Calibration, expected_error, fit
+from labelled import Scan, inside
+from modt.classification.crops import gather
+from modt.geometry import FieldOfView
+from modt.types import ObjectClass, Proposals
+from paste import Item, pasted
+from scores import average_precision, confusion
+from tests.classification.scenes import blobs
+
+EVERYWHERE = FieldOfView()
+
+
+def scan_of(points: np.ndarray, objects: list[np.ndarray], kinds: list[ObjectClass], unlabelled: np.ndarray) -> Scan:
+    boxes = np.full((len(objects), 7), np.nan)
+    return Scan("scan", "drive", points, tuple(objects), tuple(kinds), boxes, EVERYWHERE, unlabelled)
+
+
+@given(counts=st.lists(st.integers(6, 300), min_size=1, max_size=8), seed=st.integers(0, 200))
+def test_augmented_crops_keep_their_number_and_enough_points(counts: list[int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    points, proposals = blobs(counts, rng)
+    crops = gather(points, proposals, np.arange(len(counts)), 1000)
+    seen = limit(augment(crops, Beams(), rng), 50, rng)
+    assert len(seen) == len(counts)
+    assert (seen.count >= 6).all()
+    assert (seen.count <= np.minimum(counts, 50)).all()
+    assert np.isfinite(seen.xyz).all()
+
+
+def test_augmentation_repeats_itself_from_its_seed() -> None:
+    points, proposals = blobs([40, 200], np.random.default_rng(0))
+    crops = gather(points, proposals, np.arange(2), 1000)
+    once, again = (augment(crops, Beams(), np.random.default_rng(5)) for _ in range(2))
+    assert once.xyz.tobytes() == again.xyz.tobytes()
+
+
+def test_a_proposal_is_what_it_mostly_shows_and_mostly_covers() -> None:
+    points = np.zeros((40, 4), np.float32)
+    offsets = np.array([0, 10, 20, 30, 40])
+    box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
+    proposals = Proposals(np.arange(40), offsets, np.zeros((4, 3)), box, none, none)
+    car = np.arange(0, 9)  # nearly the first proposal
+    walker = np.arange(10, 14)  # too few points to count
+    rider = np.arange(17, 40)  # three points of the second, all of the third and of the fourth: neither is whole
+    unlabelled = np.zeros(40, np.bool_)
+    kinds = [ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST]
+    kind, partial = label(scan_of(points, [car, walker, rider], kinds, unlabelled), proposals)
+    assert kind.tolist() == [ObjectClass.CAR, 0, 0, 0]
+    assert partial.tolist() == [False, True, True, True]
+    unlabelled[10:] = True
+    kind, partial = label(scan_of(points, [], [], unlabelled), proposals)
+    assert partial.tolist() == [False, True, True, True]
+
+
+def test_inside_is_clear_of_the_ground_and_turned_with_the_box() -> None:
+    box = np.array([10.0, 0.0, -1.7, 4.0, 2.0, 1.5, np.pi / 2])
+    points = np.array([[10, 1.9, -1, 0], [11.9, 0, -1, 0], [10, 0, -1.6, 0], [10, 0, 0.5, 0]], np.float32)
+    assert inside(points, box).tolist() == [True, False, False, False]
+
+
+def test_a_pasted_object_stands_on_the_ground_and_hides_what_is_behind_it() -> None:
+    rng = np.random.default_rng(0)
+    azimuth, elevation = np.meshgrid(np.arange(-180, 180, 0.4), np.arange(-24, -1, 0.8))
+    rho = 1.7 / np.tan(np.deg2rad(-elevation.ravel()))
+    a = np.deg2rad(azimuth.ravel())
+    ground = np.c_[rho * np.cos(a), rho * np.sin(a), np.full(len(a), -1.7), np.zeros(len(a))].astype(np.float32)
+    body = np.c_[np.full(60, 12.0), rng.uniform(-0.3, 0.3, 60), rng.uniform(-1.6, 0, 60), np.zeros(60)]
+    item = Item(body.astype(np.float32), np.array([12.0, 0, -1.7, 0.8, 0.8, 1.8, 0]), ObjectClass.PEDESTRIAN, "there")
+    empty = scan_of(ground, [], [], np.zeros(len(ground), np.bool_))
+    items = [item, *(Item(item.points, item.box, kind, "there") for kind in (ObjectClass.CAR, ObjectClass.CYCLIST))]
+    made = list(pasted(empty, items, 8, rng))
+    assert made
+    scan = made[0]
+    assert scan.drive == "there"
+    assert len(scan.points) < len(ground) + sum(map(len, scan.objects))
+    for own, box in zip(scan.objects, scan.boxes, strict=True):
+        assert np.hypot(*scan.points[own, :2].T) == pytest.approx(np.hypot(*box[:2]), abs=1.0)
+        assert not scan.unlabelled[own].any()
+    assert scan.unlabelled.sum() == len(scan.points) - sum(map(len, scan.objects))
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 3), st.floats(0, 1)), min_size=1, max_size=40),
+    st.integers(0, 5),
+)
+def test_average_precision_agrees_with_the_definition(rows: list[tuple[int, float]], missed: int) -> None:
+    label = np.array([r[0] for r in rows])
+    score = np.array([r[1] for r in rows])
+    probability = np.c_[1 - score, score, np.zeros((len(rows), 2))]
+    truth = np.bincount(label, minlength=4)
+    truth[1] += missed
+    order = np.argsort(-score, kind="stable")
+    points, true = [], 0
+    for k, i in enumerate(order, start=1):
+        true += label[i] == 1
+        points.append((true / max(truth[1], 1), true / k))
+    area, before = 0.0, 0.0
+    for k, (recall, _) in enumerate(points):
+        area += (recall - before) * max(p for _, p in points[k:])
+        before = recall
+    assert average_precision(probability, label, truth)["car"] == pytest.approx(area, abs=1e-3)
+
+
+def test_confusion_counts_true_by_called() -> None:
+    probability = np.eye(4)[[0, 1, 1, 3]]
+    assert confusion(probability, np.array([0, 1, 2, 3]))[2] == [0, 1, 0, 0]
+
+
+def test_calibration_finds_the_temperature_and_what_is_common() -> None:
+    rng = np.random.default_rng(0)
+    true = rng.normal([2.0, 0, 0, 0], 2.0, (6000, 4))
+    share = Calibration.none().apply(true)
+    label = np.array([rng.choice(4, p=p) for p in share])
+    distorted = 3 * (true - [2.0, 0, 0, 0])
+    found = fit(distorted, label)
+    assert found.temperature == pytest.approx(3.0, rel=0.1)
+    assert found.offset[1:] == pytest.approx(np.full(3, -2.0), abs=0.2)
+    assert expected_error(found.apply(distorted), label) < 0.02
+    assert expected_error(Calibration.none().apply(distorted), label) > 0.1
+
+
+def test_calibration_folds_into_the_last_layer() -> None:
+    rng = np.random.default_rng(0)
+    calibration = Calibration(1.7, np.array([0.0, -1.0, 0.5, 2.0]))
+    x, weight, bias = rng.normal(size=(5, 8)), rng.normal(size=(8, 4)), rng.normal(size=4)
+    folded = calibration.folded((weight, bias))
+    np.testing.assert_allclose(
+        Calibration.none().apply(x @ folded[0] + folded[1]), calibration.apply(x @ weight + bias), atol=1e-5
+    )
+
+
+def test_the_exported_network_is_the_trained_one(tmp_path_factory: pytest.TempPathFactory) -> None:
+    torch = pytest.importorskip("torch", reason="extra [train] is not installed")
+    from export_pointnet import graph
+    from modt.classification.pointnet import PointNet
+    from modt.config import ClassificationConfig, SensorConfig
+    from network import PointNet as Trained
+
+    torch.manual_seed(0)
+    net = Trained()
+    counts = torch.tensor([1, 5, 60, 400, 900])
+    for _ in range(3):  # gives the normalisations something to hold
+        net(torch.randn(int(counts.sum()), 3) * 1.5, counts)
+    for norm in net.norms:
+        torch.nn.init.normal_(norm.log_scale, 0, 0.3)
+    net.eval()
+    path = tmp_path_factory.mktemp("model") / "net.onnx"
+    path.write_bytes(graph(net.layers()).SerializeToString())
+    exported = PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+    for n in (1, 2, 17, 400, 1200):
+        xyz = torch.randn(2 * n, 3) * 2
+        expected = torch.softmax(net(xyz, torch.tensor([n, n])), dim=1).detach().numpy()
+        np.testing.assert_allclose(exported.infer(xyz.reshape(2, n, 3).numpy()), expected, atol=1e-4)
