@@ -10,10 +10,10 @@ import numpy as np
 
 from modt.energy.attribution import usable
 from modt.energy.meters.meter import Kind
-from modt.energy.savings import UnitCosts
+from modt.energy.savings import Beside, UnitCosts, predict
 from modt.evaluation.comparison import total
 from modt.evaluation.figure import Figure, figure
-from modt.evaluation.gamma import Evidence, Saving, interval, mean_interval, saving, unit_costs
+from modt.evaluation.gamma import Evidence, Saving, beside_of, interval, mean_interval, saving, unit_costs
 from modt.evaluation.trials import Trial, evidence, pooled, windows_of
 from modt.pipeline import STAGES
 
@@ -32,6 +32,7 @@ class Basis:
         period_s: of the stream, over which idling is counted.
         meter: name of the meter.
         kind: of its energy.
+        coefficients: seg_J, class_J and point_J of a calibration, None without one.
     """
 
     idle_W: float
@@ -39,6 +40,7 @@ class Basis:
     period_s: float
     meter: str
     kind: Kind
+    coefficients: tuple[float, float, float] | None = None
 
     @property
     def net_W(self) -> float:
@@ -162,6 +164,7 @@ def _saving(
         "gamma_net": figure(_ratio(net1, net2), "", net1.kind),
         "gamma_gross": figure(_ratio(gross1, gross2), "", gross1.kind),
         "deviation_net": figure(_off(found.predicted, _ratio(net1, net2)), "", Kind.ESTIMATED),
+        "gamma_calibrated": figure(_calibrated(baseline, run, basis), "", Kind.ESTIMATED),
         "deviation": figure(found.deviation, "", Kind.ESTIMATED, found.deviation_interval),
         "terms": [
             {
@@ -173,6 +176,18 @@ def _saving(
         ],
         "saved_J": figure(_difference(net1, net2), "J", net1.kind),
     }
+
+
+def _calibrated(baseline: Evidence, run: Evidence, basis: Basis) -> float | None:
+    """Gamma from a calibration's joules; what was not calibrated is priced by its CPU time."""
+    if basis.coefficients is None:
+        return None
+    seg_J, class_J, point_J = basis.coefficients
+    beside1, beside2 = (
+        Beside(basis.net_W * b.track, basis.net_W * b.choose) for b in (beside_of(baseline), beside_of(run))
+    )
+    costs = UnitCosts(seg_J, beside1.track, 0.0, class_J, point_J)
+    return predict(total(baseline.counts), total(run.counts), costs, beside1, beside2).model.gamma
 
 
 def _costs(costs: UnitCosts, baseline: Evidence, basis: Basis) -> dict[str, Figure]:

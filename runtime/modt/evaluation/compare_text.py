@@ -85,10 +85,11 @@ def marked(figure: Figure, by: float = 1.0) -> str:
 
 
 def _against_meter(saving: dict[str, Any]) -> str:
-    off = saving["deviation_net"].value
+    off, calibrated = saving["deviation_net"].value, saving["gamma_calibrated"]
+    joules = "" if calibrated.value is None else f"; by calibrated joules gamma is {marked(calibrated)}"
     if saving["gamma_net"].kind is Kind.ESTIMATED or off is None:
-        return ""
-    return f"; predicted is off by {100 * off:+.1f} % against the meter"
+        return joules
+    return f"{joules}; predicted is off by {100 * off:+.1f} % against the meter"
 
 
 def _stage(stage: dict[str, Figure]) -> str:
