@@ -155,10 +155,10 @@ def _saving(
     gross1, gross2 = (energy[m]["gross_J"] for m in (base, mode))
     net1, net2 = (energy[m]["net_J"] for m in (base, mode))
     return {
-        "a": figure(p.paper.e_class / p.paper.e_seg if p.paper.e_seg else None),
-        "gamma_short": figure(p.gamma_short, "", Kind.ESTIMATED),
+        "a": figure(p.paper.a),
+        "gamma_short": figure(p.paper.gamma_short, "", Kind.ESTIMATED),
         "gamma_equation_3": figure(p.paper.gamma, "", Kind.ESTIMATED),
-        "short_form_error": figure(p.short_form_error, "", Kind.ESTIMATED),
+        "short_form_error": figure(p.paper.short_form_error, "", Kind.ESTIMATED),
         "gamma_predicted": figure(found.predicted, "", Kind.ESTIMATED, found.predicted_interval),
         "gamma_measured_cpu": figure(found.measured, "", Kind.MEASURED, found.measured_interval),
         "gamma_net": figure(_ratio(net1, net2), "", net1.kind),
