@@ -201,6 +201,13 @@ class EnergyConfig(StageConfig):
     class_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one classification")
     point_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one point classified")
 
+    @property
+    def coefficients(self) -> tuple[float, float, float] | None:
+        """Those of a calibration [J], None unless there are all three."""
+        if self.seg_J is None or self.class_J is None or self.point_J is None:
+            return None
+        return self.seg_J, self.class_J, self.point_J
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileConfig:
