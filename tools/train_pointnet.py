@@ -136,7 +136,7 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
     calibration = fit(out[clear], label[clear])
     probability = calibration.apply(out)
     there = np.isin(data.truth_drive, data.drive[judged])
-    found = np.bincount(data.truth_label[there], minlength=N_CLASSES)
+    found = np.bincount(data.truth_label[there] if there.any() else label, minlength=N_CLASSES)
     return calibration, {
         "average_precision": average_precision(probability, label, found),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], found[1:], strict=True)},
