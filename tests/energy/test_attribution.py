@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from simulated import SimulatedMachine
 
 from modt.energy.attribution import CLASS, SEG, TERMS, ByCoefficients, ByCpuTime, Fit, FitError, burst, fit
 from modt.energy.conditions import Conditions
 from modt.energy.meters.powercap import find_powercap
 from modt.energy.windows import Windows
+
+from .simulated import SimulatedMachine
 
 TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
 NOISE = 0.1

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from simulated import write_files, write_zone
 
 from modt.energy.meters.battery import find_batteries
 from modt.energy.meters.discovery import Discovery, discover
@@ -14,6 +13,8 @@ from modt.energy.meters.model import ModelMeter
 from modt.energy.meters.pmic import find_pmic, rail_power_W
 from modt.energy.meters.powercap import find_powercap
 from modt.errors import MisuseError
+
+from .simulated import write_files, write_zone
 
 PMIC = """ 3V7_WL_SW_A current(0)=0.08784000A
    VDD_CORE_A current(7)=2.10000000A

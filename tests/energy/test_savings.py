@@ -8,10 +8,11 @@ from hypothesis import strategies as st
 from modt.energy.counted import CountedClassifier
 from modt.energy.ledger import Ledger
 from modt.energy.prediction import PaperModel
-from modt.energy.savings import Counts, Model, UnitCosts, predict
+from modt.energy.savings import Beside, Counts, Model, UnitCosts, predict
 from modt.types import Float32, Float64, Int, Proposals
 
 COSTS = UnitCosts(seg=5e-3, track=1e-3, class_call=1e-4, class_item=2e-4, class_point=1e-6)
+NOTHING, SAME = Beside(0.0, 0.0), Beside(1e-3, 0.0)
 
 
 def baseline(frames: int = 100, n: int = 40) -> Counts:
@@ -27,7 +28,7 @@ def efficient(tracks: int = 200, reached: int = 200, classified: int = 200, refo
 def test_neutral_parameters_are_the_papers_equation(seg: float, item: float, n: int, tracks: int) -> None:
     base = replace(baseline(n=n), points=0)
     run = replace(base, tracks=tracks, classified_tracks=tracks, classified=tracks)
-    found = predict(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0))
+    found = predict(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0), NOTHING, NOTHING)
     paper = PaperModel(seg, item, n_obj=1.0, n_bg=n - 1.0, n_go=run.n_go)
     assert found.model.gamma == pytest.approx(paper.gamma)
     assert found.paper.gamma == pytest.approx(paper.gamma)
@@ -44,7 +45,7 @@ counts = st.builds(
 
 @given(counts, st.floats(1e-6, 1e-2), st.floats(0, 1e-2), st.floats(0, 100))
 def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: float, measured: float) -> None:
-    found = predict(baseline(), run, replace(COSTS, seg=seg), choose, 2 * choose)
+    found = predict(baseline(), run, replace(COSTS, seg=seg), Beside(1e-3, choose), Beside(2e-3, 2 * choose))
     assert found.gamma_short + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
     explained = found.explain(measured)
     assert found.gamma_short + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
@@ -54,18 +55,17 @@ def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: floa
 @given(counts)
 def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
     base = baseline()
-    found = predict(base, run, COSTS, 1e-4, 3e-4)
-    per_frame = COSTS.seg + COSTS.track
-    assert found.model.e1 == pytest.approx(per_frame + 1e-4 + COSTS.classification(base) / base.frames)
+    found = predict(base, run, COSTS, Beside(2e-3, 1e-4), Beside(3e-3, 3e-4))
+    assert found.model.e1 == pytest.approx(COSTS.seg + 2e-3 + 1e-4 + COSTS.classification(base) / base.frames)
     if run.classified:
-        assert found.model.e2 == pytest.approx(per_frame + 3e-4 + COSTS.classification(run) / run.frames)
+        assert found.model.e2 == pytest.approx(COSTS.seg + 3e-3 + 3e-4 + COSTS.classification(run) / run.frames)
     assert found.model.views == pytest.approx(run.classified / run.tracks)
 
 
 def test_more_views_save_less() -> None:
-    once = predict(baseline(), efficient(), COSTS)
-    often = predict(baseline(), efficient(classified=900), COSTS)
-    again = predict(baseline(), efficient(classified=900, refound=300), COSTS)
+    once = predict(baseline(), efficient(), COSTS, SAME, SAME)
+    often = predict(baseline(), efficient(classified=900), COSTS, SAME, SAME)
+    again = predict(baseline(), efficient(classified=900, refound=300), COSTS, SAME, SAME)
     assert often.model.gamma < once.model.gamma
     assert often.model.gamma == pytest.approx(again.model.gamma)
     assert again.terms[3].name == "views after a track was lost"
@@ -74,7 +74,7 @@ def test_more_views_save_less() -> None:
 
 def test_empty_runs_save_nothing() -> None:
     nothing = Counts(0, 0, 0, 0, 0, 0, 0, 0, 0)
-    found = predict(nothing, nothing, COSTS)
+    found = predict(nothing, nothing, COSTS, SAME, SAME)
     assert found.model.gamma == pytest.approx(1.0)
     assert (nothing.beta, nothing.n_go, nothing.n, nothing.n_obj) == (1.0, 1.0, 0.0, 0.0)
     assert Model(0, 0, 0, 1).gamma == 1.0

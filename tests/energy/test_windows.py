@@ -4,7 +4,6 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from simulated import SimulatedMachine, write_files
 
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
@@ -12,6 +11,8 @@ from modt.energy.meters.hwmon import find_hwmon
 from modt.energy.meters.meter import Facts, Kind, MeterLostError, Quantity, Scope
 from modt.energy.meters.powercap import find_powercap
 from modt.energy.windows import SCHEMA, Tape, Windows
+
+from .simulated import SimulatedMachine, write_files
 
 
 @pytest.fixture

@@ -17,13 +17,13 @@ def meters(config: EnergyConfig) -> Discovery:
     return discover(ModelMeter(config.idle_W, config.busy_W, time.monotonic_ns, time.process_time_ns))
 
 
-def windows(config: EnergyConfig, core: int | None, meter: str | None = None) -> Windows:
+def windows(config: EnergyConfig, core: int | None, meter: str | None = None, least_s: float = 1.0) -> Windows:
     """Windows over the best meter, or the one named.
 
     Raises:
         MisuseError: the one named is not usable.
     """
-    return Windows(meters(config).choose(meter).meters, Clocks(), Conditions(core or 0))
+    return Windows(meters(config).choose(meter).meters, Clocks(), Conditions(core or 0), least_s)
 
 
 def is_estimated(config: EnergyConfig, meter: str | None = None) -> bool:

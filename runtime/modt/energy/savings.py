@@ -64,7 +64,7 @@ class UnitCosts:
 
     Attributes:
         seg: E(seg), a frame.
-        track: following the proposals of a frame.
+        track: following the proposals of a frame, as tracking-by-detection does.
         class_call, class_item, class_point: of a call of the classifier, a proposal in it, and a point of it.
     """
 
@@ -84,6 +84,19 @@ class UnitCosts:
 
 
 @dataclass(frozen=True, slots=True)
+class Beside:
+    """What a run paid beside segmentation and classification, a frame, in the unit of its costs.
+
+    Attributes:
+        track: tracking.
+        choose: scheduling and fusion.
+    """
+
+    track: float
+    choose: float
+
+
+@dataclass(frozen=True, slots=True)
 class Model:
     """Equation 3 with what it leaves out; every added parameter has its neutral value by default.
 
@@ -96,7 +109,8 @@ class Model:
         repeats: further classifications a track of which the track was not lost before.
         refound: further classifications a track after it was lost.
         dearness: E(class) of the views chosen over e_class.
-        track: of both, a frame.
+        track: what following costs both, a frame.
+        remember1, remember2: what tracking costs beyond that, a frame: remembering settled classes, for one.
         choose1, choose2: scheduling and fusion a frame of tracking-by-detection and of the proposed pipeline.
     """
 
@@ -109,6 +123,8 @@ class Model:
     refound: float = 0.0
     dearness: float = 1.0
     track: float = 0.0
+    remember1: float = 0.0
+    remember2: float = 0.0
     choose1: float = 0.0
     choose2: float = 0.0
 
@@ -120,13 +136,13 @@ class Model:
     @property
     def e1(self) -> float:
         """Energy a frame of tracking-by-detection."""
-        return self.e_seg + self.n * self.e_class + self.track + self.choose1
+        return self.e_seg + self.n * self.e_class + self.track + self.remember1 + self.choose1
 
     @property
     def e2(self) -> float:
         """Energy a frame of the proposed pipeline: n / n_go new tracks, each classified k times."""
         chosen = self.n / self.n_go * self.views * self.dearness * self.e_class
-        return self.e_seg + chosen + self.track + self.choose2
+        return self.e_seg + chosen + self.track + self.remember2 + self.choose2
 
     @property
     def gamma(self) -> float:
@@ -179,17 +195,15 @@ class Prediction:
         return (*self.terms, rest)
 
 
-def predict(
-    baseline: Counts, run: Counts, costs: UnitCosts, choose1: float = 0.0, choose2: float = 0.0
-) -> Prediction:
+def predict(baseline: Counts, run: Counts, costs: UnitCosts, beside1: Beside, beside2: Beside) -> Prediction:
     """Gamma of a run over tracking-by-detection, from what both counted and what the units cost.
 
     Args:
         baseline: of tracking-by-detection on the same stream.
         run: of the proposed pipeline.
         costs: measured on neither of the two.
-        choose1: scheduling and fusion a frame of tracking-by-detection.
-        choose2: the same of the proposed pipeline.
+        beside1: what tracking-by-detection paid for what Equation 2 does not know.
+        beside2: what the proposed pipeline paid for it.
     """
     tracks = run.tracks or 1
     e_class = costs.e_class(baseline)
@@ -204,7 +218,11 @@ def predict(
             {"dearness": costs.e_class(run) / e_class if e_class and run.classified else 1.0},
         ),
         ("tracking, which both pay", {"track": costs.track}),
-        ("scheduling and fusion", {"choose1": choose1, "choose2": choose2}),
+        (
+            "tracking, which the mode pays beyond that",
+            {"remember1": beside1.track - costs.track, "remember2": beside2.track - costs.track},
+        ),
+        ("scheduling and fusion", {"choose1": beside1.choose, "choose2": beside2.choose}),
     )
     terms = [Deviation("segmentation is not free (Equation 3 in full)", paper.gamma - paper.n_go, paper.gamma)]
     model = paper

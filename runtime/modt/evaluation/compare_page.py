@@ -28,7 +28,7 @@ def compare_page(tree: dict[str, Any]) -> str:
         for mode, m in modes.items()
     ]
     answers += [
-        (f"{mode}: gamma measured", brief(s["gamma_measured_cpu"].value), holds(s)) for mode, s in savings.items()
+        (f"{mode}: gamma of CPU energy", kinded(s["gamma_measured_cpu"]), holds(s)) for mode, s in savings.items()
     ]
     return page(
         f"Energy of {tree['stream']}",
@@ -95,21 +95,29 @@ def _plots(tree: dict[str, Any]) -> list[tuple[str, str, str]]:
 
     cumulative = [svg.Trace(f"{mode}", frames, 1e-3 * np.cumsum(energy_mJ(mode))) for mode in series]
     drawn = [
-        ("Cumulative energy, E1 against E2", svg.lines(cumulative, "frame", "J"), f"E1: {base}"),
+        (
+            "Cumulative energy, E1 against E2",
+            svg.lines(cumulative, "frame", "J"),
+            f"E1: {base}; estimated from CPU time, without idling",
+        ),
         ("Gamma against N_go", _curve(tree), "dashed: gamma = N_go; line: Equation 3; dots: measured"),
     ]
     for mode in series:
         parts = {k: 1e-3 * net_mW * np.array(v) for k, v in series[mode]["cpu_ms"].items()}
         drawn.append(
-            (f"{mode}: energy by stage", svg.areas(frames, parts, "frame", "mJ a frame"), "idling not counted")
+            (
+                f"{mode}: energy by stage",
+                svg.areas(frames, parts, "frame", "mJ a frame"),
+                "estimated from CPU time, without idling",
+            )
         )
     for mode in others:
         lives = np.array(series[mode]["lives"], float)
         edges = np.linspace(0.5, max(lives.max(initial=1.0), 1.0) + 0.5, 31)
         counted = np.histogram(lives, edges)[0].astype(float)
-        drawn.append((f"{mode}: life of tracks", svg.bars(edges, counted, "frames seen", "tracks"), "every track"))
+        drawn.append((f"{mode}: life of tracks", svg.bars(edges, counted, "frames seen", "tracks"), "measured"))
     budget = [svg.Trace(mode, frames, np.array(series[mode]["classified"], float)) for mode in series]
-    drawn.append(("Classifications a frame", svg.lines(budget, "frame", "classified"), ""))
+    drawn.append(("Classifications a frame", svg.lines(budget, "frame", "classified"), "measured"))
     return drawn
 
 

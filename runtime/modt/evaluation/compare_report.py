@@ -160,6 +160,7 @@ def _saving(
         "gamma_measured_cpu": figure(found.measured, "", Kind.MEASURED, found.measured_interval),
         "gamma_net": figure(_ratio(net1, net2), "", net1.kind),
         "gamma_gross": figure(_ratio(gross1, gross2), "", gross1.kind),
+        "deviation_net": figure(_off(found.predicted, _ratio(net1, net2)), "", Kind.ESTIMATED),
         "deviation": figure(found.deviation, "", Kind.ESTIMATED, found.deviation_interval),
         "terms": [
             {
@@ -204,6 +205,10 @@ def _scaled(pair: tuple[float, float], by: float) -> tuple[float, float]:
 
 def _ratio(a: Figure, b: Figure) -> float | None:
     return None if a.value is None or not b.value else a.value / b.value
+
+
+def _off(predicted: float, measured: float | None) -> float | None:
+    return predicted / measured - 1.0 if measured else None
 
 
 def _difference(a: Figure, b: Figure) -> float | None:

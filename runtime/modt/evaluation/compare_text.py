@@ -38,7 +38,7 @@ def compare_text(tree: dict[str, Any]) -> str:
             f"{mode}: gamma measured {s['gamma_measured_cpu'].text()}, predicted {s['gamma_predicted'].text()}",
             f"  {holds(s)}",
             f"  energy: {marked(s['gamma_net'])} with idling taken off, {marked(s['gamma_gross'])} with it; "
-            f"{marked(s['saved_J'], 1e3)} mJ a frame saved",
+            f"{marked(s['saved_J'], 1e3)} mJ a frame saved{_against_meter(s)}",
             f"  {'the short form, gamma = N_go':<50}{'':>10}{brief(s['gamma_short'].value):>10}",
             *(f"  {t['name']:<50}{t['change'].value:>+10.3f}{t['gamma'].value:>10.3f}" for t in s["terms"]),
             "",
@@ -72,6 +72,13 @@ def marked(figure: Figure, by: float = 1.0) -> str:
     if figure.value is None:
         return "unavailable"
     return f"{brief(figure.value * by)}{MARK[figure.kind]}"
+
+
+def _against_meter(saving: dict[str, Any]) -> str:
+    off = saving["deviation_net"].value
+    if saving["gamma_net"].kind is Kind.ESTIMATED or off is None:
+        return ""
+    return f"; predicted is off by {100 * off:+.1f} % against the meter"
 
 
 def _stage(stage: dict[str, Figure]) -> str:

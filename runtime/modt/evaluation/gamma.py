@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.energy.savings import Prediction, UnitCosts, predict
+from modt.energy.savings import Beside, Prediction, UnitCosts, predict
 from modt.evaluation.comparison import COUNTS, total
 from modt.pipeline import CLASSIFICATION, FUSION, SCHEDULING, SEGMENTATION, STAGES, TRACKING
 from modt.types import Float64, Int
@@ -98,7 +98,7 @@ def saving(baseline: Evidence, run: Evidence, varied: Evidence, random: np.rando
     def both(frames: Int) -> tuple[Prediction, float]:
         a, b = baseline.take(frames), run.take(frames)
         costs = unit_costs(varied.take((frames + n * np.arange(passes)[:, None]).ravel()))
-        prediction = predict(total(a.counts), total(b.counts), costs, _choosing(a), _choosing(b))
+        prediction = predict(total(a.counts), total(b.counts), costs, _beside(a), _beside(b))
         return prediction, float(a.cost.sum() / b.cost.sum())
 
     prediction, measured = both(np.arange(n))
@@ -124,8 +124,9 @@ def interval(n: int, of: Callable[[Int], float], random: np.random.Generator) ->
     return _interval(np.array([of(_blocks(n, random)) for _ in range(RESAMPLES)]))
 
 
-def _choosing(run: Evidence) -> float:
-    return float(run.cost[:, [SCHEDULE, FUSE]].sum(axis=1).mean())
+def _beside(run: Evidence) -> Beside:
+    mean = run.cost.mean(axis=0)
+    return Beside(track=float(mean[TRACK]), choose=float(mean[[SCHEDULE, FUSE]].sum()))
 
 
 def _blocks(n: int, random: np.random.Generator) -> Int:

@@ -21,7 +21,7 @@ h1{font-size:1.6rem;margin:0}h2{font-size:1.1rem;margin:0 0 .5rem}
 .tile{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:12px 14px}
 .tile b{display:block;font-size:1.5rem;font-variant-numeric:tabular-nums}
 .tile small{color:var(--soft)}
-.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(440px,100%),1fr));gap:16px}
+.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(440px,100%),1fr));gap:16px;margin:0 0 16px}
 section{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:14px;margin:0 0 16px;
 break-inside:avoid;overflow-x:auto}
 .plots section{margin:0}
@@ -29,7 +29,7 @@ table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 th,td{padding:4px 10px;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
 th:first-child,td:first-child{text-align:left;white-space:normal}
 th{color:var(--soft);font-weight:600}
-em{font-style:normal;color:var(--soft);font-size:.8em}
+em{font-style:normal;color:var(--soft);font-size:.8em}.tile em{font-size:.8rem;font-weight:400}
 svg{width:100%;height:auto;display:block}
 svg text{font-size:11px;fill:var(--soft)}.end{text-anchor:end}.mid{text-anchor:middle}
 .grid{stroke:var(--line)}.axis{stroke:var(--soft)}polyline{fill:none;stroke-width:2}
@@ -57,7 +57,7 @@ def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
 def tiles(items: Sequence[tuple[str, str, str]]) -> str:
     """The answers: name, value, what is to be known of it."""
     cells = (
-        f'<div class="tile"><small>{escape(name)}</small><b>{escape(value)}</b><small>{escape(note)}</small></div>'
+        f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
         for name, value, note in items
     )
     return f'<div class="tiles">{"".join(cells)}</div>'

@@ -25,7 +25,7 @@ def run_page(tree: dict[str, Any]) -> str:
         ("energy a frame", kinded(tree["gross_J"], 1e3, "mJ"), f"{kinded(tree['net_J'], 1e3, 'mJ')} without idling"),
         ("power", kinded(tree["power_W"]), tree["test"]),
         ("gamma", kinded(saved["gamma_of_this_run"]), f"predicted {kinded(saved['gamma_predicted'])}"),
-        ("beta", f"{100 * saved['beta'].value:.1f} %", f"N_go {kinded(saved['N_go'])}"),
+        ("beta", kinded(saved["beta"], 100, "%"), f"N_go {kinded(saved['N_go'])}"),
     ]
     return page(
         f"Energy of {tree['stream']}, {tree['mode']}",

@@ -15,7 +15,7 @@ from modt.energy.attribution import ByCoefficients, ByCpuTime, usable
 from modt.energy.counted import padded_points
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.meters.meter import Kind
-from modt.energy.savings import Counts, predict
+from modt.energy.savings import Beside, Counts, predict
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.evaluation.comparison import COUNTS
@@ -231,7 +231,8 @@ def _saved(
         frames, run.proposals, run.foreground, run.tracks, run.tracks, run.proposals, 0, int(all_points.sum()), frames
     )
     choosing = float(cpu_s[:, [STAGES.index(SCHEDULING), STAGES.index(FUSION)]].sum(axis=1).mean())
-    found = predict(baseline, run, costs, choosing, choosing)
+    beside = Beside(costs.track, choosing)
+    found = predict(baseline, run, costs, beside, beside)
     n = counts[:, COUNTS.index("proposals")]
     e1_s = cpu_s.sum(axis=1)
     if mode != CONVENTIONAL:

@@ -12,7 +12,7 @@ import numpy as np
 from modt.evaluation.figure import brief
 from modt.types import Float64
 
-WIDTH, HEIGHT = 640, 260
+WIDTH, HEIGHT = 520, 230
 LEFT, RIGHT, TOP, BOTTOM = 58, 14, 12, 44
 MOST_POINTS = 400
 """Points drawn of a longer line; the page stays small."""

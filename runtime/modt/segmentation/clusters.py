@@ -65,10 +65,12 @@ class Clusters:
     of_cell: Int
     n: int
 
-    def only(self, kept: Bool) -> Clusters:
-        """The clusters that a mask (n,) keeps, numbered anew."""
-        number = np.append(np.where(kept, np.cumsum(kept) - 1, NONE), NONE)
-        return replace(self, of_cell=number[self.of_cell], n=int(kept.sum()))
+    def kept(self, keep: Bool) -> Clusters:
+        """The clusters that an (n,) mask keeps, numbered anew."""
+        if keep.all():
+            return self
+        number = np.append(np.where(keep, np.cumsum(keep) - 1, NONE), NONE)  # the last one is that of NONE
+        return replace(self, of_cell=number[self.of_cell], n=int(keep.sum()))
 
 
 def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
@@ -122,7 +124,8 @@ class Clusterer:
         cluster[parts] = piece + len(extent)
         extents = np.append(extent, _extent(x[parts], y[parts], piece))
         proper = self._proper(cluster, cells, count, extents, len(extent))
-        return Clusters(cell, sample, cells.high, cluster, len(proper)).only(proper)
+        number = np.where(proper, np.cumsum(proper) - 1, NONE)
+        return Clusters(cell, sample, cells.high, number[cluster], int(proper.sum()))
 
     def _joined_coarsely(self, fine: Cells) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell which it is a quarter of."""

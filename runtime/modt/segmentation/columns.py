@@ -38,5 +38,5 @@ class Columns:
         return type(self)(self.x[rows], self.y[rows], self.z[rows], self.root[rows])
 
     def xyz(self) -> Float32:
-        """(N, 3) points again."""
+        """(N, 3) positions, a row a point [m]."""
         return np.stack([self.x, self.y, self.z], axis=1)

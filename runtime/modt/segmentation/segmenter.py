@@ -17,7 +17,8 @@ from modt.types import NONE, Bool, Float32, Int, Proposals
 
 MARGIN_M = 6.0
 """Looked at beyond the edge of the field of view, so that what stands on the edge is segmented whole."""
-
+SLACK_M = 1.0
+"""Of an object that lies in view the sensor may see only what is this far out of it."""
 EDGE_M = 0.3
 """A proposal this near the end of the margin counts as cut by it."""
 OCCLUDER_M = 0.6
@@ -62,29 +63,27 @@ class Segmenter:
 
     def _proposals(self, raised: Columns, height: Float32, index: Int) -> Proposals:
         """The clusters of what is raised, and their boxes."""
-        clusters = self._in_view(self.clusterer.cluster(raised, height), raised)
+        clusters = self.clusterer.cluster(raised, height)
+        cell = raised.take(clusters.sample)
+        clusters = clusters.kept(self._in_view(clusters, cell))
         if not clusters.n:
             return Proposals.empty()
         outline = Groups.of(clusters.of_cell, clusters.n)
-        x, y = raised.x[clusters.sample], raised.y[clusters.sample]
         few = outline.thinned(OUTLINE)
-        yaw = headings(x[few.rows], y[few.rows], few)
+        yaw = headings(cell.x[few.rows], cell.y[few.rows], few)
         groups = Groups.of(clusters.of_cell[clusters.cell], clusters.n)
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
-        truncated = np.zeros(clusters.n, np.bool_)
-        if not self.fov.full:
-            truncated = groups.least(self.fov.depth(own.xyz())) < EDGE_M - MARGIN_M
-        hidden = occluded(x, y, clusters.top > OCCLUDER_M, outline)
+        inside_m: Float32 = self.fov.depth(cell.xyz())[outline.rows].astype(np.float32)
+        truncated = outline.least(inside_m) < EDGE_M - MARGIN_M
+        hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
         return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, hidden)
 
-    def _in_view(self, clusters: Clusters, raised: Columns) -> Clusters:
-        """Those that lie within the field of view, if only in part."""
-        if self.fov.full:
-            return clusters
-        seen = self.fov.contains(raised.take(clusters.sample).xyz()) & (clusters.of_cell != NONE)
-        return clusters.only(np.bincount(clusters.of_cell[seen], minlength=clusters.n) > 0)
+    def _in_view(self, clusters: Clusters, cell: Columns) -> Bool:
+        """(n,) whether a cluster reaches into the field of view, or nearly."""
+        seen = (self.fov.depth(cell.xyz()) > -SLACK_M) & (clusters.of_cell != NONE)
+        return np.bincount(clusters.of_cell[seen], minlength=clusters.n) > 0
 
 
 def _keep_freed_pages() -> None:

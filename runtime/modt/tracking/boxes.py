@@ -21,6 +21,21 @@ LIMIT = 1.0
 """Cost of a pair at the edge of the gate."""
 
 
+CONFIGS = {
+    "Car": BoxTrackingConfig(),
+    "Pedestrian": BoxTrackingConfig(
+        acceleration_sigma_mps2=3.0, initial_speed_sigma_mps=3.0, turn_sigma_radps=1.0, min_hits=3, turn_gain=0.5
+    ),
+    "Cyclist": BoxTrackingConfig(acceleration_sigma_mps2=5.0, initial_speed_sigma_mps=8.0, min_hits=3),
+}
+"""How objects of each type move, and how far their detections can be trusted."""
+
+
+def box_config(name: str) -> BoxTrackingConfig:
+    """The configuration for a type of object."""
+    return CONFIGS[name]
+
+
 @dataclass(frozen=True, slots=True)
 class Reported:
     """The objects of a frame.
@@ -124,7 +139,8 @@ class BoxTracker:
         self._missed[rows] = 0
         self._source[rows] = columns
         gain = np.maximum(1.0 / self._hits[rows], self.config.smoothing)
-        self._box[rows, 2:6] += gain[:, None] * (seen[:, 2:6] - self._box[rows, 2:6])
+        self._box[rows, 3:6] += gain[:, None] * (seen[:, 3:6] - self._box[rows, 3:6])
+        self._box[rows, 2] += self.config.height_gain * (seen[:, 2] - self._box[rows, 2])
         turn = wrap(seen[:, 6] - self._box[rows, 6])
         about = np.abs(turn) > np.pi / 2
         turn = np.where(about, wrap(turn + np.pi), turn)  # headings that do not flip

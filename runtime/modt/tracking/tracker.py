@@ -241,7 +241,8 @@ class Tracker:
         self._tracks = t.take(~expired)
 
     def _scenery(self) -> Bool:
-        """(M,) background, for certain, that stands still."""
+        """(M,) background, for certain, that never moved."""
         t = self._tracks
-        scenery: Bool = t.fixed & t.still & (t.posterior.argmax(axis=1) == ObjectClass.BACKGROUND)
+        stays = np.hypot(*(t.x[:, :2] - t.home).T) < STILL_M
+        scenery: Bool = t.fixed & stays & (t.posterior.argmax(axis=1) == ObjectClass.BACKGROUND)
         return scenery

@@ -21,6 +21,8 @@ REACH_UP_M = 2.2
 
 
 BARE_M = 1e-3
+NOSE_DOWN_RAD = (0.007, 0.005)
+"""Mean and spread of the sensor's pitch on its carrier: people 40 m ahead stand 0.3 m too high in real scans."""
 
 
 class Builder:
@@ -91,7 +93,8 @@ class Builder:
         people = [(number[int(p[0])], *p[1:]) for p in self._people if int(p[0]) in number]
         columns: Float64 = np.array(people).reshape(-1, 9).T
         figures = Figures(columns[0].astype(np.int64), columns[1].astype(np.int64), *columns[2:])
-        return World(terrain, [self.bodies[i] for i in stay], figures, ego, height_m, sway_rad)
+        mount = float(self.rng.normal(0.0, 0.004)), float(self.rng.normal(*NOSE_DOWN_RAD))
+        return World(terrain, [self.bodies[i] for i in stay], figures, ego, height_m, sway_rad, mount)
 
     def _person(
         self,

@@ -12,7 +12,7 @@ from modt.sources.synthetic.terrain import Terrain
 from modt.types import Float32, Float64
 
 CELL_M, BESIDE_M = 0.25, 80.0
-KERB_M, CAMBER = 0.12, 0.02
+KERB_M, CAMBER, ROUGH_M = 0.12, 0.02, 0.012
 
 Corner = tuple[float, float]
 
@@ -108,6 +108,12 @@ def terrain(
     height = np.where(carriage, road_height, np.float32(edge) + bank + rough).astype(np.float32)
     grade = rng.uniform(-0.02, 0.02, 2) * (1.0, 0.5)
     height += np.float32(grade[0]) * x[:, None] + np.float32(grade[1]) * y
+    for _ in range(2):
+        k, phase = 2 * np.pi / rng.uniform(90.0, 250.0), rng.uniform(0, 2 * np.pi)
+        lift, bearing = rng.uniform(0.0, 0.5), rng.uniform(-0.5, 0.5)
+        along = np.float32(k * np.cos(bearing)) * x[:, None] + np.float32(k * np.sin(bearing)) * y
+        height += np.float32(lift) * np.sin(along + np.float32(phase))
+    height += rng.standard_normal(height.shape, np.float32) * np.float32(ROUGH_M)
     surface = np.where(carriage, Material.ASPHALT, np.where(walk, Material.PAVING, Material.GRASS))
     return Terrain(np.array(low, np.float64), CELL_M, height, surface.astype(np.uint8))
 

@@ -68,10 +68,14 @@ class Receiver:
         return np.where(ground, tangent + np.float32(0.02), np.where(same, level, np.float32(0.7))).astype(np.float32)
 
     def _smear(self, ranged: Float32, near: Float32, heard: Bool, chance: Float32) -> None:
-        """Where a beam is split by an edge, some returns mix both surfaces."""
+        """Where a beam is split by an edge, some returns mix both surfaces and some of the nearer one come late."""
         gap = near[:, 1:] - near[:, :-1]
         share = np.float32(self.sensor.smear)
-        edge = (np.abs(gap) > 0.2) & (np.abs(gap) < 2.5) & (chance[:, 1:] > 1 - share) & heard[:, 1:] & heard[:, :-1]
-        row, column = np.nonzero(edge)
+        split = (np.abs(gap) > 0.2) & heard[:, 1:] & heard[:, :-1]
+        row, column = np.nonzero(split & (np.abs(gap) < 2.5) & (chance[:, 1:] > 1 - share))
         mix = (chance[row, column + 1] - (1 - share)) / share
         ranged[row, column + 1] -= mix * gap[row, column]
+        row, column = np.nonzero(split & (chance[:, 1:] < 1 - share))
+        front = column + (gap[row, column] < 0)
+        late = -np.log(np.maximum(1 - chance[row, front], np.float32(1e-3)))
+        ranged[row, front] += np.float32(self.sensor.late_m) * late

@@ -28,6 +28,7 @@ class SensorModel:
         misfire: share of firings lost whatever they meet.
         spot_m, divergence_rad: radius of a beam where it leaves the sensor, and how it grows with distance.
         smear: share of the returns at a depth edge that lie between both surfaces.
+        late_m: mean delay of a return from an edge that splits the beam.
         height_m: usual mounting height above the ground.
         period_s: of a sweep.
     """
@@ -47,6 +48,7 @@ class SensorModel:
     spot_m: float
     divergence_rad: float
     smear: float
+    late_m: float
     height_m: float
     period_s: float = 0.1
 
@@ -73,8 +75,8 @@ def _spinner(
     *,
     origin_m: Float64 | None = None,
     min_range_m: float = 0.9,
-    range_sigma_m: float = 0.012,
-    detect_m: float = 80.0,
+    range_sigma_m: float = 0.015,
+    detect_m: float = 70.0,
     smear: float = 0.12,
     height_m: float = 1.73,
 ) -> SensorModel:
@@ -91,9 +93,10 @@ def _spinner(
         azimuth_sigma_rad=0.0003,
         detect_m=detect_m,
         misfire=0.01,
-        spot_m=0.01,
-        divergence_rad=0.0012,
+        spot_m=0.02,
+        divergence_rad=0.0015,
         smear=smear,
+        late_m=0.06,
         height_m=height_m,
     )
 
@@ -145,6 +148,7 @@ def solid_state() -> SensorModel:
         spot_m=0.005,
         divergence_rad=0.001,
         smear=0.15,
+        late_m=0.04,
         height_m=1.0,
     )
 

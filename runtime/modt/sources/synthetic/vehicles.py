@@ -15,7 +15,7 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
     """A passenger car of (length, width, height): hatchback, saloon or estate by chance."""
     length, width, height = size
     clear, belt = rng.uniform(0.17, 0.24), height * rng.uniform(0.58, 0.64)
-    paint = Material.CAR_DARK if rng.random() < 0.35 else Material.CAR_PAINT
+    paint = (Material.CAR_PAINT, Material.CAR_DARK, Material.CAR_BLACK)[rng.choice(3, p=[0.5, 0.28, 0.22])]
     nose = belt - rng.uniform(0.12, 0.25)
     bonnet = rng.uniform(0.24, 0.3) * length
     boot = rng.choice([0.04, 0.12, 0.2]) * length

@@ -55,13 +55,21 @@ class World:
         ego: where the sensor's carrier goes.
         height_m: of the sensor above the ground.
         sway_rad: how far the carrier rolls and pitches.
+        mount_rad: roll and pitch of the sensor on its carrier; cars nose down a little.
     """
 
     def __init__(
-        self, terrain: Terrain, bodies: list[Body], figures: Figures, ego: Path, height_m: float, sway_rad: float
+        self,
+        terrain: Terrain,
+        bodies: list[Body],
+        figures: Figures,
+        ego: Path,
+        height_m: float,
+        sway_rad: float,
+        mount_rad: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self.terrain, self.bodies, self.figures = terrain, bodies, figures
-        self.ego, self.height_m, self.sway_rad = ego, height_m, sway_rad
+        self.ego, self.height_m, self.sway_rad, self.mount_rad = ego, height_m, sway_rad, mount_rad
         self._moving = [i for i, b in enumerate(bodies) if not b.still]
         self._rest = np.zeros((len(bodies), 5))
         for i, body in enumerate(bodies):
@@ -81,8 +89,8 @@ class World:
             x - 1.3 * ahead[0], y - 1.3 * ahead[1]
         )
         bank = self._smooth(x + 0.8 * left[0], y + 0.8 * left[1]) - self._smooth(x - 0.8 * left[0], y - 0.8 * left[1])
-        pitch = -np.arctan2(rise, 2.6) + self.sway_rad * np.sin(2.9 * time_s)
-        roll = np.arctan2(bank, 1.6) + self.sway_rad * np.sin(2.1 * time_s + 1.0)
+        pitch = self.mount_rad[1] - np.arctan2(rise, 2.6) + self.sway_rad * np.sin(2.9 * time_s)
+        roll = self.mount_rad[0] + np.arctan2(bank, 1.6) + self.sway_rad * np.sin(2.1 * time_s + 1.0)
         return se3(rotation_zyx(float(roll), float(pitch), yaw), np.array([x, y, z + self.height_m]))
 
     def poses(self, time_s: float) -> Float64:

@@ -1,0 +1,131 @@
+"""`modt track`: the tracker alone, on the detections of another detector."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from modt.errors import MisuseError
+
+if TYPE_CHECKING:
+    from modt.sources.detections import Detections
+    from modt.types import Float64
+
+PERIOD_S = 0.1
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("track", help="follow the boxes that another detector has found")
+    p.add_argument("detections", type=Path, metavar="DETECTIONS", help="a file a sequence, or a folder of them")
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="KITTI tracking results go here")
+    motion = p.add_mutually_exclusive_group()
+    motion.add_argument("--poses", type=Path, metavar="FILE", help="camera poses, KITTI odometry; or a folder of them")
+    motion.add_argument("--oxts", type=Path, metavar="DIR", help="OXTS records, KITTI tracking; calib/ beside it")
+    p.add_argument("--period", type=float, default=PERIOD_S, metavar="S", help="between frames (default: %(default)g)")
+    p.add_argument("--quiet", action="store_true", help="no summary")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Follow each sequence and write its results.
+
+    Raises:
+        MisuseError: detections or poses cannot be used.
+        ModtError: the results cannot be written.
+    """
+    import time
+
+    from modt.sinks.output import LineFile, writing
+    from modt.sources.detections import files, read
+
+    if not 0.001 <= arguments.period <= 10:
+        raise MisuseError("--period", f"{arguments.period:g} s is no time between frames", "give 0.001 to 10")
+    paths = files(arguments.detections)
+    sequences = [read(path) for path in paths]
+    motions = [_poses(arguments, sequence, len(paths)) for sequence in sequences]
+    with writing(arguments.out):
+        arguments.out.mkdir(parents=True, exist_ok=True)
+    frames, ids, spent_s = 0, 0, 0.0
+    for sequence, poses in zip(sequences, motions, strict=True):
+        began = time.process_time()
+        text, n = follow(sequence, poses, arguments.period)
+        spent_s += time.process_time() - began
+        frames, ids = frames + sequence.n_frames, ids + n
+        lines = LineFile(arguments.out / f"{sequence.name}.txt")
+        lines.write(text)
+        lines.close()
+    if not arguments.quiet:
+        rate = f"{frames / spent_s:.0f} frames a second of CPU time" if spent_s else "no time"
+        print(f"{len(sequences)} sequences, {frames} frames, {ids} tracks, {rate}: {arguments.out}")
+    return 0
+
+
+def follow(detections: Detections, poses: Float64 | None, period_s: float) -> tuple[str, int]:
+    """KITTI tracking results of a sequence, and how many tracks they hold.
+
+    Args:
+        detections: of the sequence.
+        poses: (n, 4, 4) T_world_camera of its frames, None where no ego-motion is known.
+        period_s: between frames.
+    """
+    import numpy as np
+
+    from modt.geometry import inverse, transform_boxes
+    from modt.sinks.kitti_detections import result_lines
+    from modt.sources.detections import T_LEVEL_CAMERA, TYPES, kitti
+    from modt.tracking.boxes import BoxTracker, box_config
+
+    lines: list[tuple[int, str]] = []
+    seen: set[int] = set()
+    for type_, name in enumerate(TYPES):
+        own = detections.take(detections.type_ == type_)
+        tracker = BoxTracker(box_config(name))
+        last = np.zeros((0, 4))
+        for frame, rows in own.frames():
+            T = None if poses is None else T_LEVEL_CAMERA @ poses[frame] @ inverse(T_LEVEL_CAMERA)
+            boxes = own.box[rows] if T is None else transform_boxes(T, own.box[rows])
+            found = tracker.follow(frame * period_s, boxes, own.score[rows])
+            if not len(found.id):
+                continue
+            if found.id.max() >= len(last):
+                last = np.concatenate([last, np.zeros((int(found.id.max()) + 64 - len(last), 4))])
+            now = found.source >= 0
+            last[found.id[now]] = own.image_box[rows][found.source[now]]
+            placed = found.box if T is None else transform_boxes(inverse(T), found.box)
+            ids = found.id * len(TYPES) + type_
+            seen.update(ids.tolist())
+            lines.append((frame, result_lines(frame, name, ids, last[found.id], kitti(placed), found.score)))
+    return "".join(text for _, text in sorted(lines, key=lambda line: line[0])), len(seen)
+
+
+def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) -> Float64 | None:
+    """(n, 4, 4) T_world_camera of every frame of the sequence."""
+    import numpy as np
+
+    from modt.geometry import inverse
+    from modt.sources import calibration, oxts
+
+    given: Path | None = arguments.poses or arguments.oxts
+    if given is None:
+        return None
+    if not given.is_dir() and sequences > 1:
+        raise MisuseError(given, f"one file for {sequences} sequences", "give a folder with a file for each")
+    path = given / f"{sequence.name}.txt" if given.is_dir() else given
+    if not path.is_file():
+        raise MisuseError(path, "is missing", "add it, or run without ego-motion")
+    if arguments.poses:
+        try:
+            table = np.loadtxt(path, dtype=np.float64, ndmin=2).reshape(-1, 3, 4)
+        except (OSError, ValueError) as error:
+            raise MisuseError(path, f"no poses ({error})", "give twelve numbers a line") from None
+        poses = np.stack([calibration.homogeneous(top) for top in table])
+    else:
+        calib = path.parent.parent / "calib" / path.name
+        T_imu_sensor = calibration.T_imu_sensor_of_sequence(calib)
+        T_sensor_camera = inverse(calibration.camera_of_sequence(calib).T_camera_sensor)
+        poses = oxts.poses(oxts.read_sequence(path)) @ T_imu_sensor @ T_sensor_camera
+    if len(poses) < sequence.n_frames:
+        raise MisuseError(path, f"{len(poses)} poses for {sequence.n_frames} frames", "give one a frame")
+    return poses

@@ -1,0 +1,175 @@
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from modt.config import SegmentationConfig, SensorConfig
+from modt.geometry import FieldOfView
+from modt.segmentation.segmenter import Segmenter
+from modt.types import NONE
+from tests.segmentation import reference, scans
+
+CAR = (4.2, 1.8, 0.2, 1.8)
+PERSON = (0.4, 0.5, 0.0, 1.75)
+UP = np.deg2rad(np.linspace(-24, 20, 96))
+AHEAD = FieldOfView(
+    np.array([[np.sin(np.pi / 4), -np.cos(np.pi / 4), 0, 0], [np.sin(np.pi / 4), np.cos(np.pi / 4), 0, 0]])
+)
+
+
+def segmenter(fov=None, **sensor):
+    return Segmenter(SegmentationConfig(), SensorConfig(**sensor), fov or FieldOfView())
+
+
+def seen(points, on, **sensor):
+    """Proposal that holds most of each box's raised points, with its share of them and its purity."""
+    label = segmenter(**sensor).segment(points).label(len(points))
+    table = []
+    for box in range(1, on.max() + 1):
+        own = label[(on == box) & (points[:, 2] > -1.73 + 0.3)]
+        best = int(np.bincount(own + 1)[1:].argmax()) if (own != NONE).any() else NONE
+        table.append((best, (own == best).mean(), (on[label == best] == box).mean()))
+    return table
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 5, 100])
+def test_little_or_nothing_gives_no_proposals(n):
+    assert len(segmenter().segment(np.zeros((n, 4), np.float32))) == 0
+    assert len(segmenter(AHEAD).segment(np.zeros((n, 4), np.float32))) == 0
+    assert len(segmenter(height_m=None).segment(np.full((n, 4), 0.1, np.float32))) == 0
+
+
+def test_one_thing_alone_is_one_proposal():
+    points, on = scans.scan([(12.0, 3.0, *CAR)], step_deg=0.17)
+    proposals = segmenter().segment(points)
+    assert len(proposals) == 1
+    assert set(on[proposals.members]) == {1}
+    assert proposals.centroid[0] == pytest.approx(points[proposals.members, :3].mean(axis=0), abs=1e-4)
+    assert not proposals.truncated[0]
+    assert not proposals.occluded[0]
+
+
+def test_points_without_a_return_belong_to_nothing():
+    points, _ = scans.scan([(12.0, 3.0, *CAR)])
+    points[::7] = 0
+    label = segmenter().segment(points).label(len(points))
+    assert (label[::7] == NONE).all()
+    assert (label != NONE).any()
+
+
+def test_two_people_walking_together_are_two():
+    points, on = scans.scan([(8.0, 0.0, *PERSON), (8.0, 0.95, *PERSON)], step_deg=0.17, azimuth_deg=(-20, 20))
+    one, other = seen(points, on)
+    assert one[0] != other[0]
+    assert min(one[1:] + other[1:]) > 0.9
+
+
+def test_a_person_by_a_parked_car_and_one_by_a_wall_stand_alone():
+    boxes = [(10.0, -2.0, *CAR), (10.0, -0.5, *PERSON), (13.2, 6.0, *PERSON), (14.0, 6.0, 0.3, 16.0, 0.0, 2.5)]
+    points, on = scans.scan(boxes, step_deg=0.17, azimuth_deg=(-50, 60))
+    table = seen(points, on)
+    assert len({table[i][0] for i in range(3)}) == 3
+    for proposal, share, purity in table[:3]:
+        assert proposal != NONE
+        assert share > 0.9
+        assert purity > 0.9
+
+
+@pytest.mark.parametrize("range_m", [20.0, 30.0, 40.0])
+def test_a_far_car_is_in_one_piece(range_m):
+    points, on = scans.scan([(range_m, 0.3 * range_m, *CAR)], step_deg=0.17, azimuth_deg=(0, 40))
+    (proposal, share, purity) = seen(points, on)[0]
+    assert proposal != NONE
+    assert share > 0.95
+    assert purity == 1.0
+
+
+def test_what_hangs_above_a_car_is_not_joined_to_it():
+    points, on = scans.scan(
+        [(12.0, 0.0, *CAR), (12.0, 0.5, 5.0, 4.0, 2.2, 5.0)], 1.73, UP, step_deg=0.17, azimuth_deg=(-30, 30)
+    )
+    (_, share, purity), _ = seen(points, on)
+    assert share > 0.95
+    assert purity == 1.0
+
+
+def test_what_is_cut_by_something_nearer_says_so():
+    points, on = scans.scan([(18.0, 0.0, *CAR), (9.0, 0.3, 0.3, 0.6, 0.0, 2.0), (15.0, -12.0, *CAR)], step_deg=0.17)
+    proposals = segmenter().segment(points)
+    owner = [
+        np.bincount(on[proposals.members[a:b]]).argmax()
+        for a, b in zip(proposals.offsets, proposals.offsets[1:], strict=False)
+    ]
+    occluded = dict(zip(owner, proposals.occluded.tolist(), strict=True))
+    assert occluded == {1: True, 2: False, 3: False}
+
+
+def test_something_behind_the_seam_of_directions_is_not_occluded_by_itself():
+    points, _ = scans.scan([(0.5, -12.0, *CAR), (-12.0, 0.5, *CAR)], step_deg=0.17)
+    proposals = segmenter().segment(points)
+    assert len(proposals) == 2
+    assert not proposals.occluded.any()
+
+
+def test_the_field_of_view_keeps_what_reaches_into_it_whole():
+    boxes = [(10.0, 0.0, *CAR), (10.0, 10.5, *CAR), (-10.0, 0.0, *CAR), (20.0, -28.5, *CAR)]
+    points, on = scans.scan(boxes, step_deg=0.25)
+    proposals = segmenter(AHEAD).segment(points)
+    held = {
+        int(np.bincount(on[proposals.members[a:b]]).argmax())
+        for a, b in zip(proposals.offsets, proposals.offsets[1:], strict=False)
+    }
+    assert held == {1, 2}
+    label = proposals.label(len(points))
+    assert (label[(on == 2) & (points[:, 2] > -1.4)] != NONE).mean() > 0.95
+
+
+def test_what_the_margin_cuts_is_truncated():
+    points, _ = scans.scan([(16.0, 21.0, 5.0, 9.0, 0.0, 1.6)], step_deg=0.25)
+    proposals = segmenter(AHEAD).segment(points)
+    assert proposals.truncated.tolist() == [True]
+
+
+def test_the_same_sweep_gives_the_same_bytes():
+    points, _ = scans.scan([(12.0, 3.0, *CAR), (8.0, -4.0, *PERSON)])
+    stage = segmenter()
+    one, other = stage.segment(points), stage.segment(points.copy())
+    for name in ("members", "offsets", "centroid", "box", "truncated", "occluded"):
+        assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
+
+
+def test_the_order_of_the_points_does_not_change_who_belongs_together():
+    points, _ = scans.scan([(12.0, 3.0, *CAR), (8.0, -4.0, *PERSON), (14.0, -8.0, 0.3, 20.0, 0.0, 2.5)])
+    order = np.random.default_rng(2).permutation(len(points))
+    straight = segmenter().segment(points).label(len(points))
+    assert reference.same_partition(segmenter().segment(points[order]).label(len(points)), straight[order])
+
+
+def test_an_unknown_height_is_as_good_as_a_known_one():
+    points, _ = scans.scan([(12.0, 3.0, *CAR), (8.0, -4.0, *PERSON)], 0.9)
+    known = segmenter(height_m=0.9).segment(points).label(len(points))
+    found = segmenter(height_m=None).segment(points).label(len(points))
+    assert (known == found).mean() > 0.999
+
+
+def test_a_small_robot_indoors_finds_the_person_before_it():
+    walls = [(6.0, 0.0, 0.2, 12.0, 0.0, 2.5), (0.0, 5.0, 12.0, 0.2, 0.0, 2.5), (0.0, -5.0, 12.0, 0.2, 0.0, 2.5)]
+    points, on = scans.scan([(3.0, 1.0, *PERSON), *walls], 0.3, scans.VLP_16, step_deg=0.2)
+    proposals = segmenter(height_m=0.3, min_range_m=0.3, max_range_m=30.0, elevation_step_deg=2.0).segment(points)
+    label = proposals.label(len(points))
+    mine = np.bincount(label[(on == 1) & (points[:, 2] > 0.0)] + 1)
+    assert mine.argmax() > 0
+    assert (on[label == mine.argmax() - 1] == 1).mean() > 0.95
+
+
+def test_a_dense_sweep_stays_within_its_memory():
+    boxes = [(8.0 + 3 * i, (-1) ** i * (3.0 + i), *CAR) for i in range(8)] + [(0.0, 20.0, 90.0, 1.0, 0.0, 6.0)]
+    points, _ = scans.scan(boxes, elevation=np.deg2rad(np.linspace(-24, 14, 128)), step_deg=0.176)
+    assert len(points) > 150_000
+    stage = segmenter()
+    stage.segment(points)
+    tracemalloc.start()
+    stage.segment(points)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 60e6

@@ -1,0 +1,54 @@
+"""What the ledger costs: a stage's booking, a frame's, and their share of a frame of a recorded stream."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+from modt import host, profile
+from modt.cli.replay import frames
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("path", nargs="?", type=Path, help="stream (default: the embedded one)")
+    parser.add_argument("--frames", type=frames, default=(0, 60), metavar="A:B")
+    parser.add_argument("--fov", choices=("camera", "full"), default="full")
+    parser.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
+    arguments = parser.parse_args()
+    host.confine(host.last_core())
+    from modt.cli import assemble
+    from modt.energy.ledger import STAGES, Ledger, NullLedger
+
+    ledger = Ledger()
+    print(f"by its own measure: {ledger.span_overhead_ns} ns a call, {ledger.frame_overhead_ns} ns a frame")
+    empty_us = {}
+    for name, books in (("ledger", ledger), ("null", NullLedger())):
+        began_ns = time.thread_time_ns()
+        for index in range(arguments.repeat):
+            for stage in STAGES:
+                books.run(stage, len, ())
+            books.close_frame(index)
+        empty_us[name] = 1e-3 * (time.thread_time_ns() - began_ns) / arguments.repeat
+    cost_us = empty_us["ledger"] - empty_us["null"]
+    print(f"a frame of {len(STAGES)} empty stages: {cost_us:.1f} us more than without a ledger")
+    request = assemble.Request(path=arguments.path, fov=arguments.fov, frames=arguments.frames)
+    stream = assemble.stream(request)
+    for mode in assemble.MODES:
+        chosen, loaded = assemble.MODES[mode], profile.load()
+        whole = assemble.pipeline(chosen, loaded, assemble.field_of_view(request, stream), ledger)
+        count = cpu_ns = 0
+        budget = chosen.budget(loaded)
+        for frame in stream:
+            began_ns = time.thread_time_ns()
+            whole.step(frame, budget)
+            ledger.close_frame(frame.index)
+            cpu_ns += time.thread_time_ns() - began_ns
+            count += 1
+        share = 1e3 * cost_us * count / cpu_ns
+        print(f"{mode:<14}{1e-6 * cpu_ns / count:8.2f} ms a frame; the ledger is {100 * share:.3f} %")
+
+
+if __name__ == "__main__":
+    main()
