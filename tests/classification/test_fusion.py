@@ -15,7 +15,15 @@ from modt.config import FusionConfig
 from modt.types import NONE, Float64, Proposals, Tracks
 from tests.classification.scenes import blobs, seen
 
-PAPER = FusionConfig(prior=(0.25, 0.25, 0.25), start_frame=1, view_weight=1.0, reopen_ratio=None)
+PAPER = FusionConfig(
+    prior=(0.25, 0.25, 0.25),
+    start_frame=1,
+    view_weight=1.0,
+    reopen_ratio=None,
+    bearing_deg=20.0,
+    range_ratio=0.2,
+    extent_ratio=0.3,
+)
 ALL = (EveryFrame(), FirstView(), KeyViews(FusionConfig()), KeyViews(PAPER))
 
 
