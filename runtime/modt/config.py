@@ -162,8 +162,8 @@ class SchedulerConfig(StageConfig):
 class FusionConfig(StageConfig):
     """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
 
-    threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
-    background_threshold: float = _number(0.95, 0.25, 1.0, "", "the same, of background")
+    threshold: float = _number(0.9, 0.25, 1.0, "", "posterior at which an object's class is fixed")
+    background_threshold: float = _number(0.4, 0.25, 1.0, "", "that of background, were all classes as common")
     view_weight: float = _number(1.0, 0.0, 1.0, "", "share of a further view's evidence; 1: as if independent")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
@@ -178,7 +178,7 @@ class FusionConfig(StageConfig):
     reopen_ratio: float | None = _number(
         3.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
     )
-    reopen_points: int = _number(200, 0, 10000, "", "a class settled from so many is never doubted")
+    reopen_points: int = _number(400, 0, 10000, "", "a class settled from so many is never doubted")
     start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
 
 
