@@ -45,11 +45,14 @@ def _garden(builder: Builder, road: Road, side: int, x: float, length: float, se
         border = (scenery.fence, scenery.hedge, scenery.wall)[make]
         builder.scenery(border(rng, run), *road.place(x + run / 2, side * edge))
     deep = max(set_back - 0.5 - edge, 1.5)
-    for _ in range(int(rng.integers(2, 6))):
+    for _ in range(int(rng.integers(1, 4))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(0.8, deep)))
         builder.scenery(scenery.shrub(rng, rng.uniform(0.5, 1.6)), *spot)
+    for _ in range(int(rng.choice(3, p=[0.65, 0.27, 0.08]))):
+        off = edge + rng.uniform(0.8, deep)
+        builder.scenery(scenery.thicket(rng), *road.place(x + rng.uniform(0, length), side * off, rng.normal(0, 0.5)))
     middle = road.place(x + length / 2, side * (edge + deep / 2))
-    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.1 * length * deep))), *middle)
+    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.04 * length * deep))), *middle)
     for _ in range(int(rng.choice(3, p=[0.5, 0.35, 0.15]))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(1.0, deep)))
         builder.scenery(scenery.tree(rng), *spot)
