@@ -40,7 +40,7 @@ def figures(scans: Iterable[Scan]) -> dict[str, str]:
         for near, far in pairwise(RINGS):
             ring = (rho >= near) & (rho < far)
             sums[f"points {near}-{far} m, low (z < -1.3 m)"].append(float((ring & (z < -1.3)).sum()))
-            sums[f"points {near}-{far} m, up to 0.9 m over ground"].append(
+            sums[f"points {near}-{far} m, upright (z -1.3 to 0.9 m)"].append(
                 float((ring & (z > -1.3) & (z < 0.9)).sum())
             )
         sums["points beyond 50 m"].append(float((rho > 50).sum()))

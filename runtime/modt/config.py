@@ -165,23 +165,23 @@ class SchedulerConfig(StageConfig):
 class FusionConfig(StageConfig):
     """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
 
-    threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
-    background_threshold: float = _number(0.95, 0.25, 1.0, "", "the same, of background")
+    threshold: float = _number(0.9, 0.25, 1.0, "", "posterior at which an object's class is fixed")
+    background_threshold: float = _number(0.4, 0.25, 1.0, "", "that of background, were all classes as common")
     view_weight: float = _number(1.0, 0.0, 1.0, "", "share of a further view's evidence; 1: as if independent")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
     )
-    background_alpha: float = _number(0.5, 0.0, 10.0, "", "the same, of what looks like background")
+    background_alpha: float = _number(1.0, 0.0, 10.0, "", "the same, of what looks like background")
     prior: tuple[float, float, float] = _per_class(
         0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
     )
-    bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
-    range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")
-    extent_ratio: float = _number(0.3, 0.0, 10.0, "", "change of size that makes it independent")
+    bearing_deg: float = _number(40.0, 0.0, 180.0, "deg", "change of view that makes it independent")
+    range_ratio: float = _number(0.4, 0.0, 10.0, "", "change of distance that makes it independent")
+    extent_ratio: float = _number(0.6, 0.0, 10.0, "", "change of size that makes it independent")
     reopen_ratio: float | None = _number(
-        4.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
+        3.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
     )
-    reopen_points: int = _number(60, 0, 10000, "", "a class settled from so many is never doubted")
+    reopen_points: int = _number(400, 0, 10000, "", "a class settled from so many is never doubted")
     start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
 
 
@@ -200,6 +200,13 @@ class EnergyConfig(StageConfig):
     seg_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one segmentation")
     class_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one classification")
     point_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one point classified")
+
+    @property
+    def coefficients(self) -> tuple[float, float, float] | None:
+        """Those of a calibration [J], None unless there are all three."""
+        if self.seg_J is None or self.class_J is None or self.point_J is None:
+            return None
+        return self.seg_J, self.class_J, self.point_J
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from modt.sources.synthetic.materials import Material
-from modt.sources.synthetic.pieces import CUTS, SOLID, Pieces
+from modt.sources.synthetic.pieces import NO_CUTS, SOLID, Pieces
 from modt.types import Bool, Float64, Int
 
 
@@ -145,7 +145,7 @@ def _bars(start: Float64, end: Float64, depth: Float64, breadth: Float64, materi
         centre=((start + end) / 2).astype(np.float32),
         half=np.column_stack([semi, length / 2]).astype(np.float32),
         quadric=np.column_stack([semi**-2.0, np.zeros(n)]).astype(np.float32),
-        cuts=np.tile(np.array([0, 0, 0, 1], np.float32), (n, CUTS, 1)),
+        cuts=NO_CUTS.repeat(n, axis=0),
         density=np.full(n, SOLID, np.float32),
         material=np.full(n, material, np.int64),
         body=body,
@@ -160,7 +160,7 @@ def _balls(centre: Float64, semi: Float64, material: int, body: Int) -> Pieces:
         centre=centre.astype(np.float32),
         half=semi.astype(np.float32),
         quadric=(semi**-2.0).astype(np.float32),
-        cuts=np.tile(np.array([0, 0, 0, 1], np.float32), (n, CUTS, 1)),
+        cuts=NO_CUTS.repeat(n, axis=0),
         density=np.full(n, SOLID, np.float32),
         material=np.full(n, material, np.int64),
         body=body,

@@ -17,6 +17,7 @@ NARROW_M = 0.3
 """Half the least side of a piece that a beam may graze on both sides."""
 
 SOLID = np.float32(np.inf)
+NO_CUTS: Float32 = np.tile(np.array([0, 0, 0, 1], np.float32), (1, CUTS, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +99,11 @@ class Pieces:
         n = len(centre)
         R = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]], np.float32)
         return cls(
-            rotation=np.broadcast_to(R, (n, 3, 3)).copy(),
+            rotation=R[None].repeat(n, axis=0),
             centre=centre.astype(np.float32),
             half=half.astype(np.float32),
             quadric=quadric.astype(np.float32),
-            cuts=np.tile(np.array([0, 0, 0, 1], np.float32), (n, CUTS, 1)),
+            cuts=NO_CUTS.repeat(n, axis=0),
             density=np.full(n, SOLID, np.float32),
             material=np.full(n, material, np.int64),
             body=np.zeros(n, np.int64),

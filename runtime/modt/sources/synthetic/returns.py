@@ -65,7 +65,7 @@ class Receiver:
         level = 1 / np.sqrt(1 + slope * slope)
         ground = group < 0
         tangent = np.abs(self.sensor.tangent[:, None]) / self.secant
-        return np.where(ground, tangent + np.float32(0.02), np.where(same, level, np.float32(0.7))).astype(np.float32)
+        return np.where(ground, tangent + np.float32(0.05), np.where(same, level, np.float32(0.7))).astype(np.float32)
 
     def _smear(self, ranged: Float32, near: Float32, heard: Bool, chance: Float32) -> None:
         """Where a beam is split by an edge, some returns mix both surfaces and some of the nearer one come late."""

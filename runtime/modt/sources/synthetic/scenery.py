@@ -72,16 +72,30 @@ def shrub(rng: np.random.Generator, size: float) -> Pieces:
     return Pieces.join(parts)
 
 
+def thicket(rng: np.random.Generator) -> Pieces:
+    """A tangle of bushes the size of a car, or a few of them."""
+    length, tall = rng.uniform(2.0, 7.0), rng.uniform(0.9, 3.0)
+    parts = []
+    for _ in range(int(rng.integers(4, 10))):
+        r = rng.uniform(0.35, 1.0)
+        x, y = rng.uniform(-0.5, 0.5) * length, rng.normal(0.0, 0.5)
+        z = rng.uniform(0.2, 0.9) * tall
+        semi = (r, r * rng.uniform(0.6, 1.2), r * rng.uniform(0.5, 1.2))
+        parts.append(ellipsoid((x, y, z), semi, Material.FOLIAGE, rng.uniform(0.8, 4.0)))
+    return Pieces.join(parts)
+
+
 def tree(rng: np.random.Generator) -> Pieces:
-    """A tree: trunk, perhaps a fork, and a canopy of leafy lumps."""
-    radius, bare = rng.uniform(0.08, 0.28), rng.uniform(1.7, 3.2)
+    """A tree: trunk, perhaps bushes at its foot, and a canopy of leafy lumps, some of which hang low."""
+    radius = rng.uniform(0.08, 0.28)
+    bare = rng.uniform(0.7, 1.7) if rng.random() < 0.4 else rng.uniform(1.7, 3.2)
     parts = [cylinder((0.0, 0.0, bare / 2 + 0.5), radius, bare + 1.0, Material.BARK)]
     spread, tall = rng.uniform(1.2, 2.8), rng.uniform(2.0, 4.5)
-    for _ in range(int(rng.integers(3, 7))):
-        x, y = rng.normal(0.0, 0.4 * spread, 2)
-        z = bare + rng.uniform(0.25, 1.0) * tall
-        r = spread * rng.uniform(0.45, 0.75)
-        parts.append(ellipsoid((x, y, z), (r, r, 0.8 * r), Material.FOLIAGE, rng.uniform(0.6, 1.6)))
+    for _ in range(int(rng.integers(4, 10))):
+        x, y = rng.normal(0.0, 0.5 * spread, 2)
+        z = bare + rng.uniform(0.1, 1.0) * tall
+        r = spread * rng.uniform(0.2, 0.65)
+        parts.append(ellipsoid((x, y, z), (r, r, 0.8 * r), Material.FOLIAGE, rng.uniform(0.6, 2.0)))
     if rng.random() < 0.4:
         parts.append(ellipsoid((0.0, 0.0, 0.3), (0.5, 0.5, 0.5), Material.FOLIAGE, 4.0))
     return Pieces.join(parts)
