@@ -37,6 +37,11 @@ class Calibration:
             (bias / self.temperature + self.offset).astype(np.float32),
         )
 
+    @classmethod
+    def of_dict(cls, report: dict[str, Any]) -> Calibration:
+        """From a report."""
+        return cls(float(report["temperature"]), np.array(report["offset"]))
+
     def as_dict(self) -> dict[str, Any]:
         """For a report."""
         return {"temperature": round(self.temperature, 4), "offset": [round(float(v), 4) for v in self.offset]}

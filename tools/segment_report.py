@@ -164,9 +164,7 @@ def stage_times(stage: Segmenter, points: Float32) -> dict[str, float]:
     sweep = Columns.of(points)
     above = stage.sensor_height.of(sweep)
     height = stage.ground.height(sweep, above)
-    rows = np.flatnonzero(
-        (height > stage.config.clearance_m) & (height < stage.config.max_height_m) & (sweep.root > 1)
-    )
+    rows = np.flatnonzero(stage.raised(sweep, height))
     raised, tall = sweep.take(rows), height[rows]
     whole = {"all": cpu_ms(lambda: stage.segment(points)), "columns": cpu_ms(lambda: Columns.of(points))}
     whole["ground"] = cpu_ms(lambda: stage.ground.height(sweep, above))

@@ -136,7 +136,7 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
     calibration = fit(out[clear], label[clear])
     probability = calibration.apply(out)
     there = np.isin(data.truth_drive, data.drive[judged])
-    found = np.bincount(data.truth_label[there], minlength=N_CLASSES)
+    found = np.bincount(data.truth_label[there] if there.any() else label, minlength=N_CLASSES)
     return calibration, {
         "average_precision": average_precision(probability, label, found),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], found[1:], strict=True)},
@@ -153,6 +153,7 @@ def main() -> None:
     parser.add_argument("--epochs", type=float, default=40)
     parser.add_argument("--fold-epochs", type=float, help="of each fold's network; as many as --epochs without it")
     parser.add_argument("--folds", type=int, default=0, help="cross-validate first; 0: leave that out")
+    parser.add_argument("--judged", type=Path, help="report.json of a cross-validated run whose calibration to take")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
     torch.set_num_threads(1)
@@ -165,7 +166,11 @@ def main() -> None:
     report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "crops_sha256": data.sha256}
     report |= {"provenance": data.provenance, "torch": torch.__version__}
     calibration = Calibration.none()
-    if args.folds:
+    if args.judged:
+        earlier = json.loads(args.judged.read_text(encoding="utf-8"))
+        calibration = Calibration.of_dict(earlier["calibration"])
+        report["cross_validation"] = earlier["cross_validation"]
+    elif args.folds:
         steps = round(per_epoch * (args.fold_epochs or args.epochs) * (1 - 1 / args.folds))
         calibration, report["cross_validation"] = cross_validate(data, args.folds, steps, args.seed)
         print(json.dumps(report["cross_validation"]))

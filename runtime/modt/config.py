@@ -114,6 +114,7 @@ class TrackingConfig(StageConfig):
     gamma: float = _number(0.1, 0.0, 10.0, "", "weight of the difference of size")
     t_da: float = _number(0.95, 0.0, 100.0, "", "highest cost of an association")
     max_missed: int = _number(8, 0, 100, "frames", "without a proposal before a track is deleted (N of a9 and a14)")
+    ask_from: int = _number(3, 1, 100, "frames", "with a proposal before a class is asked for; flicker never asks")
     position_sigma_m: float = _number(0.3, 0.01, 5.0, "m", "of a measured position")
     acceleration_sigma_mps2: float = _number(2.0, 0.01, 50.0, "m/s2", "process noise of the speed")
     turn_sigma_radps: float = _number(0.3, 0.001, 10.0, "rad/s", "process noise of the heading")
@@ -124,7 +125,9 @@ class TrackingConfig(StageConfig):
 class BoxTrackingConfig(StageConfig):
     """Tracking of whole boxes that another detector has found, one class at a time."""
 
-    strong_score: float = _number(0.0, -1e3, 1e3, "", "detections of this score begin a track; weaker ones continue one")
+    strong_score: float = _number(
+        0.0, -1e3, 1e3, "", "detections of this score begin a track; weaker ones continue one"
+    )
     sure_score: float = _number(3.0, -1e3, 1e3, "", "mean score from which a track is reported at once")
     min_hits: int = _number(2, 1, 100, "frames", "detections after which any track is reported")
     max_missed: int = _number(8, 0, 100, "frames", "without a detection before a track is deleted")
@@ -162,23 +165,23 @@ class SchedulerConfig(StageConfig):
 class FusionConfig(StageConfig):
     """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
 
-    threshold: float = _number(0.95, 0.25, 1.0, "", "posterior at which a class is fixed")
-    background_threshold: float = _number(0.95, 0.25, 1.0, "", "the same, of background")
+    threshold: float = _number(0.9, 0.25, 1.0, "", "posterior at which an object's class is fixed")
+    background_threshold: float = _number(0.4, 0.25, 1.0, "", "that of background, were all classes as common")
     view_weight: float = _number(1.0, 0.0, 1.0, "", "share of a further view's evidence; 1: as if independent")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
     )
-    background_alpha: float = _number(0.5, 0.0, 10.0, "", "the same, of what looks like background")
+    background_alpha: float = _number(1.0, 0.0, 10.0, "", "the same, of what looks like background")
     prior: tuple[float, float, float] = _per_class(
         0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
     )
-    bearing_deg: float = _number(20.0, 0.0, 180.0, "deg", "change of view that makes it independent")
-    range_ratio: float = _number(0.2, 0.0, 10.0, "", "change of distance that makes it independent")
-    extent_ratio: float = _number(0.3, 0.0, 10.0, "", "change of size that makes it independent")
+    bearing_deg: float = _number(40.0, 0.0, 180.0, "deg", "change of view that makes it independent")
+    range_ratio: float = _number(0.4, 0.0, 10.0, "", "change of distance that makes it independent")
+    extent_ratio: float = _number(0.6, 0.0, 10.0, "", "change of size that makes it independent")
     reopen_ratio: float | None = _number(
-        4.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
+        3.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
     )
-    reopen_points: int = _number(60, 0, 10000, "", "a class settled from so many is never doubted")
+    reopen_points: int = _number(400, 0, 10000, "", "a class settled from so many is never doubted")
     start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
 
 
@@ -197,6 +200,13 @@ class EnergyConfig(StageConfig):
     seg_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one segmentation")
     class_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one classification")
     point_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one point classified")
+
+    @property
+    def coefficients(self) -> tuple[float, float, float] | None:
+        """Those of a calibration [J], None unless there are all three."""
+        if self.seg_J is None or self.class_J is None or self.point_J is None:
+            return None
+        return self.seg_J, self.class_J, self.point_J
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

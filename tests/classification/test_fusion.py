@@ -15,7 +15,15 @@ from modt.config import FusionConfig
 from modt.types import NONE, Float64, Proposals, Tracks
 from tests.classification.scenes import blobs, seen
 
-PAPER = FusionConfig(prior=(0.25, 0.25, 0.25), start_frame=1, view_weight=1.0, reopen_ratio=None)
+PAPER = FusionConfig(
+    prior=(0.25, 0.25, 0.25),
+    start_frame=1,
+    view_weight=1.0,
+    reopen_ratio=None,
+    bearing_deg=20.0,
+    range_ratio=0.2,
+    extent_ratio=0.3,
+)
 ALL = (EveryFrame(), FirstView(), KeyViews(FusionConfig()), KeyViews(PAPER))
 
 
@@ -119,13 +127,23 @@ def test_an_early_view_is_forgotten_at_the_starting_frame() -> None:
 def test_a_class_settled_from_afar_is_looked_at_again_from_near() -> None:
     _, proposals = blobs([10, 10, 100], np.random.default_rng(0))
     tracks = seen(proposals)
-    fusion = KeyViews(FusionConfig(reopen_ratio=4.0, reopen_points=60))
+    config = FusionConfig(reopen_ratio=4.0, reopen_points=60)
+    fusion = KeyViews(config)
     sure = np.tile([0.99, 0.005, 0.0025, 0.0025], (3, 1))
     assert fusion.fuse(tracks, proposals, np.arange(3), sure).all()
     tracks.proposal[1] = NONE
     near = moved(proposals, offsets=np.array([0, 50, 100, 600]))
     settled = np.zeros(3, np.bool_)
     assert fusion.asks(tracks, near, settled).tolist() == [True, False, False]
+    doubt = np.array([[0.3, 0.5, 0.1, 0.1]])
+    assert not fusion.fuse(tracks, near, np.array([0]), doubt).any()
+    prior = np.append(1 - sum(config.prior), config.prior)
+    expected = (sure[0] / prior) ** (10 / 50) * doubt[0]  # what was known counts by its share of the points
+    np.testing.assert_allclose(tracks.posterior[0], expected / expected.sum(), rtol=1e-6)
+    nearer = moved(proposals, offsets=np.array([0, 200, 210, 310]))
+    tracks.age[:] = 9
+    assert fusion.asks(tracks, nearer, settled)[0]
+    tracks.fixed[0] = True
     never = KeyViews(FusionConfig(reopen_ratio=None))
     assert not never.asks(tracks, near, settled).any()
 

@@ -32,7 +32,7 @@ def test_neutral_parameters_are_the_papers_equation(seg: float, item: float, n: 
     paper = PaperModel(seg, item, n_obj=1.0, n_bg=n - 1.0, n_go=run.n_go)
     assert found.model.gamma == pytest.approx(paper.gamma)
     assert found.paper.gamma == pytest.approx(paper.gamma)
-    assert found.short_form_error == pytest.approx(paper.short_form_error)
+    assert found.paper.short_form_error == pytest.approx(paper.short_form_error)
 
 
 counts = st.builds(
@@ -46,9 +46,9 @@ counts = st.builds(
 @given(counts, st.floats(1e-6, 1e-2), st.floats(0, 1e-2), st.floats(0, 100))
 def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: float, measured: float) -> None:
     found = predict(baseline(), run, replace(COSTS, seg=seg), Beside(1e-3, choose), Beside(2e-3, 2 * choose))
-    assert found.gamma_short + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
+    assert found.paper.gamma_short + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
     explained = found.explain(measured)
-    assert found.gamma_short + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
+    assert found.paper.gamma_short + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
     assert explained[-1].gamma == measured
 
 

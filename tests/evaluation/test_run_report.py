@@ -200,8 +200,8 @@ def test_every_figure_carries_its_kind(run):
 def test_text_answers_first_and_fits_a_terminal(run):
     text = run_text(run_tree(run))
     assert text.splitlines()[2].startswith("  300 mJ a frame, ")
-    assert max(map(len, text.splitlines())) <= 118
-    assert "95 % in brackets" in text
+    assert max(map(len, text.splitlines())) <= 100
+    assert "In brackets: 95 %" in text
 
 
 def test_page_is_one_self_contained_file(run):

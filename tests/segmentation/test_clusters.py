@@ -25,11 +25,11 @@ def cloud(seed, n, spread):
 
 
 def cells_of(grid, points, height):
-    sample, cell = grid.occupy(grid.place(points))
-    row, column = np.divmod(grid.place(points)[sample], grid.side)
+    row, column = grid.row_and_column(points)
+    sample, cell = grid.occupy(grid.place(row, column))
     low = np.array([height[cell == i].min() for i in range(len(sample))], np.float32)
     high = np.array([height[cell == i].max() for i in range(len(sample))], np.float32)
-    return Cells(row, column, low, high, points.root[sample]), cell
+    return Cells(row[sample], column[sample], low, high, points.root[sample]), cell
 
 
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 250), spread=st.floats(0.05, 3.0))
@@ -63,7 +63,7 @@ def test_the_grid_stays_between_two_euclidean_radii(seed, n, spread):
 def test_every_point_is_in_the_cell_of_its_place(seed, n):
     points = Columns.of(cloud(seed, n, 1.0))
     grid = RootGrid(STEP, 80.0)
-    place = grid.place(points)
+    place = grid.place(*grid.row_and_column(points))
     sample, cell = grid.occupy(place)
     assert np.array_equal(place[sample][cell], place)
     assert len(np.unique(place)) == len(sample)

@@ -110,3 +110,16 @@ def test_a_line_that_does_not_fit_is_taken_back(tmp_path):
 def test_a_folder_that_is_not_there_is_one_clear_error(tmp_path):
     with pytest.raises(ModtError, match="No such file"):
         JsonLines(tmp_path / "none" / "r.jsonl")
+
+
+def test_records_of_other_named_schemas_are_passed_over(tmp_path):
+    path = tmp_path / "mixed.jsonl"
+    lines = JsonLines(path)
+    for k in range(3):
+        lines.write({"schema": "modt.ledger/1", "frame": k})
+        lines.write({"schema": "modt.energy/1", "window": k})
+    lines.close()
+    assert [r["frame"] for r in read_records(path, "modt.ledger/1", beside={"modt.energy/1"})] == [0, 1, 2]
+    assert [r["window"] for r in read_records(path, "modt.energy/1", beside={"modt.ledger/1"})] == [0, 1, 2]
+    with pytest.raises(MisuseError, match=r"mixed\.jsonl:2"):
+        list(read_records(path, "modt.ledger/1"))

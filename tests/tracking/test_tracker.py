@@ -16,7 +16,7 @@ EYE = np.eye(4)
 
 @pytest.fixture(params=ASSOCIATIONS)
 def tracker(request):
-    return Tracker(TrackingConfig(association=request.param), EFFICIENT)
+    return Tracker(TrackingConfig(association=request.param, ask_from=1), EFFICIENT)
 
 
 def names(tracker):
@@ -88,7 +88,7 @@ def test_a_track_that_waits_for_its_class_is_followed_and_dies_like_others(track
 
 
 def test_doubt_is_asked_again_until_it_is_gone():
-    tracker = Tracker(TrackingConfig(), ACCURATE)
+    tracker = Tracker(TrackingConfig(ask_from=1), ACCURATE)
     tracker.follow(*frame_of([box(10, 0)], 0, EYE))
     tracker.settle(np.array([0]), np.array([False]))
     assert names(tracker) == ["tracked_unclassified"]

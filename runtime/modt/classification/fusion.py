@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.config import FusionConfig
 from modt.geometry import wrap
-from modt.types import N_CLASSES, NONE, Bool, Float64, Int, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
 _FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
@@ -86,7 +86,8 @@ class KeyViews:
     The network's word is a posterior under the frequency of the classes among proposals, the prior; Equation 6
     multiplies likelihoods, so each further view is divided by the prior, lest that be counted once a view. Views of
     one object are never wholly independent: a further one may be given less than its full weight. And a class that
-    was settled from afar is looked at again when the object shows several times the points.
+    was settled from afar is looked at again when the object shows several times the points, and what was known counts
+    only by its share of these.
 
     Args:
         config: thresholds of independence and certainty.
@@ -98,12 +99,11 @@ class KeyViews:
         objects = np.array(config.prior)
         prior = np.maximum(np.append(1.0 - objects.sum(), objects), _FLOOR)
         self._log_prior = np.log(prior / prior.sum())
-        self._threshold = np.array([config.background_threshold, *[config.threshold] * (N_CLASSES - 1)])
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """Those asking that were never classified or show an independent view, and the settled that came close."""
         seen = tracks.proposal != NONE
-        asks: Bool = asking & ~tracks.fixed & seen
+        asks: Bool = (asking | (tracks.key_points > 0)) & ~tracks.fixed & seen
         rows = np.flatnonzero(asks)
         first = tracks.key_points[rows] == 0
         started = tracks.age[rows] >= self.config.start_frame
@@ -142,13 +142,26 @@ class KeyViews:
         view = np.log(_sane(likelihood))
         evidence = self.config.view_weight * (view - self._log_prior)
         fused = (tracks.views[rows] > 0)[:, None]
-        posterior = _normal(np.where(fused, np.log(_sane(tracks.posterior[rows])) + evidence, view))
-        certain: Bool = np.any(posterior >= self._threshold, axis=1)
+        past = np.log(_sane(tracks.posterior[rows])) - self._log_prior
+        share = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
+        past *= np.where(tracks.fixed[rows], np.minimum(share, 1.0), 1.0)[:, None]
+        posterior = _normal(np.where(fused, self._log_prior + past + evidence, view))
+        certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
-        tracks.fixed[rows] |= certain
+        tracks.fixed[rows] = certain
         tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
         _remember(tracks, proposals, rows)
         return certain
+
+    def _certain(self, posterior: Float64) -> Bool:
+        """(R,) whether an object's posterior, or the evidence for background, reaches its threshold.
+
+        Most proposals are background before anyone looks, so its posterior is high for nothing. What counts for it is
+        what it would be if all classes were equally common.
+        """
+        objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self.config.threshold
+        evidence = _normal(np.log(posterior) - self._log_prior)[:, 0]
+        return objects | (evidence >= self.config.background_threshold)
 
 
 def _sane(probability: Float64) -> Float64:

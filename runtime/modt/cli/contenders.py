@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.evaluation.comparison import Contender, Watched, interleave
 from modt.evaluation.trials import Trial
-from modt.types import Budget
+from modt.types import Budget, Frame
 
 BASELINE = "conventional"
 MODES = (BASELINE, "efficient", "accurate")
@@ -56,7 +57,12 @@ class Contest:
         stream = assemble.stream(self.request)
         turn, metered = self.turns()
         contenders = [self._contender(name, number, metered) for name in (*MODES, VARIED)]
-        interleave(stream, contenders, turn)
+        frames = iter(stream)
+        first = list(islice(frames, 1))
+        for frame in first:
+            for contender in contenders:
+                _warm_up(contender, frame)
+        interleave(chain(first, frames), contenders, turn)
         return Trial(contenders)
 
     def _contender(self, name: str, number: int, metered: bool) -> Contender:
@@ -73,6 +79,13 @@ class Contest:
             budget=varied_load(number) if name == VARIED else _constant(mode.budget(self.profile)),
             windows=metering.windows(self.profile.energy, self.core, self.meter) if metered else None,
         )
+
+
+def _warm_up(contender: Contender, frame: Frame) -> None:
+    """First calls allocate and load; they are not what a frame costs. Neither part remembers anything of them."""
+    parts = contender.pipeline
+    proposals = parts.segmenter.segment(frame.points)
+    parts.classifier.classify(frame.points, proposals, np.arange(len(proposals)))
 
 
 def varied_load(seed: int) -> Callable[[int], Budget]:

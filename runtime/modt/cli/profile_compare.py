@@ -68,8 +68,14 @@ def run(arguments: argparse.Namespace) -> int:
     if not done:
         raise MisuseError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
     turn, metered = contest.turns()
+    board = loaded.energy
     basis = Basis(
-        loaded.energy.idle_W, loaded.energy.busy_W, stream.info.period_s, chosen.facts.name, chosen.facts.kind
+        idle_W=board.idle_W,
+        busy_W=board.busy_W,
+        period_s=stream.info.period_s,
+        meter=chosen.facts.name,
+        kind=chosen.facts.kind,
+        coefficients=board.coefficients,
     )
     about: dict[str, Any] = {
         "stream": stream.info.name,
@@ -78,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
         "repeat": arguments.repeat,
         "turn": min(turn, done),
         "basis": "as run" if metered else f"at {1 / stream.info.period_s:.0f} Hz",
-        "board": loaded.energy.board,
+        "board": board.board,
         "conditions": {**Conditions(pinned or 0).read(), "core": pinned},
         "host": host.description(),
     }

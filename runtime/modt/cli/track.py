@@ -21,9 +21,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("detections", type=Path, metavar="DETECTIONS", help="a file a sequence, or a folder of them")
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="KITTI tracking results go here")
     motion = p.add_mutually_exclusive_group()
-    motion.add_argument("--poses", type=Path, metavar="FILE", help="camera poses, KITTI odometry; or a folder of them")
+    motion.add_argument(
+        "--poses", type=Path, metavar="FILE", help="camera poses, KITTI odometry; or a folder of them"
+    )
     motion.add_argument("--oxts", type=Path, metavar="DIR", help="OXTS records, KITTI tracking; calib/ beside it")
-    p.add_argument("--period", type=float, default=PERIOD_S, metavar="S", help="between frames (default: %(default)g)")
+    p.add_argument(
+        "--period", type=float, default=PERIOD_S, metavar="S", help="between frames (default: %(default)g)"
+    )
     p.add_argument("--quiet", action="store_true", help="no summary")
     p.set_defaults(run=run)
 

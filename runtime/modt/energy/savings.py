@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from modt.energy.prediction import PaperModel
+
 
 @dataclass(frozen=True, slots=True)
 class Counts:
@@ -176,18 +178,8 @@ class Prediction:
     """
 
     model: Model
-    paper: Model
+    paper: PaperModel
     terms: tuple[Deviation, ...]
-
-    @property
-    def gamma_short(self) -> float:
-        """The paper's approximation, N_go."""
-        return self.paper.n_go
-
-    @property
-    def short_form_error(self) -> float:
-        """Relative error of gamma = N_go against Equation 3 in full at this a."""
-        return self.gamma_short / self.paper.gamma - 1.0
 
     def explain(self, measured: float) -> tuple[Deviation, ...]:
         """The terms, and what none of them explains, up to the ratio measured."""
@@ -207,7 +199,8 @@ def predict(baseline: Counts, run: Counts, costs: UnitCosts, beside1: Beside, be
     """
     tracks = run.tracks or 1
     e_class = costs.e_class(baseline)
-    paper = Model(e_seg=costs.seg, e_class=e_class, n=baseline.n, n_go=run.n_go)
+    n_obj, n = baseline.n_obj, baseline.n
+    paper = PaperModel(e_seg=costs.seg, e_class=e_class, n_obj=n_obj, n_bg=n - n_obj, n_go=run.n_go)
     repeats = run.classified - run.classified_tracks - run.refound
     steps: tuple[tuple[str, dict[str, float]], ...] = (
         ("tracks that end unclassified", {"reached": run.classified_tracks / tracks}),
@@ -225,7 +218,7 @@ def predict(baseline: Counts, run: Counts, costs: UnitCosts, beside1: Beside, be
         ("scheduling and fusion", {"choose1": beside1.choose, "choose2": beside2.choose}),
     )
     terms = [Deviation("segmentation is not free (Equation 3 in full)", paper.gamma - paper.n_go, paper.gamma)]
-    model = paper
+    model = Model(e_seg=costs.seg, e_class=e_class, n=n, n_go=run.n_go)
     for name, change in steps:
         before, model = model.gamma, replace(model, **change)
         terms.append(Deviation(name, model.gamma - before, model.gamma))

@@ -185,11 +185,3 @@ class Windows:
         self._stages: dict[str, dict[str, int]] = {}
         self._overhead_ns = 0
         self._marks: list[str] = []
-
-
-class NoWindows:
-    """Reads no meter."""
-
-    def add(self, line: Line) -> Line | None:
-        """Nothing."""
-        return None

@@ -10,15 +10,15 @@ import numpy as np
 
 from modt.energy.attribution import usable
 from modt.energy.meters.meter import Kind
-from modt.energy.savings import UnitCosts
+from modt.energy.savings import Beside, UnitCosts, predict
 from modt.evaluation.comparison import total
 from modt.evaluation.figure import Figure, figure
-from modt.evaluation.gamma import Evidence, Saving, interval, mean_interval, saving, unit_costs
+from modt.evaluation.gamma import Evidence, Saving, beside_of, interval, mean_interval, saving, unit_costs
 from modt.evaluation.trials import Trial, evidence, pooled, windows_of
 from modt.pipeline import STAGES
 
 SCHEMA = "modt.compare/1"
-COUNTING = "Energy is watts assumed times CPU time: gamma tests the counting and the unit costs, not the physics."
+COUNTING = "Energy is watts assumed times CPU time: this tests counts and unit costs, not the physics."
 PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
 
 
@@ -32,6 +32,7 @@ class Basis:
         period_s: of the stream, over which idling is counted.
         meter: name of the meter.
         kind: of its energy.
+        coefficients: seg_J, class_J and point_J of a calibration, None without one.
     """
 
     idle_W: float
@@ -39,6 +40,7 @@ class Basis:
     period_s: float
     meter: str
     kind: Kind
+    coefficients: tuple[float, float, float] | None = None
 
     @property
     def net_W(self) -> float:
@@ -78,6 +80,7 @@ def compare_tree(
         "modes": {mode: energy[mode] | _work(runs[mode], energy[mode], random) for mode in modes},
         "unit_costs": _costs(unit_costs(priced), baseline, basis),
         "savings": savings,
+        "series_kind": Kind.MEASURED.value,
         "series": {mode: _series(runs[mode], trials[0][mode].lives) for mode in modes},
     }
 
@@ -152,15 +155,16 @@ def _saving(
     gross1, gross2 = (energy[m]["gross_J"] for m in (base, mode))
     net1, net2 = (energy[m]["net_J"] for m in (base, mode))
     return {
-        "a": figure(p.paper.e_class / p.paper.e_seg if p.paper.e_seg else None),
-        "gamma_short": figure(p.gamma_short, "", Kind.ESTIMATED),
+        "a": figure(p.paper.a, "", Kind.ESTIMATED),
+        "gamma_short": figure(p.paper.gamma_short, "", Kind.ESTIMATED),
         "gamma_equation_3": figure(p.paper.gamma, "", Kind.ESTIMATED),
-        "short_form_error": figure(p.short_form_error, "", Kind.ESTIMATED),
+        "short_form_error": figure(p.paper.short_form_error, "", Kind.ESTIMATED),
         "gamma_predicted": figure(found.predicted, "", Kind.ESTIMATED, found.predicted_interval),
         "gamma_measured_cpu": figure(found.measured, "", Kind.MEASURED, found.measured_interval),
         "gamma_net": figure(_ratio(net1, net2), "", net1.kind),
         "gamma_gross": figure(_ratio(gross1, gross2), "", gross1.kind),
         "deviation_net": figure(_off(found.predicted, _ratio(net1, net2)), "", Kind.ESTIMATED),
+        "gamma_calibrated": figure(_calibrated(baseline, run, basis), "", Kind.ESTIMATED),
         "deviation": figure(found.deviation, "", Kind.ESTIMATED, found.deviation_interval),
         "terms": [
             {
@@ -174,6 +178,18 @@ def _saving(
     }
 
 
+def _calibrated(baseline: Evidence, run: Evidence, basis: Basis) -> float | None:
+    """Gamma from a calibration's joules; what was not calibrated is priced by its CPU time."""
+    if basis.coefficients is None:
+        return None
+    seg_J, class_J, point_J = basis.coefficients
+    beside1, beside2 = (
+        Beside(basis.net_W * b.track, basis.net_W * b.choose) for b in (beside_of(baseline), beside_of(run))
+    )
+    costs = UnitCosts(seg_J, beside1.track, 0.0, class_J, point_J)
+    return predict(total(baseline.counts), total(run.counts), costs, beside1, beside2).model.gamma
+
+
 def _costs(costs: UnitCosts, baseline: Evidence, basis: Basis) -> dict[str, Figure]:
     e_class = costs.e_class(total(baseline.counts))
     return {
@@ -181,12 +197,12 @@ def _costs(costs: UnitCosts, baseline: Evidence, basis: Basis) -> dict[str, Figu
         "E_class": figure(basis.net_W * e_class, "J", Kind.ESTIMATED),
         "E_track": figure(basis.net_W * costs.track, "J", Kind.ESTIMATED),
         "seg_cpu_ms": figure(1e3 * costs.seg, "ms"),
-        "class_cpu_ms": figure(1e3 * e_class, "ms"),
+        "class_cpu_ms": figure(1e3 * e_class, "ms", Kind.ESTIMATED),
         "track_cpu_ms": figure(1e3 * costs.track, "ms"),
-        "class_call_cpu_us": figure(1e6 * costs.class_call, "us"),
-        "class_item_cpu_us": figure(1e6 * costs.class_item, "us"),
-        "class_point_cpu_us": figure(1e6 * costs.class_point, "us"),
-        "a": figure(e_class / costs.seg if costs.seg else None),
+        "class_call_cpu_us": figure(1e6 * costs.class_call, "us", Kind.ESTIMATED),
+        "class_item_cpu_us": figure(1e6 * costs.class_item, "us", Kind.ESTIMATED),
+        "class_point_cpu_us": figure(1e6 * costs.class_point, "us", Kind.ESTIMATED),
+        "a": figure(e_class / costs.seg if costs.seg else None, "", Kind.ESTIMATED),
     }
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 from modt.energy.meters.meter import Kind
 from modt.evaluation.figure import Figure, brief
 
 MARK = {Kind.MEASURED: "", Kind.INTEGRATED: "i", Kind.ESTIMATED: "e", Kind.UNAVAILABLE: "?"}
-LEGEND = "  every figure is measured, but those marked: e estimated, i integrated, ? unavailable; 95 % in brackets"
+LEGEND = "Figures are measured, but for e estimated, i integrated, ? unavailable. In brackets: 95 %."
+WIDTH = 96
 
 
 def compare_text(tree: dict[str, Any]) -> str:
@@ -35,26 +37,34 @@ def compare_text(tree: dict[str, Any]) -> str:
     ]
     for mode, s in savings.items():
         lines += [
-            f"{mode}: gamma measured {s['gamma_measured_cpu'].text()}, predicted {s['gamma_predicted'].text()}",
-            f"  {holds(s)}",
-            f"  energy: {marked(s['gamma_net'])} with idling taken off, {marked(s['gamma_gross'])} with it; "
-            f"{marked(s['saved_J'], 1e3)} mJ a frame saved{_against_meter(s)}",
-            f"  {'the short form, gamma = N_go':<50}{'':>10}{brief(s['gamma_short'].value):>10}",
+            f"{mode}: gamma measured {s['gamma_measured_cpu'].text()}, predicted {s['gamma_predicted'].text()} (e)",
+            *wrapped(holds(s)),
+            *wrapped(
+                f"energy: gamma {marked(s['gamma_net'])} with idling taken off, {marked(s['gamma_gross'])} with it; "
+                f"{marked(s['saved_J'], 1e3)} mJ a frame saved{_against_meter(s)}"
+            ),
+            f"  {'from N_go to what was measured':<50}{'change e':>10}{'gamma e':>10}",
+            f"  {'the short form, gamma = N_go':<50}{'':>10}{marked(s['gamma_short']):>10}",
             *(f"  {t['name']:<50}{t['change'].value:>+10.3f}{t['gamma'].value:>10.3f}" for t in s["terms"]),
             "",
         ]
-    return "\n".join([*lines, f"  {tree['test']}", LEGEND])
+    return "\n".join([*lines, *wrapped(tree["test"]), *wrapped(LEGEND)])
+
+
+def wrapped(text: str) -> list[str]:
+    """A sentence in lines that fit a terminal."""
+    return textwrap.wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ")
 
 
 def holds(saving: dict[str, Any]) -> str:
     """Whether the prediction holds, in a sentence."""
     deviation, a = saving["deviation"], saving["a"]
     verdict = "holds within 5 %" if abs(deviation.value) <= 0.05 else "does NOT hold within 5 %"
-    short = saving["short_form_error"].value
+    short = saving["short_form_error"]
     spread = f"{100 * deviation.low:+.1f} to {100 * deviation.high:+.1f}"
     return (
-        f"the prediction {verdict}: off by {100 * deviation.value:+.1f} % ({spread}); "
-        f"at a = {brief(a.value)} N_go alone errs by {100 * short:+.0f} %"
+        f"the prediction {verdict}: off by {100 * deviation.value:+.1f}e % ({spread}); "
+        f"at a = {marked(a)} N_go alone errs by {100 * short.value:+.0f}e %"
     )
 
 
@@ -75,10 +85,11 @@ def marked(figure: Figure, by: float = 1.0) -> str:
 
 
 def _against_meter(saving: dict[str, Any]) -> str:
-    off = saving["deviation_net"].value
+    off, calibrated = saving["deviation_net"].value, saving["gamma_calibrated"]
+    joules = "" if calibrated.value is None else f"; by calibrated joules gamma is {marked(calibrated)}"
     if saving["gamma_net"].kind is Kind.ESTIMATED or off is None:
-        return ""
-    return f"; predicted is off by {100 * off:+.1f} % against the meter"
+        return joules
+    return f"{joules}; predicted is off by {100 * off:+.1f} % against the meter"
 
 
 def _stage(stage: dict[str, Figure]) -> str:

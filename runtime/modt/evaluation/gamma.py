@@ -98,7 +98,7 @@ def saving(baseline: Evidence, run: Evidence, varied: Evidence, random: np.rando
     def both(frames: Int) -> tuple[Prediction, float]:
         a, b = baseline.take(frames), run.take(frames)
         costs = unit_costs(varied.take((frames + n * np.arange(passes)[:, None]).ravel()))
-        prediction = predict(total(a.counts), total(b.counts), costs, _beside(a), _beside(b))
+        prediction = predict(total(a.counts), total(b.counts), costs, beside_of(a), beside_of(b))
         return prediction, float(a.cost.sum() / b.cost.sum())
 
     prediction, measured = both(np.arange(n))
@@ -124,7 +124,8 @@ def interval(n: int, of: Callable[[Int], float], random: np.random.Generator) ->
     return _interval(np.array([of(_blocks(n, random)) for _ in range(RESAMPLES)]))
 
 
-def _beside(run: Evidence) -> Beside:
+def beside_of(run: Evidence) -> Beside:
+    """What a run paid for what Equation 2 does not know, a frame."""
     mean = run.cost.mean(axis=0)
     return Beside(track=float(mean[TRACK]), choose=float(mean[[SCHEDULE, FUSE]].sum()))
 

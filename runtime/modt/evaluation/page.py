@@ -19,7 +19,7 @@ h1{font-size:1.6rem;margin:0}h2{font-size:1.1rem;margin:0 0 .5rem}
 .sub{color:var(--soft);margin:.2rem 0 1.2rem}
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:12px;margin:0 0 20px}
 .tile{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:12px 14px}
-.tile b{display:block;font-size:1.5rem;font-variant-numeric:tabular-nums}
+.tile b{display:block;font-size:1.5rem;line-height:1.25;font-variant-numeric:tabular-nums}
 .tile small{color:var(--soft)}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(440px,100%),1fr));gap:16px;margin:0 0 16px}
 section{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:14px;margin:0 0 16px;

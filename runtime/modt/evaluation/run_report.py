@@ -98,6 +98,10 @@ def run_tree(run: Path) -> dict[str, Any]:
         "saved": saved,
         "marks": sorted({mark for line in [*lines, *windows] for mark in line["marks"]}),
         "series": {
+            "kinds": {
+                **dict.fromkeys(("cpu_ms", "classified", "deferred", "proposals", "lives"), Kind.MEASURED.value),
+                **dict.fromkeys(("net_W", "predicted_cpu_ms"), Kind.ESTIMATED.value),
+            },
             "net_W": board["busy_W"] - board["idle_W"],
             "cpu_ms": {s: (1e3 * cpu_s[:, k]).round(4).tolist() for k, s in enumerate(STAGES)},
             "predicted_cpu_ms": (1e3 * predicted_s).round(4).tolist(),
@@ -174,7 +178,7 @@ def _split(board: dict[str, Any], kind: Kind) -> ByCoefficients | ByCpuTime:
 
 def _circular(energy: dict[str, Any]) -> str:
     if energy["gross_J"].kind is Kind.ESTIMATED:
-        return "Energy is watts assumed times CPU time: gamma tests the counting, not the physics."
+        return "Energy is watts assumed times CPU time: this tests the counting, not the physics."
     return "Energy is the meter's; its split over the stages is estimated."
 
 
@@ -248,8 +252,8 @@ def _saved(
         "views": figure(run.classified / run.tracks if run.tracks else None),
         "E_seg": figure(net_W * costs.seg, "J", Kind.ESTIMATED),
         "E_class": figure(net_W * costs.e_class(baseline), "J", Kind.ESTIMATED),
-        "a": figure(found.paper.e_class / found.paper.e_seg if found.paper.e_seg else None, "", Kind.ESTIMATED),
-        "gamma_short": figure(found.gamma_short, "", Kind.ESTIMATED),
+        "a": figure(found.paper.a, "", Kind.ESTIMATED),
+        "gamma_short": figure(found.paper.gamma_short, "", Kind.ESTIMATED),
         "gamma_equation_3": figure(found.paper.gamma, "", Kind.ESTIMATED),
         "gamma_predicted": figure(found.model.gamma, "", Kind.ESTIMATED),
         "gamma_of_this_run": figure(gamma, "", Kind.ESTIMATED),

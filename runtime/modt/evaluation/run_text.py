@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from modt.evaluation.compare_text import LEGEND, conditions_text, marked
+from modt.evaluation.compare_text import LEGEND, conditions_text, marked, wrapped
 from modt.evaluation.figure import brief
 
 
@@ -42,7 +42,7 @@ def run_text(tree: dict[str, Any]) -> str:
     )
     if tree["marks"]:
         lines.append(f"  marked: {', '.join(tree['marks'])}")
-    return "\n".join([*lines, f"  {tree['test']}", LEGEND])
+    return "\n".join([*lines, *wrapped(tree["test"]), *wrapped(LEGEND)])
 
 
 def _savings(tree: dict[str, Any], saved: dict[str, Any]) -> list[str]:
@@ -54,10 +54,15 @@ def _savings(tree: dict[str, Any], saved: dict[str, Any]) -> list[str]:
         return [head, "  this is tracking-by-detection itself: nothing was saved; run the other modes, or compare"]
     return [
         head,
-        f"  saved {marked(saved['saved_J'], 1e3)} mJ a frame against tracking-by-detection: "
-        f"gamma {marked(saved['gamma_of_this_run'])}",
-        f"  predicted: {marked(saved['gamma_predicted'])} in full, {marked(saved['gamma_equation_3'])} "
-        f"by Equation 3, {marked(saved['gamma_short'])} by N_go alone; a = {marked(saved['a'])}",
+        *wrapped(
+            f"saved {marked(saved['saved_J'], 1e3)} mJ a frame against tracking-by-detection: "
+            f"gamma {marked(saved['gamma_of_this_run'])}"
+        ),
+        *wrapped(
+            f"predicted: {marked(saved['gamma_predicted'])} in full, {marked(saved['gamma_equation_3'])} by "
+            f"Equation 3, {marked(saved['gamma_short'])} by N_go alone; a = {marked(saved['a'])}"
+        ),
+        f"    {'from N_go to gamma':<50}{'change e':>10}{'gamma e':>10}",
         *(f"    {t['name']:<50}{t['change'].value:>+10.3f}{t['gamma'].value:>10.3f}" for t in saved["terms"]),
-        "  E1 is computed here from this run's own costs; modt-profile compare measures it",
+        *wrapped("E1 is computed here from this run's own costs; modt-profile compare measures it"),
     ]

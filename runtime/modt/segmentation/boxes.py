@@ -25,9 +25,8 @@ def headings(x: Float32, y: Float32, groups: Groups) -> Float64:
         groups: what they belong to.
     """
     across = np.stack([np.cos(FAN), np.sin(FAN)], axis=1).astype(np.float32) @ np.stack([x, y])
-    own = groups.spread(np.arange(len(groups)))
-    inward = across - groups.least(across)[:, own]
-    np.minimum(inward, groups.most(across)[:, own] - across, out=inward)
+    inward = across - groups.spread(groups.least(across))
+    np.minimum(inward, groups.spread(groups.most(across)) - across, out=inward)
     nearest = np.minimum(inward[: len(HEADINGS)], inward[len(HEADINGS) :])
     closeness = np.add.reduceat(1 / np.maximum(nearest, NEAREST_M), groups.offsets[:-1], axis=1)
     best: Float64 = HEADINGS[np.argmax(closeness, axis=0)]

@@ -59,7 +59,7 @@ class Clusters:
         n: how many there are, numbered from 0.
     """
 
-    cell: Int32
+    cell: Int
     sample: Int
     top: Float32
     of_cell: Int
@@ -75,17 +75,12 @@ class Clusters:
 
 def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
     """(C,) component of each cell: those that touch at a side or a corner, and in height, belong together."""
-    place = cells.row * np.int32(grid.side) + cells.column
-    ahead = np.array([1, grid.side - 1, grid.side, grid.side + 1], np.int32)
-    beside = grid.look_up(place, ahead).ravel()
-    link = np.flatnonzero(beside >= 0)
-    one, other = link // len(ahead), beside[link]
+    one, other = grid.beside(grid.place(cells.row, cells.column))
     gap = np.maximum(cells.low[one], cells.low[other]) - np.minimum(cells.high[one], cells.high[other])
     bound = np.float32(GAP_M) + np.float32(GAP_BEAMS * beam_rad) * np.square(cells.root)
-    near = gap < bound[one]
-    ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(place))))
-    links = other[near]
-    graph = csr_array((np.ones(len(links)), links, ends), shape=(len(place), len(place)))
+    near = np.flatnonzero(gap < bound[one])
+    ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(cells))))
+    graph = csr_array((np.ones(len(near)), other[near], ends), shape=(len(cells), len(cells)))
     component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
     return component
 
@@ -111,10 +106,10 @@ class Clusterer:
 
     def cluster(self, points: Columns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, of a height above ground [m]."""
-        place = self.fine.place(points)
-        sample, cell = self.fine.occupy(place)
-        row, column = np.divmod(place[sample], np.int32(self.fine.side))
-        cells = Cells(row, column, *_bounds(height, cell, len(sample)), points.root[sample])
+        row, column = self.fine.row_and_column(points)
+        sample, cell = self.fine.occupy(self.fine.place(row, column))
+        low, high = _least(height, cell, len(sample)), _most(height, cell, len(sample))
+        cells = Cells(row[sample], column[sample], low, high, points.root[sample])
         count, x, y = np.bincount(cell), points.x[sample], points.y[sample]
 
         cluster = self._joined_coarsely(cells)
@@ -129,35 +124,39 @@ class Clusterer:
 
     def _joined_coarsely(self, fine: Cells) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell which it is a quarter of."""
-        side = self.coarse.side
-        place = (fine.row // 2) * np.int32(side) + fine.column // 2
-        sample, coarse = self.coarse.occupy(place)
-        row, column = np.divmod(place[sample], np.int32(side))
-        low, high = _bounds(fine.low, coarse, len(sample))[0], _bounds(fine.high, coarse, len(sample))[1]
-        return join(self.coarse, Cells(row, column, low, high, fine.root[sample]), self.beam_rad)[coarse]
+        row, column = fine.row >> 1, fine.column >> 1
+        sample, coarse = self.coarse.occupy(self.coarse.place(row, column))
+        low, high = _least(fine.low, coarse, len(sample)), _most(fine.high, coarse, len(sample))
+        cells = Cells(row[sample], column[sample], low, high, fine.root[sample])
+        return join(self.coarse, cells, self.beam_rad)[coarse]
 
     def _proper(self, cluster: Int, cells: Cells, count: Int, extent: Float32, n_coarse: int) -> Bool:
         """(G,) clusters of an object's size; pieces of something vast, numbered from n_coarse, must stand out."""
         n = len(extent)
         points = np.bincount(cluster, count, n)
-        low, top = _bounds(cells.low, cluster, n)[0], _bounds(cells.high, cluster, n)[1]
+        low, top = _least(cells.low, cluster, n), _most(cells.high, cluster, n)
         proper = (points >= self.config.min_points) & (extent < self.config.max_extent_m)
         proper &= top - low >= self.config.min_height_m
         proper[n_coarse:] &= (top[n_coarse:] >= STANDS_OUT_M) & (points[n_coarse:] >= STANDS_OUT_POINTS)
         return proper
 
 
-def _bounds(values: Float32, group: Int32 | Int, n: int) -> tuple[Float32, Float32]:
-    """(n,) least and greatest value of each group, infinite where it is empty."""
-    low, high = np.full(n, np.inf, np.float32), np.full(n, -np.inf, np.float32)
-    np.minimum.at(low, group, values)
-    np.maximum.at(high, group, values)
-    return low, high
+def _least(values: Float32, group: Int, n: int) -> Float32:
+    """(n,) least value of each group, infinite where it is empty."""
+    least = np.full(n, np.inf, np.float32)
+    np.minimum.at(least, group, values)
+    return least
+
+
+def _most(values: Float32, group: Int, n: int) -> Float32:
+    """(n,) greatest value of each group, minus infinity where it is empty."""
+    most = np.full(n, -np.inf, np.float32)
+    np.maximum.at(most, group, values)
+    return most
 
 
 def _extent(x: Float32, y: Float32, group: Int) -> Float32:
-    """(G,) diagonal of the upright rectangle about each group, -inf where it is empty [m]."""
+    """(G,) diagonal of the upright rectangle about each group, infinite where it is empty [m]."""
     n = int(group.max(initial=NONE)) + 1
-    (x0, x1), (y0, y1) = _bounds(x, group, n), _bounds(y, group, n)
-    diagonal: Float32 = np.hypot(x1 - x0, y1 - y0)
+    diagonal: Float32 = np.hypot(*(_most(v, group, n) - _least(v, group, n) for v in (x, y)))
     return diagonal

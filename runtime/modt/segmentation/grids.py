@@ -69,15 +69,18 @@ class RootGrid:
         self.side = 2 * self.centre
         self._number: Int32 = np.full(self.side * self.side, NONE, np.int32)
 
-    def place(self, points: Columns) -> Int32:
-        """(K,) place of each point in the grid, row by row."""
+    def row_and_column(self, points: Columns) -> tuple[Int32, Int32]:
+        """(K,) place of each point in the grid."""
         scale = np.float32(1 / self.step) / points.root
-        place = (points.x * scale + np.float32(self.centre)).astype(np.int32)
-        place *= self.side
-        place += (points.y * scale + np.float32(self.centre)).astype(np.int32)
-        return place
+        row = (points.x * scale + np.float32(self.centre)).astype(np.int32)
+        column = (points.y * scale + np.float32(self.centre)).astype(np.int32)
+        return row, column
 
-    def occupy(self, place: Int32) -> tuple[Int, Int32]:
+    def place(self, row: Int32, column: Int32) -> Int:
+        """(K,) the same as one number, row by row."""
+        return (row * np.int32(self.side) + column).astype(np.int64)
+
+    def occupy(self, place: Int) -> tuple[Int, Int]:
         """(C,) one point of each occupied cell, its last, and (K,) the cell of each point.
 
         No sort and no search of the grid: every point writes its name in its cell, and those whose name still
@@ -85,15 +88,18 @@ class RootGrid:
         """
         name = np.arange(len(place), dtype=np.int32)
         self._number[place] = name
-        sample = np.flatnonzero(self._number[place] == name)
-        self._number[place[sample]] = name[: len(sample)]
-        cell = self._number[place]
-        self._number[place[sample]] = NONE
+        sample = np.flatnonzero(self._number.take(place) == name)
+        taken = place[sample]
+        self._number[taken] = name[: len(sample)]
+        cell = self._number.take(place).astype(np.int64)
+        self._number[taken] = NONE
         return sample, cell
 
-    def look_up(self, place: Int32, step: Int32) -> Int32:
-        """(C, S) which of the occupied places lies each step away from each, NONE where none does."""
+    def beside(self, place: Int) -> tuple[Int, Int]:
+        """Pairs of cells, by number, that touch at a side or a corner: each pair once, ordered by the first."""
         self._number[place] = np.arange(len(place), dtype=np.int32)
-        found: Int32 = self._number[place[:, None] + step]
+        ahead = np.array([1, self.side - 1, self.side, self.side + 1])
+        found = self._number.take((place[:, None] + ahead).ravel())
         self._number[place] = NONE
-        return found
+        pair = np.flatnonzero(found != NONE)
+        return pair >> 2, found[pair].astype(np.int64)

@@ -45,7 +45,7 @@ class Ground:
         supported = self._follow(lowest, sensor_height_m)
         known = np.where(supported, lowest, np.float32(-sensor_height_m))
         surface = _across(_along(known, supported, self.grid.range_m))
-        height: Float32 = points.z - surface.ravel()[cell]
+        height: Float32 = points.z - surface.ravel().take(cell)
         return height
 
     def _lowest(self, points: Columns, cell: Int, sensor_height_m: float) -> Float32:
@@ -61,20 +61,20 @@ class Ground:
 
     def _follow(self, lowest: Float32, sensor_height_m: float) -> Bool:
         """(rings, SECTORS) cells whose lowest return is ground: a short step a ring, all rays at once."""
-        steepest, gain, noise = np.float32(self.max_slope), np.float32(GAIN), np.float32(NOISE_M)
+        steepest, gain, noise, bridge = (np.float32(v) for v in (self.max_slope, GAIN, NOISE_M, BRIDGE_M))
         ray = np.zeros((4, SECTORS), np.float32)  # of the last ground on each ray
         height, at, slope, bend = ray
         height[:], bend[:] = -sensor_height_m, steepest
         step = np.zeros_like(ray)
         step[3] = BEND
         supported = np.zeros(lowest.shape, np.bool_)
-        for ring in np.flatnonzero(np.isfinite(lowest).any(axis=1)):
-            here = lowest[ring]
-            gap = self.grid.range_m[ring] - at
-            reach = np.minimum(gap, np.float32(BRIDGE_M))
+        for ring in np.flatnonzero(np.isfinite(lowest).any(axis=1)).tolist():
+            here, range_m = lowest[ring], self.grid.range_m[ring]
+            gap = range_m - at
+            reach = np.minimum(gap, bridge)
             rise = here - height
             found = np.less(np.abs(rise - slope * reach), reach * bend + noise, out=supported[ring])
-            step[0], step[1] = here, self.grid.range_m[ring]
+            step[0], step[1] = here, range_m
             step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -steepest), steepest)
             np.copyto(ray, step, where=found)
         return supported
@@ -83,15 +83,16 @@ class Ground:
 def _along(ground: Float32, supported: Bool, range_m: Float32) -> Float32:
     """The surface with its gaps filled by straight lines along each ray, level beyond the last support."""
     rings, sectors = ground.shape
+    supported = supported.copy()
     supported[0] = True
-    ring = np.arange(rings)[:, None]
-    before = np.maximum.accumulate(np.where(supported, ring, 0), axis=0)
-    after = np.minimum.accumulate(np.where(supported, ring, rings)[::-1], axis=0)[::-1]
-    after = np.where(after == rings, before, after)
-    ray = np.arange(sectors)
-    low, high = ground[before, ray], ground[after, ray]
-    span = np.maximum(range_m[after] - range_m[before], np.float32(1e-3))
-    line: Float32 = low + (high - low) * ((range_m[:, None] - range_m[before]) / span)
+    cell = np.arange(rings * sectors).reshape(rings, sectors)
+    before = np.maximum.accumulate(np.where(supported, cell, 0), axis=0)
+    after = np.minimum.accumulate(np.where(supported, cell, cell.size)[::-1], axis=0)[::-1]
+    after = np.where(after == cell.size, before, after)
+    range_of = np.repeat(range_m, sectors)
+    low, near = ground.take(before), range_of.take(before)
+    high, far = ground.take(after), range_of.take(after)
+    line: Float32 = low + (high - low) * ((range_m[:, None] - near) / np.maximum(far - near, np.float32(1e-3)))
     return line
 
 

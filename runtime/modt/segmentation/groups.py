@@ -30,9 +30,9 @@ class Groups:
     def of(cls, group: Int, n: int) -> Self:
         """Groups 0 to n - 1 of each row; a row of group NONE is left out."""
         rows = np.flatnonzero(group != NONE)
-        own = group[rows]
         kind = np.int16 if n < np.iinfo(np.int16).max else np.int64  # sorted by radix: several times faster
-        rows = rows[np.argsort(own.astype(kind), kind="stable")]
+        own = group.astype(kind)[rows]
+        rows = rows[np.argsort(own, kind="stable")]
         return cls(rows, np.append(0, np.cumsum(np.bincount(own, minlength=n))))
 
     def __len__(self) -> int:
@@ -51,8 +51,8 @@ class Groups:
         return type(self)(self.rows[kept], np.append(0, np.cumsum(-(-self.count // every))))
 
     def spread(self, values: NDArray[T]) -> NDArray[T]:
-        """(K,) a value a group given to each of its rows."""
-        return np.repeat(values, self.count)
+        """(..., K) values (..., G) of the groups given to each of their rows."""
+        return np.repeat(values, self.count, axis=-1)
 
     def least(self, values: NDArray[T]) -> NDArray[T]:
         """(..., G) least of (..., K) values in each group."""

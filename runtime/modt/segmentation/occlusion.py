@@ -9,7 +9,7 @@ from modt.segmentation.groups import Groups
 from modt.types import Bool, Float32, Float64, Int
 
 BINS = 1024
-"""Directions told apart around the circle: 0.35 degrees each."""
+"""Directions told apart around the circle, a power of two: 0.35 degrees each."""
 BESIDE = 2
 """Directions looked at beyond either side of a cluster."""
 NEARER_M = 0.5
@@ -26,23 +26,23 @@ def occluded(x: Float32, y: Float32, tall: Bool, groups: Groups) -> Bool:
         tall: (C,) high enough to hide something.
         groups: the rows that belong to each cluster.
     """
-    direction = (pseudo_angle(x, y) * np.float32(BINS / 4)).astype(np.int64) % BINS
-    range_m = np.hypot(x, y).astype(np.float64)
-    nearest = np.full(BINS, UNSEEN_M)
-    np.minimum.at(nearest, direction[tall], range_m[tall])
+    direction = (pseudo_angle(x, y) * np.float32(BINS / 4)).astype(np.int64) & (BINS - 1)
+    range_m = np.sqrt(x * x + y * y)
+    nearest = np.full(BINS, UNSEEN_M, np.float32)
+    np.minimum.at(nearest, direction, np.where(tall, range_m, np.float32(UNSEEN_M)))
     own, first = direction[groups.rows], direction[groups.rows[groups.offsets[:-1]]]
-    turned = (own - groups.spread(first) + BINS // 2) % BINS  # no cluster spans the seam now
-    depth = range_m[groups.rows] / UNSEEN_M
+    turned = (own - groups.spread(first) + BINS // 2) & (BINS - 1)  # no cluster spans the seam now
+    depth = range_m[groups.rows].astype(np.float64) / UNSEEN_M
     right = groups.least(turned + depth)
     left = groups.most(turned + 1 - depth)
     return _hides(nearest, first, right, -1) | _hides(nearest, first, left, 1)
 
 
-def _hides(nearest: Float64, first: Int, edge: Float64, side: int) -> Bool:
+def _hides(nearest: Float32, first: Int, edge: Float64, side: int) -> Bool:
     """(G,) something nearer lies just beyond an edge, given as its direction plus a fraction for its range."""
     direction = np.floor(edge).astype(np.int64)
     fraction = edge - direction
     range_m = (fraction if side < 0 else 1 - fraction) * UNSEEN_M
     beyond = direction[:, None] + side * np.arange(1, BESIDE + 1) + first[:, None] - BINS // 2
-    nearer: Bool = (nearest[beyond % BINS] < range_m[:, None] - NEARER_M).any(axis=1)
+    nearer: Bool = (nearest[beyond & (BINS - 1)] < range_m[:, None] - NEARER_M).any(axis=1)
     return nearer

@@ -23,7 +23,7 @@ EDGE_M = 0.3
 """A proposal this near the end of the margin counts as cut by it."""
 OCCLUDER_M = 0.6
 """What rises this high above ground hides what is behind it."""
-OUTLINE = 64
+OUTLINE = 32
 """Cells of a cluster, at most, that decide on its heading."""
 
 
@@ -48,13 +48,13 @@ class Segmenter:
         looked_at = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -MARGIN_M)
         sweep = Columns.of(points if looked_at is None else points[looked_at])
         height = self.ground.height(sweep, self.sensor_height.of(sweep))
-        raised = np.flatnonzero(self._raised(sweep, height))
+        raised = np.flatnonzero(self.raised(sweep, height))
         if not len(raised):
             return Proposals.empty()
         index = raised if looked_at is None else looked_at[raised]
         return self._proposals(sweep.take(raised), height[raised], index)
 
-    def _raised(self, sweep: Columns, height: Float32) -> Bool:
+    def raised(self, sweep: Columns, height: Float32) -> Bool:
         """(N,) within range, clear of the ground and no higher than objects reach."""
         near, far = np.float32(np.sqrt(self.sensor.min_range_m)), np.float32(np.sqrt(self.sensor.max_range_m))
         raised: Bool = (height > self.config.clearance_m) & (height < self.config.max_height_m)
@@ -65,7 +65,8 @@ class Segmenter:
         """The clusters of what is raised, and their boxes."""
         clusters = self.clusterer.cluster(raised, height)
         cell = raised.take(clusters.sample)
-        clusters = clusters.kept(self._in_view(clusters, cell))
+        if not self.fov.full:
+            clusters = clusters.kept(self._in_view(clusters, cell))
         if not clusters.n:
             return Proposals.empty()
         outline = Groups.of(clusters.of_cell, clusters.n)
@@ -75,8 +76,9 @@ class Segmenter:
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
-        inside_m: Float32 = self.fov.depth(cell.xyz())[outline.rows].astype(np.float32)
-        truncated = outline.least(inside_m) < EDGE_M - MARGIN_M
+        truncated = np.zeros(clusters.n, np.bool_)
+        if not self.fov.full:
+            truncated = outline.least(self.fov.depth(cell.xyz())[outline.rows]) < EDGE_M - MARGIN_M
         hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
         return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, hidden)
 

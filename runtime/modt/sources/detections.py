@@ -1,9 +1,9 @@
 """Detections that somebody else has made, one file a sequence.
 
-Two formats are recognised: AB3DMOT's 15 comma-separated columns (frame; type 1 Pedestrian, 2 Car, 3 Cyclist; left, top,
-right, bottom [pixel]; score; h, w, l, x, y, z [m], ry [rad]; alpha) and KITTI's tracking labels (frame, id, type,
-truncated, occluded, alpha, box, h, w, l, x, y, z, ry and a score, 1 where there is none). Both are in the coordinates
-of the camera: x right, y down, z forward, the place being the middle of the foot.
+Two formats are recognised: AB3DMOT's 15 comma-separated columns (frame; type 1 Pedestrian, 2 Car, 3 Cyclist; left,
+top, right, bottom [pixel]; score; h, w, l, x, y, z [m], ry [rad]; alpha) and KITTI's tracking labels (frame, id,
+type, truncated, occluded, alpha, box, h, w, l, x, y, z, ry and a score, 1 where there is none). Both are in the
+coordinates of the camera: x right, y down, z forward, the place being the middle of the foot.
 """
 
 from __future__ import annotations

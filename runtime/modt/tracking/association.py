@@ -12,7 +12,7 @@ from modt.config import TrackingConfig
 from modt.tracking.followed import Followed
 from modt.tracking.overlap import iou_3d
 from modt.tracking.sightings import Sightings
-from modt.types import Float64, Int
+from modt.types import NONE, Float64, Int
 
 FORBIDDEN = 1e6
 """Cost of a pair that may not be."""
@@ -65,13 +65,21 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     contested = np.flatnonzero(~alone)
     if not len(contested):
         return np.arange(len(rows))
-    r, i = np.unique(rows[contested], return_inverse=True)
-    c, j = np.unique(columns[contested], return_inverse=True)
-    matrix = np.full((len(r), len(c)), limit)
-    which = np.full((len(r), len(c)), -1, np.int64)
+    i, n = _compact(rows[contested])
+    j, k = _compact(columns[contested])
+    matrix = np.full((n, k), limit)
+    which = np.full((n, k), NONE, np.int64)
     matrix[i, j], which[i, j] = np.minimum(cost[contested], limit), contested
     chosen = which[linear_sum_assignment(matrix)]
     return np.sort(np.concatenate([np.flatnonzero(alone), chosen[chosen >= 0]]))
+
+
+def _compact(index: Int) -> tuple[Int, int]:
+    """Indices renumbered without gaps, and how many there are."""
+    occurs = np.zeros(int(index.max()) + 1, np.bool_)
+    occurs[index] = True
+    number = np.cumsum(occurs)
+    return number[index] - 1, int(number[-1])
 
 
 class PaperAssociation:

@@ -15,7 +15,7 @@ from modt.config import BoxTrackingConfig
 from modt.geometry import wrap
 from modt.tracking import kalman
 from modt.tracking.association import assign
-from modt.types import Bool, Float64, Int
+from modt.types import NONE, Bool, Float64, Int
 
 LIMIT = 1.0
 """Cost of a pair at the edge of the gate."""
@@ -83,11 +83,13 @@ class BoxTracker:
         self._predict(stamp_s)
         strong = score >= self.config.strong_score
         rows, columns = self._match(boxes, np.arange(len(self._id)), np.flatnonzero(strong))
-        left = np.setdiff1d(np.arange(len(self._id)), rows, assume_unique=True)
-        if len(left) and not strong.all():
+        if len(rows) < len(self._id) and not strong.all():
+            alone = np.ones(len(self._id), np.bool_)
+            alone[rows] = False
+            left = np.flatnonzero(alone)
             more, weak = self._match(boxes, left, np.flatnonzero(~strong))
             rows, columns = np.concatenate([rows, more]), np.concatenate([columns, weak])
-        self._source[:] = -1
+        self._source[:] = NONE
         self._missed += 1
         if len(rows):
             self._update(rows, columns, boxes, score)
@@ -133,7 +135,8 @@ class BoxTracker:
             step = seen[:, :2] - x[:, :2]
             course = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
             x, P = kalman.face(x, P, course)
-        R = np.broadcast_to(self.config.position_sigma_m**2 * np.eye(2), (len(rows), 2, 2))
+        R = np.zeros((len(rows), 2, 2))
+        R[:, 0, 0] = R[:, 1, 1] = self.config.position_sigma_m**2
         self._x[rows], self._P[rows] = kalman.turn_about(*kalman.update(x, P, seen[:, :2], R))
         self._hits[rows] += 1
         self._missed[rows] = 0
@@ -149,8 +152,9 @@ class BoxTracker:
 
     def _renew(self, keep: Bool, born: Int, boxes: Float64, score: Float64) -> None:
         n = len(born)
-        place, speed = self.config.position_sigma_m, self.config.initial_speed_sigma_mps
-        P = np.diag([place, place, np.pi, speed])
+        P = np.diag(
+            [self.config.position_sigma_m, self.config.position_sigma_m, np.pi, self.config.initial_speed_sigma_mps]
+        )
         x = np.zeros((n, 4))
         x[:, :2] = boxes[born, :2]
         join = np.concatenate

@@ -20,6 +20,8 @@ GATE_M = 0.8
 """How far it may be off once the motion is known."""
 VOTE_M = 0.25
 """Side of a cell in which shifts are counted."""
+ALIKE = 0.5
+"""Difference of size beyond which a pair has no vote."""
 SCALE_M = 0.08
 """Residuals beyond this lose their say (Cauchy)."""
 ROUNDS = 4
@@ -47,20 +49,24 @@ class Registration:
         if len(i) < MINIMUM:
             self._settled = False
             return np.eye(4)
-        lever = sightings.place[j] - sightings.eye
-        weight = 1.0 / (0.05**2 + tracks.P[rows[i], 0, 0] + (0.003 * sightings.range_m[j]) ** 2)
         motion = np.zeros(3)
         if not self._begun:
             shift, size, _, _ = compare(low[i], high[i], sightings.low[j], sightings.high[j])
-            motion[:2] = -_vote(shift[size < 0.5])
-        for _ in range(ROUNDS):
+            motion[:2] = -_vote(shift[size < ALIKE])
+        choices = 1 if self._settled else ROUNDS
+        for k in range(ROUNDS):
+            lever = sightings.place[j] - sightings.eye
             carry = (motion[:2] + motion[2] * _turned(lever)) @ AXES
             shift, size, overlap, _ = compare(low[i], high[i], sightings.low[j] + carry, sightings.high[j] + carry)
             error = np.hypot(shift[:, 0], shift[:, 1])
-            best = _mutual(i, j, error + size - overlap)
-            motion = motion + _fit(shift[best], lever[best], weight[best])
-        inliers = int((error[best] < INLIER_M).sum())
-        self._settled = inliers >= MINIMUM and inliers > AGREEMENT * len(best)
+            best = _mutual(i, j, error + size - overlap) if k < choices else np.arange(len(i))
+            weight = 1.0 / (0.05**2 + tracks.P[rows[i[best]], 0, 0] + (0.003 * sightings.range_m[j[best]]) ** 2)
+            motion = motion + _fit(shift[best], lever[best], weight)
+            if self._settled:
+                i, j, error = i[best], j[best], error[best]
+        agree = error if self._settled else error[best]
+        inliers = int((agree < INLIER_M).sum())
+        self._settled = inliers >= MINIMUM and inliers > AGREEMENT * len(agree)
         self._begun |= self._settled
         if np.hypot(*motion[:2]) > REACH_M or abs(motion[2]) > TURN_RAD:
             self._settled = False
@@ -74,7 +80,7 @@ def _pairs(low: Float64, high: Float64, sightings: Sightings, reach: float) -> t
         middle = ((low[:, axis] + high[:, axis]) / 2).astype(np.float32)
         other = ((sightings.low[:, axis] + sightings.high[:, axis]) / 2).astype(np.float32)
         near &= np.abs(middle[:, None] - other) < np.float32(reach)
-    i, j = np.nonzero(near)
+    i, j = np.divmod(np.flatnonzero(near), max(len(sightings), 1))
     return i, j
 
 
@@ -84,7 +90,9 @@ def _turned(lever: Float64) -> Float64:
 
 
 def _vote(shift: Float64) -> Float64:
-    """(2,) shift that most pairs agree on, whole cells of it."""
+    """(2,) shift that most pairs agree on, whole cells of it; none where there are none."""
+    if not len(shift):
+        return np.zeros(2)
     side = int(2 * REACH_M / VOTE_M) + 3
     cell = np.clip(np.rint(shift / VOTE_M).astype(np.int64) + side // 2, 1, side - 2)
     counts = np.bincount(cell[:, 0] * side + cell[:, 1], minlength=side * side).reshape(side, side)

@@ -23,7 +23,8 @@ def motion(x: Float64, dt_s: float) -> Float64:
 
 def motion_jacobian(x: Float64, dt_s: float) -> Float64:
     """(M, 4, 4) derivative of F at x."""
-    F = np.broadcast_to(np.eye(4), (len(x), 4, 4)).copy()
+    F = np.zeros((len(x), 4, 4))
+    F[:, range(4), range(4)] = 1.0
     c, s = np.cos(x[:, HEADING]), np.sin(x[:, HEADING])
     F[:, X, HEADING], F[:, X, SPEED] = -dt_s * s * x[:, SPEED], dt_s * c
     F[:, Y, HEADING], F[:, Y, SPEED] = dt_s * c * x[:, SPEED], dt_s * s
@@ -36,17 +37,13 @@ def process_noise(x: Float64, dt_s: float, acceleration: Float64, turn: Float64)
     Across its heading a track can be pushed as hard as along it while it stands: then the heading says nothing.
     """
     c, s = np.cos(x[:, HEADING]), np.sin(x[:, HEADING])
-    G = np.zeros((len(x), 4, 2))
-    G[:, X, 0], G[:, Y, 0] = dt_s**2 / 2 * c, dt_s**2 / 2 * s
-    G[:, SPEED, 0] = dt_s
-    G[:, HEADING, 1] = dt_s
-    G *= np.stack([acceleration, turn], axis=1)[:, None, :]
-    Q: Float64 = G @ G.transpose(0, 2, 1)
-    drift = (dt_s**2 / 2 * acceleration) ** 2
-    Q[:, X, X] += drift * s * s
-    Q[:, Y, Y] += drift * c * c
-    Q[:, X, Y] -= drift * c * s
-    Q[:, Y, X] -= drift * c * s
+    along, across = np.square(dt_s * acceleration), np.square(dt_s**2 / 2 * acceleration)
+    Q = np.zeros((len(x), 4, 4))
+    Q[:, X, X] = Q[:, Y, Y] = across  # as hard across as along
+    Q[:, X, SPEED] = Q[:, SPEED, X] = dt_s / 2 * along * c
+    Q[:, Y, SPEED] = Q[:, SPEED, Y] = dt_s / 2 * along * s
+    Q[:, SPEED, SPEED] = along
+    Q[:, HEADING, HEADING] = np.square(dt_s * turn)
     return Q
 
 
@@ -67,9 +64,8 @@ def update(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, Flo
     K = P[:, :, :2] @ inverse_2x2(S)
     after = x + (K @ nu[:, :, None])[:, :, 0]
     after[:, HEADING] = wrap(after[:, HEADING])
-    I_KH = np.broadcast_to(np.eye(4), P.shape).copy()
-    I_KH[:, :, :2] -= K
-    return after, I_KH @ P @ I_KH.transpose(0, 2, 1) + K @ R @ K.transpose(0, 2, 1)
+    squeezed = P - K @ P[:, :2, :]
+    return after, (squeezed + squeezed.transpose(0, 2, 1)) / 2
 
 
 def observe_speed(x: Float64, P: Float64, speed_mps: float, sigma_mps: float) -> tuple[Float64, Float64]:
@@ -89,7 +85,8 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
     """
     turn = heading_rad - x[:, HEADING]
     c, s = np.cos(turn), np.sin(turn)
-    T = np.broadcast_to(np.eye(4), P.shape).copy()
+    T = np.zeros(P.shape)
+    T[:, range(4), range(4)] = 1.0
     T[:, X, X], T[:, X, Y], T[:, Y, X], T[:, Y, Y] = c, -s, s, c
     out = x.copy()
     out[:, HEADING] = wrap(heading_rad)
@@ -110,8 +107,9 @@ def turn_about(x: Float64, P: Float64) -> tuple[Float64, Float64]:
 def inverse_2x2(S: Float64) -> Float64:
     """(M, 2, 2) inverses."""
     a, b, c, d = S[:, 0, 0], S[:, 0, 1], S[:, 1, 0], S[:, 1, 1]
-    adjugate = np.stack([np.stack([d, -b], axis=1), np.stack([-c, a], axis=1)], axis=1)
-    inverse: Float64 = adjugate / (a * d - b * c)[:, None, None]
+    inverse = np.empty_like(S)
+    inverse[:, 0, 0], inverse[:, 0, 1], inverse[:, 1, 0], inverse[:, 1, 1] = d, -b, -c, a
+    inverse /= (a * d - b * c)[:, None, None]
     return inverse
 
 

@@ -24,6 +24,8 @@ APART_MPS = 1.5
 """Parts of one object do not differ so much in velocity."""
 WITHIN = 0.6
 """Part of one that must lie within what is known of the other."""
+LESS = 1.2
+"""An outline shrunk by this factor is a part."""
 SETTLED = 4
 """Frames after which a velocity says something."""
 UNMEASURED_M2 = 100.0
@@ -32,13 +34,12 @@ UNMEASURED_M2 = 100.0
 
 def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches:
     """The matches, with the larger part of an object given to its eldest track."""
-    elders = np.flatnonzero(tracks.fixed)
-    if not len(elders) or not len(sightings):
+    if not len(sightings):
         return matches
     proposal = np.full(len(tracks), NONE, np.int64)
     owner = np.full(len(sightings), NONE, np.int64)
     proposal[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
-    elders = elders[np.argsort(tracks.id[elders])]
+    elders = _incomplete(tracks, sightings, proposal)
     swapped = np.zeros(len(tracks), np.bool_)
     taken = np.zeros(len(sightings), np.bool_)
     for elder, part in zip(*_parts(tracks, sightings, elders, proposal, owner), strict=True):
@@ -55,12 +56,24 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
     return _with(tracks, matches, proposal, swapped)
 
 
+def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
+    """Rows, eldest first, that are classified and now without a proposal, or with less than was seen before."""
+    rows = np.flatnonzero(tracks.fixed)
+    now = sightings.high[proposal[rows]] - sightings.low[proposal[rows]]
+    known = tracks.hull_high[rows] - tracks.hull_low[rows]
+    less = (proposal[rows] == NONE) | (known.sum(axis=1) > LESS * now.sum(axis=1))
+    eldest_first: Int = rows[less][np.argsort(tracks.id[rows[less]])]
+    return eldest_first
+
+
 def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
     """Rows and proposals: an elder track, and a larger part of its object that it does not have."""
     about = tracks.x[elders, :2] @ AXES
     moved = about - tracks.shown[elders] @ AXES
     low, high = tracks.low[elders] + moved, tracks.high[elders] + moved
     hull_low, hull_high = tracks.hull_low[elders] + about, tracks.hull_high[elders] + about
+    if not len(elders):
+        return elders, elders
     i, part = touching(hull_low, hull_high, sightings.low, sightings.high)
     elder, rival = elders[i], owner[part]
     class_ = tracks.posterior.argmax(axis=1)

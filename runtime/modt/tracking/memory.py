@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.tracking.followed import Followed
-from modt.tracking.sightings import Sightings, covered, touching
+from modt.tracking.sightings import AXES, Sightings, covered, touching
 from modt.types import Bool, Int
 
 CAPACITY = 2048
@@ -70,8 +70,9 @@ class BackgroundMemory:
             which: (n,) those that no track claims.
         """
         n = self._filled
-        low = np.concatenate([self._low[:n], tracks.low[rows]])
-        high = np.concatenate([self._high[:n], tracks.high[rows]])
+        about = tracks.x[rows, :2] @ AXES
+        low = np.concatenate([self._low[:n], tracks.hull_low[rows] + about])
+        high = np.concatenate([self._high[:n], tracks.hull_high[rows] + about])
         top = np.concatenate([self._top[:n], tracks.top[rows]])
         i, j = touching(sightings.low[which], sightings.high[which], low, high)
         within = covered(sightings.low[which[i]], sightings.high[which[i]], low[j], high[j]) >= COVER

@@ -56,7 +56,8 @@ class RobustAssociation:
         first = np.flatnonzero((distance < GATE) & (cost < LIMIT))
         first = first[assign(rows[first], columns[first], cost[first], LIMIT)]
         left = _left(rows, rows[first], len(tracks)) & _left(columns, columns[first], len(sightings))
-        second = np.flatnonzero(left & (cover > COVER) & ~self._swallowed(tracks, sightings, rows, columns))
+        second = np.flatnonzero(left & (cover > COVER))
+        second = second[~self._swallowed(tracks, sightings, rows[second], columns[second])]
         second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
         kept = np.concatenate([first, second])
         place = tracks.x[rows[kept], :2] + shift[kept]

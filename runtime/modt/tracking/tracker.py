@@ -38,6 +38,11 @@ def association_of(config: TrackingConfig) -> Association:
     return PaperAssociation(config) if config.association == "paper" else RobustAssociation(config)
 
 
+def memory_of(config: TrackingConfig) -> NoMemory | BackgroundMemory:
+    """The paper remembers nothing."""
+    return NoMemory() if config.association == "paper" else BackgroundMemory()
+
+
 def rigid(T: Float64) -> Float64:
     """(4, 4) nearest rigid transform: a pose that is its predecessor's product would drift from being one."""
     U, _, Vt = np.linalg.svd(T[:3, :3])
@@ -62,8 +67,8 @@ class Tracker:
         memory: NoMemory | BackgroundMemory | None = None,
     ) -> None:
         self.config, self.machine = config, machine
-        self.association = association or association_of(config)
-        self.memory = memory or (BackgroundMemory() if config.association == "robust" else NoMemory())
+        self.association = association_of(config) if association is None else association
+        self.memory = memory_of(config) if memory is None else memory
         self._registration = Registration()
         self._tracks = Followed.blank()
         self._next_id = 0
@@ -104,8 +109,9 @@ class Tracker:
         return self._tracks
 
     def asking(self) -> Bool:
-        """(M,) tracks with a proposal whose state asks for a class."""
-        asks: Bool = self.machine.asks[self._tracks.state] & (self._tracks.proposal != NONE)
+        """(M,) tracks with a proposal whose state asks for a class; what flickers does not live to ask."""
+        t = self._tracks
+        asks: Bool = self.machine.asks[t.state] & (t.proposal != NONE) & (t.hits >= self.config.ask_from)
         return asks
 
     def settle(self, rows: Int, certain: Bool) -> None:

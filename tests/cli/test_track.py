@@ -1,0 +1,82 @@
+import argparse
+
+import numpy as np
+import pytest
+
+from modt.cli import track
+from modt.errors import MisuseError
+from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
+from modt.sources.detections import T_LEVEL_CAMERA, kitti, read
+
+
+def run(*arguments):
+    parser = argparse.ArgumentParser()
+    track.add_parser(parser.add_subparsers())
+    parsed = parser.parse_args(["track", *map(str, arguments)])
+    return parsed.run(parsed)
+
+
+def parked(n, T_world_level):
+    """A parked car and one that drives, seen from n poses."""
+    for i in range(n):
+        world = np.array([[20.0, 3.0, -1.0, 4.0, 1.8, 1.5, 0.2], [10.0 + i, -3.0, -1.0, 4.2, 1.7, 1.6, 0.0]])
+        yield transform_boxes(inverse(T_world_level(i)), world)
+
+
+def write(path, n=20, T_world_level=lambda i: np.eye(4)):
+    with path.open("w") as out:
+        for i, boxes in enumerate(parked(n, T_world_level)):
+            for d in kitti(boxes):
+                print(i, 2, 100, 100, 200, 200, 9, *d, 0, sep=",", file=out)
+
+
+def turning(i):
+    return se3(rotation_zyx(0, 0, 0.05 * i), np.array([0.8 * i, 0.0, 0.0]))
+
+
+def test_results_read_back_as_they_were_seen(tmp_path, capsys):
+    source = tmp_path / "0003.txt"
+    write(source)
+    assert run(source, "--out", tmp_path / "out") == 0
+    found = read(tmp_path / "out" / "0003.txt")
+    assert found.n_frames == 20
+    np.testing.assert_allclose(found.box[found.frame == 19][:, :2], [[20, 3], [29, -3]], atol=0.2)
+    ids = {line.split()[1] for line in (tmp_path / "out" / "0003.txt").read_text().splitlines()}
+    assert len(ids) == 2
+    assert "20 frames, 2 tracks" in capsys.readouterr().out
+
+
+def test_poses_place_what_is_seen_in_the_world(tmp_path):
+    source, poses = tmp_path / "a.txt", tmp_path / "poses.txt"
+    write(source, T_world_level=turning)
+    T_camera = [inverse(T_LEVEL_CAMERA) @ turning(i) @ T_LEVEL_CAMERA for i in range(20)]
+    np.savetxt(poses, [T[:3].ravel() for T in T_camera])
+    run(source, "--out", tmp_path / "out", "--poses", poses, "--quiet")
+    found = read(tmp_path / "out" / "a.txt")
+    world = transform_boxes(turning(19), found.box[found.frame == 19])
+    np.testing.assert_allclose(world[:, :2], [[20, 3], [29, -3]], atol=0.2)
+
+
+def test_two_runs_are_the_same(tmp_path):
+    write(tmp_path / "a.txt", T_world_level=turning)
+    for out in ("one", "two"):
+        run(tmp_path / "a.txt", "--out", tmp_path / out, "--quiet")
+    assert (tmp_path / "one/a.txt").read_bytes() == (tmp_path / "two/a.txt").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("options", "cause"),
+    [
+        (["--poses", "absent.txt"], "is missing"),
+        (["--poses", "short.txt"], "1 poses for 20 frames"),
+        (["--poses", "bad.txt"], "no poses"),
+        (["--period", "0"], "no time between frames"),
+    ],
+)
+def test_misuse_is_named(tmp_path, monkeypatch, options, cause):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "a.txt")
+    np.savetxt("short.txt", np.eye(4)[:3].reshape(1, 12))
+    (tmp_path / "bad.txt").write_text("1 2 3\n")
+    with pytest.raises(MisuseError, match=cause):
+        run(tmp_path / "a.txt", "--out", tmp_path / "out", *options)

@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from modt.errors import MisuseError
+from modt.sources.detections import files, kitti, level, read
+
+AB3DMOT = "0,2,298.3,165.2,458.2,293.4,8.3,1.96,1.81,4.75,-4.57,1.84,13.53,-2.11,-1.79\n"
+LABEL = "0 7 Car 0 0 -1.79 298.3 165.2 458.2 293.4 1.96 1.81 4.75 -4.57 1.84 13.53 -2.11 8.3\n"
+
+
+def write(tmp_path, text):
+    path = tmp_path / "0000.txt"
+    path.write_text(text)
+    return path
+
+
+def test_both_formats_say_the_same(tmp_path):
+    a, b = read(write(tmp_path, AB3DMOT)), read(write(tmp_path, LABEL))
+    np.testing.assert_allclose(a.box, b.box)
+    np.testing.assert_allclose(a.score, b.score)
+    np.testing.assert_allclose(a.image_box, b.image_box)
+    assert a.type_[0] == b.type_[0] == 1
+    np.testing.assert_allclose(a.box[0, :6], [13.53, 4.57, 1.96 / 2 - 1.84, 4.75, 1.81, 1.96])
+
+
+def test_frames_without_detections_are_frames(tmp_path):
+    later = AB3DMOT.replace("0,2,", "3,2,", 1)
+    found = read(write(tmp_path, later + AB3DMOT + AB3DMOT))
+    assert [rows.stop - rows.start for _, rows in found.frames()] == [2, 0, 0, 1]
+
+
+def test_types_that_are_not_followed_are_left_out(tmp_path):
+    assert len(read(write(tmp_path, LABEL.replace("Car", "DontCare")))) == 0
+    assert read(write(tmp_path, "")).n_frames == 0
+
+
+@pytest.mark.parametrize(
+    "text", ["1,2,3\n", "a,b\n", "0 7 Car 0 0\n", AB3DMOT.replace("8.3", "nan"), AB3DMOT.replace("0,", "-1,", 1)]
+)
+def test_a_bad_line_is_named(tmp_path, text):
+    with pytest.raises(MisuseError, match=r"0000\.txt:2"):
+        read(write(tmp_path, AB3DMOT + text))
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    with pytest.raises(MisuseError, match=r"no \.txt"):
+        files(tmp_path)
+    with pytest.raises(MisuseError, match="cannot be read"):
+        read(tmp_path / "none.txt")
+
+
+@given(arrays(np.float64, (3, 7), elements=st.floats(-3, 3)))
+def test_coordinates_return(boxes):
+    np.testing.assert_allclose(level(kitti(boxes)), boxes, atol=1e-9)

@@ -1,0 +1,156 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.config import TrackingConfig
+from modt.tracking.memory import BackgroundMemory, NoMemory
+from modt.tracking.robust import compare
+from modt.tracking.sightings import AXES
+from modt.tracking.states import EFFICIENT
+from modt.tracking.tracker import Tracker
+from modt.types import NONE, ObjectClass
+
+from .tracking_scenes import box, frame_of
+
+EYE = np.eye(4)
+BACKGROUND, CAR = np.eye(4)[ObjectClass.BACKGROUND], np.eye(4)[ObjectClass.CAR]
+
+
+def tracker(**options):
+    return Tracker(TrackingConfig(ask_from=1, **options), EFFICIENT)
+
+
+def classify(tracker, posterior):
+    """Settle whatever asks."""
+    rows = np.flatnonzero(tracker.asking())
+    tracker.tracks.posterior[rows], tracker.tracks.fixed[rows] = posterior, True
+    tracker.settle(rows, np.ones(len(rows), np.bool_))
+    return len(rows)
+
+
+def run(tracker, scenes, posterior=BACKGROUND, first=0, **options):
+    asked = 0
+    for i, boxes in enumerate(scenes, first):
+        tracker.follow(*frame_of(boxes, i, EYE, **options))
+        asked += classify(tracker, posterior)
+    return asked
+
+
+def outline(centre, half):
+    middle = np.asarray(centre) @ AXES
+    return (middle - half)[None], (middle + half)[None]
+
+
+@given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.2, 3))
+def test_what_keeps_its_shape_shifts_as_it_moved(dx, dy, half):
+    shift, size, overlap, _ = compare(*outline((0, 0), half), *outline((dx, dy), half))
+    np.testing.assert_allclose(shift, [[dx, dy]], atol=1e-9)
+    np.testing.assert_allclose(size, 0, atol=1e-9)
+    assert 0 <= overlap[0] <= 1
+
+
+def test_what_only_grows_does_not_shift():
+    low, high = outline((0, 0), 1.0)
+    for grown in (high + np.array([[2.0, 1.5, 0, 0]]), high + np.array([[0, 1.0, 2.0, 1.0]])):
+        shift, _, _, cover = compare(low, high, low, grown)
+        np.testing.assert_allclose(shift, 0, atol=1e-9)
+        assert cover[0] > 0.9
+
+
+def test_a_standing_car_that_comes_into_view_has_no_speed():
+    """Its rear stays where it is; its centre runs ahead."""
+    t = tracker()
+    run(t, [[box(10 + 0.1 * i, 3, l=1.0 + 0.2 * i)] for i in range(15)], CAR)
+    assert list(t.tracks.id) == [0]
+    assert t.tracks.x[0, 3] < 0.5  # its front comes into view at 2 m/s
+
+
+def test_a_car_behind_a_pole_stays_one_object():
+    whole, halves = [box(12, 4)], [box(11.0, 4, l=1.9), box(13.3, 4, l=1.3)]
+    t = tracker()
+    run(t, [whole] * 4, CAR)
+    run(t, [halves, halves[::-1], halves], CAR, first=4, points=(80, 40))
+    for_the_larger = t.tracks.id[t.tracks.proposal == 0]
+    assert list(for_the_larger) == [0]
+    swapped = [box(11.0, 4, l=1.2), box(13.0, 4, l=1.9)]
+    run(t, [swapped, swapped], CAR, first=7, points=(40, 80))
+    assert list(t.tracks.id[t.tracks.proposal == 1]) == [0]
+    run(t, [whole], CAR, first=9)
+    assert list(t.tracks.id[t.tracks.proposal == 0]) == [0]
+
+
+def test_two_cars_in_a_row_stay_two():
+    t = tracker()
+    row = [box(10, 4), box(15.2, 4)]
+    for points in ((80, 40), (40, 80), (80, 40)):
+        run(t, [row] * 3, CAR, first=t.tracks.age.max(initial=0), points=points)
+        assert list(t.tracks.id[np.argsort(t.tracks.proposal)]) == [0, 1]
+
+
+def test_an_object_waits_while_a_wall_swallows_it():
+    t = tracker()
+    person, wall = box(10, 2, 0.6, 0.6, 1.7), box(10, 3.5, 12, 0.4, 2.5)
+    run(t, [[person]] * 4, np.eye(4)[ObjectClass.PEDESTRIAN])
+    run(t, [[box(10, 2.9, 12, 1.9, 2.5)]] * 2, first=4)
+    assert t.tracks.proposal[t.tracks.id == 0] == NONE
+    run(t, [[person, wall]], first=6)
+    assert t.tracks.id[t.tracks.proposal == 0] == 0
+
+
+def test_a_lost_track_is_found_along_its_prediction():
+    t = tracker()
+    moving = [[box(10 + 0.8 * i, 0)] if i not in (8, 9, 10) else [] for i in range(13)]
+    run(t, moving, CAR)
+    assert list(t.tracks.id) == [0]
+    assert t.tracks.missed[0] == 0
+
+
+def far(i):
+    return box(30, -8 - 0.01 * i, 1, 1)
+
+
+def test_background_is_remembered_where_it_stood():
+    for memory, asked in ((BackgroundMemory(), 0), (NoMemory(), 1)):
+        t = Tracker(TrackingConfig(ask_from=1, max_missed=2), EFFICIENT, memory=memory)
+        run(t, [[far(0), box(10, 4, 1, 1)]] * 4)
+        run(t, [[far(0)]] * 5, first=4)
+        assert len(t.tracks) == 1
+        assert run(t, [[far(0), box(10.05, 4, 1, 1)]], first=9) == asked
+        back = t.tracks.id == 2
+        assert t.machine.names[t.tracks.state[back][0]] == "tracked"
+        assert t.tracks.posterior[back][0].argmax() == ObjectClass.BACKGROUND
+
+
+@pytest.mark.parametrize("stranger", [box(10, 4, 1, 1, h=2.6, z=-0.45), box(12, 4, 1, 1), box(10, 4, 3, 3)])
+def test_what_is_taller_larger_or_elsewhere_asks(stranger):
+    t = tracker(max_missed=2)
+    run(t, [[far(0), box(10, 4, 1, 1)]] * 4)
+    run(t, [[far(0)]] * 5, first=4)
+    assert run(t, [[far(0), stranger]], first=9) == 1
+
+
+def test_foreground_is_not_remembered():
+    t = tracker(max_missed=2)
+    run(t, [[far(0), box(10, 4, 1, 1)]] * 4, CAR)
+    run(t, [[far(0)]] * 5, CAR, first=4)
+    assert run(t, [[far(0), box(10, 4, 1, 1)]], first=9) == 1
+
+
+def test_what_leaves_its_place_must_ask_after_all():
+    """A pedestrian who parts from the wall that it stood before is background until it has gone a step."""
+    t = tracker()
+    run(t, [[box(10, 3, 12, 2.0, 1.8)]] * 4)
+    steps = [[box(10, 3.6, 12, 0.8, 1.8), box(10, 2.8 - 0.15 * i, 0.5, 0.5, 1.7)] for i in range(8)]
+    assert run(t, steps[:2], first=4) == 0
+    assert run(t, steps[2:], first=6) == 1
+
+
+def test_memory_forgets_the_oldest():
+    memory = BackgroundMemory(capacity=3)
+    t = Tracker(TrackingConfig(ask_from=1, max_missed=0), EFFICIENT, memory=memory)
+    for i in range(5):
+        run(t, [[box(10 + 5 * i, 0, 1, 1)]] * 2, first=2 * i)
+    assert len(memory) == 3
+    assert run(t, [[box(10, 0, 1, 1)]], first=10) == 1
+    assert run(t, [[box(20, 0, 1, 1)]], first=11) == 0
