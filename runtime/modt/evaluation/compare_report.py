@@ -155,7 +155,7 @@ def _saving(
     gross1, gross2 = (energy[m]["gross_J"] for m in (base, mode))
     net1, net2 = (energy[m]["net_J"] for m in (base, mode))
     return {
-        "a": figure(p.paper.a),
+        "a": figure(p.paper.a, "", Kind.ESTIMATED),
         "gamma_short": figure(p.paper.gamma_short, "", Kind.ESTIMATED),
         "gamma_equation_3": figure(p.paper.gamma, "", Kind.ESTIMATED),
         "short_form_error": figure(p.paper.short_form_error, "", Kind.ESTIMATED),
@@ -197,12 +197,12 @@ def _costs(costs: UnitCosts, baseline: Evidence, basis: Basis) -> dict[str, Figu
         "E_class": figure(basis.net_W * e_class, "J", Kind.ESTIMATED),
         "E_track": figure(basis.net_W * costs.track, "J", Kind.ESTIMATED),
         "seg_cpu_ms": figure(1e3 * costs.seg, "ms"),
-        "class_cpu_ms": figure(1e3 * e_class, "ms"),
+        "class_cpu_ms": figure(1e3 * e_class, "ms", Kind.ESTIMATED),
         "track_cpu_ms": figure(1e3 * costs.track, "ms"),
-        "class_call_cpu_us": figure(1e6 * costs.class_call, "us"),
-        "class_item_cpu_us": figure(1e6 * costs.class_item, "us"),
-        "class_point_cpu_us": figure(1e6 * costs.class_point, "us"),
-        "a": figure(e_class / costs.seg if costs.seg else None),
+        "class_call_cpu_us": figure(1e6 * costs.class_call, "us", Kind.ESTIMATED),
+        "class_item_cpu_us": figure(1e6 * costs.class_item, "us", Kind.ESTIMATED),
+        "class_point_cpu_us": figure(1e6 * costs.class_point, "us", Kind.ESTIMATED),
+        "a": figure(e_class / costs.seg if costs.seg else None, "", Kind.ESTIMATED),
     }
 
 

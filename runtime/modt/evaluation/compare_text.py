@@ -44,7 +44,7 @@ def compare_text(tree: dict[str, Any]) -> str:
                 f"{marked(s['saved_J'], 1e3)} mJ a frame saved{_against_meter(s)}"
             ),
             f"  {'from N_go to what was measured':<50}{'change e':>10}{'gamma e':>10}",
-            f"  {'the short form, gamma = N_go':<50}{'':>10}{brief(s['gamma_short'].value):>10}",
+            f"  {'the short form, gamma = N_go':<50}{'':>10}{marked(s['gamma_short']):>10}",
             *(f"  {t['name']:<50}{t['change'].value:>+10.3f}{t['gamma'].value:>10.3f}" for t in s["terms"]),
             "",
         ]
@@ -60,11 +60,11 @@ def holds(saving: dict[str, Any]) -> str:
     """Whether the prediction holds, in a sentence."""
     deviation, a = saving["deviation"], saving["a"]
     verdict = "holds within 5 %" if abs(deviation.value) <= 0.05 else "does NOT hold within 5 %"
-    short = saving["short_form_error"].value
+    short = saving["short_form_error"]
     spread = f"{100 * deviation.low:+.1f} to {100 * deviation.high:+.1f}"
     return (
-        f"the prediction {verdict}: off by {100 * deviation.value:+.1f} % ({spread}); "
-        f"at a = {brief(a.value)} N_go alone errs by {100 * short:+.0f} %"
+        f"the prediction {verdict}: off by {100 * deviation.value:+.1f}e % ({spread}); "
+        f"at a = {marked(a)} N_go alone errs by {100 * short.value:+.0f}e %"
     )
 
 

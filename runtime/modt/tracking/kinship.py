@@ -62,8 +62,8 @@ def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
     now = sightings.high[proposal[rows]] - sightings.low[proposal[rows]]
     known = tracks.hull_high[rows] - tracks.hull_low[rows]
     less = (proposal[rows] == NONE) | (known.sum(axis=1) > LESS * now.sum(axis=1))
-    rows = rows[less]
-    return rows[np.argsort(tracks.id[rows])]
+    eldest_first: Int = rows[less][np.argsort(tracks.id[rows[less]])]
+    return eldest_first
 
 
 def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:

@@ -48,7 +48,7 @@ def crossing(rng: np.random.Generator, seconds: float, height_m: float) -> World
         for side in (-1, 1):
             roadside.people(builder, road, side, apart_m=14.0)
             roadside.parked(builder, road, side, share)
-        dress(builder, road)
+        dress(builder, road, wild=0.5)
     pace = np.interp(np.linspace(0, 1, 200), [0.0, 0.35, 0.5, 0.65, 1.0], speed * np.array([1.0, 0.6, 0.4, 0.7, 1.0]))
     ego = Path(line, *timetable(seconds, pace, max(corner_m - approach, 0.0)))
     return builder.world(terrain(rng, roads, (-reach, -reach), (reach, reach)), ego, height_m)

@@ -13,8 +13,8 @@ LANE = 0.45
 """Middle of a lane, as a share of half the carriageway."""
 
 
-def houses(builder: Builder, road: Road, side: int, density: float = 0.85) -> None:
-    """A row of houses behind gardens, and what stands in their second row."""
+def houses(builder: Builder, road: Road, side: int, density: float, wild: float) -> None:
+    """A row of houses behind gardens, more or less overgrown, and what stands in their second row."""
     rng, x = builder.rng, road.start_m
     while x < road.end_m:
         length, depth = rng.uniform(8.0, 18.0), rng.uniform(8.0, 12.0)
@@ -25,7 +25,7 @@ def houses(builder: Builder, road: Road, side: int, density: float = 0.85) -> No
             spot = road.place(x + length / 2, side * (set_back + depth / 2), 0.0 if side > 0 else np.pi)
             builder.scenery(scenery.building(rng, length, depth, rng.uniform(5.5, 11.0)), *spot)
         if open_:
-            _garden(builder, road, side, x, length, set_back if built else set_back + 12.0)
+            _garden(builder, road, side, x, length, set_back if built else set_back + 12.0, wild)
             behind = side * (set_back + depth + rng.uniform(6.0, 22.0))
             spot = road.place(x + rng.uniform(0, length), behind, rng.uniform(-0.2, 0.2))
             if rng.random() < 0.5:
@@ -35,7 +35,7 @@ def houses(builder: Builder, road: Road, side: int, density: float = 0.85) -> No
         x += length + rng.choice([0.5, 3.0, 6.0, 12.0], p=[0.3, 0.3, 0.25, 0.15])
 
 
-def _garden(builder: Builder, road: Road, side: int, x: float, length: float, set_back: float) -> None:
+def _garden(builder: Builder, road: Road, side: int, x: float, length: float, set_back: float, wild: float) -> None:
     """What lies between pavement and house: a border with a gate, bushes, low plants, a tree."""
     rng = builder.rng
     edge = road.half_m + road.pavement_m + 0.4
@@ -45,14 +45,14 @@ def _garden(builder: Builder, road: Road, side: int, x: float, length: float, se
         border = (scenery.fence, scenery.hedge, scenery.wall)[make]
         builder.scenery(border(rng, run), *road.place(x + run / 2, side * edge))
     deep = max(set_back - 0.5 - edge, 1.5)
-    for _ in range(int(rng.integers(1, 4))):
+    for _ in range(int(rng.poisson(2.5 * wild))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(0.8, deep)))
         builder.scenery(scenery.shrub(rng, rng.uniform(0.5, 1.6)), *spot)
     for _ in range(int(rng.choice(3, p=[0.65, 0.27, 0.08]))):
         off = edge + rng.uniform(0.8, deep)
         builder.scenery(scenery.thicket(rng), *road.place(x + rng.uniform(0, length), side * off, rng.normal(0, 0.5)))
     middle = road.place(x + length / 2, side * (edge + deep / 2))
-    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.04 * length * deep))), *middle)
+    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.06 * wild * length * deep))), *middle)
     for _ in range(int(rng.choice(3, p=[0.5, 0.35, 0.15]))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(1.0, deep)))
         builder.scenery(scenery.tree(rng), *spot)

@@ -49,9 +49,9 @@ def residential(rng: np.random.Generator, travelled_m: float) -> Road:
     )
 
 
-def dress(builder: Builder, road: Road) -> None:
-    """Houses, gardens and street furniture on both sides."""
+def dress(builder: Builder, road: Road, wild: float = 1.0) -> None:
+    """Houses, gardens, more or less overgrown, and street furniture on both sides."""
     density = builder.rng.uniform(0.5, 0.95)
     for side in (-1, 1):
-        roadside.houses(builder, road, side, density)
+        roadside.houses(builder, road, side, density, wild)
         roadside.furniture(builder, road, side)
