@@ -37,13 +37,13 @@ def main() -> None:
     args.work.mkdir(parents=True, exist_ok=True)
     synthetic, real = args.work / "synthetic.npz", args.work / "kitti.npz"
     tool("build_crops", synthetic, "--synthetic", WORLDS, "--each", SWEEPS)
-    tool("train_pointnet", args.work / "synthetic", synthetic, "--epochs", "8", "--fold-epochs", "3", "--folds", "2")
+    tool("train_pointnet", args.work / "synthetic", synthetic, "--epochs", "4", "--fold-epochs", "2", "--folds", "2")
     tool("export_pointnet", args.work / "synthetic", MODELS / "pointnet-synthetic.onnx",
          "--data", SYNTHETIC_DATA, "--licence", "Apache-2.0: free for any use")  # fmt: skip
     if args.kitti:
         tool("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
         tool("train_pointnet", args.work / "kitti", real, synthetic,
-             "--epochs", "40", "--fold-epochs", "15", "--folds", "3")  # fmt: skip
+             "--epochs", "55", "--fold-epochs", "15", "--folds", "3")  # fmt: skip
         tool("export_pointnet", args.work / "kitti", MODELS / "pointnet-kitti.onnx",
              "--data", KITTI_DATA, "--licence", "CC BY-NC-SA 3.0, as its data: not for commercial use")  # fmt: skip
 

@@ -111,11 +111,12 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
 
 def folds(data: Dataset, k: int) -> Int:
     """Fold of each drive, objects of the rare classes spread evenly."""
-    drives = int(max(data.drive.max(), data.truth_drive.max())) + 1
-    weight = np.zeros((drives, N_CLASSES))
-    np.add.at(weight, (data.truth_drive, data.truth_label), 1.0)
+    counted = len(data.truth_drive) > 0
+    drive, label = (data.truth_drive, data.truth_label) if counted else (data.drive, data.label)
+    weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
+    np.add.at(weight, (drive, label), 1.0)
     weight /= weight.sum(axis=0).clip(1)
-    load_of, fold = np.zeros((k, N_CLASSES)), np.zeros(drives, np.int64)
+    load_of, fold = np.zeros((k, N_CLASSES)), np.zeros(len(weight), np.int64)
     for drive in np.argsort(-weight.max(axis=1), kind="stable"):
         fold[drive] = np.argmin((load_of + weight[drive]).max(axis=1) + load_of.sum(axis=1) * 1e-3)
         load_of[fold[drive]] += weight[drive]
