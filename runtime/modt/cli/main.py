@@ -12,10 +12,10 @@ import sys
 from collections.abc import Callable, Sequence
 
 from modt import __version__
-from modt.cli import replay, simulate
+from modt.cli import replay, simulate, track
 from modt.errors import ModtError
 
-COMMANDS = (replay, simulate)
+COMMANDS = (replay, simulate, track)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.sources.synthetic.materials import Material
@@ -31,6 +31,7 @@ def scene(seed, n=40):
     return Pieces.join(made)
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 1000))
 def test_rays_cast_together_meet_what_windows_cast_one_by_one_meet(seed):
     pieces, depth = scene(seed), np.ones_like(NO_GROUND)
@@ -42,6 +43,7 @@ def test_rays_cast_together_meet_what_windows_cast_one_by_one_meet(seed):
     np.testing.assert_allclose(one_by_one.distance[hit], together.distance[hit], rtol=2e-5)
 
 
+@settings(max_examples=25)
 @given(st.integers(0, 1000))
 def test_windows_leave_out_no_ray_that_hits(seed):
     pieces = scene(seed, n=6)
