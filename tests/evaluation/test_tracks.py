@@ -19,7 +19,6 @@ def frames(ids, shift=0.0, n=10):
 
 @pytest.fixture(autouse=True)
 def _with_trackeval():
-    pytest.importorskip("trackeval")
 
 
 def test_what_is_right_scores_full():
