@@ -114,6 +114,26 @@ def test_the_height_of_the_sensor_is_found(true_m):
     assert height.of(Columns.of(points)) == pytest.approx(true_m, abs=0.05)
 
 
+def test_walls_alone_are_no_floor():
+    walls = [
+        (x, y, *((3.0, 0.2) if y else (0.2, 3.0)), -1.0, 3.0) for x, y in [(1.2, 0), (-1.4, 0), (0, 1.3), (0, -1.5)]
+    ]
+    points, on = scans.scan(walls, 0.8, scans.VLP_16, step_deg=0.2)
+    assert (on > 0).all()
+    sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
+    assert EstimatedHeight(sensor).of(Columns.of(points)) == USUAL_M
+
+
+def test_a_floor_is_found_between_walls_that_hide_most_of_it():
+    walls = [
+        (x, y, *((4.0, 0.2) if y else (0.2, 4.0)), 0.0, 3.0) for x, y in [(1.9, 0), (-1.7, 0), (0, 1.8), (0, -2.0)]
+    ]
+    points, on = scans.scan(walls, 0.36, scans.VLP_16, step_deg=0.2)
+    assert 0.05 < (on == 0).mean() < 0.2
+    sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
+    assert EstimatedHeight(sensor).of(Columns.of(points)) == pytest.approx(0.36, abs=0.03)
+
+
 def test_no_floor_leaves_the_usual_height():
     height = sensor_height(SensorConfig(height_m=None))
     assert height.of(Columns.of(np.zeros((0, 4), np.float32))) == USUAL_M
