@@ -17,10 +17,6 @@ def frames(ids, shift=0.0, n=10):
     ]
 
 
-@pytest.fixture(autouse=True)
-def _with_trackeval():
-
-
 def test_what_is_right_scores_full():
     truth = frames(lambda i: [5, 9])
     scores = evaluate([(truth, frames(lambda i: [1, 0]))])
