@@ -65,6 +65,7 @@ class Proposals:
         box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
         truncated: (P,) cut by the edge of the field of view.
         occluded: (P,) cut by something nearer that stands in front of it.
+        sensor_height_m: of the sensor above the ground that they were found on, None where it is not known.
     """
 
     members: Int
@@ -73,6 +74,7 @@ class Proposals:
     box: Float64
     truncated: Bool
     occluded: Bool
+    sensor_height_m: float | None = None
 
     def __len__(self) -> int:
         return len(self.offsets) - 1

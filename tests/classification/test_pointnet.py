@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import shutil
 from itertools import pairwise
 from pathlib import Path
@@ -88,6 +89,18 @@ def test_two_calls_give_the_same_bytes(shipped: PointNet) -> None:
     points, proposals = blobs([40, 7, 200], np.random.default_rng(0))
     first = shipped.classify(points, proposals, np.arange(3))
     assert first.tobytes() == shipped.classify(points, proposals, np.arange(3)).tobytes()
+
+
+def test_a_height_that_the_proposals_know_is_believed(tmp_path: Path) -> None:
+    model = str(save(tmp_path, random_layers(3)))
+    low = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=0.4))
+    unknown = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=None))
+    points, proposals = blobs([40, 7, 200], np.random.default_rng(5))
+    rows = np.arange(3)
+    told = dataclasses.replace(proposals, sensor_height_m=0.4)
+    expected = low.classify(points, proposals, rows)
+    assert np.array_equal(unknown.classify(points, told, rows), expected)
+    assert not np.allclose(unknown.classify(points, proposals, rows), expected, atol=1e-3)
 
 
 def test_rows_are_distributions(shipped: PointNet) -> None:

@@ -49,6 +49,12 @@ def test_one_thing_alone_is_one_proposal():
     assert not proposals.occluded[0]
 
 
+@pytest.mark.parametrize("given_m", [0.8, None])
+def test_proposals_tell_the_height_of_the_sensor(given_m):
+    points, _ = scans.scan([(8.0, 3.0, *CAR)], height_m=0.8)
+    assert segmenter(height_m=given_m).segment(points).sensor_height_m == pytest.approx(0.8, abs=0.03)
+
+
 def test_points_without_a_return_belong_to_nothing():
     points, _ = scans.scan([(12.0, 3.0, *CAR)])
     points[::7] = 0

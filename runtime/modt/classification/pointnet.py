@@ -35,7 +35,7 @@ class PointNet:
 
     Args:
         config: the model and the sizes of a call.
-        sensor: how high it stands.
+        sensor: how high it stands, for proposals that do not say.
 
     Attributes:
         path: the model file.
@@ -62,7 +62,9 @@ class PointNet:
             proposals: its segments.
             which: (R,) those to classify.
         """
-        crops = canonical(gather(points, proposals, which, self.config.max_points), self.height_m)
+        found_at = proposals.sensor_height_m
+        height_m = self.height_m if found_at is None else found_at
+        crops = canonical(gather(points, proposals, which, self.config.max_points), height_m)
         out = np.empty((len(crops), N_CLASSES))
         by_size = np.argsort(crops.count, kind="stable")
         for first in range(0, len(crops), self.config.batch):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
@@ -47,12 +49,13 @@ class Segmenter:
         """Proposals of (N, 4) points; none for an empty sweep."""
         looked_at = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -MARGIN_M)
         sweep = Columns.of(points if looked_at is None else points[looked_at])
-        height = self.ground.height(sweep, self.sensor_height.of(sweep))
+        above = self.sensor_height.of(sweep)
+        height = self.ground.height(sweep, above)
         raised = np.flatnonzero(self.raised(sweep, height))
         if not len(raised):
             return Proposals.empty()
         index = raised if looked_at is None else looked_at[raised]
-        return self._proposals(sweep.take(raised), height[raised], index)
+        return replace(self._proposals(sweep.take(raised), height[raised], index), sensor_height_m=above)
 
     def raised(self, sweep: Columns, height: Float32) -> Bool:
         """(N,) within range, clear of the ground and no higher than objects reach."""
