@@ -115,18 +115,15 @@ def peak_mb(stage: Segmenter, points: Float32) -> float:
     return peak / 1e6
 
 
-def summary(times: dict[str, list[float]], against: str) -> dict[str, dict[str, float]]:
-    """Median and minimum of each [ms], and their ratios to one of them."""
-    base = times.get(against, [float("nan")])
-    return {
-        name: {
-            "median_ms": round(float(np.median(ms)), 2),
-            "min_ms": round(min(ms), 2),
-            "ratio_median": round(float(np.median(ms) / np.median(base)), 3),
-            "ratio_min": round(min(ms) / min(base), 3),
-        }
-        for name, ms in times.items()
-    }
+def summary(times: dict[str, list[float]], base: list[float]) -> dict[str, dict[str, float]]:
+    """Median and minimum of each [ms], and their ratios to a base, if there is one."""
+    rows = {}
+    for name, ms in times.items():
+        rows[name] = {"median_ms": round(float(np.median(ms)), 2), "min_ms": round(min(ms), 2)}
+        if base:
+            rows[name]["ratio_median"] = round(float(np.median(ms) / np.median(base)), 3)
+            rows[name]["ratio_min"] = round(min(ms) / min(base), 3)
+    return rows
 
 
 def beams(rounds: int) -> dict[str, dict[str, float]]:
@@ -166,10 +163,12 @@ def main() -> None:
         settings = profile.load()
         stage = Segmenter(settings.segmentation, settings.sensor, FieldOfView())
         found["scans"], found["peak_mb"] = len(scans), round(max(peak_mb(stage, scan) for scan in scans), 1)
-        found["quick"] = summary(measure(dict(quick(stage)), scans, args.rounds), YARDSTICK)
+        times = measure(dict(quick(stage)), scans, args.rounds)
+        base = times.get(YARDSTICK, [])
+        found["quick"] = summary(times, base)
         if args.slow:
             above = [raised(stage, scan) for scan in scans]
-            found["slow"] = summary(measure(dict(slow(stage)), above, 1), YARDSTICK)
+            found["slow"] = summary(measure(dict(slow(stage)), above, 1), base)
     if not found:
         parser.error("give scans, or --beams")
     text = json.dumps(found, indent=2)
