@@ -58,7 +58,7 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
 
 def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
     """Rows, eldest first, that are classified and now without a proposal, or with less than was seen before."""
-    rows = np.flatnonzero(tracks.fixed)
+    rows = np.flatnonzero(tracks.fixed | (tracks.views > 0))
     now = sightings.high[proposal[rows]] - sightings.low[proposal[rows]]
     known = tracks.hull_high[rows] - tracks.hull_low[rows]
     less = (proposal[rows] == NONE) | (known.sum(axis=1) > LESS * now.sum(axis=1))
