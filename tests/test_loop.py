@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from modt.energy.ledger import NullLedger
 from modt.loop import FixedPeriod, FullSpeed, Stop, drive
-from modt.sinks.sink import NullLines
 from modt.types import UNLIMITED
 
 from .results import result
@@ -50,6 +49,7 @@ def test_a_stall_is_counted_and_no_burst_follows():
     out, pace = starts([0.35, 0.01, 0.01, 0.01])
     assert out == pytest.approx([0.0, 0.35, 0.45, 0.55])
     assert pace.missed == 2
+    assert pace.report()["max_lateness_ms"] == pytest.approx(250)  # the stall is not hidden by starting anew
 
 
 def test_a_small_overrun_is_made_up_for():
@@ -62,16 +62,20 @@ def test_a_small_overrun_is_made_up_for():
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
 def test_frames_never_start_early_nor_in_a_burst(work):
     out, pace = starts(work)
-    assert all(
-        b - a >= 0.1 - max(0, a % 0.1) - 1e-6 or b - a >= w for a, b, w in zip(out, out[1:], work, strict=False)
-    )
-    assert len(out) == len(work)
-    assert min(pace.lateness_s) >= -1e-9
+    for i, first in enumerate(out):
+        for steps, later in enumerate(out[i:]):
+            assert later - first >= (steps - 1) * 0.1 - 1e-6  # one frame at most is made up for, never a row of them
+    assert pace.missed >= sum(w > 0.21 for w in work[:-1])
 
 
 def test_full_speed_never_waits():
     FullSpeed().wait()
     assert FullSpeed().report() == {"rate_hz": None}
+
+
+class NullLines:
+    def write(self, record):
+        pass
 
 
 class Pipe:

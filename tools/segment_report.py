@@ -37,6 +37,8 @@ BAND_M = 15
 GROUND = (40, 44, 48, 49, 60, 72)
 """SemanticKITTI: road, parking, sidewalk, other ground, lane marking, terrain."""
 UNKNOWN = (0, 1)
+GROUND_TOLERANCE_M = 0.15
+"""What lies this near the estimated ground counts as ground here; objects begin at the profile's clearance_m."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,7 @@ def report(scenes: Iterator[Scene], settings: ProfileConfig, whole: bool, pictur
         sweep = Columns.of(scene.points)
         height = around.ground.height(sweep, around.sensor_height.of(sweep))
         if scene.ground is not None and scene.known is not None:
-            low = (height < settings.segmentation.ground_tolerance_m) & scene.known
+            low = (height < GROUND_TOLERANCE_M) & scene.known
             ground["both"] += int((low & scene.ground).sum())
             ground["said"] += int(low.sum())
             ground["true"] += int((scene.ground & scene.known).sum())

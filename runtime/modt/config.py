@@ -85,7 +85,6 @@ class SensorConfig(StageConfig):
     height_m: float | None = _number(1.73, 0.05, 5.0, "m", "above the ground; none: estimated from the stream")
     min_range_m: float = _number(2.0, 0.0, 20.0, "m", "nearer points belong to the robot itself")
     max_range_m: float = _number(80.0, 1.0, 400.0, "m", "farther points are left out")
-    azimuth_step_deg: float = _number(0.17, 0.01, 5.0, "deg", "between neighbouring returns of a beam")
     elevation_step_deg: float = _number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
     period_s: float = _number(0.1, 0.001, 10.0, "s", "of a sweep, where the stream has no stamps")
 
@@ -94,7 +93,6 @@ class SensorConfig(StageConfig):
 class SegmentationConfig(StageConfig):
     """Ground, clusters and the sizes of what can be an object (section III-A)."""
 
-    ground_tolerance_m: float = _number(0.15, 0.02, 1.0, "m", "points this near the ground belong to it")
     max_slope_deg: float = _number(12.0, 0.5, 45.0, "deg", "of the ground")
     clearance_m: float = _number(0.25, 0.02, 1.0, "m", "above ground, from where on points make objects")
     max_height_m: float = _number(2.6, 0.3, 20.0, "m", "above ground; what hangs higher joins nothing")

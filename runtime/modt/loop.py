@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from modt.pipeline import SINK, SOURCE, Pipeline
@@ -52,14 +52,14 @@ class FixedPeriod:
         clock: monotonic time [s].
         sleep: waits for that many seconds.
         missed: deadlines that had passed before the frame could start.
-        lateness_s: how late each frame started [s].
+        max_lateness_s: how late a frame started at worst [s].
     """
 
     period_s: float
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
     missed: int = 0
-    lateness_s: list[float] = field(default_factory=list)
+    max_lateness_s: float = 0.0
     _deadline_s: float | None = None
 
     def wait(self) -> None:
@@ -70,10 +70,11 @@ class FixedPeriod:
         if now < self._deadline_s:
             self.sleep(self._deadline_s - now)
             now = self.clock()
-        elif now - self._deadline_s > self.period_s:
-            self.missed += int((now - self._deadline_s) / self.period_s)
+        late_s = now - self._deadline_s
+        self.max_lateness_s = max(self.max_lateness_s, late_s)
+        if late_s > self.period_s:
+            self.missed += int(late_s / self.period_s)
             self._deadline_s = now
-        self.lateness_s.append(now - self._deadline_s)
         self._deadline_s += self.period_s
 
     def report(self) -> dict[str, Any]:
@@ -81,7 +82,7 @@ class FixedPeriod:
         return {
             "rate_hz": 1.0 / self.period_s,
             "missed_deadlines": self.missed,
-            "max_lateness_ms": 1e3 * max(self.lateness_s, default=0.0),
+            "max_lateness_ms": 1e3 * self.max_lateness_s,
         }
 
 

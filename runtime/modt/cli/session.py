@@ -104,6 +104,7 @@ class Session:
                 "layout": info.layout,
                 "path": str(self.request.path.resolve()) if self.request.path else None,
                 "frames": info.n_frames,
+                "poses": info.has_poses,
                 "notes": list(info.notes),
             },
             "mode": self.request.mode,

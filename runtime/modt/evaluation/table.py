@@ -45,7 +45,7 @@ def summary_table(summary: dict[str, Any]) -> str:
         lines.append(_host_line(summary["host"]))
     faults = summary.get("faults", {})
     if faults.get("count"):
-        lines.append(f"  {faults['count']} faulty scans, {faults['skipped']} of them skipped: {faults['first']}")
+        lines.append(f"  faulty scans: {faults['count']}, {faults['skipped']} of them skipped: {faults['first']}")
     return "\n".join(lines)
 
 

@@ -29,13 +29,3 @@ class LineSink(Protocol):
     def close(self) -> None:
         """No more will come."""
         ...
-
-
-class NullLines:
-    """Keeps nothing."""
-
-    def write(self, record: dict[str, Any]) -> None:
-        """Forget it."""
-
-    def close(self) -> None:
-        """Nothing was open."""

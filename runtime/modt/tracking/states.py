@@ -73,7 +73,6 @@ class StateMachine:
         transitions: the rows.
         asking: states in which the class is asked for.
         certain: states in which it is settled.
-        lost: states without a proposal.
         waiting: states before the first classification.
     """
 
@@ -82,7 +81,6 @@ class StateMachine:
     transitions: tuple[Transition, ...]
     asking: frozenset[str]
     certain: frozenset[str]
-    lost: frozenset[str]
     waiting: frozenset[str] = frozenset({"unmatched", "lost_unmatched"})
 
     @property
@@ -130,11 +128,6 @@ class StateMachine:
         """(S,) whether the class is settled in a state."""
         return self._among(self.certain)
 
-    @cached_property
-    def misses(self) -> Bool:
-        """(S,) whether a state has no proposal."""
-        return self._among(self.lost)
-
     def fire(self, states: Int, events: Int) -> Int:
         """(M,) states after events (M,), by index in the table's events.
 
@@ -179,7 +172,6 @@ EFFICIENT = StateMachine(
     names=("proposal", "matched", "unmatched", "tracked", "lost", "lost_unmatched", "deleted"),
     asking=frozenset({"unmatched"}),
     certain=frozenset({"tracked", "lost"}),
-    lost=frozenset({"lost", "lost_unmatched"}),
     transitions=(
         Transition("proposal", "a1", "matched", _H.ASSOCIATED, "associated with an existing object"),
         Transition("proposal", "a2", "unmatched", _H.UNASSOCIATED, "associated with none"),
@@ -216,7 +208,6 @@ ACCURATE = StateMachine(
     ),
     asking=frozenset({"unmatched", "tracked_unclassified"}),
     certain=frozenset({"tracked_classified", "lost_classified"}),
-    lost=frozenset({"lost_unclassified", "lost_classified", "lost_unmatched"}),
     transitions=(
         Transition("proposal", "a1", "matched", _H.ASSOCIATED, "associated with an existing object"),
         Transition("proposal", "a2", "unmatched", _H.UNASSOCIATED, "associated with none"),

@@ -36,7 +36,7 @@ def crossing(rng: np.random.Generator, seconds: float, height_m: float) -> World
         )
         for i in range(2)
     ]
-    line, corner_m = _turn(rng, roads, approach)
+    line, corner_m = _turn(rng, roads)
     builder = Builder(rng, seconds)
     for road in roads:
         stop = float(road.gaps[0][1]) + 1.5
@@ -54,7 +54,7 @@ def crossing(rng: np.random.Generator, seconds: float, height_m: float) -> World
     return builder.world(terrain(rng, roads, (-reach, -reach), (reach, reach)), ego, height_m)
 
 
-def _turn(rng: np.random.Generator, roads: list[Road], approach_m: float) -> tuple[Float64, float]:
+def _turn(rng: np.random.Generator, roads: list[Road]) -> tuple[Float64, float]:
     """Way points of a drive in along the first road and out along the second, and how far along it the corner is."""
     right = bool(rng.random() < 0.5)
     y_in = -roads[0].half_m * roadside.LANE

@@ -14,8 +14,6 @@ from modt.types import Float32, Float64
 CELL_M, BESIDE_M = 0.25, 80.0
 KERB_M, CAMBER, ROUGH_M = 0.12, 0.02, 0.012
 
-Corner = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class Road:
