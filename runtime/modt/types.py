@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from functools import cache
 from typing import Any, Self
 
 import numpy as np
@@ -184,11 +185,12 @@ class Tracks:
 
     def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """Every column with its name."""
-        return ((f.name, getattr(self, f.name)) for f in fields(self))
+        return ((name, getattr(self, name)) for name in _names(type(self)))
 
     def take(self, rows: Int | Bool) -> Self:
         """A copy of the rows given, by index or mask."""
-        return type(self)(**{name: column[rows] for name, column in self.columns()})
+        index = np.flatnonzero(rows) if rows.dtype == np.bool_ else rows
+        return type(self)(**{name: column.take(index, axis=0) for name, column in self.columns()})
 
     def copy(self) -> Self:
         """The same rows, independent of these."""
@@ -204,6 +206,11 @@ class Tracks:
         seen = np.flatnonzero(self.proposal != NONE)
         rows[self.proposal[seen]] = seen
         return rows
+
+
+@cache
+def _names(table: type[Tracks]) -> tuple[str, ...]:
+    return tuple(f.name for f in fields(table))
 
 
 @dataclass(frozen=True, slots=True)

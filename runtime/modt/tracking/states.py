@@ -119,6 +119,14 @@ class StateMachine:
         return answer
 
     @cached_property
+    def after(self) -> Int:
+        """(S, H) state that each happening leads to, NONE where none answers to it."""
+        after = np.full(self.answer.shape, NONE, np.int64)
+        states, happenings = np.nonzero(self.answer != NONE)
+        after[states, happenings] = self.table[states, self.answer[states, happenings]]
+        return after
+
+    @cached_property
     def asks(self) -> Bool:
         """(S,) whether a state asks for a class."""
         return self._among(self.asking)
@@ -148,7 +156,10 @@ class StateMachine:
         Raises:
             UndefinedTransitionError: one of them has no answer to it.
         """
-        return self.fire(states, self.answer[states, happening])
+        after: Int = self.after[states, happening]
+        if after.min(initial=0) == NONE:
+            self.fire(states, self.answer[states, happening])  # says which of them
+        return after
 
     def inherits(self, states: Int) -> Int:
         """(M,) happening that joining a track in each state is to a proposal."""
