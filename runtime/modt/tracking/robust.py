@@ -45,8 +45,11 @@ class RobustAssociation:
         low, high = carried(tracks)
         R = self.noise(sightings)
         rows, columns = self._near(tracks, low, high, sightings)
-        shift, size, overlap, cover = compare(low[rows], high[rows], sightings.low[columns], sightings.high[columns])
-        S = tracks.P[rows][:, :2, :2] + R[columns] + JUMP_M**2 * np.eye(2)
+        shift, size, overlap, cover = compare(
+            *(ends.take(rows, axis=0) for ends in (low, high)),
+            *(ends.take(columns, axis=0) for ends in (sightings.low, sightings.high)),
+        )
+        S = tracks.P.take(rows, axis=0)[:, :2, :2] + R.take(columns, axis=0) + JUMP_M**2 * np.eye(2)
         distance = kalman.mahalanobis_squared(shift, S)
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
@@ -111,13 +114,14 @@ def compare(
     least = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
     shift = least @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     length_a, length_b = high_a - low_a, high_b - low_b
-    size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).mean(axis=1)
+    ratio = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).T
+    size = (ratio[0] + ratio[1] + ratio[2] + ratio[3]) / 4
     pad = SOFT_M / 3
     common = np.maximum(np.minimum(high_a, high_b) - np.maximum(low_a, low_b) + pad, 0.0)
     squares = [(length + pad)[:, :2] * (length + pad)[:, 2:] for length in (length_a, length_b)]
     shared = common[:, :2] * common[:, 2:]  # in the upright square, and in the one on its corner
-    overlap = (shared / (squares[0] + squares[1] - shared)).min(axis=1)
-    cover = (shared / np.minimum(*squares)).min(axis=1)
+    overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)).T)  # a reduction of so short an axis is slow
+    cover = np.minimum(*(shared / np.minimum(*squares)).T)
     return shift, size, overlap, cover
 
 
