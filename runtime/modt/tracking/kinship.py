@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from modt.geometry import corners
 from modt.tracking.association import Matches
 from modt.tracking.followed import Followed
-from modt.tracking.sightings import AXES, Sightings, covered, touching
+from modt.tracking.kalman import HEADING, SPEED
+from modt.tracking.sightings import AXES, Sightings, covered, girth, touching
 from modt.types import NONE, Bool, Float64, Int, ObjectClass
 
 ROOM_M = np.array([[6.0, 2.7], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
@@ -59,59 +59,84 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
 def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
     """Rows, eldest first, that are classified and now without a proposal, or with less than was seen before."""
     rows = np.flatnonzero(tracks.fixed | (tracks.views > 0))
-    now = sightings.high[proposal[rows]] - sightings.low[proposal[rows]]
-    known = tracks.hull_high[rows] - tracks.hull_low[rows]
-    less = (proposal[rows] == NONE) | (known.sum(axis=1) > LESS * now.sum(axis=1))
-    eldest_first: Int = rows[less][np.argsort(tracks.id[rows[less]])]
+    own = proposal[rows]
+    now = girth(sightings.low, sightings.high)[own]
+    known = girth(tracks.hull_low, tracks.hull_high)[rows]
+    less = rows[(own == NONE) | (known > LESS * now)]
+    eldest_first: Int = less[np.argsort(tracks.id[less])]
     return eldest_first
 
 
 def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
     """Rows and proposals: an elder track, and a larger part of its object that it does not have."""
-    about = tracks.x[elders, :2] @ AXES
-    moved = about - tracks.shown[elders] @ AXES
-    low, high = tracks.low[elders] + moved, tracks.high[elders] + moved
-    hull_low, hull_high = tracks.hull_low[elders] + about, tracks.hull_high[elders] + about
     if not len(elders):
         return elders, elders
+    about = tracks.x[elders, :2] @ AXES
+    hull_low, hull_high = (ends.take(elders, axis=0) + about for ends in (tracks.hull_low, tracks.hull_high))
     i, part = touching(hull_low, hull_high, sightings.low, sightings.high)
     elder, rival = elders[i], owner[part]
-    class_ = tracks.posterior.argmax(axis=1)
-    bulky = class_ <= ObjectClass.CAR  # one is easily taken for the other where little is seen of it
     size = np.where(proposal == NONE, 0, sightings.count[proposal])
-    free = (rival == NONE) | ~tracks.fixed[rival] | (class_[rival] == class_[elder]) | bulky[rival] & bulky[elder]
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
-    vx, vy = tracks.x[:, 3] * np.cos(tracks.x[:, 2]), tracks.x[:, 3] * np.sin(tracks.x[:, 2])
-    apart = np.hypot(vx[rival] - vx[elder], vy[rival] - vy[elder]) > APART_MPS
-    free &= (rival == NONE) | (tracks.hits[rival] < SETTLED) | ~apart
-    larger = free & junior & (rival != elder) & (sightings.count[part] > size[elder])
+    larger = np.flatnonzero(junior & (rival != elder) & (sightings.count[part] > size[elder]))
+    larger = larger[_free(tracks, elder[larger], rival[larger])]
     i, elder, part = i[larger], elder[larger], part[larger]
+    moved = tracks.x[elder, :2] - tracks.shown[elder]
     box = tracks.box[elder]
-    box[:, :2] += tracks.x[elder, :2] - tracks.shown[elder]
-    fits = _fits(box, sightings.box[part], ROOM_M[class_[elder]])
-    within = covered(sightings.low[part], sightings.high[part], hull_low[i], hull_high[i]) > WITHIN
-    whole = covered(low[i], high[i], sightings.low[part], sightings.high[part]) > WITHIN
+    box[:, :2] += moved
+    fits = _fits(box, sightings.box[part], ROOM_M[tracks.posterior[elder].argmax(axis=1)])
+    part_low, part_high = sightings.low[part], sightings.high[part]
+    within = covered(part_low, part_high, hull_low[i], hull_high[i]) > WITHIN
+    moved = moved @ AXES
+    whole = covered(tracks.low[elder] + moved, tracks.high[elder] + moved, part_low, part_high) > WITHIN
     related = fits & (within | whole)
     return elder[related], part[related]
+
+
+def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
+    """(k,) whether the elder may take the part that the rival (NONE: nobody) has: they may be one object."""
+    class_, other = (tracks.posterior[rows].argmax(axis=1) for rows in (elder, rival))
+    bulky = (class_ <= ObjectClass.CAR) & (other <= ObjectClass.CAR)  # little is seen: one is easily taken for the other
+    alike = ~tracks.fixed[rival] | (class_ == other) | bulky
+    (vx, vy), (wx, wy) = (_velocity(tracks.x[rows]) for rows in (elder, rival))
+    together = np.hypot(wx - vx, wy - vy) <= APART_MPS
+    free: Bool = (rival == NONE) | alike & (together | (tracks.hits[rival] < SETTLED))
+    return free
+
+
+def _velocity(x: Float64) -> tuple[Float64, Float64]:
+    """(k,) x and (k,) y of the velocities of states (k, 4) [m/s]."""
+    return x[:, SPEED] * np.cos(x[:, HEADING]), x[:, SPEED] * np.sin(x[:, HEADING])
 
 
 def _fits(a: Float64, b: Float64, room: Float64) -> Bool:
     """(k,) whether boxes a and b (k, 7) lie within one box of the room (k, 2), along the heading of the longer."""
     yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
-    points = np.concatenate([corners(a), corners(b)], axis=1)
-    c, s = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-    along = np.ptp(points[..., 0] * c + points[..., 1] * s, axis=1)
-    across = np.ptp(points[..., 1] * c - points[..., 0] * s, axis=1)
-    long, short = np.maximum(along, across), np.minimum(along, across)
-    fits: Bool = (long < room[:, 0]) & (short < room[:, 1])
+    c, s = np.cos(yaw), np.sin(yaw)
+    offset = b[:, :2] - a[:, :2]
+    lengths = []
+    for apart, turn in ((offset[:, 0] * c + offset[:, 1] * s, 0.0), (offset[:, 1] * c - offset[:, 0] * s, np.pi / 2)):
+        half_a, half_b = (_half_width(box, yaw + turn) for box in (a, b))
+        lengths.append(np.maximum(half_a, apart + half_b) - np.minimum(-half_a, apart - half_b))
+    fits: Bool = (np.maximum(*lengths) < room[:, 0]) & (np.minimum(*lengths) < room[:, 1])
     return fits
+
+
+def _half_width(boxes: Float64, direction_rad: Float64) -> Float64:
+    """(k,) how far each box (k, 7) reaches from its middle in its direction, bird's-eye view [m]."""
+    turn = direction_rad - boxes[:, 6]
+    half: Float64 = (boxes[:, 3] * np.abs(np.cos(turn)) + boxes[:, 4] * np.abs(np.sin(turn))) / 2
+    return half
 
 
 def _with(tracks: Followed, matches: Matches, proposal: Int, swapped: Bool) -> Matches:
     """The matches after the exchange: what changed hands measures nothing."""
-    place = tracks.x[:, :2].copy()
-    R = np.broadcast_to(UNMEASURED_M2 * np.eye(2), (len(tracks), 2, 2)).copy()
-    kept = ~swapped[matches.rows]
-    place[matches.rows[kept]], R[matches.rows[kept]] = matches.place[kept], matches.R[kept]
+    match = np.full(len(tracks), NONE, np.int64)
+    match[matches.rows] = np.arange(len(matches.rows))
+    match[swapped] = NONE
     rows = np.flatnonzero(proposal != NONE)
-    return replace(matches, rows=rows, proposals=proposal[rows], place=place[rows], R=R[rows])
+    kept = match[rows] != NONE
+    measured = match[rows[kept]]
+    place, R = tracks.x[rows, :2], np.zeros((len(rows), 2, 2))
+    R[:, 0, 0] = R[:, 1, 1] = UNMEASURED_M2
+    place[kept], R[kept] = matches.place[measured], matches.R[measured]
+    return replace(matches, rows=rows, proposals=proposal[rows], place=place, R=R)

@@ -89,6 +89,13 @@ def covered(low: Float64, high: Float64, low_place: Float64, high_place: Float64
     return least
 
 
+def girth(low: Float64, high: Float64) -> Float64:
+    """(k,) sum of the four lengths of each outline (k, 4) [m]."""
+    length = (high - low).T
+    total: Float64 = length[0] + length[1] + length[2] + length[3]  # a reduction of so short an axis is slow
+    return total
+
+
 def outlines(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> tuple[Float64, Float64]:
     """(P, 4) least and (P, 4) greatest coordinate of each proposal's points along AXES, world frame [m]."""
     n = len(proposals)
