@@ -4,8 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
+from modt.geometry import corners
+from modt.tracking.kinship import _fits
 from modt.tracking.memory import BackgroundMemory, NoMemory
-from modt.tracking.robust import compare
+from modt.tracking.robust import SOFT_M, compare
 from modt.tracking.sightings import AXES
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
@@ -50,6 +52,33 @@ def test_what_keeps_its_shape_shifts_as_it_moved(dx, dy, half):
     assert 0 <= overlap[0] <= 1
 
 
+def slow_compare(low_a, high_a, low_b, high_b):
+    """Shift, size, overlap and cover of one pair of outlines, number by number."""
+    shifts, sizes, squares = [], [], ([], [], [])
+    for la, ha, lb, hb in zip(low_a, high_a, low_b, high_b, strict=True):
+        shifts.append(hb - ha if abs(hb - ha) < abs(lb - la) else lb - la)
+        sizes.append(abs(np.log(hb - lb + SOFT_M) - np.log(ha - la + SOFT_M)))
+        common = max(min(ha, hb) - max(la, lb) + SOFT_M / 3, 0.0)
+        for side, length in zip(squares, (ha - la + SOFT_M / 3, hb - lb + SOFT_M / 3, common), strict=True):
+            side.append(length)
+    shift = [sum(s * c for s, c in zip(shifts, axis, strict=True)) / 2 for axis in AXES]
+    a, b, common = ([s[0] * s[2], s[1] * s[3]] for s in squares)
+    overlap = min(c / (p + q - c) for p, q, c in zip(a, b, common, strict=True))
+    cover = min(c / min(p, q) for p, q, c in zip(a, b, common, strict=True))
+    return shift, sum(sizes) / 4, overlap, cover
+
+
+@given(st.integers(0, 6), st.integers(0, 2**16))
+def test_compare_is_the_slow_one_row_by_row(n, seed):
+    rng = np.random.default_rng(seed)
+    middle, length = rng.uniform(-2, 2, (2, n, 4)), rng.uniform(0.0, 3.0, (2, n, 4))
+    ends = (middle[0] - length[0], middle[0] + length[0], middle[1] - length[1], middle[1] + length[1])
+    found = compare(*ends)
+    for k in range(n):
+        for fast, slow in zip(found, slow_compare(*(e[k] for e in ends)), strict=True):
+            np.testing.assert_allclose(fast[k], slow, atol=1e-9)
+
+
 def test_what_only_grows_does_not_shift():
     low, high = outline((0, 0), 1.0)
     for grown in (high + np.array([[2.0, 1.5, 0, 0]]), high + np.array([[0, 1.0, 2.0, 1.0]])):
@@ -64,6 +93,23 @@ def test_a_standing_car_that_comes_into_view_has_no_speed():
     run(t, [[box(10 + 0.1 * i, 3, l=1.0 + 0.2 * i)] for i in range(15)], CAR)
     assert list(t.tracks.id) == [0]
     assert t.tracks.x[0, 3] < 0.5  # its front comes into view at 2 m/s
+
+
+def slow_fits(a, b, room):
+    """Whether the corners of two boxes lie in the room, along the heading of the longer one."""
+    yaw = a[6] if a[3] > b[3] else b[6]
+    points = np.concatenate([corners(a[None])[0], corners(b[None])[0]])
+    c, s = np.cos(yaw), np.sin(yaw)
+    along, across = np.ptp(points @ [c, s]), np.ptp(points @ [-s, c])
+    return max(along, across) < room[0] and min(along, across) < room[1]
+
+
+@given(st.integers(0, 2**16))
+def test_parts_fit_where_their_corners_do(seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform([-2, -2, 0, 0.2, 0.2, 1, -4], [2, 2, 0, 4, 2, 1, 4], (2, 50, 7))
+    room = rng.uniform([1.0, 0.5], [7.0, 4.0], (50, 2))
+    assert _fits(a, b, room).tolist() == [slow_fits(*k) for k in zip(a, b, room, strict=True)]
 
 
 def test_a_car_behind_a_pole_stays_one_object():

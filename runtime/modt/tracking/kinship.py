@@ -95,7 +95,7 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
 def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
     """(k,) whether the elder may take the part that the rival (NONE: nobody) has: they may be one object."""
     class_, other = (tracks.posterior[rows].argmax(axis=1) for rows in (elder, rival))
-    bulky = (class_ <= ObjectClass.CAR) & (other <= ObjectClass.CAR)  # little is seen: one is easily taken for the other
+    bulky = (class_ <= ObjectClass.CAR) & (other <= ObjectClass.CAR)  # one is easily taken for the other
     alike = ~tracks.fixed[rival] | (class_ == other) | bulky
     (vx, vy), (wx, wy) = (_velocity(tracks.x[rows]) for rows in (elder, rival))
     together = np.hypot(wx - vx, wy - vy) <= APART_MPS

@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import transform, transform_boxes
-from modt.types import Bool, Float64, Frame, Int, Proposals
+from modt.types import Bool, Float32, Float64, Frame, Int, Proposals
 
 DIRECTIONS = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 """Bearings of the axes along which an outline is measured, world frame [rad]."""
 PAD_M = 0.15
 """Outlines jitter by this much."""
+FEW_PAIRS = 20_000
+"""Up to this many, looking at every pair costs less than sorting."""
 AXES = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
 
 
@@ -71,14 +73,39 @@ def sight(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> Sighti
 
 
 def touching(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> tuple[Int, Int]:
-    """Pairs of outlines (n, 4) and (k, 4) that overlap along x and along y, as two arrays of indices."""
-    near = np.ones((len(low_a), len(low_b)), np.bool_)
-    for axis in (0, 2):
-        near &= low_a[:, axis].astype(np.float32)[:, None] <= high_b[:, axis].astype(np.float32)
-        near &= high_a[:, axis].astype(np.float32)[:, None] >= low_b[:, axis].astype(np.float32)
-    found = np.flatnonzero(near)
-    i, j = np.divmod(found, max(len(low_b), 1))
+    """Pairs of outlines (n, 4) and (k, 4) that overlap along x and along y, as two arrays of indices, in order."""
+    ends = (np.ascontiguousarray(a[:, [0, 2]].T, np.float32) for a in (low_a, high_a, low_b, high_b))
+    find = compare_all if len(low_a) * len(low_b) < FEW_PAIRS else sweep
+    pair = find(*ends)
+    i, j = np.divmod(pair, max(len(low_b), 1))
     return i, j
+
+
+def compare_all(low_a: Float32, high_a: Float32, low_b: Float32, high_b: Float32) -> Int:
+    """Pairs i * k + j, in order, of intervals (2, n) and (2, k) that overlap along both axes, all looked at."""
+    near = low_a[0][:, None] <= high_b[0]
+    near &= high_a[0][:, None] >= low_b[0]
+    near &= low_a[1][:, None] <= high_b[1]
+    near &= high_a[1][:, None] >= low_b[1]
+    return np.flatnonzero(near)
+
+
+def sweep(low_a: Float32, high_a: Float32, low_b: Float32, high_b: Float32) -> Int:
+    """The same pairs: sorted along the first axis, those that can overlap an interval are a stretch of the others.
+
+    It ends where they begin beyond the interval, and begins where the first of them reaches it.
+    """
+    order = low_b[0].argsort()
+    low_b, high_b = low_b.take(order, axis=1), high_b.take(order, axis=1)
+    first = np.maximum.accumulate(high_b[0]).searchsorted(low_a[0])
+    n = np.maximum(low_b[0].searchsorted(high_a[0], side="right") - first, 0)
+    i = np.repeat(np.arange(len(n)), n)
+    j = np.arange(len(i)) + np.repeat(first + n - np.cumsum(n), n)
+    near = (low_a[1].take(i) <= high_b[1].take(j)) & (high_a[1].take(i) >= low_b[1].take(j))
+    near &= low_a[0].take(i) <= high_b[0].take(j)  # the first reaches it, not all that come after
+    pair: Int = i[near] * len(order) + order[j[near]]
+    pair.sort()
+    return pair
 
 
 def covered(low: Float64, high: Float64, low_place: Float64, high_place: Float64) -> Float64:
