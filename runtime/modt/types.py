@@ -209,7 +209,7 @@ class Tracks:
 
 
 @cache
-def _names(table: type[Tracks]) -> tuple[str, ...]:
+def _names(table: Any) -> tuple[str, ...]:
     return tuple(f.name for f in fields(table))
 
 

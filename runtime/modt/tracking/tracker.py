@@ -157,7 +157,7 @@ class Tracker:
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""
         t, rows = self._tracks, matches.rows
-        x, P = t.x[rows], t.P[rows]
+        x, P = t.x.take(rows, axis=0), t.P.take(rows, axis=0)
         slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
         step = matches.place - x[:, :2]
         heading = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
@@ -171,25 +171,28 @@ class Tracker:
     def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
         """Note what was seen of the tracks."""
         tracks.shown[rows] = place
-        low, high = (a[proposals] - place @ AXES for a in (sightings.low, sightings.high))
-        tracks.hull_low[rows] = np.minimum(low, FORGET * tracks.hull_low[rows] + (1 - FORGET) * low)
-        tracks.hull_high[rows] = np.maximum(high, FORGET * tracks.hull_high[rows] + (1 - FORGET) * high)
+        low, high = (ends.take(proposals, axis=0) for ends in (sightings.low, sightings.high))
+        tracks.low[rows], tracks.high[rows] = low, high
+        low, high = low - place @ AXES, high - place @ AXES
+        hull_low, hull_high = (FORGET * ends.take(rows, axis=0) for ends in (tracks.hull_low, tracks.hull_high))
+        tracks.hull_low[rows] = np.minimum(low, hull_low + (1 - FORGET) * low)
+        tracks.hull_high[rows] = np.maximum(high, hull_high + (1 - FORGET) * high)
         tracks.proposal[rows] = proposals
-        tracks.box[rows] = sightings.box[proposals]
+        tracks.box[rows] = sightings.box.take(proposals, axis=0)
         tracks.points[rows] = sightings.count[proposals]
-        tracks.low[rows], tracks.high[rows] = sightings.low[proposals], sightings.high[proposals]
         tracks.foot[rows], tracks.top[rows] = sightings.foot[proposals], sightings.top[proposals]
 
     def _rest(self, rows: Int) -> None:
         """What stays where it was has no speed; what has stopped is at home where it is."""
         t = self._tracks
-        stopped = rows[(t.x[rows, kalman.SPEED] < SLOW_MPS) & ~t.still[rows] & (t.hits[rows] > 3)]
-        t.home[stopped] = t.x[stopped, :2]
-        away = np.hypot(*(t.x[rows, :2] - t.home[rows]).T)
-        t.still[rows] = (away < STILL_M) & (t.hits[rows] > 2)
-        near = rows[away < STILL_M]
-        t.home[near] += HOME_GAIN * (t.x[near, :2] - t.home[near])
-        t.x[near], t.P[near] = kalman.observe_speed(t.x[near], t.P[near], 0.0, STILL_SIGMA_MPS)
+        x = t.x.take(rows, axis=0)
+        stopped = (x[:, kalman.SPEED] < SLOW_MPS) & ~t.still[rows] & (t.hits[rows] > 3)
+        t.home[rows[stopped]] = x[stopped, :2]
+        stays = self._away(rows) < STILL_M
+        t.still[rows] = stays & (t.hits[rows] > 2)
+        near, x = rows[stays], x[stays]
+        t.home[near] += HOME_GAIN * (x[:, :2] - t.home[near])
+        t.x[near], t.P[near] = kalman.observe_speed(x, t.P.take(near, axis=0), 0.0, STILL_SIGMA_MPS)
 
     def _miss(self, matched: Int) -> None:
         """Tracks without a proposal coast."""
@@ -204,8 +207,8 @@ class Tracker:
     def _doubt(self) -> None:
         """A class inherited from a place does not hold away from it."""
         t = self._tracks
-        away = np.hypot(*(t.x[:, :2] - t.home).T) > STILL_M
-        rows = np.flatnonzero(t.inherited & away & (t.proposal != NONE))
+        rows = np.flatnonzero(t.inherited & (t.proposal != NONE))
+        rows = rows[self._away(rows) > STILL_M]
         t.state[rows] = self.machine.meet(t.state[rows], Happening.DOUBTED)
         t.inherited[rows] = t.fixed[rows] = False
         t.posterior[rows] = 1.0 / N_CLASSES
@@ -217,7 +220,8 @@ class Tracker:
         born = np.flatnonzero(free)
         if not len(born):
             return
-        known = self.memory.recall(self._tracks, np.flatnonzero(self._scenery()), sightings, born)
+        scenery = self._scenery(np.arange(len(self._tracks)))
+        known = self.memory.recall(self._tracks, scenery, sightings, born)
         new = Followed.blank(len(born))
         new.id[:] = self._next_id + np.arange(len(born))
         self._next_id += len(born)
@@ -240,15 +244,23 @@ class Tracker:
         """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered."""
         t = self._tracks
         expired = t.missed > self.config.max_missed
-        if not expired.any():
+        rows = np.flatnonzero(expired)
+        if not len(rows):
             return
-        t.state[expired] = self.machine.meet(t.state[expired], Happening.EXPIRED)
-        self.memory.keep(t, np.flatnonzero(expired & self._scenery()))
+        t.state[rows] = self.machine.meet(t.state[rows], Happening.EXPIRED)
+        self.memory.keep(t, self._scenery(rows))
         self._tracks = t.take(~expired)
 
-    def _scenery(self) -> Bool:
-        """(M,) background, for certain, that never moved."""
+    def _scenery(self, rows: Int) -> Int:
+        """Those of the rows that are background, for certain, and never moved."""
         t = self._tracks
-        stays = np.hypot(*(t.x[:, :2] - t.home).T) < STILL_M
-        scenery: Bool = t.fixed & stays & (t.posterior.argmax(axis=1) == ObjectClass.BACKGROUND)
-        return scenery
+        fixed = rows[t.fixed[rows]]
+        scenery = fixed[t.posterior.take(fixed, axis=0).argmax(axis=1) == ObjectClass.BACKGROUND]
+        return scenery[self._away(scenery) < STILL_M]
+
+    def _away(self, rows: Int) -> Float64:
+        """(R,) how far each of the rows is from its home [m]."""
+        t = self._tracks
+        step = t.x.take(rows, axis=0)[:, :2] - t.home.take(rows, axis=0)
+        away: Float64 = np.hypot(step[:, 0], step[:, 1])
+        return away
