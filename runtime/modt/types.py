@@ -185,7 +185,12 @@ class Tracks:
 
     def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """Every column with its name."""
-        return ((name, getattr(self, name)) for name in _names(type(self)))
+        return ((name, getattr(self, name)) for name in self._names())
+
+    @classmethod
+    @cache
+    def _names(cls) -> tuple[str, ...]:
+        return tuple(f.name for f in fields(cls))
 
     def take(self, rows: Int | Bool) -> Self:
         """A copy of the rows given, by index or mask."""
@@ -206,11 +211,6 @@ class Tracks:
         seen = np.flatnonzero(self.proposal != NONE)
         rows[self.proposal[seen]] = seen
         return rows
-
-
-@cache
-def _names(table: Any) -> tuple[str, ...]:
-    return tuple(f.name for f in fields(table))
 
 
 @dataclass(frozen=True, slots=True)

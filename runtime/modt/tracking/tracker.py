@@ -255,8 +255,9 @@ class Tracker:
         """Those of the rows that are background, for certain, and never moved."""
         t = self._tracks
         fixed = rows[t.fixed[rows]]
-        scenery = fixed[t.posterior.take(fixed, axis=0).argmax(axis=1) == ObjectClass.BACKGROUND]
-        return scenery[self._away(scenery) < STILL_M]
+        background = fixed[t.posterior.take(fixed, axis=0).argmax(axis=1) == ObjectClass.BACKGROUND]
+        scenery: Int = background[self._away(background) < STILL_M]
+        return scenery
 
     def _away(self, rows: Int) -> Float64:
         """(R,) how far each of the rows is from its home [m]."""
