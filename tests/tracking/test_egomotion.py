@@ -1,7 +1,10 @@
 import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
+from modt.tracking.egomotion import SCALE_M, _fit, _mutual
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker, rigid
 
@@ -73,3 +76,34 @@ def test_products_of_poses_stay_rigid():
     T[:3, :3] *= 1.01
     R = rigid(T)[:3, :3]
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
+
+
+def slow_fit(shift, lever, weight):
+    """Weighted least squares of shift + (x, y) + turn * turned = 0, reweighted by the residuals, solved as such."""
+    turned = np.stack([-lever[:, 1], lever[:, 0]], axis=1)
+    design = np.concatenate([np.tile(np.eye(2), (len(shift), 1)), turned.reshape(-1, 1)], axis=1)
+    motion = np.zeros(3)
+    for _ in range(3):
+        residual = (shift.ravel() + design @ motion).reshape(-1, 2)
+        w = np.repeat(weight / (1 + (residual**2).sum(axis=1) / SCALE_M**2), 2)
+        A = design.T @ (w[:, None] * design)
+        motion = -np.linalg.solve(A + 1e-6 * np.trace(A) * np.eye(3), design.T @ (w * shift.ravel()))
+    return motion
+
+
+@given(st.integers(3, 40), st.integers(0, 2**16))
+def test_the_fit_is_weighted_least_squares(n, seed):
+    rng = np.random.default_rng(seed)
+    shift, lever, weight = rng.normal(0, 0.3, (n, 2)), rng.uniform(-60, 60, (n, 2)), rng.uniform(1, 100, n)
+    np.testing.assert_allclose(_fit(shift, lever, weight), slow_fit(shift, lever, weight), rtol=1e-6, atol=1e-9)
+
+
+@given(st.integers(0, 30), st.integers(0, 2**16))
+def test_mutual_pairs_are_the_best_of_both(n, seed):
+    rng = np.random.default_rng(seed)
+    i, j, cost = rng.integers(0, 6, n), rng.integers(0, 6, n), rng.integers(0, 8, n) / 8.0
+
+    def first_of(index, k):  # of equals the first
+        return min(np.flatnonzero(index == index[k]), key=lambda p: (cost[p], p)) == k
+
+    assert _mutual(i, j, cost).tolist() == [k for k in range(n) if first_of(i, k) and first_of(j, k)]

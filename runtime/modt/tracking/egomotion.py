@@ -10,8 +10,8 @@ import numpy as np
 
 from modt.geometry import rotation_zyx, se3
 from modt.tracking.followed import Followed
-from modt.tracking.robust import carried, compare
-from modt.tracking.sightings import AXES, Sightings
+from modt.tracking.robust import carried, compare, likeness, shift_between
+from modt.tracking.sightings import AXES, Sightings, touching
 from modt.types import Float64, Int
 
 REACH_M = 2.5
@@ -44,7 +44,7 @@ class Registration:
     def correct(self, tracks: Followed, sightings: Sightings) -> Float64:
         """(4, 4) motion in the world that brings the sightings onto the tracks; identity where nothing says so."""
         rows = np.flatnonzero((tracks.still | (tracks.hits < 3)) & (tracks.missed <= 2))
-        low, high = (a[rows] for a in carried(tracks))
+        low, high = (a.take(rows, axis=0) for a in carried(tracks))
         i, j = _pairs(low, high, sightings, GATE_M if self._settled else REACH_M)
         if len(i) < MINIMUM:
             self._settled = False
@@ -54,14 +54,21 @@ class Registration:
             shift, size, _, _ = compare(low[i], high[i], sightings.low[j], sightings.high[j])
             motion[:2] = -_vote(shift[size < ALIKE])
         choices = 1 if self._settled else ROUNDS
+        levers = sightings.place - sightings.eye
+        variance = 0.05**2 + tracks.P[rows, 0, 0]
         for k in range(ROUNDS):
-            lever = sightings.place[j] - sightings.eye
+            lever = levers.take(j, axis=0)
             carry = (motion[:2] + motion[2] * _turned(lever)) @ AXES
-            shift, size, overlap, _ = compare(low[i], high[i], sightings.low[j] + carry, sightings.high[j] + carry)
+            known = low.take(i, axis=0), high.take(i, axis=0)
+            seen = sightings.low.take(j, axis=0) + carry, sightings.high.take(j, axis=0) + carry
+            shift = shift_between(*known, *seen)
             error = np.hypot(shift[:, 0], shift[:, 1])
-            best = _mutual(i, j, error + size - overlap) if k < choices else np.arange(len(i))
-            weight = 1.0 / (0.05**2 + tracks.P[rows[i[best]], 0, 0] + (0.003 * sightings.range_m[j[best]]) ** 2)
-            motion = motion + _fit(shift[best], lever[best], weight)
+            best = np.arange(len(i))
+            if k < choices:
+                size, overlap, _ = likeness(*known, *seen)
+                best = _mutual(i, j, error + size - overlap)
+            weight = 1.0 / (variance[i[best]] + (0.003 * sightings.range_m[j[best]]) ** 2)
+            motion = motion + _fit(shift.take(best, axis=0), lever.take(best, axis=0), weight)
             if self._settled:
                 i, j, error = i[best], j[best], error[best]
         agree = error if self._settled else error[best]
@@ -75,13 +82,9 @@ class Registration:
 
 
 def _pairs(low: Float64, high: Float64, sightings: Sightings, reach: float) -> tuple[Int, Int]:
-    near = np.ones((len(low), len(sightings)), np.bool_)
-    for axis in (0, 2):
-        middle = ((low[:, axis] + high[:, axis]) / 2).astype(np.float32)
-        other = ((sightings.low[:, axis] + sightings.high[:, axis]) / 2).astype(np.float32)
-        near &= np.abs(middle[:, None] - other) < np.float32(reach)
-    i, j = np.divmod(np.flatnonzero(near), max(len(sightings), 1))
-    return i, j
+    """Rows and sightings whose middles are within reach of one another, along x and along y."""
+    middle, other = (low + high) / 2, (sightings.low + sightings.high) / 2
+    return touching(middle - reach, middle + reach, other, other)
 
 
 def _turned(lever: Float64) -> Float64:
@@ -103,28 +106,30 @@ def _vote(shift: Float64) -> Float64:
 
 def _mutual(i: Int, j: Int, cost: Float64) -> Int:
     """Indices of the pairs that are the best of their row and of their column."""
-    order = np.argsort(cost, kind="stable")
-    first_i = np.zeros(len(cost), np.bool_)
-    first_j = np.zeros(len(cost), np.bool_)
-    first_i[order[np.unique(i[order], return_index=True)[1]]] = True
-    first_j[order[np.unique(j[order], return_index=True)[1]]] = True
-    return np.flatnonzero(first_i & first_j)
+    dearest_first = np.argsort(cost, kind="stable")[::-1]
+    best_of_i, best_of_j = (np.empty(int(index.max(initial=0)) + 1, np.int64) for index in (i, j))
+    best_of_i[i[dearest_first]] = best_of_j[j[dearest_first]] = dearest_first  # the last one written is the cheapest
+    k = np.arange(len(cost))
+    return np.flatnonzero((best_of_i[i] == k) & (best_of_j[j] == k))
 
 
 def _fit(shift: Float64, lever: Float64, weight: Float64) -> Float64:
-    """(3,) x, y [m] and turn [rad] that undo the shifts (K, 2), by weighted least squares, outliers discounted."""
-    motion = np.zeros(3)
-    turned = _turned(lever)
+    """(3,) x, y [m] and turn [rad] that undo the shifts (K, 2), by weighted least squares, outliers discounted.
+
+    The normal equations are sums of the same products in every round, weighted anew; their block of x and y is a
+    multiple of the identity, so that they are solved in a line each.
+    """
+    (sx, sy), (tx, ty) = shift.T, _turned(lever).T
+    products = np.stack([np.ones(len(sx)), tx, ty, tx * tx + ty * ty, sx, sy, tx * sx + ty * sy])
+    x = y = turn = 0.0
     for _ in range(3):
-        left = shift + motion[:2] + motion[2] * turned
-        w = weight / (1 + (left**2).sum(axis=1) / SCALE_M**2)
-        A = np.zeros((3, 3))
-        A[0, 0] = A[1, 1] = w.sum()
-        A[:2, 2] = A[2, :2] = w @ turned
-        A[2, 2] = w @ (lever**2).sum(axis=1)
-        b = np.append(w @ shift, (w[:, None] * turned * shift).sum())
-        motion = -np.linalg.solve(A + 1e-6 * np.eye(3) * np.trace(A), b)
-    return motion
+        left = np.square(sx + x + turn * tx) + np.square(sy + y + turn * ty)
+        n, a, b, c, p, q, r = (products @ (weight / (1 + left / SCALE_M**2))).tolist()
+        little = 1e-6 * (2 * n + c)
+        n, c = n + little, c + little
+        turn = ((a * p + b * q) / n - r) / (c - (a * a + b * b) / n)
+        x, y = -(p + a * turn) / n, -(q + b * turn) / n
+    return np.array([x, y, turn])
 
 
 def _about(motion: Float64, eye: Float64) -> Float64:

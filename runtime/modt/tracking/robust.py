@@ -110,9 +110,19 @@ def compare(
         overlap: (K,) intersection over union.
         cover: (K,) intersection over the smaller of the two.
     """
+    return shift_between(low_a, high_a, low_b, high_b), *likeness(low_a, high_a, low_b, high_b)
+
+
+def shift_between(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> Float64:
+    """(K, 2) compare's shift alone."""
     ahead, behind = high_b - high_a, low_b - low_a
     least = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
-    shift = least @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    shift: Float64 = least @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    return shift
+
+
+def likeness(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> tuple[Float64, Float64, Float64]:
+    """(K,) compare's size, overlap and cover."""
     length_a, length_b = high_a - low_a, high_b - low_b
     ratio = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).T
     size = (ratio[0] + ratio[1] + ratio[2] + ratio[3]) / 4
@@ -122,7 +132,7 @@ def compare(
     shared = common[:, :2] * common[:, 2:]  # in the upright square, and in the one on its corner
     overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)).T)  # a reduction of so short an axis is slow
     cover = np.minimum(*(shared / np.minimum(*squares)).T)
-    return shift, size, overlap, cover
+    return size, overlap, cover
 
 
 def _left(all_: Int, taken: Int, n: int) -> Bool:
