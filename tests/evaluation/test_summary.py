@@ -29,7 +29,7 @@ FRAMES = [
 def whole():
     summary = Summary()
     for r in FRAMES:
-        summary.add_frame(frame_record(r))
+        summary.add_result(r)
         summary.add_ledger(ledger_line(r.frame.index, 1 + r.frame.index))
     return summary.result()
 
@@ -66,7 +66,7 @@ def test_nothing_gives_no_ratio():
 def test_only_the_living_are_remembered():
     lives = TrackLives()
     for i in range(50):
-        lives.add([{"id": i, "proposal": 0, "class": "background"}])
+        lives.add([(i, True, False)])
     assert len(lives._alive) == 1
     assert lives.totals(foreground_only=False) == (50, 50)
 

@@ -1,7 +1,14 @@
 """tracks.jsonl."""
 
-from modt.sinks.records import read_records
-from modt.sinks.tracks import SCHEMA, TrackLines, frame_record
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from modt.sinks.numerals import beside, probabilities, text, thousandths
+from modt.sinks.records import line, read_records
+from modt.sinks.tracks import SCHEMA, TrackLines, frame_line, frame_record
 
 from ..results import CAR, result
 
@@ -43,4 +50,51 @@ def test_lines_are_read_back(tmp_path):
     lines.close()
     read = list(read_records(tmp_path / "tracks.jsonl", SCHEMA))
     assert [r["frame"] for r in read] == [0, 1, 2]
-    assert read[-1] == lines.last
+    assert read[-1] == frame_record(result(2, [4], {0: 1}))
+
+
+NUMBERS = st.one_of(
+    st.floats(-200, 200),
+    st.floats(-1e7, 1e7),
+    st.sampled_from([0.0, -0.0, 0.0005, -0.0004, 0.0015, 9999.9995, 10000.0, 99999999.5, 1e8, -1e17, 5e-324]),
+)
+LIKELIHOODS = st.one_of(
+    st.floats(0, 1), st.sampled_from([0.0, 1.0, 1e-6, 1.2e-5, 9.9e-5, 1e-4, 0.99999949, 0.9999996, 1 + 1e-9, -1e-9])
+)
+COUNTS = st.one_of(st.integers(0, 300), st.sampled_from([9999, 10_000, 10**8 - 1, 10**8, 10**12]))
+
+
+@st.composite
+def results(draw):
+    """Frames of few or no tracks and proposals, with whatever numbers."""
+    seen, lost = draw(st.integers(0, 4)), draw(st.integers(0, 3))
+    r = result(draw(COUNTS), [3] * seen, {p: 7 + p for p in range(seen)}, lost=tuple(range(90, 90 + lost)))
+    t = r.tracks
+    for column in (t.points, t.age, t.missed):
+        column[:] = draw(arrays(np.int64, column.shape, elements=COUNTS))
+    for column, elements in ((t.x, NUMBERS), (r.proposals.box, NUMBERS), (t.posterior, LIKELIHOODS)):
+        column[:] = draw(arrays(np.float64, column.shape, elements=elements))
+    t.fixed[:] = draw(arrays(np.bool_, len(t)))
+    return r
+
+
+@given(results())
+def test_the_line_of_a_frame_is_that_of_its_record(r):
+    assert frame_line(r) == line(frame_record(r))
+
+
+@given(st.integers(0, 2**32))
+def test_numbers_are_written_as_repr_writes_them(seed):
+    rng = np.random.default_rng(seed)
+    lengths, likely = rng.normal(0, 10.0 ** rng.integers(-4, 7), 200), rng.random(200) ** rng.integers(1, 12)
+    assert text(beside(200, thousandths(lengths), ",")) == "".join(f"{v!r}," for v in np.round(lengths, 3).tolist())
+    assert text(beside(200, probabilities(likely), ",")) == "".join(f"{v!r}," for v in np.round(likely, 6).tolist())
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_what_is_not_finite_is_not_written(bad):
+    for column in ("x", "posterior"):
+        r = result(0, [3], {0: 1})
+        getattr(r.tracks, column)[0, 1] = bad
+        with pytest.raises(ValueError, match="JSON"):
+            frame_line(r)

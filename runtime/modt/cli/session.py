@@ -60,12 +60,12 @@ class Session:
     def run(self, tick: Tick) -> dict[str, Any]:
         """Drive the stream through; returns the summary that was written."""
         summary = Summary()
-        tracks, ledger_lines = self.directory.tracks(), self.directory.ledger()
-        sinks: list[Sink] = [tracks, *self._further_sinks()]
+        ledger_lines = self.directory.ledger()
+        sinks: list[Sink] = [self.directory.tracks(), *self._further_sinks()]
         windows = metering.windows(self.profile.energy, self.core)
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
-            summary.add_frame(tracks.last)
+            summary.add_result(result)
             summary.add_ledger(ledger_line)
             window = windows.add(ledger_line)
             if window is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import defaultdict
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from modt.pipeline import CLASSIFICATION, SEGMENTATION
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
-from modt.types import CLASS_NAMES, ObjectClass
+from modt.types import CLASS_NAMES, NONE, FrameResult, ObjectClass
 
 SCHEMA = "modt.summary/1"
 LEDGER_SCHEMA = "modt.ledger/1"
@@ -29,12 +30,12 @@ class TrackLives:
         self._alive: dict[int, tuple[int, bool]] = {}
         self._ended = {True: [0, 0], False: [0, 0]}  # foreground: tracks, frames seen
 
-    def add(self, tracks: list[dict[str, Any]]) -> None:
-        """The tracks of one frame."""
+    def add(self, tracks: Iterable[tuple[int, bool, bool]]) -> None:
+        """The tracks of one frame: id, whether it is seen, whether it is foreground."""
         present: dict[int, tuple[int, bool]] = {}
-        for track in tracks:
-            seen, _ = self._alive.pop(track["id"], (0, False))
-            present[track["id"]] = (seen + (track["proposal"] is not None), track["class"] != BACKGROUND)
+        for id_, visible, foreground in tracks:
+            seen, _ = self._alive.pop(id_, (0, False))
+            present[id_] = (seen + visible, foreground)
         for seen, foreground in self._alive.values():
             self._ended[foreground][0] += 1
             self._ended[foreground][1] += seen
@@ -63,11 +64,21 @@ class Summary:
 
     def add_frame(self, record: dict[str, Any]) -> None:
         """A line of tracks.jsonl."""
+        self._add_counts(record["proposals"], record["classified"], record["deferred"])
+        self.lives.add((t["id"], t["proposal"] is not None, t["class"] != BACKGROUND) for t in record["tracks"])
+
+    def add_result(self, result: FrameResult) -> None:
+        """What add_frame reads in the line of this result."""
+        tracks = result.tracks
+        self._add_counts(len(result.proposals), result.classified, result.deferred)
+        seen, foreground = tracks.proposal != NONE, tracks.posterior.argmax(axis=1) != ObjectClass.BACKGROUND
+        self.lives.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))
+
+    def _add_counts(self, proposals: int, classified: int, deferred: int) -> None:
         self.frames += 1
-        self.proposals += record["proposals"]
-        self.classified += record["classified"]
-        self.deferred += record["deferred"]
-        self.lives.add(record["tracks"])
+        self.proposals += proposals
+        self.classified += classified
+        self.deferred += deferred
 
     def add_ledger(self, record: dict[str, Any]) -> None:
         """A line of ledger.jsonl."""

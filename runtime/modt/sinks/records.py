@@ -14,6 +14,15 @@ from modt.sinks.output import LineFile
 log = logging.getLogger(__name__)
 
 
+def line(record: dict[str, Any]) -> str:
+    """The line of a record.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    return json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n"
+
+
 class JsonLines:
     """A growing file of records."""
 
@@ -26,7 +35,7 @@ class JsonLines:
         Raises:
             ModtError: the file cannot be written.
         """
-        self._lines.write(json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n")
+        self._lines.write(line(record))
 
     def close(self) -> None:
         """No more will come."""
@@ -46,11 +55,11 @@ def read_records(path: Path, schema: str, beside: Collection[str] = ()) -> Itera
     """
     try:
         with path.open(encoding="utf-8") as lines:
-            for number, line in enumerate(lines, 1):
+            for number, text in enumerate(lines, 1):
                 try:
-                    record = json.loads(line)
+                    record = json.loads(text)
                 except json.JSONDecodeError:
-                    if line.endswith("\n"):
+                    if text.endswith("\n"):
                         raise MisuseError(f"{path}:{number}", "no JSON", "give a file that modt wrote") from None
                     log.warning("%s:%d: last line cut short, left out", path, number)
                     return

@@ -1,13 +1,21 @@
-"""tracks.jsonl: what was known after every frame."""
+"""tracks.jsonl: what was known after every frame.
+
+`frame_record` says what a line holds. `frame_line` writes the same line at a fraction of the cost: nearly all of it
+is numbers, and those of all tracks are looked up at once.
+"""
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modt.sinks.records import JsonLines
+from modt.sinks.numerals import LIMIT, Words, beside, probabilities, table, text, thousandths, whole, words
+from modt.sinks.output import LineFile
+from modt.sinks.records import line
 from modt.types import CLASS_NAMES, NONE, FrameResult
 
 SCHEMA = "modt.frame/1"
@@ -61,12 +69,68 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
     }
 
 
+CLASSES = table([json.dumps(name) for name in CLASS_NAMES])
+TRUTH = table(["false", "true"])
+NULL = words("null")[0]
+
+
+def frame_line(result: FrameResult) -> str:
+    """The line of frame_record(result), the same to the last character.
+
+    Raises:
+        ValueError: something is not finite.
+    """
+    if not _in_tables(result):
+        return line(frame_record(result))
+    tracks, n = result.tracks, len(result.tracks)
+    seen = tracks.proposal != NONE
+    counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
+    id_, proposal, points, age, missed = whole(np.stack(counts))
+    box = _keyed(BOX_KEYS, thousandths(result.proposals.box[tracks.proposal]))
+    for value in (proposal, box):
+        value[~seen], value[~seen, 0] = 0, NULL
+    states = table([json.dumps(name) for name in result.state_names])
+    lines = beside(
+        n,
+        *(',{"id":', id_, ',"state":', states[tracks.state], ',"class":', CLASSES[tracks.posterior.argmax(axis=1)]),
+        *(
+            ',"posterior":',
+            _listed(probabilities(tracks.posterior)),
+            ',"fixed":',
+            TRUTH[tracks.fixed.astype(np.int64)],
+        ),
+        *(',"proposal":', proposal, ',"points":', points, ',"age":', age, ',"missed":', missed),
+        *(',"box":', box, ',"world":', _keyed(WORLD_KEYS, thousandths(tracks.x)), "}"),
+    )
+    around = line(frame_record(replace(result, tracks=tracks.take(np.zeros(0, np.int64)))))
+    return around.replace('"tracks":[]', f'"tracks":[{text(lines)[1:]}]')
+
+
+def _in_tables(result: FrameResult) -> bool:
+    """Whether every number can be looked up."""
+    tracks, boxes = result.tracks, result.proposals.box
+    near = all((np.abs(lengths) < LIMIT - 1).all() for lengths in (tracks.x, boxes))
+    few = all((numbers < LIMIT).all() for numbers in (tracks.id, tracks.points, tracks.age, tracks.missed))
+    return bool(len(boxes) and near and few and (np.abs(tracks.posterior - 0.5) <= 0.5).all())
+
+
+def _keyed(keys: tuple[str, ...], values: Words) -> Words:
+    """(n, w) words of objects with these keys and values (n, k, v)."""
+    marks = [f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)]
+    return beside(len(values), *(piece for k, mark in enumerate(marks) for piece in (mark, values[:, k])), "}")
+
+
+def _listed(values: Words) -> Words:
+    """(n, w) words of lists of values (n, k, v)."""
+    marks = ["," if k else "[" for k in range(values.shape[1])]
+    return beside(len(values), *(piece for k, mark in enumerate(marks) for piece in (mark, values[:, k])), "]")
+
+
 class TrackLines:
-    """Writes tracks.jsonl, and hands the record on to whoever counts."""
+    """Writes tracks.jsonl."""
 
     def __init__(self, path: Path) -> None:
-        self._lines = JsonLines(path)
-        self.last: dict[str, Any] = {}
+        self._lines = LineFile(path)
 
     def write(self, result: FrameResult) -> None:
         """Append one frame.
@@ -74,8 +138,7 @@ class TrackLines:
         Raises:
             ModtError: the file cannot be written.
         """
-        self.last = frame_record(result)
-        self._lines.write(self.last)
+        self._lines.write(frame_line(result))
 
     def close(self) -> None:
         """No more will come."""
