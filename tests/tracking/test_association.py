@@ -6,7 +6,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import linear_sum_assignment
 
 from modt.config import TrackingConfig
-from modt.tracking.association import FORBIDDEN, PaperAssociation, assign
+from modt.tracking.association import FORBIDDEN, PaperAssociation, assign, assign_all
 from modt.tracking.sightings import AXES, sight
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
@@ -26,6 +26,27 @@ def test_sparse_assignment_is_the_dense_one(cost):
     real = dense[i, j] < FORBIDDEN
     assert len(keep) == real.sum()
     np.testing.assert_allclose(cost[rows, columns][keep].sum(), dense[i, j][real].sum(), atol=1e-9)
+
+
+def greatest_gain(cost, limit):
+    """What the best of all ways to pair rows and columns saves below the limit, one pair after the other tried."""
+    if not len(cost):
+        return 0.0
+    alone = greatest_gain(cost[1:], limit)
+    paired = [
+        limit - cost[0, j] + greatest_gain(np.delete(cost[1:], j, axis=1), limit)
+        for j in np.flatnonzero(cost[0] < limit)
+    ]
+    return max([alone, *paired])
+
+
+@given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 2**16))
+def test_no_assignment_of_few_to_few_is_cheaper(n, k, seed):
+    cost = np.random.default_rng(seed).uniform(0, 2, (n, k))
+    rows, columns = assign_all(cost, 1.0)
+    assert len(set(rows)) == len(set(columns)) == len(rows)
+    assert (cost[rows, columns] < 1).all()
+    np.testing.assert_allclose((1 - cost[rows, columns]).sum(), greatest_gain(cost, 1.0), atol=1e-9)
 
 
 def candidates(before, after, **counts):

@@ -10,7 +10,7 @@ from modt.errors import MisuseError
 
 if TYPE_CHECKING:
     from modt.sources.detections import Detections
-    from modt.types import Float64
+    from modt.types import Float64, Int
 
 PERIOD_S = 0.1
 
@@ -81,12 +81,14 @@ def follow(detections: Detections, poses: Float64 | None, period_s: float) -> tu
     from modt.sources.detections import T_LEVEL_CAMERA, TYPES, kitti
     from modt.tracking.boxes import BoxTracker, box_config
 
-    lines: list[tuple[int, str]] = []
-    seen: set[int] = set()
+    lines: list[str] = []
+    order: list[int] = []
+    tracks = 0
     for type_, name in enumerate(TYPES):
         own = detections.take(detections.type_ == type_)
         tracker = BoxTracker(box_config(name))
         last = np.zeros((0, 4))
+        reports: list[tuple[Int, Int, Float64, Float64, Float64]] = []
         for frame, rows in own.frames():
             T = None if poses is None else T_LEVEL_CAMERA @ poses[frame] @ inverse(T_LEVEL_CAMERA)
             boxes = own.box[rows] if T is None else transform_boxes(T, own.box[rows])
@@ -98,10 +100,13 @@ def follow(detections: Detections, poses: Float64 | None, period_s: float) -> tu
             now = found.source >= 0
             last[found.id[now]] = own.image_box[rows][found.source[now]]
             placed = found.box if T is None else transform_boxes(inverse(T), found.box)
-            ids = found.id * len(TYPES) + type_
-            seen.update(ids.tolist())
-            lines.append((frame, result_lines(frame, name, ids, last[found.id], kitti(placed), found.score)))
-    return "".join(text for _, text in sorted(lines, key=lambda line: line[0])), len(seen)
+            reports.append((np.full(len(found.id), frame), found.id, last[found.id], placed, found.score))
+        if reports:
+            frames, ids, image_box, box, score = (np.concatenate(column) for column in zip(*reports, strict=True))
+            lines += result_lines(frames, name, ids * len(TYPES) + type_, image_box, kitti(box), score)
+            order += frames.tolist()
+            tracks += len(np.unique(ids))
+    return "".join(lines[k] for k in np.argsort(order, kind="stable")), tracks
 
 
 def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) -> Float64 | None:

@@ -74,6 +74,13 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     return np.sort(np.concatenate([np.flatnonzero(alone), chosen[chosen >= 0]]))
 
 
+def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
+    """Rows and columns of a least-cost assignment of few to few; cost (n, k), pairs of limit and more may not be."""
+    rows, columns = linear_sum_assignment(np.minimum(cost, limit))
+    chosen = cost[rows, columns] < limit
+    return rows[chosen], columns[chosen]
+
+
 def _compact(index: Int) -> tuple[Int, int]:
     """Indices renumbered without gaps, and how many there are."""
     occurs = np.zeros(int(index.max()) + 1, np.bool_)

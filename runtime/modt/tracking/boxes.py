@@ -14,7 +14,7 @@ import numpy as np
 from modt.config import BoxTrackingConfig
 from modt.geometry import wrap
 from modt.tracking import kalman
-from modt.tracking.association import assign
+from modt.tracking.association import assign_all
 from modt.types import NONE, Bool, Float64, Int
 
 LIMIT = 1.0
@@ -62,6 +62,9 @@ class BoxTracker:
 
     def __init__(self, config: BoxTrackingConfig) -> None:
         self.config = config
+        position, speed = config.position_sigma_m, config.initial_speed_sigma_mps
+        self._R = np.square(position) * np.eye(2)[None]
+        self._P_born = np.diag(np.square([position, position, np.pi, speed]))[None]
         self._next_id = 0
         self._stamp_s: float | None = None
         self._start(0)
@@ -82,13 +85,7 @@ class BoxTracker:
         """
         self._predict(stamp_s)
         strong = score >= self.config.strong_score
-        rows, columns = self._match(boxes, np.arange(len(self._id)), np.flatnonzero(strong))
-        if len(rows) < len(self._id) and not strong.all():
-            alone = np.ones(len(self._id), np.bool_)
-            alone[rows] = False
-            left = np.flatnonzero(alone)
-            more, weak = self._match(boxes, left, np.flatnonzero(~strong))
-            rows, columns = np.concatenate([rows, more]), np.concatenate([columns, weak])
+        rows, columns = self._match(boxes, strong)
         self._source[:] = NONE
         self._missed += 1
         if len(rows):
@@ -105,56 +102,56 @@ class BoxTracker:
         self._stamp_s = stamp_s
         if not len(self._id):
             return
-        ones = np.ones(len(self._id))
-        Q = kalman.process_noise(
-            self._x, dt_s, ones * self.config.acceleration_sigma_mps2, ones * self.config.turn_sigma_radps
-        )
+        Q = kalman.process_noise(self._x, dt_s, self.config.acceleration_sigma_mps2, self.config.turn_sigma_radps)
         self._x, self._P = kalman.predict(self._x, self._P, Q, dt_s)
 
-    def _match(self, boxes: Float64, tracks: Int, detections: Int) -> tuple[Int, Int]:
-        """Rows and detections that belong together."""
-        if not len(tracks) or not len(detections):
+    def _match(self, boxes: Float64, strong: Bool) -> tuple[Int, Int]:
+        """Rows and detections that belong together: the strong ones first, the weak ones among what is left."""
+        if not len(self._id) or not len(boxes):
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
-        found = boxes[detections]
-        offset = found[None, :, :2] - self._x[tracks, None, :2]
-        square = (offset**2).sum(axis=2)
-        sigma = self.config.position_sigma_m**2 + (self._P[tracks, 0, 0] + self._P[tracks, 1, 1]) / 2
-        reach = self.config.gate * sigma[:, None] + (self.config.overlap * self._box[tracks, 3:4]) ** 2
-        rise = np.abs(found[None, :, 2] - self._box[tracks, None, 2])
-        turn = np.abs(np.sin(found[None, :, 6] - self._box[tracks, None, 6]))
-        cost = square / reach + 0.2 * rise + 0.1 * turn
-        i, j = np.nonzero(cost < LIMIT)
-        kept = assign(i, j, cost[i, j], LIMIT)
-        return tracks[i[kept]], detections[j[kept]]
+        cost = self._cost(boxes)
+        if strong.all():
+            return assign_all(cost, LIMIT)
+        rows, columns = assign_all(np.where(strong, cost, LIMIT), LIMIT)
+        cost[rows], cost[:, strong] = LIMIT, LIMIT
+        more, weak = assign_all(cost, LIMIT)
+        return np.concatenate([rows, more]), np.concatenate([columns, weak])
+
+    def _cost(self, boxes: Float64) -> Float64:
+        """(T, D) of each pair, LIMIT and more beyond the gate."""
+        dx, dy = boxes[:, 0] - self._x[:, 0, None], boxes[:, 1] - self._x[:, 1, None]
+        sigma = self.config.position_sigma_m**2 + (self._P[:, 0, 0] + self._P[:, 1, 1]) / 2
+        reach = self.config.gate * sigma + (self.config.overlap * self._box[:, 3]) ** 2
+        rise = np.abs(boxes[:, 2] - self._box[:, 2, None])
+        turn = np.abs(np.sin(boxes[:, 6] - self._box[:, 6, None]))
+        cost: Float64 = (dx * dx + dy * dy) / reach[:, None] + 0.2 * rise + 0.1 * turn
+        return cost
 
     def _update(self, rows: Int, columns: Int, boxes: Float64, score: Float64) -> None:
-        seen = boxes[columns]
-        x, P = self._x[rows], self._P[rows]
+        seen = boxes.take(columns, axis=0)
+        x, P = self._x.take(rows, axis=0), self._P.take(rows, axis=0)
         slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
         if slow.any():
             step = seen[:, :2] - x[:, :2]
             course = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
             x, P = kalman.face(x, P, course)
-        R = np.zeros((len(rows), 2, 2))
-        R[:, 0, 0] = R[:, 1, 1] = self.config.position_sigma_m**2
-        self._x[rows], self._P[rows] = kalman.turn_about(*kalman.update(x, P, seen[:, :2], R))
-        self._hits[rows] += 1
+        self._x[rows], self._P[rows] = kalman.turn_about(*kalman.update(x, P, seen[:, :2], self._R))
         self._missed[rows] = 0
         self._source[rows] = columns
-        gain = np.maximum(1.0 / self._hits[rows], self.config.smoothing)
-        self._box[rows, 3:6] += gain[:, None] * (seen[:, 3:6] - self._box[rows, 3:6])
-        self._box[rows, 2] += self.config.height_gain * (seen[:, 2] - self._box[rows, 2])
-        turn = wrap(seen[:, 6] - self._box[rows, 6])
+        hits = self._hits[rows] + 1
+        box = self._box.take(rows, axis=0)
+        gain = np.maximum(1.0 / hits, self.config.smoothing)
+        box[:, 3:6] += gain[:, None] * (seen[:, 3:6] - box[:, 3:6])
+        box[:, 2] += self.config.height_gain * (seen[:, 2] - box[:, 2])
+        turn = wrap(seen[:, 6] - box[:, 6])
         about = np.abs(turn) > np.pi / 2
         turn = np.where(about, wrap(turn + np.pi), turn)  # headings that do not flip
-        self._box[rows, 6] = wrap(self._box[rows, 6] + self.config.turn_gain * turn)
-        self._score[rows] += (score[columns] - self._score[rows]) / self._hits[rows]
+        box[:, 6] = wrap(box[:, 6] + self.config.turn_gain * turn)
+        self._hits[rows], self._box[rows] = hits, box
+        self._score[rows] += (score[columns] - self._score[rows]) / hits
 
     def _renew(self, keep: Bool, born: Int, boxes: Float64, score: Float64) -> None:
         n = len(born)
-        P = np.diag(
-            [self.config.position_sigma_m, self.config.position_sigma_m, np.pi, self.config.initial_speed_sigma_mps]
-        )
         x = np.zeros((n, 4))
         x[:, :2] = boxes[born, :2]
         join = np.concatenate
@@ -164,7 +161,7 @@ class BoxTracker:
         self._missed = join([self._missed[keep], np.zeros(n, np.int64)])
         self._source = join([self._source[keep], born])
         self._x = join([self._x[keep], x])
-        self._P = join([self._P[keep], np.broadcast_to(P**2, (n, 4, 4))])
+        self._P = join([self._P[keep], self._P_born.repeat(n, axis=0)])
         self._box = join([self._box[keep], boxes[born]])
         self._score = join([self._score[keep], score[born]])
 

@@ -23,15 +23,14 @@ def motion(x: Float64, dt_s: float) -> Float64:
 
 def motion_jacobian(x: Float64, dt_s: float) -> Float64:
     """(M, 4, 4) derivative of F at x."""
-    F = np.zeros((len(x), 4, 4))
-    F[:, range(4), range(4)] = 1.0
+    F = np.eye(4)[None].repeat(len(x), axis=0)
     c, s = np.cos(x[:, HEADING]), np.sin(x[:, HEADING])
     F[:, X, HEADING], F[:, X, SPEED] = -dt_s * s * x[:, SPEED], dt_s * c
     F[:, Y, HEADING], F[:, Y, SPEED] = dt_s * c * x[:, SPEED], dt_s * s
     return F
 
 
-def process_noise(x: Float64, dt_s: float, acceleration: Float64, turn: Float64) -> Float64:
+def process_noise(x: Float64, dt_s: float, acceleration: Float64 | float, turn: Float64 | float) -> Float64:
     """(M, 4, 4) what an acceleration [m/s2] and a rate of turn [rad/s], white within dt_s, add to the covariance.
 
     Across its heading a track can be pushed as hard as along it while it stands: then the heading says nothing.
@@ -85,8 +84,7 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
     """
     turn = heading_rad - x[:, HEADING]
     c, s = np.cos(turn), np.sin(turn)
-    T = np.zeros(P.shape)
-    T[:, range(4), range(4)] = 1.0
+    T = np.eye(4)[None].repeat(len(x), axis=0)
     T[:, X, X], T[:, X, Y], T[:, Y, X], T[:, Y, Y] = c, -s, s, c
     out = x.copy()
     out[:, HEADING] = wrap(heading_rad)
