@@ -49,7 +49,7 @@ class RobustAssociation:
             *(ends.take(rows, axis=0) for ends in (low, high)),
             *(ends.take(columns, axis=0) for ends in (sightings.low, sightings.high)),
         )
-        S = tracks.P.take(rows, axis=0)[:, :2, :2] + R.take(columns, axis=0) + JUMP_M**2 * np.eye(2)
+        S = tracks.P[:, :2, :2].copy().take(rows, axis=0) + R.take(columns, axis=0) + JUMP_M**2 * np.eye(2)
         distance = kalman.mahalanobis_squared(shift, S)
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
