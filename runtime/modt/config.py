@@ -86,6 +86,7 @@ class SensorConfig(StageConfig):
     min_range_m: float = _number(2.0, 0.0, 20.0, "m", "nearer points belong to the robot itself")
     max_range_m: float = _number(80.0, 1.0, 400.0, "m", "farther points are left out")
     elevation_step_deg: float = _number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
+    azimuth_step_deg: float = _number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
     period_s: float = _number(0.1, 0.001, 10.0, "s", "of a sweep, where the stream has no stamps")
 
 
