@@ -15,6 +15,10 @@ from modt.types import Bool, Float32, Float64, Int
 
 COMPANY_M = (0.8, 3.0)
 """A cluster that holds a person and more is this long: two people side by side, or one beside a bush."""
+AROUND = 1.5
+"""What is not this many times its length away surrounds the sensor and has no sides ..."""
+NEAR_M = np.float32(0.1)
+"""... nor has what is nearer than this."""
 HEAD_M = (1.1, 2.2)
 """Heads end between these heights above ground: those of children of five, and of tall people on a kerb."""
 BREADTH_M = (0.2, 0.85)
@@ -41,7 +45,7 @@ STEP_M = 0.4
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """The columns in which a sensor sees each of some groups, from right to left; those at either end are empty.
+    """The columns in which a sensor sees each of some groups, from right to left; its last is empty.
 
     Attributes:
         group: (C,) whom a column is of.
@@ -86,6 +90,7 @@ class Silhouettes:
         """
         company: Bool = (extent > COMPANY_M[0]) & (extent < COMPANY_M[1]) & (top > HEAD_M[0])
         company &= (points >= 2 * self.points) & (root < np.float32(np.sqrt(self.range_m)))
+        company &= np.square(root) > AROUND * extent
         return company
 
     def parted(self, points: Columns, height: Float32, cell: Int, cluster: Int, company: Bool) -> tuple[Int, int]:
@@ -115,7 +120,7 @@ class Silhouettes:
         return new, n + len(cuts)
 
     def view(self, x: Float32, y: Float32, height: Float32, group: Int) -> tuple[Int, View]:
-        """(K,) column of each point of groups, none empty nor around the sensor, and what is seen in each column."""
+        """(K,) column of each point of groups, none empty or around the sensor, and what is seen in each column."""
         count = np.bincount(group)
         middle = np.bincount(group, x) / count, np.bincount(group, y) / count
         range_m = np.hypot(*middle)
@@ -124,8 +129,10 @@ class Silhouettes:
         depth = x * c + y * s
         half = (COMPANY_M[1] / (range_m * step)).astype(np.int64) + 2
         ends = np.cumsum(2 * half)
-        aside = (y * c - x * s) / (depth * step.astype(np.float32)[group])
-        column = (aside + (ends - half).astype(np.float32)[group]).astype(np.int64)
+        aside = np.floor((y * c - x * s) / (np.maximum(depth, NEAR_M) * step.astype(np.float32)[group]))
+        reach = half[group]
+        column = np.clip(aside.astype(np.int64), -reach, reach - 2)
+        column += ends[group] - reach
         n = int(ends[-1])
         returns = np.bincount(column, minlength=n)
         near, top = np.full(n, np.inf, np.float32), np.zeros(n, np.float32)
