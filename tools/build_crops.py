@@ -46,7 +46,7 @@ class Labels:
     Attributes:
         kind: (R,) class.
         partial: (R,) neither clearly one object nor clearly none.
-        unknown: (R,) nobody says what they are, or nobody asks: beyond the labels, or of too few points to be counted.
+        unknown: (R,) not to be judged by: beyond the labels, or of an object with too few points.
         tall: (R,) vehicles the height of a van: rare, and unlike other cars.
     """
 
