@@ -38,7 +38,7 @@ REFLECTIVITY = np.array(
 """Share of the light returned."""
 
 LOSS = np.array(
-    [0, 0, 0, 0, 0.01, 0.02, 0, 0.04, 0, 0.12, 0.3, 0.72, 0.1, 0.02, 0.01, 0.01, 0.02, 0.35, 0.65], np.float32
+    [0, 0, 0, 0, 0.01, 0.02, 0, 0.04, 0, 0.05, 0.12, 0.72, 0.1, 0.02, 0.01, 0.01, 0.02, 0.2, 0.65], np.float32
 )
 """Share of pulses that never come back: mirrored away, let through, or lost in a window on the way."""
 

@@ -25,7 +25,7 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
     paint = (Material.CAR_PAINT, Material.CAR_DARK, Material.CAR_BLACK)[rng.choice(3, p=[0.5, 0.28, 0.22])]
     nose = belt - rng.uniform(0.12, 0.25)
     bonnet = rng.uniform(0.24, 0.3) * length
-    boot = rng.choice([0.04, 0.12, 0.2]) * length
+    boot = rng.choice([0.03, 0.1, 0.2], p=[0.6, 0.15, 0.25]) * length
     body_height = belt - clear
     middle = clear + body_height / 2
     hull = wedge(
@@ -38,11 +38,11 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
             (-1.0, 0.0, -0.35, length / 2 + 0.35 * body_height * 0.2),
         ],
     )
-    hull = rounded(hull, (length / 2, width * rng.uniform(0.8, 1.1), body_height * rng.uniform(1.1, 1.6)))
+    hull = rounded(hull, (0.515 * length, width * rng.uniform(0.95, 1.6), body_height * rng.uniform(1.4, 2.4)))
     front, rear = length / 2 - bonnet + 0.1, -length / 2 + boot
     cabin_height = height - belt + 0.02
     half = cabin_height / 2
-    rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.25, 0.8), rng.uniform(0.2, 0.32)
+    rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.15, 0.6), rng.uniform(0.28, 0.45)
     long = front - rear
     glass = wedge(
         ((front + rear) / 2, 0.0, belt + half - 0.02),
@@ -55,7 +55,7 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
             (0.0, -1.0, tuck, 0.47 * width - tuck * half),
         ],
     )
-    glass = rounded(glass, (long * 0.52, width * rng.uniform(0.75, 1.0), np.inf))
+    glass = rounded(glass, (long * 0.52, width * rng.uniform(0.95, 1.6), np.inf))
     glass.density[:] = rng.uniform(0.6, 2.0)
     lid_length = max(long - rake - tail, 0.5)
     lid = box(
@@ -91,7 +91,7 @@ def van(rng: np.random.Generator, size: Size) -> Pieces:
         paint,
         [(drop, 0.0, bonnet, drop * (length / 2 - bonnet) + bonnet * low / 2)],
     )
-    hull = rounded(hull, (length * 0.505, width * rng.uniform(0.85, 1.2), np.inf))
+    hull = rounded(hull, (0.515 * length, width * rng.uniform(1.2, 2.2), np.inf))
     front, rear = length / 2 - bonnet, -length / 2 + rng.uniform(0.02, 0.2)
     cab = rake + rng.uniform(0.9, 1.3)
     glass = wedge(
