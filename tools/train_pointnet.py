@@ -113,7 +113,7 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
 
 
 def folds(data: Dataset, k: int) -> Int:
-    """Fold of each drive, objects of the rare classes spread evenly; NONE where nothing is judged: always learnt from."""
+    """Fold of each drive, objects of the rare classes spread evenly; NONE where nothing is judged: always learnt."""
     counted = len(data.truth_drive) > 0
     drive, label = (data.truth_drive, data.truth_label) if counted else (data.drive, data.label)
     weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
