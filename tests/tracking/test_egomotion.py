@@ -60,6 +60,27 @@ def test_odometry_that_fails_for_a_while_is_bridged():
     assert tracker.tracks.age.min() == 20
 
 
+def test_odometry_that_begins_late_finds_the_tracks_where_they_are():
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
+    for i in range(20):
+        T = None if i < 6 or i in (12, 13) else T_elsewhere @ drive(i)
+        tracker.follow(*frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150))
+    assert len(tracker.tracks) == 40
+    assert tracker.tracks.age.min() == 20
+    np.testing.assert_allclose(tracker.T_world_sensor, drive(19), atol=0.15)
+
+
+def test_a_first_pose_far_from_the_origin_is_no_motion():
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
+    for i in range(4):
+        T = T_elsewhere @ drive(0) if i == 0 else None
+        tracker.follow(*frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150))
+    assert len(tracker.tracks) == 40
+    np.testing.assert_allclose(tracker.T_world_sensor, T_elsewhere @ drive(3), atol=0.15)
+
+
 def test_without_landmarks_the_sensor_goes_on_as_it_went():
     tracker = follow(10)
     before = tracker.T_world_sensor.copy()

@@ -75,6 +75,7 @@ class Tracker:
         self._stamp_s: float | None = None
         self._T_world_sensor = np.eye(4)
         self._T_last_now = np.eye(4)
+        self._T_world_odometry: Float64 | None = None
 
     @property
     def tracks(self) -> Tracks:
@@ -143,14 +144,19 @@ class Tracker:
 
     def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
         """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
-        before = self._T_world_sensor
-        if frame.T_world_sensor is not None:
-            after, sightings = frame.T_world_sensor, sight(frame, proposals, frame.T_world_sensor)
+        before, given, first = self._T_world_sensor, frame.T_world_sensor, self._stamp_s is None
+        if first and given is not None:
+            before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
+        if given is not None and self._T_world_odometry is not None:
+            after = self._T_world_odometry @ given
+            sightings = sight(frame, proposals, after)
         else:
             after = before @ self._T_last_now
             sightings = sight(frame, proposals, after)
             after = rigid(self._registration.correct(self._tracks, sightings) @ after)
             sightings = sight(frame, proposals, after)
+            if given is not None:  # odometry that begins late is brought to where the tracks are
+                self._T_world_odometry = after @ inverse(given)
         self._T_world_sensor, self._T_last_now = after, inverse(before) @ after
         return sightings
 
