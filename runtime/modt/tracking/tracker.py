@@ -27,6 +27,10 @@ STILL_SIGMA_MPS = 1.0
 """How surely what stands still has no speed, per frame."""
 SLOW_MPS = 0.5
 """What is slower than this has stopped."""
+LANDMARK_GAIN = 0.03
+"""Least say of a new view in the mean outline of a landmark."""
+LANDMARK_M = 0.2
+"""An end of an outline that is off by more is another end."""
 FORGET = 0.98
 """What is kept, a frame, of an extent that is not seen again."""
 AGILITY = np.array([0.25, 1.5, 0.75, 1.0])
@@ -103,6 +107,7 @@ class Tracker:
         matches = reunite(self._tracks, sightings, self.association.match(self._tracks, sightings))
         self._update(matches, sightings)
         self._rest(matches.rows)
+        self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
         self._bear(matches, sightings)
@@ -196,6 +201,15 @@ class Tracker:
         near = rows[away < STILL_M]
         t.home[near] += HOME_GAIN * (t.x[near, :2] - t.home[near])
         t.x[near], t.P[near] = kalman.observe_speed(t.x[near], t.P[near], 0.0, STILL_SIGMA_MPS)
+
+    def _stand(self, rows: Int) -> None:
+        """The mean outline of what stands: a landmark that does not creep with what is registered to it."""
+        t = self._tracks
+        t.stood[rows] = np.where(t.still[rows], t.stood[rows] + 1, 0)
+        gain = np.maximum(1.0 / np.maximum(t.stood[rows], 1), LANDMARK_GAIN)[:, None]
+        for mean, seen in ((t.stood_low, t.low), (t.stood_high, t.high)):
+            off = seen[rows] - mean[rows]
+            mean[rows] += np.where(np.abs(off) < LANDMARK_M, gain, 1.0) * off
 
     def _miss(self, matched: Int) -> None:
         """Tracks without a proposal coast."""
