@@ -15,6 +15,9 @@ SOFT_M = 0.3
 """Lengths are compared with this added: a difference of a few returns says nothing."""
 GATE = 16.0
 """Greatest squared Mahalanobis distance of a pair: one true pair in three thousand lies beyond."""
+AGREE_M = 0.6
+"""Ends of an outline that differ by less moved with the object, if it is up to a metre long and so is seen whole; of
+a longer one that comes into view by as much less as it is longer."""
 JUMP_M = 0.2
 """Outlines jump by this much beyond the filter's noise, as parts of an object come into view and go."""
 COVER = 0.3
@@ -30,8 +33,9 @@ class RobustAssociation:
     """Matches outlines, not centres.
 
     What is seen of an object changes with the view: its far side appears, a pole hides its rear, the field of view
-    cuts it. Along each of four axes an outline has two ends; one of them usually stays, and the smaller of the two
-    shifts from where the filter expects them is taken for the object's own.
+    cuts it. Along each of four axes an outline has two ends. Where both moved alike, the object moved by their mean;
+    where they did not, one of them usually stayed, and the smaller of the two shifts from where the filter expects
+    them is taken for the object's own. (The smaller of two alike would fall short of every motion.)
 
     Args:
         config: deviation of a measured place.
@@ -102,15 +106,18 @@ def compare(
     """How outlines b (K, 4) lie to outlines a (K, 4), row by row.
 
     Returns:
-        shift: (K, 2) from a to b [m], by the end that moved less along each axis.
+        shift: (K, 2) from a to b [m], by both ends along each axis where they agree, else by that which moved less.
         size: (K,) mean difference of the logarithms of their lengths.
         overlap: (K,) intersection over union.
         cover: (K,) intersection over the smaller of the two.
     """
     ahead, behind = high_b - high_a, low_b - low_a
     least = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
-    shift = least @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     length_a, length_b = high_a - low_a, high_b - low_b
+    reach = AGREE_M / np.maximum(np.maximum(length_a, length_b).max(axis=1), 1.0)
+    both = np.square(np.maximum(1 - np.square((ahead - behind) / reach[:, None]), 0.0))
+    moved = both * (ahead + behind) / 2 + (1 - both) * least
+    shift = moved @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).mean(axis=1)
     pad = SOFT_M / 3
     common = np.maximum(np.minimum(high_a, high_b) - np.maximum(low_a, low_b) + pad, 0.0)
