@@ -4,8 +4,8 @@
                          [--mode efficient]
 
 Every synthetic drive is played twice, with the memory and without. Of the proposals that are new and inherit, those
-are wrong that are truly an object: most of their points are of a car, a pedestrian or a cyclist. They stay so until the
-class is doubted (e7), the track ends or what it follows is no longer an object.
+are wrong that are truly an object: most of their points are of a car, a pedestrian or a cyclist. They stay so until
+the class is doubted (e7), the track ends or what it follows is no longer an object.
 """
 
 from __future__ import annotations
