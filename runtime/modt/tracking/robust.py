@@ -35,7 +35,8 @@ class RobustAssociation:
     What is seen of an object changes with the view: its far side appears, a pole hides its rear, the field of view
     cuts it. Along each of four axes an outline has two ends. Where both moved alike, the object moved by their mean;
     where they did not, one of them usually stayed, and the smaller of the two shifts from where the filter expects
-    them is taken for the object's own. (The smaller of two alike would fall short of every motion.)
+    them is taken for the object's own. (The smaller of two alike would fall short of every motion.) Pairs are
+    gated by the smaller shifts alone.
 
     Args:
         config: deviation of a measured place.
@@ -49,9 +50,10 @@ class RobustAssociation:
         low, high = carried(tracks)
         R = self.noise(sightings)
         rows, columns = self._near(tracks, low, high, sightings)
-        shift, size, overlap, cover = compare(low[rows], high[rows], sightings.low[columns], sightings.high[columns])
+        ends = low[rows], high[rows], sightings.low[columns], sightings.high[columns]
+        shift, size, overlap, cover = compare(*ends)
         S = tracks.P[rows][:, :2, :2] + R[columns] + JUMP_M**2 * np.eye(2)
-        distance = kalman.mahalanobis_squared(shift, S)
+        distance = kalman.mahalanobis_squared(least(*ends) @ AXES.T / 2, S)  # what changed its shape may be far off
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
         count = np.abs(np.log(tracks.points[rows] / sightings.count[columns]))
@@ -112,11 +114,10 @@ def compare(
         cover: (K,) intersection over the smaller of the two.
     """
     ahead, behind = high_b - high_a, low_b - low_a
-    least = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
     length_a, length_b = high_a - low_a, high_b - low_b
     reach = AGREE_M / np.maximum(np.maximum(length_a, length_b).max(axis=1), 1.0)
     both = np.square(np.maximum(1 - np.square((ahead - behind) / reach[:, None]), 0.0))
-    moved = both * (ahead + behind) / 2 + (1 - both) * least
+    moved = both * (ahead + behind) / 2 + (1 - both) * least(low_a, high_a, low_b, high_b)
     shift = moved @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).mean(axis=1)
     pad = SOFT_M / 3
@@ -126,6 +127,12 @@ def compare(
     overlap = (shared / (squares[0] + squares[1] - shared)).min(axis=1)
     cover = (shared / np.minimum(*squares)).min(axis=1)
     return shift, size, overlap, cover
+
+
+def least(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> Float64:
+    """(K, 4) along each axis, how far the end moved that moved less from outlines a to b (K, 4) [m]."""
+    ahead, behind = high_b - high_a, low_b - low_a
+    return np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
 
 
 def _left(all_: Int, taken: Int, n: int) -> Bool:
