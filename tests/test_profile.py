@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt import assets, profile
-from modt.config import ProfileConfig, SegmentationConfig, StageConfig, ValueRangeError
+from modt.config import (
+    EnergyConfig,
+    ProfileConfig,
+    SchedulerConfig,
+    SegmentationConfig,
+    StageConfig,
+    ValueRangeError,
+)
 from modt.errors import MisuseError
 
 
@@ -43,6 +50,10 @@ def test_dump_and_parse_are_inverse():
         ("fusion: 3\n", ["p.yaml:1", "no mapping"]),
         ("a: [1\n", ["p.yaml:", "no YAML"]),
         ("sensor: {}\nsensor: {}\n", ["p.yaml:2", "twice"]),
+        (
+            "scheduler: {energy_mJ_per_frame: 5}\nenergy: {idle_W: 3, busy_W: 3}\n",
+            ["p.yaml: scheduler.energy_mJ_per_frame", "busy_W", "calibrate"],
+        ),
     ],
 )
 def test_what_is_wrong_is_named_with_its_line(text, parts):
@@ -85,6 +96,18 @@ def test_every_value_declares_bounds_and_meaning():
 def test_configuration_made_in_code_is_checked_too():
     with pytest.raises(ValueRangeError, match="cell_m"):
         SegmentationConfig(cell_m=-1.0)
+
+
+@pytest.mark.parametrize(
+    ("time_ms", "energy_mJ", "allowed_ms"),
+    [(None, None, None), (4.0, None, 4.0), (None, 6.0, 3.0), (4.0, 6.0, 3.0), (2.0, 6.0, 2.0), (None, 0.0, 0.0)],
+)
+def test_of_time_and_energy_the_scarcer_binds(time_ms, energy_mJ, allowed_ms):
+    config = ProfileConfig(
+        scheduler=SchedulerConfig(cpu_ms_per_frame=time_ms, energy_mJ_per_frame=energy_mJ),
+        energy=EnergyConfig(idle_W=3.0, busy_W=5.0),
+    )
+    assert config.classification_ms == allowed_ms
 
 
 def test_stages_are_frozen():

@@ -1,10 +1,11 @@
 """Build the data set of crops: the proposals of our own segmentation over labelled scans, labelled by overlap.
 
-    build_crops.py OUT.npz [--kitti ROOT [--paste N]] [--synthetic N]
+    build_crops.py OUT.npz --kitti ROOT [--paste N]
 
 A proposal is an object if more than half of its points lie in the object's box and it holds more than half of those
-that do. What is neither clearly that nor clearly something else (fragments, merged objects, regions that the
-annotators left out) is kept but marked partial. The file carries its own provenance.
+that do. What is neither clearly that nor clearly something else (fragments, merged objects) is kept but marked
+partial; what the annotators left out is marked unknown. Neither is trained on, and what is unknown is not judged.
+The file carries its own provenance. tools/build_synthetic_crops.py writes the same of synthetic scans.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import dataclasses
 import hashlib
 import json
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 import modt
 from dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC
-from labelled import Scan, object_scans, raw_scans, semantic_scans, synthetic_scans
+from labelled import Scan, argoverse_scans, object_scans, raw_scans, semantic_scans
 from modt import profile
 from modt.classification.crops import gather
 from modt.config import ProfileConfig
@@ -33,32 +35,53 @@ CELL_SCALES = (0.75, 1.4)
 MAX_POINTS = 1200
 MIN_BOX_POINTS, COUNTED_BOX_POINTS = 5, 10
 """An object must show so many points to be trained on, and to be counted as one that should be found."""
+TALL_M = 1.85
+"""Cars taller than this are vans and their like."""
 
 
-def label(scan: Scan, proposals: Proposals) -> tuple[Int, Bool]:
-    """Class of each proposal, and whether it is unclear."""
+@dataclass(frozen=True)
+class Labels:
+    """What the proposals of a scan are.
+
+    Attributes:
+        kind: (R,) class.
+        partial: (R,) neither clearly one object nor clearly none.
+        unknown: (R,) not to be judged by: beyond the labels, or of an object with too few points.
+        tall: (R,) vehicles the height of a van: rare, and unlike other cars.
+    """
+
+    kind: Int
+    partial: Bool
+    unknown: Bool
+    tall: Bool
+
+
+def label(scan: Scan, proposals: Proposals) -> Labels:
+    """The proposals of a scan, labelled by overlap with its objects."""
     number = proposals.label(len(scan.points))
     size = proposals.count
     kind = np.full(len(proposals), ObjectClass.BACKGROUND, np.int64)
     left_out = np.bincount(number[scan.unlabelled & (number >= 0)], minlength=len(proposals))
-    partial = left_out > 0.5 * size
-    for members, of_class in zip(scan.objects, scan.kinds, strict=True):
+    partial, tall = np.zeros(len(proposals), np.bool_), np.zeros(len(proposals), np.bool_)
+    unknown = left_out > 0.5 * size
+    for members, of_class, box, to_find in zip(scan.objects, scan.kinds, scan.boxes, countable(scan), strict=True):
         if len(members) < MIN_BOX_POINTS:
             continue
         own = number[members]
         shared = np.bincount(own[own >= 0], minlength=len(proposals))
         whole = (shared > 0.5 * size) & (shared > 0.5 * len(own))
         kind[whole] = of_class
+        tall[whole] = of_class == ObjectClass.CAR and box[5] > TALL_M
         partial |= (shared > 0.2 * size) & ~whole
         partial[whole] = False
-    return kind, partial
+        unknown[whole] |= not to_find
+    return Labels(kind, partial, unknown, tall)
 
 
-def counted(scan: Scan) -> Int:
-    """Classes of the objects that a detector should find in a scan."""
+def countable(scan: Scan) -> Bool:
+    """(B,) objects that a detector should find in a scan."""
     points = [int(scan.fov.contains(scan.points[own]).sum()) for own in scan.objects]
-    kinds = [k for k, n in zip(scan.kinds, points, strict=True) if k and n >= COUNTED_BOX_POINTS]
-    return np.array(kinds, np.int64)
+    return np.array([n >= COUNTED_BOX_POINTS for n in points], np.bool_)
 
 
 class Writer:
@@ -72,16 +95,18 @@ class Writer:
         """The proposals of a scan, clusters so much coarser; if judged, its objects count as to be found."""
         stage = dataclasses.replace(self.config.segmentation, cell_m=self.config.segmentation.cell_m * scale)
         proposals = Segmenter(stage, self.config.sensor, scan.fov).segment(scan.points)
-        kind, partial = label(scan, proposals)
-        wanted = ~partial & (kind > 0) if variant == PASTED else np.ones(len(proposals), np.bool_)
-        kept = np.flatnonzero(wanted)
+        labels = label(scan, proposals)
+        objects = (labels.kind > 0) & ~labels.partial
+        kept = np.flatnonzero(objects if variant == PASTED else np.ones(len(proposals), np.bool_))
         crops = gather(scan.points, proposals, kept, MAX_POINTS)
         n = len(kept)
-        row = {"xyz": crops.xyz, "count": crops.count, "label": kind[kept].astype(np.int8), "partial": partial[kept]}
+        row = {"xyz": crops.xyz, "count": crops.count, "label": labels.kind[kept].astype(np.int8)}
+        row |= {"partial": labels.partial[kept], "unknown": labels.unknown[kept], "tall": labels.tall[kept]}
         row |= {"variant": np.full(n, variant, np.int8)}
         row |= {"scan": np.array([scan.name] * n, np.str_), "drive": np.array([scan.drive] * n, np.str_)}
         if judged:
-            truth = counted(scan)
+            truth = np.array(scan.kinds, np.int64)[countable(scan)]
+            truth = truth[truth > ObjectClass.BACKGROUND]
             row |= {"truth_label": truth.astype(np.int8), "truth_drive": np.array([scan.drive] * len(truth), np.str_)}
         for key, value in row.items():
             self.columns.setdefault(key, []).append(value)
@@ -92,7 +117,7 @@ class Writer:
         table["offsets"] = np.append(0, np.cumsum(table.pop("count")))
         table.setdefault("truth_label", np.zeros(0, np.int8))
         table.setdefault("truth_drive", np.zeros(0, np.str_))
-        clear = ~table["partial"]
+        clear = ~table["partial"] & ~(table["unknown"] & (table["label"] == 0))
         tally = {
             name: np.bincount(table["label"][clear & (table["variant"] == v)], minlength=4).tolist()
             for name, v in {
@@ -121,7 +146,7 @@ def add_kitti(writer: Writer, root: Path, pastes: int, seed: int) -> None:
         writer.add(scan, SHIPPED, judged=True)
         for scale in CELL_SCALES:
             writer.add(scan, CLUSTERED, scale)
-    for scan in semantic_scans(root / "odometry"):
+    for scan in (*semantic_scans(root / "odometry"), *argoverse_scans(root / "argoverse2")):
         writer.add(scan, CLUSTERED)
     items = library(scans)
     rng = np.random.default_rng(seed)
@@ -134,20 +159,14 @@ def add_kitti(writer: Writer, root: Path, pastes: int, seed: int) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path, help="file to write (.npz)")
-    parser.add_argument("--kitti", type=Path, help="KITTI root")
+    parser.add_argument("--kitti", type=Path, required=True, help="KITTI root")
     parser.add_argument("--paste", type=int, default=0, help="objects to try to paste into each real scan")
-    parser.add_argument("--synthetic", type=int, default=0, help="synthetic worlds")
-    parser.add_argument("--each", type=int, default=8, help="sweeps of each synthetic world")
     parser.add_argument("--profile", default=profile.DEFAULT)
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     writer = Writer(profile.load(args.profile))
-    if args.kitti:
-        add_kitti(writer, args.kitti, args.paste, args.seed)
-    for scan in synthetic_scans(range(1, 1 + args.synthetic), args.each):
-        writer.add(scan, SYNTHETIC, judged=True)
-    asked = {"kitti": bool(args.kitti), "paste": args.paste, "synthetic": args.synthetic, "each": args.each}
-    print(json.dumps(writer.save(args.out, {**asked, "seed": args.seed})))
+    add_kitti(writer, args.kitti, args.paste, args.seed)
+    print(json.dumps(writer.save(args.out, {"paste": args.paste, "seed": args.seed})))
 
 
 if __name__ == "__main__":

@@ -14,11 +14,12 @@ from pathlib import Path
 
 TOOLS = Path(__file__).resolve().parent
 MODELS = TOOLS.parent / "models"
-WORLDS, SWEEPS, PASTES = "12", "5", "30"
+WORLDS, PASTES = "120", "120"
 KITTI_DATA = (
     "106 + 2 object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; "
-    "SemanticKITTI labels, J. Behley et al., ICCV 2019), as our segmentation cuts them up, their objects pasted into "
-    "other scans and resampled to other ranges, and the synthetic world; nothing of drive 0005"
+    "SemanticKITTI labels, J. Behley et al., ICCV 2019) and 3 sweeps of Argoverse 2 (B. Wilson et al., 2021), as our "
+    "segmentation cuts them up, their objects pasted into other scans and moved to other ranges, and the synthetic "
+    "world, part of it with objects where KITTI's label files have them; nothing of drive 0005"
 )
 SYNTHETIC_DATA = "the synthetic world alone: no recording went into it"
 
@@ -35,14 +36,16 @@ def main() -> None:
     parser.add_argument("--kitti", type=Path, help="KITTI root")
     args = parser.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
-    synthetic, real = args.work / "synthetic.npz", args.work / "kitti.npz"
-    tool("build_crops", synthetic, "--synthetic", WORLDS, "--each", SWEEPS)
-    tool("train_pointnet", args.work / "synthetic", synthetic, "--epochs", "4", "--fold-epochs", "2", "--folds", "2")
+    free, placed, real = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti"))
+    tool("build_synthetic_crops", free, "--worlds", WORLDS)
+    tool("train_pointnet", args.work / "synthetic", free, "--epochs", "4", "--fold-epochs", "2", "--folds", "2")
     tool("export_pointnet", args.work / "synthetic", MODELS / "pointnet-synthetic.onnx",
          "--data", SYNTHETIC_DATA, "--licence", "Apache-2.0: free for any use")  # fmt: skip
     if args.kitti:
         tool("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
-        tool("train_pointnet", args.work / "kitti", real, synthetic,
+        tool("build_synthetic_crops", placed, "--worlds", WORLDS,
+             "--labels", args.kitti / "object" / "training_all_labels")  # fmt: skip
+        tool("train_pointnet", args.work / "kitti", real, placed,
              "--epochs", "55", "--fold-epochs", "15", "--folds", "3")  # fmt: skip
         tool("export_pointnet", args.work / "kitti", MODELS / "pointnet-kitti.onnx",
              "--data", KITTI_DATA, "--licence", "CC BY-NC-SA 3.0, as its data: not for commercial use")  # fmt: skip

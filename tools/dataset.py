@@ -25,7 +25,7 @@ class Dataset:
     """Labelled crops in the sensor frame.
 
     Attributes:
-        crops: all of them, and label, partial, variant, drive: (R,) of each.
+        crops: all of them, and label, partial, unknown, tall, variant, drive: (R,) of each.
         truth_label, truth_drive: of each labelled object, seen by the segmentation or not.
         provenance: how each file was made.
         sha256: of each file.
@@ -34,6 +34,8 @@ class Dataset:
     crops: Crops
     label: Int
     partial: Bool
+    unknown: Bool
+    tall: Bool
     variant: Int
     drive: Int
     truth_label: Int
@@ -43,6 +45,11 @@ class Dataset:
 
     def __len__(self) -> int:
         return len(self.label)
+
+    @property
+    def clear(self) -> Bool:
+        """(R,) what can be learnt from: objects, and what is known to be none."""
+        return ~self.partial & ((self.label > 0) | ~self.unknown)
 
     def take(self, rows: Int) -> Crops:
         """Crops of these rows."""
@@ -68,6 +75,8 @@ def load(*paths: Path) -> Dataset:
         crops=Crops(joined["xyz"], np.append(0, np.cumsum(count))),
         label=joined["label"].astype(np.int64),
         partial=joined["partial"],
+        unknown=joined["unknown"],
+        tall=joined["tall"],
         variant=joined["variant"].astype(np.int64),
         drive=drive[:n],
         truth_label=joined["truth_label"].astype(np.int64),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,8 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from modt.geometry import Camera, FieldOfView, inverse, se3, transform
-from modt.sources.synthetic.scenes import SCENES
-from modt.sources.synthetic.stream import SyntheticStream
 from modt.types import Bool, Float32, Float64, Int, ObjectClass
 
 CLASS_OF = {
@@ -36,6 +35,11 @@ SEMANTIC_CLASS = {
 }
 SEMANTIC_UNKNOWN = (0, 1, 13, 15, 16, 20, 32, 99, 255, 256, 257, 259)
 """Labels that say nothing about the classes: unlabelled, and vehicles that KITTI's object labels name otherwise."""
+ARGOVERSE_CLASS = {"REGULAR_VEHICLE": "Car", "PEDESTRIAN": "Pedestrian", "BICYCLIST": "Cyclist"}
+ARGOVERSE_SENSOR = np.array([1.35, 0.0, 1.4], np.float32)
+"""Where its sweeps get their origin: at the heads, at the height above the ground that KITTI's have."""
+ARGOVERSE_CARRIER_M = 2.5
+"""Its own car is seen within this."""
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
 
@@ -179,19 +183,26 @@ def semantic_scans(folder: Path) -> Iterator[Scan]:
         yield Scan(name, drive, points, tuple(objects), tuple(kinds), boxes, FieldOfView(), unknown)
 
 
-def synthetic_scans(seeds: range, each: int) -> Iterator[Scan]:
-    """Sweeps of synthetic worlds, so many of each, a while apart."""
-    for seed in seeds:
-        for scene in sorted(SCENES):
-            stream = SyntheticStream(scene, "hdl-64e", 60.0, seed)
-            for index in np.linspace(0, 599, each).astype(int).tolist():
-                frame, truth = stream.simulator.sweep(index)
-                kinds = tuple(kind.object_class for kind in truth.kinds)
-                objects = tuple(np.flatnonzero(truth.instance == body) for body in truth.bodies)
-                boxes = truth.boxes - np.outer(truth.boxes[:, 5] / 2, np.eye(7)[2])
-                none = np.zeros(len(frame.points), np.bool_)
-                name = f"synthetic/{scene}/{seed}"
-                yield Scan(f"{name}/{index}", name, frame.points, objects, kinds, boxes, FieldOfView(), none)
+def argoverse_scans(folder: Path) -> Iterator[Scan]:
+    """Sweeps of Argoverse 2 (two heads of 32 beams), labelled all around: folder/*.npz, folder/*.csv.
+
+    Their frame has its origin on the rear axle; the sweeps are moved to where the heads and our own sensor would be.
+    """
+    for path in sorted(folder.glob("*.npz")):
+        with np.load(path) as file:
+            points = file["points"].astype(np.float32)
+        points[:, :3] -= ARGOVERSE_SENSOR
+        points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_CARRIER_M]
+        with path.with_suffix(".csv").open(encoding="utf-8") as rows:
+            objects = [row for row in csv.DictReader(rows) if int(row["points"]) > 0]
+        columns = ("x_m", "y_m", "z_centre_m", "length_m", "width_m", "height_m", "yaw_rad")
+        boxes = np.array([[float(row[c]) for c in columns] for row in objects])
+        boxes[:, :3] -= ARGOVERSE_SENSOR
+        boxes[:, 2] -= boxes[:, 5] / 2
+        kinds = [ARGOVERSE_CLASS.get(row["category"], "") for row in objects]
+        drive = f"argoverse2/{path.stem.split('_')[0]}"
+        none = np.zeros(len(points), np.bool_)
+        yield boxed(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
 
 
 def _raw_camera(date: Path) -> Camera:

@@ -77,7 +77,7 @@ def main() -> None:
     parser.add_argument("--points", type=int, default=ClassificationConfig().max_points)
     args = parser.parse_args()
     data = load(args.crops)
-    shipped = np.flatnonzero((data.variant == SHIPPED) & ~data.partial)
+    shipped = np.flatnonzero((data.variant == SHIPPED) & data.clear)
     report: dict[str, object] = {}
     with tempfile.TemporaryDirectory() as folder:
         small = Path(folder) / "int8.onnx"

@@ -34,6 +34,8 @@ SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
 MIX = np.array([0.3, 0.3, 0.25, 0.15])
 """Of each variant (shipped, clustered, pasted, synthetic) among the crops of a class, where there are such."""
+TALL = 0.3
+"""Of vans among the cars."""
 BATCH, POINTS, MOST_POINTS = 128, 128, 400
 """Crops of a step, points of each, and points that are augmented at most."""
 
@@ -45,12 +47,13 @@ def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def odds(data: Dataset, rows: Int) -> list[tuple[Int, Float64]]:
-    """Rows of each class and how likely each is drawn: crops of one class and variant alike."""
+    """Rows of each class and how likely each is drawn: crops of one class, variant and height alike."""
     pools = []
     for c in range(N_CLASSES):
         own = rows[data.label[rows] == c]
-        variant = data.variant[own]
-        weight = (MIX / np.bincount(variant, minlength=len(MIX)).clip(1))[variant]
+        group = 2 * data.variant[own] + data.tall[own]
+        share = np.outer(MIX, [1 - TALL, TALL]).ravel()
+        weight = (share / np.bincount(group, minlength=len(share)).clip(1))[group]
         pools.append((own, weight / weight.sum()))
     return pools
 
@@ -126,10 +129,10 @@ def folds(data: Dataset, k: int) -> Int:
 def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
     """Out-of-fold calibration and scores; missed objects count as false negatives."""
     fold = folds(data, k)
-    judged = np.flatnonzero(data.variant == data.variant.min())  # real scans where there are any
+    judged = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)  # of real scans where there are any
     out = np.zeros((len(judged), N_CLASSES))
     for i in range(k):
-        rows = np.flatnonzero(~data.partial & (fold[data.drive] != i))
+        rows = np.flatnonzero(data.clear & (fold[data.drive] != i))
         net, _ = train(data, rows, steps, seed + i, None)
         mine = np.flatnonzero(fold[data.drive[judged]] == i)
         out[mine] = logits(net, data, judged[mine])
@@ -161,7 +164,7 @@ def main() -> None:
     torch.use_deterministic_algorithms(True)
     data = load(*args.crops)
     args.out.mkdir(parents=True, exist_ok=True)
-    clear = np.flatnonzero(~data.partial)
+    clear = np.flatnonzero(data.clear)
     per_epoch = np.count_nonzero(data.variant[clear] == data.variant[clear].min()) / BATCH
     started = time.process_time()
     report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "crops_sha256": data.sha256}

@@ -86,6 +86,7 @@ class SensorConfig(StageConfig):
     min_range_m: float = _number(2.0, 0.0, 20.0, "m", "nearer points belong to the robot itself")
     max_range_m: float = _number(80.0, 1.0, 400.0, "m", "farther points are left out")
     elevation_step_deg: float = _number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
+    azimuth_step_deg: float = _number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
     period_s: float = _number(0.1, 0.001, 10.0, "s", "of a sweep, where the stream has no stamps")
 
 
@@ -157,6 +158,7 @@ class SchedulerConfig(StageConfig):
 
     calls_per_frame: int | None = _number(16, 0, 10000, "", "proposals classified")
     cpu_ms_per_frame: float | None = _number(None, 0.0, 10000.0, "ms", "CPU time by the measured cost model")
+    energy_mJ_per_frame: float | None = _number(None, 0.0, 100000.0, "mJ", "drawn beyond idle during that time")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -200,6 +202,11 @@ class EnergyConfig(StageConfig):
     point_J: float | None = _number(None, -1000.0, 1000.0, "J", "of one point classified")
 
     @property
+    def active_W(self) -> float:
+        """Power of one busy core beyond idle [W], that is mJ a ms."""
+        return self.busy_W - self.idle_W
+
+    @property
     def coefficients(self) -> tuple[float, float, float] | None:
         """Those of a calibration [J], None unless there are all three."""
         if self.seg_J is None or self.class_J is None or self.point_J is None:
@@ -228,3 +235,19 @@ class ProfileConfig:
     fusion: FusionConfig = field(default_factory=FusionConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     energy: EnergyConfig = field(default_factory=EnergyConfig)
+
+    def __post_init__(self) -> None:
+        if self.scheduler.energy_mJ_per_frame is not None and self.energy.active_W <= 0:
+            raise ValueRangeError(
+                "scheduler.energy_mJ_per_frame",
+                "buys any number of calls, since energy.busy_W is not above energy.idle_W",
+                "calibrate the board (modt-profile calibrate) or state both powers",
+            )
+
+    @property
+    def classification_ms(self) -> float | None:
+        """CPU time that a frame may spend on classification [ms]: what its time and its energy allow."""
+        stage = self.scheduler
+        by_energy = stage.energy_mJ_per_frame
+        limits = [stage.cpu_ms_per_frame, None if by_energy is None else by_energy / self.energy.active_W]
+        return min((limit for limit in limits if limit is not None), default=None)

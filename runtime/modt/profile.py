@@ -50,7 +50,10 @@ def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
         stage = stages[key]
         assert isinstance(stage, type)
         built[key] = _stage(stage, node, origin, line)
-    return ProfileConfig(**built)
+    try:
+        return ProfileConfig(**built)
+    except ValueRangeError as error:
+        raise MisuseError(f"{origin}: {error.key}", error.cause, error.remedy) from None
 
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +12,7 @@ from hypothesis import strategies as st
 from augment import Beams, augment, limit
 from build_crops import label
 from calibration import Calibration, expected_error, fit
-from labelled import Scan, inside
+from labelled import Scan, argoverse_scans, inside
 from modt.classification.crops import gather
 from modt.geometry import FieldOfView
 from modt.types import ObjectClass, Proposals
@@ -55,12 +57,36 @@ def test_a_proposal_is_what_it_mostly_shows_and_mostly_covers() -> None:
     rider = np.arange(17, 40)  # three points of the second, all of the third and of the fourth: neither is whole
     unlabelled = np.zeros(40, np.bool_)
     kinds = [ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST]
-    kind, partial = label(scan_of(points, [car, walker, rider], kinds, unlabelled), proposals)
-    assert kind.tolist() == [ObjectClass.CAR, 0, 0, 0]
-    assert partial.tolist() == [False, True, True, True]
-    unlabelled[10:] = True
-    kind, partial = label(scan_of(points, [], [], unlabelled), proposals)
-    assert partial.tolist() == [False, True, True, True]
+    labels = label(scan_of(points, [car, walker, rider], kinds, unlabelled), proposals)
+    assert labels.kind.tolist() == [ObjectClass.CAR, 0, 0, 0]
+    assert labels.partial.tolist() == [False, True, True, True]
+    assert labels.unknown.tolist() == [True, False, False, False]  # nine points are too few to be judged by
+
+
+def test_what_nobody_labelled_is_unknown() -> None:
+    points = np.zeros((40, 4), np.float32)
+    box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
+    proposals = Proposals(np.arange(40), np.array([0, 10, 20, 30, 40]), np.zeros((4, 3)), box, none, none)
+    unlabelled = np.arange(40) >= 10
+    assert label(scan_of(points, [], [], unlabelled), proposals).unknown.tolist() == [False, True, True, True]
+
+
+def test_argoverse_sweeps_are_moved_to_the_sensor(tmp_path: Path) -> None:
+    car = np.array([11.35, 0.0, 0.5, 0.2], np.float32) + np.linspace(0, 1, 30)[:, None] * np.float32([0, 1, 0, 0])
+    carrier = np.array([[1.4, 0.1, 1.0, 0.2]], np.float32)
+    np.savez(tmp_path / "log_1.npz", points=np.concatenate([carrier, car]))
+    (tmp_path / "log_1.csv").write_text(
+        "category,track,x_m,y_m,z_centre_m,length_m,width_m,height_m,yaw_rad,points\n"
+        "REGULAR_VEHICLE,a,11.5,0.5,0.4,4.0,1.8,1.5,1.57,30\n"
+        "BICYCLE,b,5.0,5.0,0.4,1.6,0.6,1.1,0.0,9\n"
+        "PEDESTRIAN,c,60.0,5.0,0.4,0.6,0.6,1.7,0.0,0\n"
+    )
+    (scan,) = argoverse_scans(tmp_path)
+    assert scan.kinds == (ObjectClass.CAR, ObjectClass.BACKGROUND)
+    assert scan.drive == "argoverse2/log"
+    np.testing.assert_allclose(scan.points[0, :3], [10.0, 0.0, -0.9], atol=1e-5)
+    np.testing.assert_allclose(scan.boxes[0, :3], [10.15, 0.5, -1.75], atol=1e-5)
+    assert len(scan.objects[0]) == 30
 
 
 def test_inside_is_clear_of_the_ground_and_turned_with_the_box() -> None:

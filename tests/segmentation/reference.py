@@ -1,10 +1,13 @@
 """The same things done slowly and obviously."""
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from modt.segmentation import silhouettes
 from modt.segmentation.boxes import HEADINGS, NEAREST_M
 from modt.segmentation.clusters import GAP_BEAMS, GAP_M
 from modt.segmentation.grids import SECTORS
@@ -74,3 +77,41 @@ def same_partition(one, other):
 def refines(fine, coarse):
     """Whether every group of the first lies within one of the second."""
     return len(np.unique(np.stack([fine, coarse]), axis=1).T) == len(np.unique(fine))
+
+
+def people_cuts(x, y, height, step_rad, beam_rad, least_points):
+    """(K,) column of each point of one group, and the columns at which it is cut: column by column, run by run."""
+    mx, my = x.mean(), y.mean()
+    away = np.hypot(mx, my)
+    c, s = np.float32(mx / away), np.float32(my / away)
+    step = max(step_rad, silhouettes.COLUMN_M / away)
+    depth = x * c + y * s
+    column = np.floor((y * c - x * s) / (np.maximum(depth, silhouettes.NEAR_M) * np.float32(step))).astype(int)
+    expected = silhouettes.UPRIGHT_M / (away * beam_rad) * step / step_rad
+    runs = []
+    for here in range(column.min(), column.max() + 1):
+        own = np.flatnonzero(column == here)
+        if len(own) < max(silhouettes.FILLED * expected, 1.0):
+            continue
+        beside = runs and runs[-1][-1][0] == here - 1
+        if beside and abs(runs[-1][-1][1] - depth[own].mean(dtype=float)) <= silhouettes.STEP_M:
+            runs[-1].append((here, depth[own].mean(dtype=float), own))
+        else:
+            runs.append([(here, depth[own].mean(dtype=float), own)])
+    parts = []
+    for run in runs:
+        own = np.concatenate([c[2] for c in run])
+        near = np.array([depth[c[2]].min() for c in run])
+        breadth, head = len(run) * step * away, height[own].max()
+        if breadth <= silhouettes.BREADTH_M[0] or len(own) < least_points:
+            continue
+        person = breadth < silhouettes.BREADTH_M[1] and silhouettes.HEAD_M[0] < head < silhouettes.HEAD_M[1]
+        person = person and near.max() - near.min() < silhouettes.DEPTH_M
+        person = person and depth[own].mean(dtype=float) - near.min() < silhouettes.HOLLOW_M
+        parts.append((run[0][0], run[-1][0], near.mean(dtype=float), person))
+    cuts = []
+    for right, left in pairwise(parts):
+        apart = left[0] - right[1] > silhouettes.GAP or abs(left[2] - right[2]) > silhouettes.STEP_M
+        if apart and (right[3] or left[3]):
+            cuts.append((right[1] + left[0] + 1) // 2)
+    return column, cuts

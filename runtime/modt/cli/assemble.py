@@ -64,7 +64,7 @@ class Mode:
 
 
 def _profile_budget(profile: ProfileConfig) -> Budget:
-    return Budget(profile.scheduler.calls_per_frame, profile.scheduler.cpu_ms_per_frame)
+    return Budget(profile.scheduler.calls_per_frame, profile.classification_ms)
 
 
 MODES = {

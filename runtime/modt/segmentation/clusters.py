@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.columns import Columns
 from modt.segmentation.grids import Int32, RootGrid
+from modt.segmentation.silhouettes import Silhouettes
 from modt.types import NONE, Bool, Float32, Int
 
 GAP_M = 0.3
@@ -90,7 +91,7 @@ class Clusterer:
 
     A first grid joins what is one thing even where it is thinly seen. What grows vast that way (a wall, a hedge, and
     whoever stands against them) is taken apart again on a grid of half the spacing, of which it keeps what stands
-    out as an object of its own.
+    out as an object of its own. Last, people are parted from whom and what they stand beside.
 
     Args:
         sensor: its range and the spacing of its beams.
@@ -103,6 +104,7 @@ class Clusterer:
         self.beam_rad = float(np.deg2rad(sensor.elevation_step_deg))
         self.coarse = RootGrid(step, sensor.max_range_m)
         self.fine = RootGrid(step / 2, sensor.max_range_m)
+        self.silhouettes = Silhouettes(sensor, config)
 
     def cluster(self, points: Columns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, of a height above ground [m]."""
@@ -118,9 +120,14 @@ class Clusterer:
         piece = join(self.fine, cells.take(parts), self.beam_rad)
         cluster[parts] = piece + len(extent)
         extents = np.append(extent, _extent(x[parts], y[parts], piece))
-        proper = self._proper(cluster, cells, count, extents, len(extent))
-        number = np.where(proper, np.cumsum(proper) - 1, NONE)
-        return Clusters(cell, sample, cells.high, number[cluster], int(proper.sum()))
+        top, held = _most(cells.high, cluster, len(extents)), np.bincount(cluster, count, len(extents))
+        proper = self._proper(cluster, cells, held, extents, top, len(extent))
+        number = np.where(proper, np.cumsum(proper) - 1, NONE)[cluster]
+        root = np.zeros(len(extents), np.float32)
+        root[cluster] = cells.root
+        company = self.silhouettes.company(extents, top, held, root)[proper]
+        of_cell, n = self.silhouettes.parted(points, height, cell, number, company)
+        return Clusters(cell, sample, cells.high, of_cell, n)
 
     def _joined_coarsely(self, fine: Cells) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell which it is a quarter of."""
@@ -130,12 +137,10 @@ class Clusterer:
         cells = Cells(row[sample], column[sample], low, high, fine.root[sample])
         return join(self.coarse, cells, self.beam_rad)[coarse]
 
-    def _proper(self, cluster: Int, cells: Cells, count: Int, extent: Float32, n_coarse: int) -> Bool:
+    def _proper(self, cluster: Int, cells: Cells, points: Int, extent: Float32, top: Float32, n_coarse: int) -> Bool:
         """(G,) clusters of an object's size; pieces of something vast, numbered from n_coarse, must stand out."""
-        n = len(extent)
-        points = np.bincount(cluster, count, n)
-        low, top = _least(cells.low, cluster, n), _most(cells.high, cluster, n)
-        proper = (points >= self.config.min_points) & (extent < self.config.max_extent_m)
+        low = _least(cells.low, cluster, len(extent))
+        proper: Bool = (points >= self.config.min_points) & (extent < self.config.max_extent_m)
         proper &= top - low >= self.config.min_height_m
         proper[n_coarse:] &= (top[n_coarse:] >= STANDS_OUT_M) & (points[n_coarse:] >= STANDS_OUT_POINTS)
         return proper

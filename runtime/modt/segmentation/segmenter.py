@@ -75,7 +75,7 @@ class Segmenter:
         outline = Groups.of(clusters.of_cell, clusters.n)
         few = outline.thinned(OUTLINE)
         yaw = headings(cell.x[few.rows], cell.y[few.rows], few)
-        groups = Groups.of(clusters.of_cell[clusters.cell], clusters.n)
+        groups = Groups.of(clusters.of_cell.take(clusters.cell), clusters.n)
         own = raised.take(groups.rows)
         box = upright_boxes(own.x, own.y, own.z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)

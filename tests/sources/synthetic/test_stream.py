@@ -106,11 +106,12 @@ def test_distorted_scans_are_mended_by_the_motion_that_distorted_them():
     late_s = 0.1 * (np.arctan2(a.points[:, 1], a.points[:, 0]) % (2 * np.pi)) / (2 * np.pi)
     moved = np.linalg.norm(a.points[:, :3] - b.points[:, :3], axis=1)[still]
     assert moved.max() > 0.2
-    rows = np.flatnonzero(still)[::500]
-    for row in rows:
+    off_m = []
+    for row in np.flatnonzero(still)[::500]:
         T = inverse(world.ego_pose(0.5)) @ world.ego_pose(0.5 + float(late_s[row]))
         mended = transform(T, b.points[row : row + 1, :3].astype(np.float64))[0]
-        assert np.linalg.norm(mended - a.points[row, :3]) < 0.05
+        off_m.append(np.linalg.norm(mended - a.points[row, :3]))
+    assert np.quantile(off_m, 0.95) < 0.02  # but for beams that the edge of a body splits
 
 
 @pytest.mark.parametrize(

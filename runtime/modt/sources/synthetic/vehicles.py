@@ -10,15 +10,22 @@ from modt.types import Float64
 
 Size = tuple[float, float, float]
 
+ROOM_M = 0.07
+"""Between the roof of a car and the top of its box, as annotators draw it."""
+
+LEAN = 0.1
+"""How far the sides of a van lean inwards for each metre of height."""
+
 
 def car(rng: np.random.Generator, size: Size) -> Pieces:
     """A passenger car of (length, width, height): hatchback, saloon or estate by chance."""
-    length, width, height = size
+    length, width = size[:2]
+    height = size[2] - ROOM_M
     clear, belt = rng.uniform(0.17, 0.24), height * rng.uniform(0.58, 0.64)
     paint = (Material.CAR_PAINT, Material.CAR_DARK, Material.CAR_BLACK)[rng.choice(3, p=[0.5, 0.28, 0.22])]
     nose = belt - rng.uniform(0.12, 0.25)
     bonnet = rng.uniform(0.24, 0.3) * length
-    boot = rng.choice([0.04, 0.12, 0.2]) * length
+    boot = rng.choice([0.03, 0.1, 0.2], p=[0.6, 0.15, 0.25]) * length
     body_height = belt - clear
     middle = clear + body_height / 2
     hull = wedge(
@@ -31,11 +38,11 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
             (-1.0, 0.0, -0.35, length / 2 + 0.35 * body_height * 0.2),
         ],
     )
-    hull = rounded(hull, (length / 2, width * rng.uniform(0.8, 1.1), body_height * rng.uniform(1.1, 1.6)))
+    hull = rounded(hull, (0.515 * length, width * rng.uniform(0.95, 1.6), body_height * rng.uniform(1.4, 2.4)))
     front, rear = length / 2 - bonnet + 0.1, -length / 2 + boot
     cabin_height = height - belt + 0.02
     half = cabin_height / 2
-    rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.25, 0.8), rng.uniform(0.2, 0.32)
+    rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.15, 0.6), rng.uniform(0.28, 0.45)
     long = front - rear
     glass = wedge(
         ((front + rear) / 2, 0.0, belt + half - 0.02),
@@ -48,8 +55,8 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
             (0.0, -1.0, tuck, 0.47 * width - tuck * half),
         ],
     )
-    glass = rounded(glass, (long * 0.52, width * rng.uniform(0.75, 1.0), np.inf))
-    glass.density[:] = rng.uniform(0.3, 1.2)
+    glass = rounded(glass, (long * 0.52, width * rng.uniform(0.95, 1.6), np.inf))
+    glass.density[:] = rng.uniform(0.6, 2.0)
     lid_length = max(long - rake - tail, 0.5)
     lid = box(
         ((front - rake + rear + tail) / 2, 0.0, height - 0.05),
@@ -71,26 +78,49 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
 
 
 def van(rng: np.random.Generator, size: Size) -> Pieces:
-    """A delivery van or people carrier."""
+    """A delivery van, closed behind the cab, or a people carrier with windows all around."""
     length, width, height = size
-    clear = rng.uniform(0.2, 0.3)
+    clear, belt = rng.uniform(0.2, 0.3), height * rng.uniform(0.46, 0.55)
     paint = Material.CAR_PAINT if rng.random() < 0.8 else Material.CAR_DARK
-    tall = height - clear
-    slope, start = rng.uniform(0.3, 0.7), rng.uniform(0.45, 0.55)
+    low, upper = belt - clear, height - belt
+    bonnet, rake = rng.uniform(0.04, 0.19) * length, rng.uniform(0.4, 0.9)
+    drop, roof = rng.uniform(0.1, 0.3), rng.uniform(0.12, 0.2)
     hull = wedge(
-        (0.0, 0.0, clear + tall / 2),
-        (length, 0.97 * width, tall),
+        (0.0, 0.0, clear + low / 2),
+        (length, 0.97 * width, low),
         paint,
-        [
-            (1.0, 0.0, slope, length / 2 + slope * tall * (start - 0.5)),
-            (1.0, 0.0, 2.2, length / 2 - 0.9 + 2.2 * tall / 2),
-            (0.0, 1.0, 0.08, 0.485 * width - 0.08 * tall * 0.1),
-            (0.0, -1.0, 0.08, 0.485 * width - 0.08 * tall * 0.1),
-        ],
+        [(drop, 0.0, bonnet, drop * (length / 2 - bonnet) + bonnet * low / 2)],
     )
-    hull = rounded(hull, (length * 0.505, width * rng.uniform(0.85, 1.2), np.inf))
+    hull = rounded(hull, (0.515 * length, width * rng.uniform(1.2, 2.2), np.inf))
+    front, rear = length / 2 - bonnet, -length / 2 + rng.uniform(0.02, 0.2)
+    cab = rake + rng.uniform(0.9, 1.3)
+    glass = wedge(
+        (front - cab / 2, 0.0, belt + upper / 2),
+        (cab, 0.95 * width, upper),
+        Material.GLASS,
+        [(upper, 0.0, rake, upper * (cab / 2 - rake / 2)), *_leaning(width)],
+    )
+    load = wedge(
+        ((front - cab + rear) / 2, 0.0, belt + upper / 2),
+        (front - cab - rear, 0.97 * width, upper),
+        Material.GLASS if rng.random() < 0.4 else paint,
+        _leaning(width),
+    )
+    for window in (glass, load):
+        if window.material[0] == Material.GLASS:
+            window.density[:] = rng.uniform(0.6, 2.0)
+    lid = box(((front - rake + rear) / 2, 0.0, height - roof / 2), (front - rake - rear, 0.9 * width, roof), paint)
     return Pieces.join(
-        [hull, _wheels(rng, length, width, 0.34), _mirrors(length * 0.28, height * 0.55, width, paint)]
+        [
+            hull,
+            glass,
+            load,
+            lid,
+            _seats(front - 0.7 * rake, rear + 0.3, belt, width),
+            _pillars(rng, (front, rear, rake, 0.05), (belt, height), width, LEAN, paint),
+            _wheels(rng, length, width, 0.34),
+            _mirrors(front - 0.3, belt, width, paint),
+        ]
     )
 
 
@@ -164,6 +194,11 @@ def truck_size(rng: np.random.Generator) -> Size:
     return float(rng.uniform(6.5, 12.0)), float(rng.uniform(2.3, 2.7)), float(rng.uniform(2.8, 3.8))
 
 
+def _leaning(width: float) -> list[tuple[float, float, float, float]]:
+    """Cuts that lean the sides of a van's upper half inwards."""
+    return [(0.0, side, LEAN, 0.485 * width) for side in (1.0, -1.0)]
+
+
 def _wheels(rng: np.random.Generator, length: float, width: float, radius: float) -> Pieces:
     x = length * rng.uniform(0.29, 0.32)
     places: Float64 = np.array([[i * x, j * (width / 2 - 0.1)] for i in (-1, 1) for j in (-1, 1)])
@@ -177,8 +212,8 @@ def _mirrors(x: float, z: float, width: float, paint: int) -> Pieces:
 def _seats(front: float, rear: float, belt: float, width: float) -> Pieces:
     """What can be seen through the windows: backs of seats and a dashboard."""
     rows = [front - 0.75, max(front - 1.7, rear + 0.1)]
-    backs = [box((x, s * 0.22 * width, belt), (0.14, 0.45, 0.7), Material.CLOTH) for x in rows for s in (-1, 1)]
-    return Pieces.join([*backs, box((front + 0.15, 0.0, belt - 0.02), (0.4, 0.8 * width, 0.16), Material.RUBBER)])
+    backs = [box((x, s * 0.22 * width, belt), (0.14, 0.45, 0.7), Material.INTERIOR) for x in rows for s in (-1, 1)]
+    return Pieces.join([*backs, box((front + 0.15, 0.0, belt - 0.02), (0.4, 0.8 * width, 0.16), Material.INTERIOR)])
 
 
 def _pillars(
@@ -198,5 +233,5 @@ def _pillars(
     return Pieces.join(
         limb((a, s * bottom, belt), (b, s * top, height - 0.05), r, paint)
         for s in (-1, 1)
-        for (a, b), r in zip(places, (0.05, 0.06, 0.12), strict=True)
+        for (a, b), r in zip(places, (0.035, 0.045, 0.1), strict=True)
     )
