@@ -123,12 +123,14 @@ def test_poses_of_a_file_do_what_the_streams_own_do(tmp_path, street, own):
     assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
     again = list(read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA))[-1]["tracks"]
     before = {t["id"]: t for t in json.loads(own[1].splitlines()[-1])["tracks"]}
-    T = inverse(street[0][1])
+    T, apart = inverse(street[0][1]), []
     for t in again:
         if t["id"] in before and before[t["id"]]["proposal"] == t["proposal"] is not None:
             x, y = (before[t["id"]]["world"][k] for k in "xy")
             moved = T[:2, :2] @ [x, y] + T[:2, 3]
-            assert np.hypot(moved[0] - t["world"]["x"], moved[1] - t["world"]["y"]) < 0.5
+            apart.append(np.hypot(moved[0] - t["world"]["x"], moved[1] - t["world"]["y"]))
+    assert len(apart) > 10
+    assert np.median(apart) < 0.2  # outlines are measured along the axes of the world, which is turned
 
 
 GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
