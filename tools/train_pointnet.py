@@ -32,8 +32,9 @@ from scores import average_precision, confusion
 SENSOR_HEIGHT_M = 1.73
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
-MIX = np.array([0.3, 0.3, 0.25, 0.15])
-"""Of each variant (shipped, clustered, pasted, synthetic) among the crops of a class, where there are such."""
+MIX = np.array([[0.4, 0.35, 0.0, 0.25], [0.3, 0.25, 0.3, 0.15], [0.2, 0.15, 0.3, 0.35], [0.2, 0.15, 0.3, 0.35]])
+"""Of each variant (shipped, clustered, pasted, synthetic) among the crops of each class, where there are such: the
+rarer a class is in real scans, the more of it is made."""
 TALL = 0.3
 """Of vans among the cars."""
 BATCH, POINTS, MOST_POINTS = 128, 128, 400
@@ -52,7 +53,7 @@ def odds(data: Dataset, rows: Int) -> list[tuple[Int, Float64]]:
     for c in range(N_CLASSES):
         own = rows[data.label[rows] == c]
         group = 2 * data.variant[own] + data.tall[own]
-        share = np.outer(MIX, [1 - TALL, TALL]).ravel()
+        share = np.outer(MIX[c], [1 - TALL, TALL]).ravel()
         weight = (share / np.bincount(group, minlength=len(share)).clip(1))[group]
         pools.append((own, weight / weight.sum()))
     return pools

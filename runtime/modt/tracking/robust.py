@@ -122,8 +122,8 @@ def compare(
 def shift_between(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> Float64:
     """(K, 2) compare's shift alone."""
     ahead, behind = high_b - high_a, low_b - low_a
-    length = np.maximum(high_a - low_a, high_b - low_b).max(axis=1)
-    reach = AGREE_M / np.maximum(length, 1.0)
+    a, b, c, d = np.maximum(high_a - low_a, high_b - low_b).T  # a reduction of so short an axis is slow
+    reach = AGREE_M / np.maximum(np.maximum(np.maximum(a, b), np.maximum(c, d)), 1.0)
     both = np.square(np.maximum(1 - np.square((ahead - behind) / reach[:, None]), 0.0))
     moved = both * (ahead + behind) / 2 + (1 - both) * least(low_a, high_a, low_b, high_b)
     shift: Float64 = moved @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
