@@ -25,15 +25,16 @@ from augment import Beams, augment, limit
 from calibration import Calibration, expected_error, fit
 from dataset import Dataset, load
 from modt.classification.crops import Crops, canonical
-from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
+from modt.types import CLASS_NAMES, N_CLASSES, NONE, Float64, Int
 from network import PointNet
 from scores import average_precision, confusion
 
 SENSOR_HEIGHT_M = 1.73
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
-MIX = np.array([0.3, 0.3, 0.25, 0.15])
-"""Of each variant (shipped, clustered, pasted, synthetic) among the crops of a class, where there are such."""
+MIX = np.array([[0.4, 0.35, 0.0, 0.25], [0.3, 0.25, 0.3, 0.15], [0.2, 0.15, 0.3, 0.35], [0.2, 0.15, 0.3, 0.35]])
+"""Of each variant (shipped, clustered, pasted, synthetic) among the crops of each class, where there are such: the
+rarer a class is in real scans, the more of it is made."""
 TALL = 0.3
 """Of vans among the cars."""
 BATCH, POINTS, MOST_POINTS = 128, 128, 400
@@ -52,7 +53,7 @@ def odds(data: Dataset, rows: Int) -> list[tuple[Int, Float64]]:
     for c in range(N_CLASSES):
         own = rows[data.label[rows] == c]
         group = 2 * data.variant[own] + data.tall[own]
-        share = np.outer(MIX, [1 - TALL, TALL]).ravel()
+        share = np.outer(MIX[c], [1 - TALL, TALL]).ravel()
         weight = (share / np.bincount(group, minlength=len(share)).clip(1))[group]
         pools.append((own, weight / weight.sum()))
     return pools
@@ -113,14 +114,15 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
 
 
 def folds(data: Dataset, k: int) -> Int:
-    """Fold of each drive, objects of the rare classes spread evenly."""
+    """Fold of each drive, objects of the rare classes spread evenly; NONE where nothing is judged: always learnt."""
     counted = len(data.truth_drive) > 0
     drive, label = (data.truth_drive, data.truth_label) if counted else (data.drive, data.label)
     weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
     np.add.at(weight, (drive, label), 1.0)
     weight /= weight.sum(axis=0).clip(1)
-    load_of, fold = np.zeros((k, N_CLASSES)), np.zeros(len(weight), np.int64)
-    for drive in np.argsort(-weight.max(axis=1), kind="stable"):
+    load_of, fold = np.zeros((k, N_CLASSES)), np.full(len(weight), NONE)
+    judged = np.unique(data.drive[data.variant == data.variant.min()])
+    for drive in judged[np.argsort(-weight[judged].max(axis=1), kind="stable")]:
         fold[drive] = np.argmin((load_of + weight[drive]).max(axis=1) + load_of.sum(axis=1) * 1e-3)
         load_of[fold[drive]] += weight[drive]
     return fold

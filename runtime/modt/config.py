@@ -215,6 +215,15 @@ class EnergyConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OdometryConfig(StageConfig):
+    """Poses that come in by a socket."""
+
+    max_age_s: float = _number(0.3, 0.001, 10.0, "s", "from a pose, beyond which it says nothing")
+    max_ahead_s: float = _number(60.0, 0.1, 3600.0, "s", "of a pose before its frame; more is another clock")
+    capacity: int = _number(256, 2, 65536, "", "poses kept, and taken in one frame at most")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileConfig:
     """All of it: a sensor and a board, as a profile file describes them."""
 
@@ -224,6 +233,7 @@ class ProfileConfig:
     classification: ClassificationConfig = field(default_factory=ClassificationConfig)
     scheduler: SchedulerConfig = field(default_factory=SchedulerConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    odometry: OdometryConfig = field(default_factory=OdometryConfig)
     energy: EnergyConfig = field(default_factory=EnergyConfig)
 
     def __post_init__(self) -> None:

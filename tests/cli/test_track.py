@@ -69,7 +69,7 @@ def test_two_runs_are_the_same(tmp_path):
     [
         (["--poses", "absent.txt"], "is missing"),
         (["--poses", "short.txt"], "1 poses for 20 frames"),
-        (["--poses", "bad.txt"], "no poses"),
+        (["--poses", "bad.txt"], r"bad.txt:1: 3 numbers"),
         (["--period", "0"], "no time between frames"),
     ],
 )

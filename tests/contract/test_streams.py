@@ -1,14 +1,35 @@
 """What every source promises, whichever it is."""
 
 import itertools
+import json
+import socket
 
 import numpy as np
 import pytest
 
+from modt.config import OdometryConfig
+from modt.sources.odometry import ListedPoses, NoOdometry, OwnOdometry, PosedStream
+from modt.sources.pose_socket import PoseSocket
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic.stream import SyntheticStream
 
 from ..sources import layouts
+
+
+def listed(root):
+    stream = open_stream(layouts.bare(root))
+    (root / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 2\n" * 3)
+    return PosedStream(stream, ListedPoses(root / "poses.txt", stream.info.camera, stream.info.end))
+
+
+def sent(root):
+    stream = open_stream(layouts.bare(root))
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    for frame in stream:
+        there.send(json.dumps({"stamp": frame.stamp_s, "x": 1.0, "y": 0.0, "yaw": 0.1}).encode())
+    there.close()
+    return PosedStream(stream, PoseSocket(here, OdometryConfig(), "sent"))
+
 
 SOURCES = {
     "raw": lambda root: open_stream(layouts.raw_drive(root)),
@@ -16,13 +37,20 @@ SOURCES = {
     "odometry": lambda root: open_stream(layouts.odometry(root)),
     "bare": lambda root: open_stream(layouts.bare(root)),
     "street": lambda root: SyntheticStream("street", "hdl-64e", 0.4, seed=3),
+    "own": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), OwnOdometry()),
+    "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoOdometry()),
+    "listed": listed,
+    "sent": sent,
     "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
 }
 
 
 @pytest.fixture(params=SOURCES, name="stream")
 def a_stream(request, tmp_path):
-    return SOURCES[request.param](tmp_path)
+    stream = SOURCES[request.param](tmp_path)
+    yield stream
+    if isinstance(stream, PosedStream):
+        stream.odometry.close()
 
 
 def test_frames_are_what_frames_are(stream):

@@ -63,6 +63,27 @@ def test_odometry_that_fails_for_a_while_is_bridged():
     assert tracker.tracks.age.min() == 20
 
 
+def test_odometry_that_begins_late_finds_the_tracks_where_they_are():
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
+    for i in range(20):
+        T = None if i < 6 or i in (12, 13) else T_elsewhere @ drive(i)
+        tracker.follow(*frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150))
+    assert len(tracker.tracks) == 40
+    assert tracker.tracks.age.min() == 20
+    np.testing.assert_allclose(tracker.T_world_sensor, drive(19), atol=0.15)
+
+
+def test_a_first_pose_far_from_the_origin_is_no_motion():
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
+    for i in range(4):
+        T = T_elsewhere @ drive(0) if i == 0 else None
+        tracker.follow(*frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150))
+    assert len(tracker.tracks) == 40
+    np.testing.assert_allclose(tracker.T_world_sensor, T_elsewhere @ drive(3), atol=0.15)
+
+
 def test_without_landmarks_the_sensor_goes_on_as_it_went():
     tracker = follow(10)
     before = tracker.T_world_sensor.copy()
@@ -107,3 +128,49 @@ def test_mutual_pairs_are_the_best_of_both(n, seed):
         return min(np.flatnonzero(index == index[k]), key=lambda p: (cost[p], p)) == k
 
     assert _mutual(i, j, cost).tolist() == [k for k in range(n) if first_of(i, k) and first_of(j, k)]
+
+
+def test_a_turn_that_begins_and_ends_at_once_is_followed():
+    """The prediction is off by metres far away when it begins; pairs are then sought farther away."""
+    tracker, yaw, x, y = Tracker(TrackingConfig(), EFFICIENT), 0.0, 0.0, 0.0
+    world = street()
+    for i in range(30):
+        yaw += 0.08 if 10 <= i < 20 else 0.0
+        x, y = x + 0.8 * np.cos(yaw), y + 0.8 * np.sin(yaw)
+        T = se3(rotation_zyx(0, 0, yaw), np.array([x, y, 0.0]))
+        if i == 0:
+            T_first = T
+        tracker.follow(*frame_of(transform_boxes(inverse(T), world), i, None, points=150))
+    error = inverse(inverse(T_first) @ T) @ tracker.T_world_sensor
+    assert abs(np.rad2deg(yaw_of(error))) < 0.6
+    assert np.hypot(*error[:2, 3]) < 0.3
+
+
+def test_the_error_of_one_frame_is_not_handed_on():
+    """Landmarks keep to where they were seen on average, so a pose found wrongly does not move the world."""
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    rng = np.random.default_rng(5)
+    for i in range(80):
+        seen = transform_boxes(inverse(drive(0)), world)
+        seen[:, :2] += rng.normal(0, 0.05, (len(seen), 2))  # every view jitters; the sensor stands
+        tracker.follow(*frame_of(seen, i, None, points=150))
+    assert abs(np.rad2deg(yaw_of(tracker.T_world_sensor))) < 0.05
+    assert np.hypot(*tracker.T_world_sensor[:2, 3]) < 0.02
+
+
+def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
+    tracker, seen = Tracker(TrackingConfig(), EFFICIENT), []
+    for i in range(12):
+        tracker.follow(*frame_of(street(n=3), i, np.eye(4), points=40))
+        t = tracker.tracks
+        seen.append(t.low.copy())
+        since = int(t.stood[0])
+        if since:
+            np.testing.assert_allclose(t.stood_low, np.mean(seen[-since:], axis=0), atol=1e-9)
+    assert since > 8
+    for i in range(12, 20):  # it drives off: what it was seen as before is no landmark
+        moved = street(n=3)
+        moved[:, 0] += 0.4 * (i - 11)
+        tracker.follow(*frame_of(moved, i, np.eye(4), points=40))
+    assert not tracker.tracks.still.any()
+    np.testing.assert_allclose(tracker.tracks.stood_low, tracker.tracks.low, atol=1e-9)

@@ -7,7 +7,7 @@ from modt.config import TrackingConfig
 from modt.geometry import corners
 from modt.tracking.kinship import _fits
 from modt.tracking.memory import BackgroundMemory, NoMemory
-from modt.tracking.robust import SOFT_M, compare
+from modt.tracking.robust import AGREE_M, SOFT_M, compare
 from modt.tracking.sightings import AXES
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
@@ -55,8 +55,12 @@ def test_what_keeps_its_shape_shifts_as_it_moved(dx, dy, half):
 def slow_compare(low_a, high_a, low_b, high_b):
     """Shift, size, overlap and cover of one pair of outlines, number by number."""
     shifts, sizes, squares = [], [], ([], [], [])
+    longest = max(*(high_a - low_a), *(high_b - low_b), 1.0)
     for la, ha, lb, hb in zip(low_a, high_a, low_b, high_b, strict=True):
-        shifts.append(hb - ha if abs(hb - ha) < abs(lb - la) else lb - la)
+        ahead, behind = hb - ha, lb - la
+        smaller = ahead if abs(ahead) < abs(behind) else behind
+        alike = max(0.0, 1 - ((ahead - behind) * longest / AGREE_M) ** 2) ** 2
+        shifts.append(alike * (ahead + behind) / 2 + (1 - alike) * smaller)
         sizes.append(abs(np.log(hb - lb + SOFT_M) - np.log(ha - la + SOFT_M)))
         common = max(min(ha, hb) - max(la, lb) + SOFT_M / 3, 0.0)
         for side, length in zip(squares, (ha - la + SOFT_M / 3, hb - lb + SOFT_M / 3, common), strict=True):
@@ -72,6 +76,8 @@ def slow_compare(low_a, high_a, low_b, high_b):
 def test_compare_is_the_slow_one_row_by_row(n, seed):
     rng = np.random.default_rng(seed)
     middle, length = rng.uniform(-2, 2, (2, n, 4)), rng.uniform(0.0, 3.0, (2, n, 4))
+    middle[1, ::2] = middle[0, ::2] + rng.normal(0, 0.1, middle[0, ::2].shape)  # some pairs are nearly alike
+    length[1, ::2] = np.abs(length[0, ::2] + rng.normal(0, 0.1, length[0, ::2].shape))
     ends = (middle[0] - length[0], middle[0] + length[0], middle[1] - length[1], middle[1] + length[1])
     found = compare(*ends)
     for k in range(n):

@@ -11,7 +11,7 @@ from modt.classification.costed import CostedClassifier
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import LinearCost, Scheduler
-from modt.config import ProfileConfig
+from modt.config import OdometryConfig, ProfileConfig
 from modt.energy.counted import CountedClassifier
 from modt.energy.ledger import StageLedger
 from modt.errors import MisuseError
@@ -19,6 +19,8 @@ from modt.geometry import FieldOfView
 from modt.pipeline import Fusion, Pipeline
 from modt.profile import DEFAULT
 from modt.segmentation.segmenter import Segmenter
+from modt.sources.odometry import ListedPoses, NoOdometry, Odometry, OwnOdometry
+from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 from modt.sources.synthetic.stream import SyntheticStream
@@ -27,6 +29,8 @@ from modt.tracking.tracker import Tracker
 from modt.types import UNLIMITED, Budget
 
 EMBEDDED_SECONDS = 10.0
+OWN, NONE = "own", "none"
+"""Odometries that need no address."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,6 +44,8 @@ class Request:
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
     labels: bool = False
+    odometry: str = OWN
+    poses: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +91,21 @@ def stream(request: Request) -> Stream:
         asked = f"{first}:{'' if last is None else last}"
         raise MisuseError(whole.info.name, f"no frames in {asked}", f"it holds {whole.info.n_frames} frames")
     return cut
+
+
+def odometry(request: Request, stream: Stream, config: OdometryConfig) -> Odometry:
+    """Where the poses of a stream's frames come from.
+
+    Raises:
+        MisuseError: a file of poses that cannot be used, an address that cannot be bound or is none.
+    """
+    if request.poses is not None:
+        return ListedPoses(request.poses, stream.info.camera, stream.info.end)
+    if request.odometry == OWN:
+        return OwnOdometry()
+    if request.odometry == NONE:
+        return NoOdometry()
+    return PoseSocket(open_socket(request.odometry), config, request.odometry)
 
 
 def field_of_view(request: Request, stream: Stream) -> FieldOfView:

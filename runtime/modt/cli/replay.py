@@ -27,6 +27,16 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument(
         "--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last one)"
     )
+    motion = p.add_mutually_exclusive_group()
+    motion.add_argument(
+        "--poses", type=Path, metavar="FILE", help="poses in KITTI odometry's format, for the stream's own"
+    )
+    motion.add_argument(
+        "--odometry",
+        default="own",
+        metavar="SOURCE",
+        help="own (the stream's, the default), none, or a socket that poses are sent to: udp://HOST:PORT, unix:///PATH",
+    )
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     p.set_defaults(run=run)
@@ -85,6 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
         frames=arguments.frames,
         rate_hz=arguments.rate,
         labels=arguments.labels,
+        odometry=arguments.odometry,
+        poses=arguments.poses,
     )
     session = Session(request, arguments.out, pinned, command=["modt", *sys.argv[1:]])
     show = not arguments.quiet

@@ -18,6 +18,7 @@ from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.sink import Sink
+from modt.sources.odometry import PosedStream
 from modt.types import FrameResult
 
 HELPER_SHARE = 0.01
@@ -42,7 +43,9 @@ class Session:
         self.request, self.core = request, core
         self.profile = profile.load(request.profile)
         self.mode = assemble.MODES[request.mode]
-        self.stream = assemble.stream(request)
+        found = assemble.stream(request)
+        self.odometry = assemble.odometry(request, found, self.profile.odometry)
+        self.stream = PosedStream(found, self.odometry)
         self.pipeline = assemble.pipeline(
             self.mode, self.profile, assemble.field_of_view(request, self.stream), Ledger()
         )
@@ -75,6 +78,7 @@ class Session:
         budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
         with ExitStack() as stack:
+            stack.callback(self.odometry.close)
             stack.callback(ledger_lines.close)
             for sink in sinks:
                 stack.callback(sink.close)
@@ -105,6 +109,7 @@ class Session:
                 "path": str(self.request.path.resolve()) if self.request.path else None,
                 "frames": info.n_frames,
                 "poses": info.has_poses,
+                "odometry": self.odometry.report()["source"],
                 "notes": list(info.notes),
             },
             "mode": self.request.mode,
@@ -133,6 +138,7 @@ class Session:
                 "stopped_by": self.stop.signal,
                 **self.pace.report(),
             },
+            "odometry": self.odometry.report(),
             "host": {
                 "core": self.core,
                 "one_core_verified": one_core,

@@ -111,10 +111,9 @@ def follow(detections: Detections, poses: Float64 | None, period_s: float) -> tu
 
 def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) -> Float64 | None:
     """(n, 4, 4) T_world_camera of every frame of the sequence."""
-    import numpy as np
-
     from modt.geometry import inverse
     from modt.sources import calibration, oxts
+    from modt.sources.poses import read_poses
 
     given: Path | None = arguments.poses or arguments.oxts
     if given is None:
@@ -125,11 +124,7 @@ def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) 
     if not path.is_file():
         raise MisuseError(path, "is missing", "add it, or run without ego-motion")
     if arguments.poses:
-        try:
-            table = np.loadtxt(path, dtype=np.float64, ndmin=2).reshape(-1, 3, 4)
-        except (OSError, ValueError) as error:
-            raise MisuseError(path, f"no poses ({error})", "give twelve numbers a line") from None
-        poses = np.stack([calibration.homogeneous(top) for top in table])
+        poses = read_poses(path)
     else:
         calib = path.parent.parent / "calib" / path.name
         T_imu_sensor = calibration.T_imu_sensor_of_sequence(calib)

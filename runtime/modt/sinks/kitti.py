@@ -55,14 +55,23 @@ class KittiResults:
         turn = np.arctan2(-ahead[:, 2], ahead[:, 0])
         alpha = turn - np.arctan2(foot[:, 0], foot[:, 2])
         alpha = (alpha + np.pi) % (2 * np.pi) - np.pi
-        image = self._image_boxes(boxes)
+        score = tracks.posterior[rows].max(axis=1)
+        columns = (
+            tracks.id[rows],
+            class_[rows],
+            cut,
+            alpha,
+            self._image_boxes(boxes),
+            boxes[:, 3:6],
+            foot,
+            turn,
+            score,
+        )
         text = "".join(
-            f"{result.frame.index} {tracks.id[row]} {NAMES[ObjectClass(class_[row])]} "
-            f"{int(cut[k])} -1 {alpha[k]:.4f} "
-            f"{' '.join(f'{v:.2f}' for v in image[k])} "
-            f"{boxes[k, 5]:.3f} {boxes[k, 4]:.3f} {boxes[k, 3]:.3f} "
-            f"{foot[k, 0]:.3f} {foot[k, 1]:.3f} {foot[k, 2]:.3f} {turn[k]:.4f} {tracks.posterior[row].max():.6f}\n"
-            for k, row in enumerate(rows)
+            f"{result.frame.index} {id_} {NAMES[ObjectClass(kind)]} {int(cut_)} -1 {alpha_:.4f} "
+            f"{i[0]:.2f} {i[1]:.2f} {i[2]:.2f} {i[3]:.2f} {lwh[2]:.3f} {lwh[1]:.3f} {lwh[0]:.3f} "
+            f"{at[0]:.3f} {at[1]:.3f} {at[2]:.3f} {turn_:.4f} {score_:.6f}\n"
+            for id_, kind, cut_, alpha_, i, lwh, at, turn_, score_ in zip(*(c.tolist() for c in columns), strict=True)
         )
         self._lines.write(text)
 

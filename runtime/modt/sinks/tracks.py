@@ -7,7 +7,7 @@ is numbers, and those of all tracks are looked up at once.
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +43,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
         np.round(tracks.x, 3).tolist(),
         strict=True,
     )
-    return {
-        "schema": SCHEMA,
-        "frame": result.frame.index,
-        "stamp_s": round(result.frame.stamp_s, 6),
-        "proposals": len(result.proposals),
-        "classified": result.classified,
-        "deferred": result.deferred,
+    return _around(result) | {
         "tracks": [
             {
                 "id": id_,
@@ -66,6 +60,18 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
             }
             for id_, state, class_, posterior, fixed, proposal, points, age, missed, box, world in columns
         ],
+    }
+
+
+def _around(result: FrameResult) -> dict[str, Any]:
+    """What a record says of the frame itself."""
+    return {
+        "schema": SCHEMA,
+        "frame": result.frame.index,
+        "stamp_s": round(result.frame.stamp_s, 6),
+        "proposals": len(result.proposals),
+        "classified": result.classified,
+        "deferred": result.deferred,
     }
 
 
@@ -89,10 +95,16 @@ def frame_line(result: FrameResult) -> str:
     box = _keyed(BOX_KEYS, thousandths(result.proposals.box[tracks.proposal]))
     for value in (proposal, box):
         value[~seen], value[~seen, 0] = 0, NULL
-    states = table([json.dumps(name) for name in result.state_names])
     lines = beside(
         n,
-        *(',{"id":', id_, ',"state":', states[tracks.state], ',"class":', CLASSES[tracks.posterior.argmax(axis=1)]),
+        *(
+            ',{"id":',
+            id_,
+            ',"state":',
+            _states(result.state_names)[tracks.state],
+            ',"class":',
+            CLASSES[tracks.posterior.argmax(axis=1)],
+        ),
         *(
             ',"posterior":',
             _listed(probabilities(tracks.posterior)),
@@ -102,8 +114,14 @@ def frame_line(result: FrameResult) -> str:
         *(',"proposal":', proposal, ',"points":', points, ',"age":', age, ',"missed":', missed),
         *(',"box":', box, ',"world":', _keyed(WORLD_KEYS, thousandths(tracks.x)), "}"),
     )
-    around = line(frame_record(replace(result, tracks=tracks.take(np.zeros(0, np.int64)))))
+    around = line(_around(result) | {"tracks": []})
     return around.replace('"tracks":[]', f'"tracks":[{text(lines)[1:]}]')
+
+
+@lru_cache
+def _states(names: tuple[str, ...]) -> Words:
+    """(S, w) words of the states' names."""
+    return table([json.dumps(name) for name in names])
 
 
 def _in_tables(result: FrameResult) -> bool:

@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.geometry import Camera, inverse
+from modt.geometry import Camera
 from modt.sources import calibration, oxts
+from modt.sources.poses import read_poses, sensor_poses
 from modt.sources.scan_stream import ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt.types import Float64
@@ -72,9 +73,7 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     if found is None or camera is None:
         notes.append(f"{places[0] if found is None else calib} is missing: no ego-motion")
     else:
-        T_camera_sensor = camera.T_camera_sensor
-        camera_poses = [calibration.homogeneous(row.reshape(3, 4)) for row in _numbers(found, columns=12)]
-        poses = {i: inverse(T_camera_sensor) @ T @ T_camera_sensor for i, T in enumerate(camera_poses)}
+        poses = dict(enumerate(sensor_poses(read_poses(found), camera.T_camera_sensor)))
     times = sequence / "times.txt"
     stamps: dict[int, float] = {}
     if times.is_file():

@@ -42,7 +42,7 @@ class ScanStream:
     """
 
     def __init__(self, info: StreamInfo, scans: list[ScanReference]) -> None:
-        self.info = replace(info, n_frames=len(scans))
+        self.info = replace(info, n_frames=len(scans), end=scans[-1].index + 1 if scans else 0)
         self.scans = scans
         self.faults: list[Fault] = []
 

@@ -23,6 +23,7 @@ class StreamInfo:
         camera: camera that the annotations and KITTI results refer to, None where there is none.
         has_poses: frames carry T_world_sensor.
         notes: what is missing, and what that costs.
+        end: one more than the number of the last frame, None where it is not known.
     """
 
     name: str
@@ -33,6 +34,7 @@ class StreamInfo:
     camera: Camera | None
     has_poses: bool
     notes: tuple[str, ...] = ()
+    end: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,8 @@ the sensor's own.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from modt.geometry import rotation_zyx, se3
@@ -29,10 +31,33 @@ INLIER_M = 0.2
 """A landmark this near to where it should be agrees."""
 AGREEMENT = 0.3
 """Part of the landmarks that must agree for the prediction to be trusted next time."""
+CONSENT = 0.75
+"""Part that must agree lest the prediction is mistrusted and pairs are sought farther away."""
+STOOD = 3
+"""Frames from which the mean of what stands is its place."""
 TURN_RAD = 0.2
 """Greatest turn of a correction."""
 MINIMUM = 3
 """Landmarks without which nothing is corrected."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A motion, and how many of the landmarks agree with it.
+
+    Attributes:
+        motion: (3,) x, y [m] and turn [rad].
+        agree: landmarks that are where they should be after it.
+        landmarks: those that it was fitted to.
+    """
+
+    motion: Float64
+    agree: int
+    landmarks: int
+
+    def shared_by(self, part: float) -> bool:
+        """Whether more than this part of the landmarks agree."""
+        return self.agree >= MINIMUM and self.agree > part * self.landmarks
 
 
 class Registration:
@@ -43,17 +68,30 @@ class Registration:
 
     def correct(self, tracks: Followed, sightings: Sightings) -> Float64:
         """(4, 4) motion in the world that brings the sightings onto the tracks; identity where nothing says so."""
-        rows = np.flatnonzero((tracks.still | (tracks.hits < 3)) & (tracks.missed <= 2))
-        low, high = (a.take(rows, axis=0) for a in carried(tracks))
-        i, j = _pairs(low, high, sightings, GATE_M if self._settled else REACH_M)
-        if len(i) < MINIMUM:
+        fit = self._solve(tracks, sightings, GATE_M, choices=1) if self._settled else None
+        if fit is None or not fit.shared_by(CONSENT):  # the prediction may be off: look farther
+            wide = self._solve(tracks, sightings, REACH_M, choices=ROUNDS)
+            if fit is None or (wide is not None and wide.agree > fit.agree):
+                fit = wide
+        self._settled = fit is not None and fit.shared_by(AGREEMENT)
+        self._begun |= self._settled
+        if fit is None:
+            return np.eye(4)
+        if np.hypot(*fit.motion[:2]) > REACH_M or abs(fit.motion[2]) > TURN_RAD:
             self._settled = False
             return np.eye(4)
+        return _about(fit.motion, sightings.eye)
+
+    def _solve(self, tracks: Followed, sightings: Sightings, reach_m: float, choices: int) -> Fit | None:
+        """The motion that most landmarks within reach say; pairs are chosen anew in the first rounds."""
+        rows, low, high = landmarks(tracks)
+        i, j = _pairs(low, high, sightings, reach_m)
+        if len(i) < MINIMUM:
+            return None
         motion = np.zeros(3)
         if not self._begun:
             shift, size, _, _ = compare(low[i], high[i], sightings.low[j], sightings.high[j])
             motion[:2] = -_vote(shift[size < ALIKE])
-        choices = 1 if self._settled else ROUNDS
         levers = sightings.place - sightings.eye
         variance = 0.05**2 + tracks.P[rows, 0, 0]
         for k in range(ROUNDS):
@@ -69,16 +107,23 @@ class Registration:
                 best = _mutual(i, j, error + size - overlap)
             weight = 1.0 / (variance[i[best]] + (0.003 * sightings.range_m[j[best]]) ** 2)
             motion = motion + _fit(shift.take(best, axis=0), lever.take(best, axis=0), weight)
-            if self._settled:
+            if choices == 1:
                 i, j, error = i[best], j[best], error[best]
-        agree = error if self._settled else error[best]
-        inliers = int((agree < INLIER_M).sum())
-        self._settled = inliers >= MINIMUM and inliers > AGREEMENT * len(agree)
-        self._begun |= self._settled
-        if np.hypot(*motion[:2]) > REACH_M or abs(motion[2]) > TURN_RAD:
-            self._settled = False
-            return np.eye(4)
-        return _about(motion, sightings.eye)
+        agree = error if choices == 1 else error[best]
+        return Fit(motion, int((agree < INLIER_M).sum()), len(agree))
+
+
+def landmarks(tracks: Followed) -> tuple[Int, Float64, Float64]:
+    """Rows of what stands or may, and (n, 4) least and (n, 4) greatest coordinates of their outlines.
+
+    What has stood for a while lies where it was seen on average, not where it was seen last: then an error of one
+    frame is not handed on to all that follow.
+    """
+    rows = np.flatnonzero((tracks.still | (tracks.hits < 3)) & (tracks.missed <= 2))
+    low, high = (a[rows] for a in carried(tracks))
+    known = (tracks.still & (tracks.stood >= STOOD))[rows]
+    low[known], high[known] = tracks.stood_low[rows[known]], tracks.stood_high[rows[known]]
+    return rows, low, high
 
 
 def _pairs(low: Float64, high: Float64, sightings: Sightings, reach: float) -> tuple[Int, Int]:

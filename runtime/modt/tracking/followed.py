@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from modt.types import Bool, Float64, Tracks
+from modt.types import Bool, Float64, Int, Tracks
 
 
 @dataclass(slots=True)
@@ -21,6 +21,8 @@ class Followed(Tracks):
         shown: (M, 2) place that the outline was taken to show [m, world].
         home: (M, 2) place at which the track was last known to stand [m, world].
         still: the track stands.
+        stood: frames with a proposal since it began to.
+        stood_low, stood_high: (M, 4) mean outline since then, an end that jumped beginning anew [m, world].
         inherited: its class was taken over from a remembered place, not from a classification of its own.
     """
 
@@ -33,6 +35,9 @@ class Followed(Tracks):
     shown: Float64
     home: Float64
     still: Bool
+    stood: Int
+    stood_low: Float64
+    stood_high: Float64
     inherited: Bool
 
     @classmethod
@@ -50,5 +55,8 @@ class Followed(Tracks):
             shown=np.zeros((m, 2)),
             home=np.zeros((m, 2)),
             still=np.zeros(m, np.bool_),
+            stood=np.zeros(m, np.int64),
+            stood_low=np.zeros((m, 4)),
+            stood_high=np.zeros((m, 4)),
             inherited=np.zeros(m, np.bool_),
         )

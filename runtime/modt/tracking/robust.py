@@ -15,6 +15,9 @@ SOFT_M = 0.3
 """Lengths are compared with this added: a difference of a few returns says nothing."""
 GATE = 16.0
 """Greatest squared Mahalanobis distance of a pair: one true pair in three thousand lies beyond."""
+AGREE_M = 0.6
+"""Ends of an outline that differ by less moved with the object, if it is up to a metre long and so is seen whole; of
+a longer one that comes into view by as much less as it is longer."""
 JUMP_M = 0.2
 """Outlines jump by this much beyond the filter's noise, as parts of an object come into view and go."""
 COVER = 0.3
@@ -30,8 +33,10 @@ class RobustAssociation:
     """Matches outlines, not centres.
 
     What is seen of an object changes with the view: its far side appears, a pole hides its rear, the field of view
-    cuts it. Along each of four axes an outline has two ends; one of them usually stays, and the smaller of the two
-    shifts from where the filter expects them is taken for the object's own.
+    cuts it. Along each of four axes an outline has two ends. Where both moved alike, the object moved by their mean;
+    where they did not, one of them usually stayed, and the smaller of the two shifts from where the filter expects
+    them is taken for the object's own. (The smaller of two alike would fall short of every motion.) Pairs are
+    gated by the smaller shifts alone.
 
     Args:
         config: deviation of a measured place.
@@ -45,12 +50,13 @@ class RobustAssociation:
         low, high = carried(tracks)
         R = self.noise(sightings)
         rows, columns = self._near(tracks, low, high, sightings)
-        shift, size, overlap, cover = compare(
-            *(ends.take(rows, axis=0) for ends in (low, high)),
-            *(ends.take(columns, axis=0) for ends in (sightings.low, sightings.high)),
+        ends = (
+            *(end.take(rows, axis=0) for end in (low, high)),
+            *(end.take(columns, axis=0) for end in (sightings.low, sightings.high)),
         )
+        shift, size, overlap, cover = compare(*ends)
         S = tracks.P[:, :2, :2].copy().take(rows, axis=0) + R.take(columns, axis=0) + JUMP_M**2 * np.eye(2)
-        distance = kalman.mahalanobis_squared(shift, S)
+        distance = kalman.mahalanobis_squared(least(*ends) @ AXES.T / 2, S)  # what changed its shape may be far off
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
         count = np.abs(np.log(tracks.points[rows] / sightings.count[columns]))
@@ -105,7 +111,7 @@ def compare(
     """How outlines b (K, 4) lie to outlines a (K, 4), row by row.
 
     Returns:
-        shift: (K, 2) from a to b [m], by the end that moved less along each axis.
+        shift: (K, 2) from a to b [m], by both ends along each axis where they agree, else by that which moved less.
         size: (K,) mean difference of the logarithms of their lengths.
         overlap: (K,) intersection over union.
         cover: (K,) intersection over the smaller of the two.
@@ -116,8 +122,11 @@ def compare(
 def shift_between(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> Float64:
     """(K, 2) compare's shift alone."""
     ahead, behind = high_b - high_a, low_b - low_a
-    least = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
-    shift: Float64 = least @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    a, b, c, d = np.maximum(high_a - low_a, high_b - low_b).T  # a reduction of so short an axis is slow
+    reach = AGREE_M / np.maximum(np.maximum(np.maximum(a, b), np.maximum(c, d)), 1.0)
+    both = np.square(np.maximum(1 - np.square((ahead - behind) / reach[:, None]), 0.0))
+    moved = both * (ahead + behind) / 2 + (1 - both) * least(low_a, high_a, low_b, high_b)
+    shift: Float64 = moved @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     return shift
 
 
@@ -133,6 +142,12 @@ def likeness(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -
     overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)).T)  # a reduction of so short an axis is slow
     cover = np.minimum(*(shared / np.minimum(*squares)).T)
     return size, overlap, cover
+
+
+def least(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> Float64:
+    """(K, 4) along each axis, how far the end moved that moved less from outlines a to b (K, 4) [m]."""
+    ahead, behind = high_b - high_a, low_b - low_a
+    return np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
 
 
 def _left(all_: Int, taken: Int, n: int) -> Bool:

@@ -27,6 +27,10 @@ STILL_SIGMA_MPS = 1.0
 """How surely what stands still has no speed, per frame."""
 SLOW_MPS = 0.5
 """What is slower than this has stopped."""
+LANDMARK_GAIN = 0.03
+"""Least say of a new view in the mean outline of a landmark."""
+LANDMARK_M = 0.2
+"""An end of an outline that is off by more is another end."""
 FORGET = 0.98
 """What is kept, a frame, of an extent that is not seen again."""
 AGILITY = np.array([0.25, 1.5, 0.75, 1.0])
@@ -75,6 +79,7 @@ class Tracker:
         self._stamp_s: float | None = None
         self._T_world_sensor = np.eye(4)
         self._T_last_now = np.eye(4)
+        self._T_world_odometry: Float64 | None = None
 
     @property
     def tracks(self) -> Tracks:
@@ -102,6 +107,7 @@ class Tracker:
         matches = reunite(self._tracks, sightings, self.association.match(self._tracks, sightings))
         self._update(matches, sightings)
         self._rest(matches.rows)
+        self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
         self._bear(matches, sightings)
@@ -143,14 +149,19 @@ class Tracker:
 
     def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
         """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
-        before = self._T_world_sensor
-        if frame.T_world_sensor is not None:
-            after, sightings = frame.T_world_sensor, sight(frame, proposals, frame.T_world_sensor)
+        before, given, first = self._T_world_sensor, frame.T_world_sensor, self._stamp_s is None
+        if first and given is not None:
+            before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
+        if given is not None and self._T_world_odometry is not None:
+            after = self._T_world_odometry @ given
+            sightings = sight(frame, proposals, after)
         else:
             after = before @ self._T_last_now
             sightings = sight(frame, proposals, after)
             after = rigid(self._registration.correct(self._tracks, sightings) @ after)
             sightings = sight(frame, proposals, after)
+            if given is not None:  # odometry that begins late is brought to where the tracks are
+                self._T_world_odometry = after @ inverse(given)
         self._T_world_sensor, self._T_last_now = after, inverse(before) @ after
         return sightings
 
@@ -193,6 +204,15 @@ class Tracker:
         near, x = rows[stays], x[stays]
         t.home[near] += HOME_GAIN * (x[:, :2] - t.home[near])
         t.x[near], t.P[near] = kalman.observe_speed(x, t.P.take(near, axis=0), 0.0, STILL_SIGMA_MPS)
+
+    def _stand(self, rows: Int) -> None:
+        """The mean outline of what stands: a landmark that does not creep with what is registered to it."""
+        t = self._tracks
+        t.stood[rows] = np.where(t.still[rows], t.stood[rows] + 1, 0)
+        gain = np.maximum(1.0 / np.maximum(t.stood[rows], 1), LANDMARK_GAIN)[:, None]
+        for mean, seen in ((t.stood_low, t.low), (t.stood_high, t.high)):
+            off = seen[rows] - mean[rows]
+            mean[rows] += np.where(np.abs(off) < LANDMARK_M, gain, 1.0) * off
 
     def _miss(self, matched: Int) -> None:
         """Tracks without a proposal coast."""

@@ -77,6 +77,7 @@ class SyntheticStream:
             period_s=model.period_s,
             camera=nominal_camera(),
             has_poses=True,
+            end=self._indices.stop,
         )
 
     def __iter__(self) -> Iterator[Frame]:
@@ -92,5 +93,5 @@ class SyntheticStream:
         part, whole = copy.copy(self), self._indices
         part.faults = []
         part._indices = range(max(first, whole.start), whole.stop if last is None else min(last, whole.stop))
-        part.info = replace(self.info, n_frames=len(part._indices))
+        part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
         return part

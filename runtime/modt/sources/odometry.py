@@ -1,0 +1,140 @@
+"""Where the sensor was, from elsewhere than the stream itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol, Self
+
+from modt.errors import MisuseError
+from modt.geometry import Camera
+from modt.sources.poses import read_poses, sensor_poses
+from modt.sources.stream import Fault, Stream, StreamInfo
+from modt.types import Float64, Frame
+
+
+class Odometry(Protocol):
+    """Answers with the pose of a frame."""
+
+    def poses(self, info: StreamInfo) -> bool:
+        """Whether frames of a stream may get one."""
+        ...
+
+    def pose(self, frame: Frame) -> Float64 | None:
+        """(4, 4) T_world_sensor of a frame, None where it is not known. Frames are asked for in their order."""
+        ...
+
+    def report(self) -> dict[str, Any]:
+        """What there was, and what could not be used."""
+        ...
+
+    def close(self) -> None:
+        """No more will be asked."""
+        ...
+
+
+class OwnOdometry:
+    """The stream's own."""
+
+    def poses(self, info: StreamInfo) -> bool:
+        """Where it has one."""
+        return info.has_poses
+
+    def pose(self, frame: Frame) -> Float64 | None:
+        """What the frame carries."""
+        return frame.T_world_sensor
+
+    def report(self) -> dict[str, Any]:
+        """Which one it was."""
+        return {"source": "own"}
+
+    def close(self) -> None:
+        """Nothing to be done."""
+
+
+class NoOdometry:
+    """Nobody knows: the proposals must tell."""
+
+    def poses(self, info: StreamInfo) -> bool:
+        """Never."""
+        return False
+
+    def pose(self, frame: Frame) -> Float64 | None:
+        """None."""
+        return None
+
+    def report(self) -> dict[str, Any]:
+        """Which one it was."""
+        return {"source": "none"}
+
+    def close(self) -> None:
+        """Nothing to be done."""
+
+
+class ListedPoses:
+    """Poses of a file in KITTI's odometry format: line k, from 0, is that of frame number k.
+
+    Args:
+        path: the file.
+        camera: if the stream has one, the poses are its (KITTI's rectified left camera); else they are the sensor's.
+        end: one more than the number of the last frame, None where it is not known.
+
+    Raises:
+        MisuseError: the file is missing, a line is no pose, or there are too few.
+    """
+
+    def __init__(self, path: Path, camera: Camera | None, end: int | None) -> None:
+        self.path = path
+        poses = read_poses(path)
+        self._poses = poses if camera is None else sensor_poses(poses, camera.T_camera_sensor)
+        if end is not None and end > len(poses):
+            raise self._too_few(end - 1)
+
+    def poses(self, info: StreamInfo) -> bool:
+        """Always."""
+        return True
+
+    def pose(self, frame: Frame) -> Float64 | None:
+        """That of the frame's number.
+
+        Raises:
+            MisuseError: there are fewer.
+        """
+        if frame.index >= len(self._poses):
+            raise self._too_few(frame.index)
+        pose: Float64 = self._poses[frame.index]
+        return pose
+
+    def report(self) -> dict[str, Any]:
+        """Which file it was."""
+        return {"source": str(self.path)}
+
+    def close(self) -> None:
+        """Nothing to be done."""
+
+    def _too_few(self, frame: int) -> MisuseError:
+        cause = f"{len(self._poses)} poses, too few for frame {frame}"
+        return MisuseError(self.path, cause, "give a line for every frame from 0 on, or fewer --frames")
+
+
+class PosedStream:
+    """A stream whose frames carry the poses of another odometry.
+
+    Args:
+        stream: the frames.
+        odometry: their poses.
+    """
+
+    def __init__(self, stream: Stream, odometry: Odometry) -> None:
+        self._stream, self.odometry = stream, odometry
+        self.info: StreamInfo = replace(stream.info, has_poses=odometry.poses(stream.info))
+        self.faults: list[Fault] = stream.faults
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames, posed."""
+        return (replace(frame, T_world_sensor=self.odometry.pose(frame)) for frame in self._stream)
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last."""
+        return type(self)(self._stream.between(first, last), self.odometry)

@@ -1,0 +1,85 @@
+"""One pose as a datagram of JSON.
+
+Either {"stamp": s, "x": m, "y": m, "yaw": rad}, or {"stamp": s, "pose": [...]} with the 16 numbers of T_world_sensor
+row by row, or the first 12 of them. Further keys are left alone.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from modt.geometry import rotation_zyx, se3
+from modt.sources.poses import fault
+from modt.types import Float64
+
+LARGEST_BYTES = 4096
+PLANAR = ("x", "y", "yaw")
+
+
+class DatagramError(ValueError):
+    """No pose; kind is the counter that it belongs to."""
+
+    def __init__(self, kind: str, cause: str) -> None:
+        super().__init__(cause)
+        self.kind = kind
+
+
+def read_datagram(raw: bytes) -> tuple[float, Float64]:
+    """Stamp [s] and (4, 4) T_world_sensor.
+
+    Raises:
+        DatagramError: anything else, whatever the bytes are.
+    """
+    if len(raw) > LARGEST_BYTES:
+        raise DatagramError("malformed", f"more than {LARGEST_BYTES} bytes")
+    try:
+        message = json.loads(raw)
+    except (ValueError, RecursionError):
+        raise DatagramError("malformed", "no JSON") from None
+    if not isinstance(message, dict):
+        raise DatagramError("malformed", "no JSON object")
+    if ("pose" in message) == any(key in message for key in PLANAR):
+        raise DatagramError("malformed", "neither x, y, yaw nor pose, or both")
+    stamp = _number(message, "stamp")
+    if "pose" in message:
+        T = _matrix(message["pose"])
+    else:
+        x, y, yaw = (_number(message, key) for key in PLANAR)
+        T = se3(rotation_zyx(0.0, 0.0, math.remainder(yaw, 2 * math.pi)), np.array([x, y, 0.0]))
+    wrong = fault(T)
+    if wrong:
+        raise DatagramError("malformed", f"pose is {wrong}")
+    return stamp, T
+
+
+def _number(message: dict[str, Any], key: str) -> float:
+    if key not in message:
+        raise DatagramError("malformed", f"no {key}")
+    return _finite(message[key], key)
+
+
+def _finite(value: object, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise DatagramError("malformed", f"{key} is no number")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise DatagramError("non_finite", f"{key} is not finite")
+    return number
+
+
+def _matrix(values: object) -> Float64:
+    if not isinstance(values, list) or len(values) not in (12, 16):
+        raise DatagramError("malformed", "pose is no list of 12 or 16 numbers")
+    numbers = np.array([_finite(value, "pose") for value in values])
+    if len(numbers) == 16 and np.abs(numbers[12:] - [0, 0, 0, 1]).max() > 1e-6:
+        raise DatagramError("malformed", "the last row of pose is not 0 0 0 1")
+    T = np.eye(4)
+    T[:3] = numbers[:12].reshape(3, 4)
+    return T

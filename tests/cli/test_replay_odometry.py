@@ -1,0 +1,158 @@
+"""`modt replay` with poses from elsewhere: a file, nobody, another process."""
+
+import json
+import queue
+import socket
+import threading
+
+import numpy as np
+import pytest
+
+from modt.cli.assemble import Request
+from modt.cli.session import Session
+from modt.geometry import inverse
+from modt.sinks.records import read_records
+from modt.sinks.tracks import SCHEMA
+from modt.sources.synthetic.stream import SyntheticStream
+
+from ..sources import layouts
+from .commands import modt
+
+FRAMES = 10
+
+
+@pytest.fixture(scope="module", name="street")
+def the_embedded_street():
+    """Stamps and poses of its first frames."""
+    simulator = SyntheticStream("street", "hdl-64e", 10.0, seed=0).simulator
+    period_s = simulator.sensor.period_s
+    return [(i * period_s, simulator.world.ego_pose(i * period_s)) for i in range(FRAMES)]
+
+
+def session(out, **options):
+    return Session(Request(mode="efficient", frames=(0, FRAMES), **options), out, None, ["modt"])
+
+
+def run(out, **options):
+    """Summary of a run and the bytes of its tracks."""
+    summary = session(out, **options).run(lambda result: None)
+    return summary, (out / "tracks.jsonl").read_bytes()
+
+
+@pytest.fixture(scope="module", name="own")
+def a_run_with_its_own_odometry(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("own") / "run")
+
+
+def lives(raw, tmp_path):
+    """Mean age of the tracks seen in the last frame."""
+    (tmp_path / "t.jsonl").write_bytes(raw)
+    last = list(read_records(tmp_path / "t.jsonl", SCHEMA))[-1]
+    return np.mean([t["age"] for t in last["tracks"] if t["proposal"] is not None])
+
+
+class Feeder:
+    """A thread that sends a pose for each number it is told; told by the loop at each frame, like a pace."""
+
+    def __init__(self, path, street, silent=()):
+        self.path, self.street, self.silent = path, street, silent
+        self.todo, self.done = queue.Queue(), queue.Queue()
+        self.frame = 0
+        threading.Thread(target=self.work, daemon=True).start()
+        self.send(0)
+
+    def work(self):
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
+            while True:
+                number = self.todo.get()
+                if number < len(self.street) and number not in self.silent:
+                    stamp_s, T = self.street[number]
+                    out.sendto(json.dumps({"stamp": stamp_s, "pose": T.ravel().tolist()}).encode(), str(self.path))
+                self.done.put(number)
+
+    def send(self, number):
+        self.todo.put(number)
+        assert self.done.get(timeout=60) == number
+
+    def wait(self):
+        """The frame in hand has been posed; the next one's pose may come."""
+        self.frame += 1
+        self.send(self.frame)
+
+    def report(self):
+        return {}
+
+
+def fed(tmp_path, street, **options):
+    url = f"unix://{tmp_path / 's'}"
+    played = session(tmp_path / "run", odometry=url)
+    played.pace = Feeder(tmp_path / "s", street, **options)
+    summary = played.run(lambda result: None)
+    assert not (tmp_path / "s").exists()
+    return summary, (tmp_path / "run" / "tracks.jsonl").read_bytes()
+
+
+def test_poses_sent_live_do_what_the_streams_own_do(tmp_path, street, own):
+    summary, tracks = fed(tmp_path, street)
+    assert summary["odometry"]["frames_posed"] == FRAMES
+    assert summary["odometry"]["used"] == FRAMES
+    assert tracks == own[1]
+
+
+def test_a_sender_that_falls_silent_is_bridged(tmp_path, street, own):
+    summary, tracks = fed(tmp_path, street, silent=(4, 5, 6, 7, 8))
+    assert summary["odometry"]["used"] == FRAMES - 5
+    assert 1 <= summary["odometry"]["frames_unposed"] <= 5
+    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+
+
+def test_without_odometry_the_proposals_tell(tmp_path, own):
+    summary, tracks = run(tmp_path / "run", odometry="none")
+    assert summary["odometry"] == {"source": "none"}
+    assert tracks != own[1]
+    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+
+
+def test_poses_of_a_file_do_what_the_streams_own_do(tmp_path, street, own):
+    """As `modt simulate` writes them: the camera's, from where it started."""
+    camera = SyntheticStream("street", "hdl-64e", 1.0).info.camera.T_camera_sensor
+    rows = [(camera @ inverse(street[0][1]) @ T @ inverse(camera))[:3].ravel() for _, T in street]
+    np.savetxt(tmp_path / "poses.txt", rows, fmt="%.12e")
+    summary, tracks = run(tmp_path / "run", poses=tmp_path / "poses.txt")
+    assert summary["odometry"]["source"].endswith("poses.txt")
+    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+    again = list(read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA))[-1]["tracks"]
+    before = {t["id"]: t for t in json.loads(own[1].splitlines()[-1])["tracks"]}
+    T, apart = inverse(street[0][1]), []
+    for t in again:
+        if t["id"] in before and before[t["id"]]["proposal"] == t["proposal"] is not None:
+            x, y = (before[t["id"]]["world"][k] for k in "xy")
+            moved = T[:2, :2] @ [x, y] + T[:2, 3]
+            apart.append(np.hypot(moved[0] - t["world"]["x"], moved[1] - t["world"]["y"]))
+    assert len(apart) > 10
+    assert np.median(apart) < 0.2  # outlines are measured along the axes of the world, which is turned
+
+
+GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["scans", "--poses", "absent.txt"], ["absent.txt", "No such file"]),
+        (["scans", "--poses", "short.txt"], ["short.txt", "1 poses, too few for frame 2"]),
+        (["scans", "--poses", "bad.txt"], ["bad.txt:2", "numbers"]),
+        (["scans", "--poses", "short.txt", "--odometry", "none"], ["not allowed with"]),
+        (["--odometry", "wheels"], ["wheels", "udp://HOST:PORT"]),
+        (["--odometry", "udp://127.0.0.1:0"], ["udp://127.0.0.1:0"]),
+    ],
+)
+def test_misuse_is_one_line_and_status_2(tmp_path, arguments, words):
+    layouts.bare(tmp_path)
+    (tmp_path / "short.txt").write_text(GOOD)
+    (tmp_path / "bad.txt").write_text(GOOD + "1 0 0\n")
+    done = modt("replay", *arguments, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert all(word in done.stderr.splitlines()[-1] for word in words), done.stderr
+    assert not (tmp_path / "runs").exists()

@@ -1,0 +1,295 @@
+"""Poses that come in by a socket: any bytes are survived, and every datagram is counted once."""
+
+import json
+import logging
+import socket
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.config import OdometryConfig
+from modt.errors import MisuseError
+from modt.geometry import inverse, rotation_zyx, se3, yaw_of
+from modt.sources.pose_datagram import DatagramError, read_datagram
+from modt.sources.pose_ring import PoseRing, between
+from modt.sources.pose_socket import PoseSocket, open_socket
+from modt.types import Frame
+
+CONFIG = OdometryConfig()
+EMPTY = np.zeros((0, 4), np.float32)
+
+
+def frame(stamp_s):
+    return Frame(0, stamp_s, EMPTY)
+
+
+def planar(stamp_s, x=0.0, y=0.0, yaw=0.0):
+    return json.dumps({"stamp": stamp_s, "x": x, "y": y, "yaw": yaw}).encode()
+
+
+def matrix(T):
+    return se3(rotation_zyx(0, 0, T[2]), np.array([T[0], T[1], 0.0]))
+
+
+@pytest.fixture(name="pair")
+def a_pair():
+    """A sender, and the odometry that it sends to."""
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    odometry = PoseSocket(here, CONFIG, "test")
+    yield there, odometry
+    there.close()
+    odometry.close()
+
+
+numbers = st.one_of(
+    st.floats(allow_nan=True, allow_infinity=True), st.integers(-(10**400), 10**400), st.booleans(), st.none()
+)
+keys = st.sampled_from(["stamp", "x", "y", "yaw", "pose", "other"])
+nearly = st.dictionaries(keys, st.one_of(numbers, st.lists(numbers, max_size=17), st.text(max_size=3)))
+payload = st.one_of(
+    st.binary(max_size=200),
+    st.builds(lambda d: json.dumps(d).encode(), nearly),
+    st.builds(lambda n: b"[" * n, st.integers(0, 5000)),
+    st.builds(planar, st.floats(-5, 5), st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9)),
+    st.builds(planar, st.floats(), st.floats(), st.floats(), st.floats()),
+)
+
+
+@given(payload)
+def test_any_bytes_are_a_pose_or_are_refused(raw):
+    kind = None
+    try:
+        stamp_s, T = read_datagram(raw)
+    except DatagramError as error:
+        kind = error.kind
+    if kind is None:
+        assert np.isfinite(stamp_s)
+        np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=0.02)
+        np.testing.assert_array_equal(T[3], [0, 0, 0, 1])
+    assert kind in (None, *PoseSocket.KINDS)
+
+
+@given(st.lists(st.one_of(payload, st.floats(0, 3)), max_size=30))
+def test_counters_add_up_whatever_comes(events):
+    """Events are datagrams, or the stamp of a frame that asks."""
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    odometry, sent, frames = PoseSocket(here, CONFIG, "test"), 0, 0
+    for event in [*events, 3.0]:
+        if isinstance(event, bytes):
+            there.send(event)
+            sent += 1
+        else:
+            T = odometry.pose(frame(event))
+            frames += 1
+            assert T is None or np.isfinite(T).all()
+    report = odometry.report()
+    assert report["received"] == sent == report["used"] + sum(report["refused"].values())
+    assert report["frames_posed"] + report["frames_unposed"] == frames
+    there.close()
+    odometry.close()
+
+
+def test_both_forms_say_the_same():
+    T = matrix([1.0, 2.0, 0.5])
+    flat = {"stamp": 1.5, "pose": T.ravel().tolist(), "source": "wheels"}
+    short = {"stamp": 1.5, "pose": T[:3].ravel().tolist()}
+    for raw in (planar(1.5, 1.0, 2.0, 0.5), json.dumps(flat).encode(), json.dumps(short).encode()):
+        stamp_s, read = read_datagram(raw)
+        assert stamp_s == 1.5
+        np.testing.assert_allclose(read, T, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("raw", "kind", "cause"),
+    [
+        (b"", "malformed", "no JSON"),
+        (b"\xff\xfe", "malformed", "no JSON"),
+        (b"[1]", "malformed", "no JSON object"),
+        (b'{"stamp": 1}', "malformed", "neither"),
+        (b'{"stamp": 1, "x": 0, "pose": []}', "malformed", "or both"),
+        (b'{"x": 0, "y": 0, "yaw": 0}', "malformed", "no stamp"),
+        (b'{"stamp": 1, "x": 0, "yaw": 0}', "malformed", "no y"),
+        (b'{"stamp": true, "x": 0, "y": 0, "yaw": 0}', "malformed", "stamp is no number"),
+        (b'{"stamp": 1, "x": NaN, "y": 0, "yaw": 0}', "non_finite", "x is not finite"),
+        (b'{"stamp": 1e999, "x": 0, "y": 0, "yaw": 0}', "non_finite", "stamp"),
+        (b'{"stamp": 1, "x": 6e5, "y": 0, "yaw": 0}', "malformed", "100 km"),
+        (b'{"stamp": 1, "pose": [1, 2]}', "malformed", "12 or 16"),
+        (b'{"stamp": 1, "pose": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}', "malformed", "no rotation"),
+        (b'{"stamp": 1, "pose": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1]}', "malformed", "last row"),
+        (planar(1) + b" " * 5000, "malformed", "4096 bytes"),
+    ],
+)
+def test_what_is_wrong_is_said(raw, kind, cause):
+    with pytest.raises(DatagramError, match=cause) as caught:
+        read_datagram(raw)
+    assert caught.value.kind == kind
+
+
+def test_a_frame_between_two_poses_lies_between(pair):
+    there, odometry = pair
+    there.send(planar(1.0, 0.0, 0.0, 3.1))
+    there.send(planar(1.2, 1.0, -2.0, -3.1))
+    T = odometry.pose(frame(1.05))
+    np.testing.assert_allclose(T[:2, 3], [0.25, -0.5])
+    assert abs(yaw_of(T) - (3.1 + 0.25 * (2 * np.pi - 6.2))) < 1e-9  # the short way round
+    np.testing.assert_array_equal(odometry.pose(frame(1.2)), matrix([1.0, -2.0, -3.1]))
+
+
+def test_a_frame_soon_after_the_newest_pose_goes_on_as_it_went(pair):
+    there, odometry = pair
+    for k in range(5):
+        there.send(planar(0.1 * k, 1.0 * k, 0.0, 0.02 * k))
+    np.testing.assert_allclose(odometry.pose(frame(0.5)), matrix([5.0, 0.0, 0.1]), atol=1e-9)
+    assert odometry.pose(frame(0.4 + CONFIG.max_age_s + 0.01)) is None
+    assert odometry.pose(frame(0.4 + CONFIG.max_age_s - 0.01)) is not None
+
+
+def test_noise_between_poses_close_together_is_not_magnified():
+    ring, rng = PoseRing(256, 0.3), np.random.default_rng(0)
+    for k in range(200):
+        ring.add(0.005 * k, matrix([0.05 * k + rng.normal(0, 0.005), 0.0, 0.0]))
+    T = ring.at(0.995 + 0.1)
+    assert abs(T[0, 3] - 10 * 1.095) < 0.05
+
+
+def test_one_pose_tells_no_other_time_and_long_gaps_none(pair):
+    there, odometry = pair
+    assert odometry.pose(frame(0.0)) is None
+    there.send(planar(0.1))
+    assert odometry.pose(frame(0.1)) is not None
+    assert odometry.pose(frame(0.15)) is None
+    there.send(planar(1.0, 5.0))
+    assert odometry.pose(frame(0.5)) is None
+    assert odometry.pose(frame(0.95)) is None
+    assert odometry.pose(frame(1.05)) is None
+
+
+def test_each_cause_is_counted_and_logged_once(pair, caplog):
+    there, odometry = pair
+    bad = [b"nonsense", b'{"stamp": NaN, "x": 0, "y": 0, "yaw": 0}', planar(9.0), planar(10.0), planar(1e9)]
+    with caplog.at_level(logging.WARNING):
+        for raw in [planar(10.0), *bad, *bad]:
+            there.send(raw)
+        odometry.pose(frame(10.0))
+    assert odometry.report() == {
+        "source": "test",
+        "received": 11,
+        "used": 1,
+        "refused": {"malformed": 2, "non_finite": 2, "stale": 2, "out_of_order": 2, "ahead": 2},
+        "frames_posed": 1,
+        "frames_unposed": 0,
+    }
+    assert len(caplog.records) == 5
+    assert "is it the stream's clock?" in caplog.text
+
+
+def test_a_flood_takes_no_more_than_a_ringful_of_a_frame():
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    there.setblocking(False)
+    odometry = PoseSocket(here, OdometryConfig(capacity=4), "test")
+    for k in range(6):
+        there.send(planar(0.1 * k))
+    odometry.pose(frame(0.0))
+    assert odometry.received == 4
+    odometry.pose(frame(0.1))
+    assert odometry.received == 6
+    there.close()
+    odometry.close()
+
+
+@given(
+    st.tuples(*[st.floats(-50, 50)] * 2, st.floats(-3, 3)),
+    st.tuples(*[st.floats(-50, 50)] * 2, st.floats(-3, 3)),
+    st.floats(-1, 2),
+)
+def test_between_is_what_the_plane_says(a, b, share):
+    """The slow, obvious way: each number by itself, the angle the short way round."""
+    turn = (b[2] - a[2] + np.pi) % (2 * np.pi) - np.pi
+    if abs(abs(turn) - np.pi) < 1e-6:
+        return  # both ways round are as short
+    expected = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * turn]
+    np.testing.assert_allclose(between(matrix(a), matrix(b), share), matrix(expected), atol=1e-6)
+
+
+@given(st.tuples(*[st.floats(-1.5, 1.5)] * 3), st.tuples(*[st.floats(-1.5, 1.5)] * 3))
+def test_between_in_space_ends_at_both_and_stays_rigid(begin, end):
+    a, b = se3(rotation_zyx(*begin), np.zeros(3)), se3(rotation_zyx(*end), np.ones(3))
+    np.testing.assert_allclose(between(a, b, 0.0), a, atol=1e-9)
+    np.testing.assert_allclose(between(a, b, 1.0), b, atol=1e-9)
+    half = between(a, b, 0.5)
+    np.testing.assert_allclose(half @ inverse(half), np.eye(4), atol=1e-9)
+    np.testing.assert_allclose(between(half, b, -1.0), a, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "udp://",
+        "udp://127.0.0.1",
+        "udp://127.0.0.1:99999",
+        "udp://127.0.0.1:x",
+        "udp://[::1:5",
+        "tcp://127.0.0.1:5005",
+        "unix://",
+        "unix://relative",
+        "unix:///no/such/folder/s",
+        "unix:///" + "x" * 200,
+        "nonsense",
+    ],
+)
+def test_an_address_that_is_none_is_one_error(url):
+    with pytest.raises(MisuseError, match=r"write own, none, udp://HOST:PORT or unix:///PATH|cannot be bound"):
+        open_socket(url)
+
+
+def test_a_udp_socket_hears_and_is_held(free_port):
+    url = f"udp://127.0.0.1:{free_port}"
+    odometry = PoseSocket(open_socket(url), CONFIG, url)
+    with pytest.raises(MisuseError, match="cannot be bound"):
+        open_socket(url)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(planar(1.0, 4.0), ("127.0.0.1", free_port))
+    assert odometry.pose(frame(1.0))[0, 3] == 4.0
+    odometry.close()
+
+
+def test_a_unix_socket_goes_with_its_run_and_an_abandoned_one_is_replaced(tmp_path):
+    path = tmp_path / "odometry.sock"
+    killed = open_socket(f"unix://{path}")
+    with pytest.raises(MisuseError, match="cannot be bound"):
+        open_socket(f"unix://{path}")
+    killed.close()
+    assert path.exists()
+    odometry = PoseSocket(open_socket(f"unix://{path}"), CONFIG, "test")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+        sender.sendto(planar(1.0, 4.0), str(path))
+    assert odometry.pose(frame(1.0))[0, 3] == 4.0
+    odometry.close()
+    assert not path.exists()
+
+
+def test_a_file_in_the_way_is_left_alone(tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(MisuseError, match="cannot be bound"):
+        open_socket(f"unix://{tmp_path / 'mine'}")
+    assert (tmp_path / "mine").read_text() == "mine"
+
+
+def test_asking_never_waits(pair):
+    """Nobody sends: the answer is there all the same, from another thread that would otherwise hang."""
+    _, odometry = pair
+    answers = []
+    asking = threading.Thread(target=lambda: answers.append(odometry.pose(frame(0.0))), daemon=True)
+    asking.start()
+    asking.join(timeout=60)
+    assert answers == [None]
+
+
+@pytest.fixture(name="free_port")
+def a_free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]

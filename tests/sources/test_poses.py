@@ -1,0 +1,117 @@
+"""Poses from files: which frame they are in, and what is wrong with a bad one."""
+
+import dataclasses
+import shutil
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.errors import MisuseError
+from modt.geometry import Camera, inverse, rotation_zyx, se3
+from modt.sources.odometry import ListedPoses, NoOdometry, OwnOdometry, PosedStream
+from modt.sources.poses import read_poses
+from modt.sources.recognise import open_stream
+
+from . import layouts
+
+T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
+CAMERA = Camera(np.zeros((3, 4)), T_CAMERA_SENSOR, 100.0, 100.0)
+angle, place = st.floats(-3, 3), st.floats(-1000, 1000)
+pose = st.builds(lambda r, p, y, *xyz: se3(rotation_zyx(r, p, y), np.array(xyz)), *[angle] * 3, *[place] * 3)
+
+
+def write(path, poses):
+    np.savetxt(path, [T[:3].ravel() for T in poses])
+    return path
+
+
+@given(st.lists(pose, min_size=1, max_size=5))
+def test_poses_read_back_as_they_were_written(tmp_path_factory, poses):
+    path = write(tmp_path_factory.mktemp("poses") / "p.txt", poses)
+    np.testing.assert_allclose(read_poses(path), poses, atol=1e-9)
+
+
+GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (None, "No such file"),
+        ("", "no poses"),
+        (GOOD + "1 0 0\n", r"p\.txt:2: 3 numbers, not 12"),
+        (GOOD + "\n" + GOOD, r"p\.txt:2: 0 numbers"),
+        (GOOD * 2 + "1 0 0 0 0 1 0 0 0 0 1 x\n", r"p\.txt:3: no numbers"),
+        (GOOD + "1 0 0 nan 0 1 0 0 0 0 1 0\n", r"p\.txt:2: not finite"),
+        ("2 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
+        ("-1 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
+        ("1 0 0 5e6 0 1 0 0 0 0 1 0\n", r"p\.txt:1: farther than 100 km"),
+        ("\u00e9", "no text"),
+    ],
+)
+def test_a_bad_file_is_named_with_its_line(tmp_path, text, named):
+    path = tmp_path / "p.txt"
+    if text is not None:
+        path.write_text(text, encoding="utf-8")
+    with pytest.raises(MisuseError, match=named):
+        read_poses(path)
+
+
+def test_poses_of_a_camera_are_brought_to_the_sensor_and_others_taken_as_they_are(tmp_path):
+    frame = next(iter(open_stream(layouts.bare(tmp_path))))
+    T_sensor = se3(rotation_zyx(0.01, -0.02, 0.7), np.array([3.0, -2.0, 0.1]))
+    path = write(tmp_path / "p.txt", [T_CAMERA_SENSOR @ T_sensor @ inverse(T_CAMERA_SENSOR)])
+    np.testing.assert_allclose(ListedPoses(path, CAMERA, 1).pose(frame), T_sensor, atol=1e-9)
+    path = write(tmp_path / "q.txt", [T_sensor])
+    np.testing.assert_allclose(ListedPoses(path, None, 1).pose(frame), T_sensor, atol=1e-9)
+
+
+def test_a_line_belongs_to_the_frame_of_its_number(tmp_path):
+    stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
+    path = write(tmp_path / "p.txt", [se3(np.eye(3), np.array([0.0, 0.0, float(k)])) for k in range(5)])
+    posed = PosedStream(stream, ListedPoses(path, stream.info.camera, stream.info.end))
+    # z of this camera is x of the sensor
+    assert [f.T_world_sensor[0, 3] for f in posed] == [0, 1, 4]
+    assert [f.T_world_sensor[0, 3] for f in posed.between(1, 5)] == [1, 4]
+
+
+def test_too_few_lines_are_named_before_the_start(tmp_path):
+    stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
+    path = write(tmp_path / "p.txt", [np.eye(4)] * 3)
+    with pytest.raises(MisuseError, match="3 poses, too few for frame 4"):
+        ListedPoses(path, None, stream.info.end)
+    assert ListedPoses(path, None, stream.between(0, 2).info.end)
+    endless = dataclasses.replace(stream.info, end=None)
+    posed = PosedStream(stream, ListedPoses(path, None, endless.end))
+    with pytest.raises(MisuseError, match="too few for frame 4"):
+        list(posed)
+
+
+def test_the_streams_own_may_be_kept_or_switched_off(tmp_path):
+    stream = open_stream(layouts.raw_drive(tmp_path))
+    own, none = PosedStream(stream, OwnOdometry()), PosedStream(stream, NoOdometry())
+    assert (own.info.has_poses, none.info.has_poses) == (True, False)
+    assert all(f.T_world_sensor is None for f in none)
+    for a, b in zip(own, stream, strict=True):
+        np.testing.assert_array_equal(a.T_world_sensor, b.T_world_sensor)
+        assert a.points.tobytes() == b.points.tobytes()
+
+
+def test_faults_of_the_stream_are_those_of_the_posed_one(tmp_path):
+    drive = layouts.raw_drive(tmp_path)
+    (drive / "velodyne_points" / "data" / f"{1:010d}.bin").write_bytes(b"short")
+    posed = PosedStream(open_stream(drive), NoOdometry()).between(0, 3)
+    list(posed)
+    assert [f.frame for f in posed.faults] == [1]
+
+
+def test_the_poses_beside_a_sequence_given_again_are_the_same(tmp_path):
+    sequence = layouts.odometry(tmp_path)
+    before = [f.T_world_sensor for f in open_stream(sequence)]
+    path = shutil.copy(sequence / "poses.txt", tmp_path / "again.txt")
+    (sequence / "poses.txt").unlink()
+    stream = open_stream(sequence)
+    posed = PosedStream(stream, ListedPoses(path, stream.info.camera, stream.info.end))
+    np.testing.assert_allclose([f.T_world_sensor for f in posed], before, atol=1e-12)

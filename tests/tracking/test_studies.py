@@ -1,0 +1,133 @@
+"""The tools that judge tracking, and what they find on small scenes."""
+
+import sys
+
+import numpy as np
+import pytest
+
+import ego_drift
+from filter_consistency import Life, consistency, errors, lives, normalised, study
+from modt.geometry import rotation_zyx, se3
+from modt.sources.recognise import open_stream
+from modt.sources.synthetic.drive import DriveWriter
+from modt.sources.synthetic.stream import SyntheticStream
+from modt.tracking.memory import NoMemory
+from modt.types import NONE, Proposals
+from study_inheritance import Tally, table_of
+from truth_replay import owners, replay
+
+
+@pytest.fixture(scope="module", name="crossing")
+def a_small_crossing():
+    """People, cyclists and cars, by a cheap sensor."""
+    return SyntheticStream("crossing", "vlp-16", 3.0, seed=1)
+
+
+def drawn(rng, n, scale):
+    """A track that follows a point 0.3 m beside a walker's middle, with errors as its covariance says, scaled."""
+    heading = np.full(n, 0.7)
+    pose = np.c_[np.arange(n) * 0.1, np.zeros(n), heading, np.full(n, 1.2)]
+    A = rng.normal(0, 0.2, (n, 4, 4))
+    P = A @ A.transpose(0, 2, 1) + 0.01 * np.eye(4)
+    error = scale * np.einsum("nij,nj->ni", np.linalg.cholesky(P), rng.normal(0, 1, (n, 4)))
+    beside = 0.3 * np.array([-np.sin(0.7), np.cos(0.7)])
+    x = pose + error
+    x[:, :2] += beside
+    return Life("pedestrian, moving", x, P, pose)
+
+
+def test_errors_as_large_as_they_should_be_are_consistent_and_others_are_not():
+    rng = np.random.default_rng(0)
+    for scale, fits in ((1.0, True), (1.6, False), (0.5, False)):
+        found = study([drawn(rng, 60, scale) for _ in range(80)])["pedestrian, moving"]
+        for part in found.values():
+            assert (part.low < part.mean < part.high) is fits
+            assert (abs(part.beyond - 0.05) < 0.02) is fits
+
+
+def test_normalised_errors_are_what_the_slow_way_says():
+    life = drawn(np.random.default_rng(1), 7, 1.0)
+    place, _ = errors(life)
+    slow = [e @ np.linalg.inv(P) @ e for e, P in zip(place, life.P[:, :2, :2], strict=True)]
+    np.testing.assert_allclose(normalised(place, life.P[:, :2, :2]), slow)
+    np.testing.assert_allclose(consistency([place], [life.P[:, :2, :2]]).mean, np.mean(slow))
+
+
+def test_a_point_fixed_on_a_body_that_turns_is_no_error():
+    heading = np.linspace(0, 2, 9)
+    pose = np.c_[np.zeros((9, 2)), heading, np.ones(9)]
+    x = pose.copy()
+    x[:, :2] = np.c_[np.cos(heading), np.sin(heading)]  # always one metre ahead
+    place, _ = errors(Life("car, moving", x, np.tile(np.eye(4), (9, 1, 1)), pose))
+    np.testing.assert_allclose(place, 0, atol=1e-12)
+
+
+def test_walkers_are_nearly_where_the_filter_says_they_are(crossing):
+    """Two would be consistent; by the smaller shift of both ends alone it is 32 and 0.3 m."""
+    found = study(lives(crossing, replay(crossing, "vlp-16")))["pedestrian, moving"]
+    place, motion = found["place"], found["motion"]
+    assert place.tracks >= 10
+    assert place.low < place.mean < 8
+    assert place.beyond < 0.3
+    assert place.rms < 0.2
+    assert motion.beyond < 0.3
+
+
+def test_both_sides_of_remembered_background_are_counted(crossing):
+    kind_of = np.array([int(body.kind.object_class) for body in crossing.simulator.world.bodies])
+    on, off = Tally(), Tally()
+    on.add(replay(crossing, "vlp-16"), kind_of)
+    off.add(replay(crossing, "vlp-16", memory=NoMemory()), kind_of)
+    assert on.proposals == off.proposals
+    assert off.inherited == sum(off.wrong.values()) == len(off.frames_wrong) == 0
+    assert 0 < on.inherited <= on.born
+    assert on.calls < off.calls
+    assert sum(on.wrong.values()) == len(on.frames_wrong) <= on.inherited
+    assert all(n >= 1 for n in on.frames_wrong)
+    assert table_of(on, off).count("\n") == 6
+
+
+def test_the_owner_of_a_proposal_is_the_body_of_most_of_its_points():
+    instance = np.array([3, 3, 7, NONE, NONE, 7, 7])
+    none = np.zeros(3, np.bool_)
+    members, offsets = np.arange(7), np.array([0, 3, 5, 7])
+    body, share = owners(Proposals(members, offsets, np.zeros((3, 3)), np.zeros((3, 7)), none, none), instance)
+    assert body.tolist() == [3, NONE, 7]
+    np.testing.assert_allclose(share, [2 / 3, 1.0, 1.0])
+    assert [len(a) for a in owners(Proposals.empty(), instance)] == [0, 0]
+
+
+def circle(n, radius=20.0, scale=1.0, turn=1.0):
+    angle = np.linspace(0, turn, n)
+    place = scale * radius * np.c_[np.sin(angle), 1 - np.cos(angle), np.zeros(n)]
+    return np.array([se3(rotation_zyx(0, 0, a), p) for a, p in zip(angle, place, strict=True)])
+
+
+def test_drift_is_told_by_way_end_and_heading():
+    reference = circle(200)
+    elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([5.0, 6.0, 0.0])) @ reference
+    assert all(abs(v) < 1e-9 for v in ego_drift.drift(elsewhere, reference).values())
+    longer = ego_drift.drift(circle(200, scale=1.02), reference)
+    assert longer["way_percent"] == pytest.approx(2.0)
+    assert longer["end_percent"] == pytest.approx(2.0 * 2 * np.sin(0.5), rel=1e-4)  # chord over arc
+    assert longer["heading_deg"] == pytest.approx(0.0, abs=1e-9)
+    assert ego_drift.drift(circle(200, turn=1.01), reference)["heading_deg"] == pytest.approx(np.rad2deg(0.01))
+
+
+def test_the_drift_of_a_written_drive_is_small_against_positions_and_velocities(tmp_path, monkeypatch, capsys):
+    stream = SyntheticStream("street", "vlp-16", 2.0, seed=2)
+    writer = DriveWriter(tmp_path, stream)
+    for frame, truth in stream.sweeps():
+        writer.write(frame, truth)
+    writer.close()
+    indices = [s.index for s in open_stream(writer.drive).scans]
+    positions = np.array([s.T_world_sensor for s in open_stream(writer.drive).scans])
+    assert abs(ego_drift.drift(ego_drift.integrated(writer.drive, indices), positions)["end_percent"]) < 0.5
+    monkeypatch.setattr(sys, "argv", ["ego_drift", str(writer.drive), str(writer.drive), "--no-kiss"])
+    ego_drift.main()
+    said = capsys.readouterr().out
+    assert "means over 2 drives" in said
+    assert "proposals, camera against OXTS positions" in said
+    figures = ego_drift.drift(ego_drift.by_proposals(open_stream(writer.drive), camera=False), positions)
+    assert abs(figures["heading_deg"]) < 1.0
+    assert abs(figures["end_percent"]) < 5.0
