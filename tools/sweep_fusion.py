@@ -1,6 +1,7 @@
 """Sweep the parameters of key views and fusion over drives with truth, followed by an ideal tracker.
 
-    sweep_fusion.py [--world SCENE:SEED ...] [--check SCENE:SEED ...] [--frames N] [--model NAME] [--page FILE]
+    sweep_fusion.py [--world SCENE:SEED ...] [--check SCENE:SEED ...] [--frames N] [--model NAME] [--page FILE] [--docs]
+    sweep_fusion.py --paper
     sweep_fusion.py --drive KITTI_RAW_DRIVE [--model NAME]
 
 Each drive is segmented and classified once; every setting then replays the fusion of the runtime over what the network
@@ -20,7 +21,9 @@ import argparse
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +44,8 @@ from synthetic_scans import scan_of
 WORLDS = ("street:2001", "street:2002", "crossing:2003")
 CHECKS = ("street:3001", "street:3002", "crossing:3003", "street:3004", "street:3005", "crossing:3006")
 PERIOD_S = 0.1
+DOCUMENT = Path(__file__).parent.parent / "docs" / "classification.md"
+BEGIN, END = "<!-- tools/sweep_fusion.py -->\n", "<!-- end of tools/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
 ALPHAS = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
 SWEEPS: dict[str, tuple[float | None, ...]] = {
@@ -50,8 +55,11 @@ SWEEPS: dict[str, tuple[float | None, ...]] = {
     "background_threshold": (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
     "view_weight": (0.25, 0.5, 0.75, 1.0),
     "reopen_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
-    "reopen_points": (50, 100, 200, 400, 800),
+    "reopen_points": (30, 50, 100, 200, 400, 800),
 }
+NO_BETTER = "No setting is better on both sets at no more calls."
+DOUBTS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
+"""Ratio and points together: to doubt sooner costs calls, to doubt only what was seen far away saves them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,20 +106,36 @@ def variants(config: FusionConfig) -> list[Setting]:
 
 
 def sweeps(config: FusionConfig) -> Iterator[Setting]:
-    """One value at a time, the others as configured."""
+    """One value at a time, the others as configured; of doubt both that there are."""
     for k, name in enumerate(OBJECTS):
         for value in sorted({*ALPHAS, config.alpha[k]}):
             alpha = (*config.alpha[:k], value, *config.alpha[k + 1 :])
-            yield _moved(config, f"alpha of {name}", "alpha", alpha, value)
+            yield _moved(config, f"alpha of {name}", _text(value), alpha=alpha)
     for key, values in SWEEPS.items():
         for moved in values:
-            yield _moved(config, key, key, moved, moved)
+            yield _moved(config, key, _text(moved), **{key: moved})
+    for ratio, points in DOUBTS if config.reopen_ratio is not None else ():
+        changes = {"reopen_ratio": ratio, "reopen_points": points}
+        yield _moved(config, "reopen_ratio, reopen_points", f"{ratio:g}, {points}", **changes)
 
 
-def _moved(config: FusionConfig, sweep: str, key: str, content: object, value: float | None) -> Setting:
-    moved = dataclasses.replace(config, **{key: content})
-    text = "none" if value is None else f"{value:g}"
+def _moved(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
+    moved = dataclasses.replace(config, **changes)
     return Setting(sweep, f"{text} *" if moved == config else text, lambda: KeyViews(moved))
+
+
+def _text(value: float | None) -> str:
+    return "none" if value is None else f"{value:g}"
+
+
+def papers(config: ProfileConfig) -> ProfileConfig:
+    """Alpha alone makes a view independent, from the first frame on, and nothing settled is doubted."""
+    off = {"bearing_deg": 180.0, "range_ratio": 10.0, "extent_ratio": 10.0, "reopen_ratio": None}
+    return dataclasses.replace(
+        config,
+        fusion=dataclasses.replace(config.fusion, **off),
+        tracking=dataclasses.replace(config.tracking, ask_from=1),
+    )
 
 
 def world(name: str, frames: int, config: ProfileConfig, network: PointNet) -> Recording:
@@ -156,14 +180,44 @@ def better(results: Sequence[Tried], default: Tried) -> list[Tried]:
 
 
 def table(title: str, results: Sequence[Tried], default: Tried, *, named: bool = False) -> str:
-    """Aligned for reading, and Markdown for the pages."""
-    sets = ("", ", checked")[: len(default.outcomes)]
-    head = [title, *(f"{name}{of}" for of in sets for name in (*OBJECTS, "mean", "calls")), "drives better, worse"]
-    rows = [head, ["---"] * len(head)]
+    """A line for each setting: precision, calls, on how many drives it is better and worse than the default."""
+    head = [title, *OBJECTS, "mean", "calls", *(("mean, checked", "calls, checked") if default.checked else ())]
+    rows = []
     for result in results:
         name = f"{result.setting.sweep} {result.setting.value}" if named else result.setting.value
-        cells = [cell for outcome in result.outcomes for cell in _cells(outcome)]
+        cells = _cells(result.found) + (_cells(result.checked)[len(OBJECTS) :] if result.checked else [])
         rows.append([name, *cells, _drives(result, default)])
+    return aligned([*head, "better, worse"], rows)
+
+
+def spans(results: Sequence[Tried]) -> str:
+    """A line for each sweep: how far it moves mean precision and calls, and where precision is best."""
+    rows = []
+    for sweep, members in by_sweep(results).items():
+        mean = [100 * r.found.mean for r in members]
+        calls = [100 * r.found.share for r in members]
+        best = [
+            max(members, key=lambda r, k=k: r.outcomes[k].mean).setting.value
+            for k in range(len(members[0].outcomes))
+        ]
+        values = f"{members[0].setting.value} to {members[-1].setting.value}".replace(" *", "")
+        ends = [f"{min(mean):.1f} to {max(mean):.1f}", f"{min(calls):.1f} to {max(calls):.1f} %"]
+        rows.append([sweep, values, *ends, *best])
+    head = ["swept", "values", "mean", "calls", "best", "best, checked"]
+    return aligned(head[: len(rows[0])] if rows else head, rows)
+
+
+def by_sweep(results: Sequence[Tried]) -> dict[str, list[Tried]]:
+    """The settings of each sweep."""
+    parts: dict[str, list[Tried]] = {}
+    for result in results:
+        parts.setdefault(result.setting.sweep, []).append(result)
+    return parts
+
+
+def aligned(head: list[str], body: Sequence[list[str]]) -> str:
+    """A table for reading, and Markdown for the pages."""
+    rows = [head, ["---"] * len(head), *body]
     width = [max(len(row[k]) for row in rows) for k in range(len(head))]
     return "\n".join(
         "| " + " | ".join(f"{cell:{'<' if k == 0 else '>'}{width[k]}}" for k, cell in enumerate(row)) + " |"
@@ -186,11 +240,8 @@ def _drives(result: Tried, default: Tried) -> str:
 
 def drawn(results: Sequence[Tried], title: str, subtitle: str) -> str:
     """A page with average precision against calls, sweep by sweep."""
-    by_sweep: dict[str, list[Tried]] = {}
-    for result in results:
-        by_sweep.setdefault(result.setting.sweep, []).append(result)
     items = []
-    for sweep, members in by_sweep.items():
+    for sweep, members in by_sweep(results).items():
         calls = np.array([100 * r.found.share for r in members])
         traces = [
             svg.Trace(name, calls, np.array([100 * r.found.precision.get(name, np.nan) for r in members]))
@@ -204,6 +255,27 @@ def drawn(results: Sequence[Tried], title: str, subtitle: str) -> str:
     return page.page(title, subtitle, [page.plots(items)])
 
 
+def report(first: Sequence[Tried], moved: Sequence[Tried], about: str) -> tuple[str, str]:
+    """What belongs into the docs, and everything; the defaults are the last of the first."""
+    default = first[-1]
+    total = max(sum(default.found.calls.values()), 1)
+    reasons = ", ".join(f"{100 * n / total:.0f} are {why}" for why, n in default.found.calls.items())
+    short = [about, table(first[0].setting.sweep, first, default), f"Of 100 calls {reasons}."]
+    whole = [*short, *(table(sweep, members, default) for sweep, members in by_sweep(moved).items())]
+    if moved:
+        winners = better(moved, default)
+        ends = [spans(moved), table("better at no more calls", winners, default, named=True) if winners else NO_BETTER]
+        short += ends
+        whole += [table("front of precision and calls", front([*first, *moved]), default, named=True), *ends]
+    return "\n\n".join(short), "\n\n".join(whole)
+
+
+def renewed(text: str, section: str) -> str:
+    """The document with this section between its marks."""
+    before, rest = text.split(BEGIN)
+    return f"{before}{BEGIN}\n{section}\n\n{END}{rest.split(END)[1]}"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--world", nargs="+", default=WORLDS, metavar="SCENE:SEED", help="to sweep over")
@@ -213,13 +285,15 @@ def main() -> None:
     parser.add_argument("--confirm", action="store_true", help="open the test drive, to confirm what is settled")
     parser.add_argument("--model", default="pointnet-kitti")
     parser.add_argument("--profile", default=profile.DEFAULT)
-    parser.add_argument("--ask-from", type=int, help="frames before a class is asked for; default: the profile's")
+    parser.add_argument("--paper", action="store_true", help="as the paper swept alpha and the starting frame")
     parser.add_argument("--page", type=Path, help="draw precision against calls into this HTML file")
+    parser.add_argument("--docs", action="store_true", help="renew the figures of docs/classification.md")
     args = parser.parse_args()
     testing = args.drive is not None and args.drive.resolve().name == TEST_DRIVE
     if testing and not args.confirm:
         parser.error(f"{TEST_DRIVE} is the test drive: tune elsewhere, and give --confirm to confirm what is settled")
-    config = profile.load(args.profile)
+    shipped = profile.load(args.profile)
+    config = papers(shipped) if args.paper else shipped
     network = PointNet(dataclasses.replace(config.classification, model=args.model), config.sensor)
     if args.drive:
         drives, checks = [real(args.drive, config, network, confirm=args.confirm)], []
@@ -227,21 +301,15 @@ def main() -> None:
         drives, checks = (
             [world(name, args.frames, config, network) for name in names] for names in (args.world, args.check)
         )
-    judged_from = config.tracking.ask_from
-    when = (judged_from if args.ask_from is None else args.ask_from, judged_from)
+    when = config.tracking.ask_from, shipped.tracking.ask_from
     first = [tried(setting, drives, checks, *when) for setting in variants(config.fusion)]
-    default = first[-1]
     moved = [] if testing else [tried(setting, drives, checks, *when) for setting in sweeps(config.fusion)]
-    about = f"{network.path.name}, {', '.join(d.name for d in drives)}"
-    about += f"; checked on {', '.join(d.name for d in checks)}" if checks else ""
-    print(f"{about}\nproposals: {', '.join(str(d.n_proposals) for d in (*drives, *checks))}\n")
-    print(table(first[0].setting.sweep, first, default))
-    total = max(sum(default.found.calls.values()), 1)
-    print(f"\nOf 100 calls: {', '.join(f'{100 * n / total:.0f} {why}' for why, n in default.found.calls.items())}.")
-    for sweep in dict.fromkeys(result.setting.sweep for result in moved):
-        print("\n" + table(sweep, [r for r in moved if r.setting.sweep == sweep], default))
-    print("\n" + table("front of precision and calls", front([*first, *moved]), default, named=True))
-    print("\n" + table("better at no more calls", better(moved, default), default, named=True))
+    about = f"`{network.path.stem}` on {', '.join(d.name for d in drives)}"
+    about += f";\nchecked on {', '.join(d.name for d in checks)}." if checks else "."
+    short, whole = report(first, moved, about)
+    print(whole)
+    if args.docs:
+        DOCUMENT.write_text(renewed(DOCUMENT.read_text(encoding="utf-8"), short), encoding="utf-8")
     if args.page:
         page.save(args.page, drawn(moved, "Fusion: precision against calls", about))
 
