@@ -1,14 +1,14 @@
 """A drive segmented, followed by its truth and classified once, and played back for whatever comes after that.
 
 So that only key views and fusion act, the tracker is an ideal one: a proposal goes to the true object that holds most
-of its points; of several, the one with the most points. What belongs to no object, and what broke off one, is followed
-by our own tracker.
+of its points; of several, the one with the most points. What belongs to no object, and what broke off one, is
+followed by our own tracker.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,11 @@ class Recording:
     def n_proposals(self) -> int:
         """Calls of tracking by detection, which classifies whatever it sees."""
         return sum(len(moment.proposals) for moment in self.moments)
+
+    def judged_from(self, points: int) -> Recording:
+        """The same drive, of which only proposals of so many points are judged."""
+        large = (replace(m, judged=m.judged & (m.proposals.count >= points)) for m in self.moments)
+        return replace(self, moments=tuple(large))
 
 
 def record(name: str, drive: Iterable[tuple[Frame, Scan]], config: ProfileConfig, network: Classifier) -> Recording:

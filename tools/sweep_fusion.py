@@ -1,18 +1,21 @@
 """Sweep the parameters of key views and fusion over drives with truth, followed by an ideal tracker.
 
-    sweep_fusion.py [--world SCENE:SEED ...] [--check SCENE:SEED ...] [--frames N] [--model NAME] [--page FILE] [--docs]
+    sweep_fusion.py [--world SCENE:SEED ...] [--check SCENE:SEED ...] [--frames N] [--points N] [--page FILE] [--docs]
     sweep_fusion.py --paper
-    sweep_fusion.py --drive KITTI_RAW_DRIVE [--model NAME]
+    sweep_fusion.py --drive KITTI_RAW_DRIVE
 
-Each drive is segmented and classified once; every setting then replays the fusion of the runtime over what the network
-said. The defaults of the profile stand in every table; one value at a time is moved away from them. Average precision
-over the proposals that are clearly one object or clearly none, from the frame in which a class is asked for; calls
-relative to tracking by detection. No network was trained on the worlds (tools/build_models.py takes seeds from 100000
-on). What --world suggests --check must confirm: these are other worlds.
+Each drive is segmented and classified once; every setting then replays the fusion of the runtime over what the
+network said. The defaults of the profile stand in every table; one value at a time is moved away from them. Average
+precision over the proposals that are clearly one object or clearly none, from the frame in which a class is asked
+for; calls relative to tracking by detection. No network was trained on the worlds (tools/build_models.py takes seeds
+from 100000 on). What --world suggests --check must confirm: these are other worlds.
+
+--paper is the setting of Figs. 10 and 11: asked from the first frame, the number of points alone makes a view
+independent, and a class that is settled stays so. --docs writes what belongs there into docs/classification.md.
 
 A KITTI drive with tracklets stands in for the worlds, in the camera's view. Drive 0001 is five scans, of those that
-pointnet-kitti was trained on. Drive 0005 is the test drive: it is refused unless --confirm is given, and then nothing is
-swept on it.
+pointnet-kitti was trained on. Drive 0005 is the test drive: it is refused unless --confirm is given, and then nothing
+is swept on it.
 """
 
 from __future__ import annotations
@@ -197,8 +200,7 @@ def spans(results: Sequence[Tried]) -> str:
         mean = [100 * r.found.mean for r in members]
         calls = [100 * r.found.share for r in members]
         best = [
-            max(members, key=lambda r, k=k: r.outcomes[k].mean).setting.value
-            for k in range(len(members[0].outcomes))
+            max(members, key=lambda r, k=k: r.outcomes[k].mean).setting.value for k in range(len(members[0].outcomes))
         ]
         values = f"{members[0].setting.value} to {members[-1].setting.value}".replace(" *", "")
         ends = [f"{min(mean):.1f} to {max(mean):.1f}", f"{min(calls):.1f} to {max(calls):.1f} %"]
@@ -264,7 +266,10 @@ def report(first: Sequence[Tried], moved: Sequence[Tried], about: str) -> tuple[
     whole = [*short, *(table(sweep, members, default) for sweep, members in by_sweep(moved).items())]
     if moved:
         winners = better(moved, default)
-        ends = [spans(moved), table("better at no more calls", winners, default, named=True) if winners else NO_BETTER]
+        ends = [
+            spans(moved),
+            table("better at no more calls", winners, default, named=True) if winners else NO_BETTER,
+        ]
         short += ends
         whole += [table("front of precision and calls", front([*first, *moved]), default, named=True), *ends]
     return "\n\n".join(short), "\n\n".join(whole)
@@ -286,6 +291,7 @@ def main() -> None:
     parser.add_argument("--model", default="pointnet-kitti")
     parser.add_argument("--profile", default=profile.DEFAULT)
     parser.add_argument("--paper", action="store_true", help="as the paper swept alpha and the starting frame")
+    parser.add_argument("--points", type=int, default=0, help="judge only proposals of so many points or more")
     parser.add_argument("--page", type=Path, help="draw precision against calls into this HTML file")
     parser.add_argument("--docs", action="store_true", help="renew the figures of docs/classification.md")
     args = parser.parse_args()
@@ -301,6 +307,7 @@ def main() -> None:
         drives, checks = (
             [world(name, args.frames, config, network) for name in names] for names in (args.world, args.check)
         )
+    drives, checks = ([d.judged_from(args.points) for d in of] for of in (drives, checks))
     when = config.tracking.ask_from, shipped.tracking.ask_from
     first = [tried(setting, drives, checks, *when) for setting in variants(config.fusion)]
     moved = [] if testing else [tried(setting, drives, checks, *when) for setting in sweeps(config.fusion)]
