@@ -199,14 +199,17 @@ def spans(results: Sequence[Tried]) -> str:
     for sweep, members in by_sweep(results).items():
         mean = [100 * r.found.mean for r in members]
         calls = [100 * r.found.share for r in members]
-        best = [
-            max(members, key=lambda r, k=k: r.outcomes[k].mean).setting.value for k in range(len(members[0].outcomes))
-        ]
+        best = [_best(members, k).setting.value for k in range(len(members[0].outcomes))]
         values = f"{members[0].setting.value} to {members[-1].setting.value}".replace(" *", "")
         ends = [f"{min(mean):.1f} to {max(mean):.1f}", f"{min(calls):.1f} to {max(calls):.1f} %"]
         rows.append([sweep, values, *ends, *best])
     head = ["swept", "values", "mean", "calls", "best", "best, checked"]
     return aligned(head[: len(rows[0])] if rows else head, rows)
+
+
+def _best(members: Sequence[Tried], k: int) -> Tried:
+    """The most precise of a sweep on one set of drives, to the digit that is shown; the default among equals."""
+    return max(members, key=lambda r: (round(100 * r.outcomes[k].mean, 1), r.setting.value.endswith("*")))
 
 
 def by_sweep(results: Sequence[Tried]) -> dict[str, list[Tried]]:
@@ -298,6 +301,10 @@ def main() -> None:
     testing = args.drive is not None and args.drive.resolve().name == TEST_DRIVE
     if testing and not args.confirm:
         parser.error(f"{TEST_DRIVE} is the test drive: tune elsewhere, and give --confirm to confirm what is settled")
+    if args.docs and (args.paper or args.drive or args.points):
+        parser.error(
+            "--docs writes the figures of the whole sweep over worlds: leave out --paper, --drive and --points"
+        )
     shipped = profile.load(args.profile)
     config = papers(shipped) if args.paper else shipped
     network = PointNet(dataclasses.replace(config.classification, model=args.model), config.sensor)
@@ -311,7 +318,7 @@ def main() -> None:
     when = config.tracking.ask_from, shipped.tracking.ask_from
     first = [tried(setting, drives, checks, *when) for setting in variants(config.fusion)]
     moved = [] if testing else [tried(setting, drives, checks, *when) for setting in sweeps(config.fusion)]
-    about = f"`{network.path.stem}` on {', '.join(d.name for d in drives)}"
+    about = f"`{network.path.stem}` ({network.sha256[:8]}) on {', '.join(d.name for d in drives)}"
     about += f";\nchecked on {', '.join(d.name for d in checks)}." if checks else "."
     short, whole = report(first, moved, about)
     print(whole)
