@@ -20,8 +20,8 @@ from modt.types import NONE, Bool, Float64, Int, ObjectClass
 
 ROOM_M = np.array([[6.0, 2.7], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
 """Greatest length and width of one object of each class; what counts as background may be a car not known as one."""
-APART_MPS = 1.5
-"""Parts of one object do not differ so much in velocity."""
+APART_MPS, SIGMAS = 1.5, 2.0
+"""Parts of one object do not differ so much in velocity, and by so many standard deviations of their speeds."""
 WITHIN = 0.6
 """Part of one that must lie within what is known of the other."""
 LESS = 1.2
@@ -57,8 +57,8 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
 
 
 def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
-    """Rows, eldest first, that are classified and now without a proposal, or with less than was seen before."""
-    rows = np.flatnonzero(tracks.fixed | (tracks.views > 0))
+    """Rows, eldest first, of what was seen more than once and is now not seen, or less of it than before."""
+    rows = np.flatnonzero(tracks.hits > 1)
     own = proposal[rows]
     now = girth(sightings.low, sightings.high)[own]
     known = girth(tracks.hull_low, tracks.hull_high)[rows]
@@ -79,6 +79,9 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
     larger = np.flatnonzero(junior & (rival != elder) & (sightings.count[part] > size[elder]))
     larger = larger[_free(tracks, elder[larger], rival[larger])]
+    person = ROOM_M[ObjectClass.PEDESTRIAN, 0]
+    stout = (sightings.box[part[larger], 3] > person) & (tracks.box[elder[larger], 3] > person)
+    larger = larger[stout | _gives_way(tracks, elder[larger], rival[larger])]
     i, elder, part = i[larger], elder[larger], part[larger]
     moved = tracks.x[elder, :2] - tracks.shown[elder]
     box = tracks.box[elder]
@@ -98,7 +101,8 @@ def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
     bulky = (class_ <= ObjectClass.CAR) & (other <= ObjectClass.CAR)  # one is easily taken for the other
     alike = ~tracks.fixed[rival] | (class_ == other) | bulky
     (vx, vy), (wx, wy) = (_velocity(tracks.x[rows]) for rows in (elder, rival))
-    together = np.hypot(wx - vx, wy - vy) <= APART_MPS
+    doubt = SIGMAS * np.sqrt(tracks.P[elder, SPEED, SPEED] + tracks.P[rival, SPEED, SPEED])
+    together = np.hypot(wx - vx, wy - vy) <= APART_MPS + doubt
     free: Bool = (rival == NONE) | alike & (together | (tracks.hits[rival] < SETTLED))
     return free
 
@@ -106,6 +110,13 @@ def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
 def _velocity(x: Float64) -> tuple[Float64, Float64]:
     """(k,) x and (k,) y of the velocities of states (k, 4) [m/s]."""
     return x[:, SPEED] * np.cos(x[:, HEADING]), x[:, SPEED] * np.sin(x[:, HEADING])
+
+
+def _gives_way(tracks: Followed, elder: Int, rival: Int) -> Bool:
+    """(k,) whether a part that may be a person goes to the elder: nobody settled has it, or the elder is a car."""
+    car = tracks.fixed[elder] & (tracks.posterior[elder].argmax(axis=1) == ObjectClass.CAR)
+    way: Bool = (rival == NONE) | (tracks.hits[rival] < SETTLED) | car
+    return way
 
 
 def _fits(a: Float64, b: Float64, room: Float64) -> Bool:
