@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +56,7 @@ class Scan:
         boxes: (B, 7) x, y, z of the middle of the foot, l, w, h, yaw, sensor frame, of each; NaN where unknown.
         fov: where labels are complete.
         unlabelled: (N,) points of which nothing is known.
+        numbers: of each object, the same in every scan of a drive; none where nobody follows them.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Scan:
     boxes: Float64
     fov: FieldOfView
     unlabelled: Bool
+    numbers: tuple[int, ...] = ()
 
 
 def inside(points: Float32, box: Float64) -> Bool:
@@ -148,19 +150,21 @@ def _in_regions(points: Float32, camera: Camera, regions: Float64) -> Bool:
     return hit
 
 
-def raw_scans(drive: Path) -> Iterator[Scan]:
-    """Scans of a KITTI raw drive with tracklets."""
-    assert drive.name != TEST_DRIVE, drive
+def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
+    """Scans of a KITTI raw drive with tracklets; of the test drive only to confirm what was found elsewhere."""
+    assert confirm or drive.name != TEST_DRIVE, drive
     camera = _raw_camera(drive.parent)
     tracklets = _tracklets(drive / "tracklet_labels.xml")
     for path in sorted((drive / "velodyne_points" / "data").glob("*.bin")):
         frame = int(path.stem)
-        here = [(kind, hwl, poses[frame - f0]) for kind, hwl, f0, poses in tracklets if f0 <= frame < f0 + len(poses)]
+        seen = [k for k, (_, _, first, poses) in enumerate(tracklets) if first <= frame < first + len(poses)]
+        here = [(kind, hwl, poses[frame - first]) for kind, hwl, first, poses in (tracklets[k] for k in seen)]
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         boxes = [[*pose[:3], hwl[2], hwl[1], hwl[0], pose[3]] for _, hwl, pose in here]
         name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
         kinds = [kind for kind, _, _ in here]
-        yield boxed(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
+        scan = boxed(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
+        yield replace(scan, numbers=tuple(seen))
 
 
 def semantic_scans(folder: Path) -> Iterator[Scan]:

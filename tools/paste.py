@@ -84,6 +84,7 @@ def pasted(scan: Scan, items: list[Item], tries: int, rng: Generator) -> Iterato
                 boxes=np.array(boxes),
                 fov=FieldOfView(),
                 unlabelled=unknown,
+                numbers=(),
             )
 
 

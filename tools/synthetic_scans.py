@@ -32,6 +32,7 @@ def scan_of(frame: Frame, truth: Truth, name: str, world: str, *, camera: bool) 
         truth.boxes - np.outer(truth.boxes[:, 5] / 2, np.eye(7)[2]),
         FieldOfView.of_camera(nominal_camera()) if camera else FieldOfView(),
         np.zeros(len(frame.points), np.bool_),
+        tuple(truth.bodies.tolist()),
     )
 
 

@@ -1,0 +1,162 @@
+"""A drive segmented, followed by its truth and classified once, and played back for whatever comes after that.
+
+So that only key views and fusion act, the tracker is an ideal one: a proposal goes to the true object that holds most
+of its points; of several, the one with the most points. What belongs to no object, and what broke off one, is
+followed by our own tracker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from build_crops import label
+from labelled import Scan
+from modt.config import ProfileConfig
+from modt.geometry import transform_boxes
+from modt.pipeline import Classifier
+from modt.segmentation.segmenter import Segmenter
+from modt.tracking.states import ACCURATE
+from modt.tracking.tracker import Tracker
+from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, Tracks
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What is known of one frame.
+
+    Attributes:
+        proposals: its segments.
+        box: (P, 7) their boxes in the world.
+        track: (P,) row of the ideal track of each.
+        likelihood: (P, 4) what the network says of each.
+        kind: (P,) true class.
+        judged: (P,) clearly one object, or clearly none.
+    """
+
+    proposals: Proposals
+    box: Float64
+    track: Int
+    likelihood: Float64
+    kind: Int
+    judged: Bool
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A drive: its moments, and how many ideal tracks they show."""
+
+    name: str
+    moments: tuple[Moment, ...]
+    n_tracks: int
+
+    @property
+    def n_proposals(self) -> int:
+        """Calls of tracking by detection, which classifies whatever it sees."""
+        return sum(len(moment.proposals) for moment in self.moments)
+
+    def judged_from(self, points: int) -> Recording:
+        """The same drive, of which only proposals of so many points are judged."""
+        large = (replace(m, judged=m.judged & (m.proposals.count >= points)) for m in self.moments)
+        return replace(self, moments=tuple(large))
+
+
+def record(name: str, drive: Iterable[tuple[Frame, Scan]], config: ProfileConfig, network: Classifier) -> Recording:
+    """Everything before fusion, once.
+
+    Args:
+        name: of the drive.
+        drive: frames, and their labels with the objects' numbers.
+        config: of segmentation and of our own tracker.
+        network: that says what each proposal is.
+    """
+    tracker = Tracker(config.tracking, ACCURATE)
+    rows: dict[tuple[str, int], int] = {}
+    moments = []
+    for frame, scan in drive:
+        proposals = Segmenter(config.segmentation, config.sensor, scan.fov).segment(frame.points)
+        own = tracker.follow(frame, proposals)
+        ids = own.id[own.row_of_proposal(len(proposals))]
+        keys = [
+            ("track", i) if body == NONE else ("body", body)
+            for i, body in zip(ids.tolist(), owners(scan, proposals).tolist(), strict=True)
+        ]
+        labels = label(scan, proposals)
+        moments.append(
+            Moment(
+                proposals=proposals,
+                box=transform_boxes(tracker.T_world_sensor, proposals.box),
+                track=np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64),
+                likelihood=network.classify(frame.points, proposals, np.arange(len(proposals))),
+                kind=labels.kind,
+                judged=~labels.partial & ~labels.unknown,
+            )
+        )
+    return Recording(name, tuple(moments), len(rows))
+
+
+def owners(scan: Scan, proposals: Proposals) -> Int:
+    """(P,) number of the object that each proposal shows most of, NONE where it is of none or a lesser piece."""
+    of = proposals.label(len(scan.points))
+    owner = np.full(len(proposals), NONE, np.int64)
+    for members, number in zip(scan.objects, scan.numbers, strict=True):
+        own = of[members]
+        shared = np.bincount(own[own != NONE], minlength=len(proposals))
+        pieces = np.flatnonzero(shared > 0.5 * proposals.count)
+        if len(pieces):
+            owner[pieces[shared[pieces].argmax()]] = number
+    return owner
+
+
+class Player:
+    """Segmenter, tracker and classifier of a pipeline, from a recording, frame by frame.
+
+    The table has a row for every track of the drive, before its birth and after its end as well.
+
+    Args:
+        recording: what to play.
+        ask_from: frames with a proposal before a track asks for a class.
+    """
+
+    state_names = ("followed",)
+
+    def __init__(self, recording: Recording, ask_from: int) -> None:
+        self._moments = iter(recording.moments)
+        self._ask_from = ask_from
+        self._tracks = Tracks.blank(recording.n_tracks)
+        self._tracks.id[:] = np.arange(recording.n_tracks)
+
+    def segment(self, points: Float32) -> Proposals:
+        """The next frame's proposals."""
+        self._moment = next(self._moments)
+        return self._moment.proposals
+
+    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
+        """Each to its track."""
+        t, rows = self._tracks, self._moment.track
+        t.proposal[:] = NONE
+        t.proposal[rows] = np.arange(len(rows))
+        t.box[rows], t.points[rows] = self._moment.box, proposals.count
+        t.hits[rows] += 1
+        t.age += t.hits > 0
+        t.missed = np.where(t.proposal == NONE, t.missed + 1, 0)
+        return t
+
+    def asking(self) -> Bool:
+        """(M,) tracks seen often enough, whose class is not settled."""
+        t = self._tracks
+        asks: Bool = (t.proposal != NONE) & ~t.fixed & (t.hits >= self._ask_from)
+        return asks
+
+    def settle(self, rows: Int, certain: Bool) -> None:
+        """Nothing: what is settled stands in the table already."""
+
+    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
+        """(R, 4) what the network said when the drive was recorded."""
+        return self._moment.likelihood[which]
+
+    def facts(self) -> dict[str, str]:
+        """No model runs."""
+        return {}
