@@ -1,6 +1,6 @@
 """Compare synthetic sweeps with real ones, figure by figure.
 
-    compare_synthetic.py KITTI_ROOT [--scene NAME ...] [--worlds N] [--drive DRIVE] [--markdown]
+    compare_synthetic.py KITTI_ROOT [--scene NAME ...] [--worlds N] [--sweeps N] [--real N]
 
 Real: the full scans of the object benchmark (or the frames of a raw drive with tracklets). Synthetic: a few sweeps
 of several worlds. Both go through the same segmentation and the same counting.
