@@ -87,6 +87,18 @@ def test_a_track_that_waits_for_its_class_is_followed_and_dies_like_others(track
     assert len(tracker.tracks) == 0
 
 
+@pytest.mark.parametrize(("seen", "patience"), [(2, 4), (3, 8)])
+def test_what_was_never_asked_for_is_given_up_sooner(seen, patience):
+    tracker = Tracker(TrackingConfig(ask_from=3, max_missed=8), EFFICIENT)
+    for i in range(seen):
+        tracker.follow(*frame_of([box(10, 0)], i, EYE))
+    for i in range(seen, seen + patience):
+        tracker.follow(*frame_of([], i, EYE))
+        assert len(tracker.tracks) == 1
+    tracker.follow(*frame_of([], seen + patience, EYE))
+    assert len(tracker.tracks) == 0
+
+
 def test_doubt_is_asked_again_until_it_is_gone():
     tracker = Tracker(TrackingConfig(ask_from=1), ACCURATE)
     tracker.follow(*frame_of([box(10, 0)], 0, EYE))

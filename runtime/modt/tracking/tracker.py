@@ -261,9 +261,13 @@ class Tracker:
         self._tracks = self._tracks.append(new)
 
     def _bury(self) -> None:
-        """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered."""
+        """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered.
+
+        What was not seen often enough to be asked for is deleted after half as many: nothing is known of it.
+        """
         t = self._tracks
-        expired = t.missed > self.config.max_missed
+        patience = np.where(t.hits < self.config.ask_from, self.config.max_missed // 2, self.config.max_missed)
+        expired = t.missed > patience
         rows = np.flatnonzero(expired)
         if not len(rows):
             return
