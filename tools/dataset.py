@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from modt.classification.crops import Crops
-from modt.types import Bool, Int
+from modt.types import N_CLASSES, NONE, Bool, Int
 
 SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
 """Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
@@ -84,3 +84,18 @@ def load(*paths: Path) -> Dataset:
         provenance=[json.loads(str(part["provenance"])) for part in parts],
         sha256=[hashlib.sha256(path.read_bytes()).hexdigest() for path in paths],
     )
+
+
+def folds(data: Dataset, k: int) -> Int:
+    """Fold of each drive, objects of the rare classes spread evenly; NONE where nothing is judged: always learnt."""
+    counted = len(data.truth_drive) > 0
+    drive, label = (data.truth_drive, data.truth_label) if counted else (data.drive, data.label)
+    weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
+    np.add.at(weight, (drive, label), 1.0)
+    weight /= weight.sum(axis=0).clip(1)
+    load_of, fold = np.zeros((k, N_CLASSES)), np.full(len(weight), NONE)
+    judged = np.unique(data.drive[data.variant == data.variant.min()])
+    for drive in judged[np.argsort(-weight[judged].max(axis=1), kind="stable")]:
+        fold[drive] = np.argmin((load_of + weight[drive]).max(axis=1) + load_of.sum(axis=1) * 1e-3)
+        load_of[fold[drive]] += weight[drive]
+    return fold

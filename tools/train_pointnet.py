@@ -23,9 +23,9 @@ from numpy.random import Generator
 
 from augment import Beams, augment, limit
 from calibration import Calibration, expected_error, fit
-from dataset import Dataset, load
+from dataset import Dataset, folds, load
 from modt.classification.crops import Crops, canonical
-from modt.types import CLASS_NAMES, N_CLASSES, NONE, Float64, Int
+from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
 from network import PointNet
 from scores import average_precision, confusion
 
@@ -111,21 +111,6 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     rng = np.random.default_rng(0)
     parts = [net(*tensors(limit(data.take(rows[i : i + BATCH]), POINTS, rng))) for i in range(0, len(rows), BATCH)]
     return torch.cat(parts).double().numpy()
-
-
-def folds(data: Dataset, k: int) -> Int:
-    """Fold of each drive, objects of the rare classes spread evenly; NONE where nothing is judged: always learnt."""
-    counted = len(data.truth_drive) > 0
-    drive, label = (data.truth_drive, data.truth_label) if counted else (data.drive, data.label)
-    weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
-    np.add.at(weight, (drive, label), 1.0)
-    weight /= weight.sum(axis=0).clip(1)
-    load_of, fold = np.zeros((k, N_CLASSES)), np.full(len(weight), NONE)
-    judged = np.unique(data.drive[data.variant == data.variant.min()])
-    for drive in judged[np.argsort(-weight[judged].max(axis=1), kind="stable")]:
-        fold[drive] = np.argmin((load_of + weight[drive]).max(axis=1) + load_of.sum(axis=1) * 1e-3)
-        load_of[fold[drive]] += weight[drive]
-    return fold
 
 
 def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:

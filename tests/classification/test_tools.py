@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from augment import Beams, augment, limit
 from build_crops import label
 from calibration import Calibration, expected_error, fit
+from dataset import SHIPPED, SYNTHETIC, Dataset, folds
 from labelled import Scan, argoverse_scans, inside
-from modt.classification.crops import gather
+from modt.classification.crops import Crops, gather
 from modt.geometry import FieldOfView
-from modt.types import ObjectClass, Proposals
+from modt.types import NONE, ObjectClass, Proposals
 from paste import Item, pasted
 from scores import average_precision, confusion
 from tests.classification.scenes import blobs
@@ -87,6 +88,19 @@ def test_argoverse_sweeps_are_moved_to_the_sensor(tmp_path: Path) -> None:
     np.testing.assert_allclose(scan.points[0, :3], [10.0, 0.0, -0.9], atol=1e-5)
     np.testing.assert_allclose(scan.boxes[0, :3], [10.15, 0.5, -1.75], atol=1e-5)
     assert len(scan.objects[0]) == 30
+
+
+def test_folds_split_what_is_judged_by_drive_and_learn_from_the_rest_always() -> None:
+    drive = np.array([0, 0, 1, 2, 3, 4, 4, 5])  # the last two drives are synthetic
+    variant = np.where(drive < 4, SHIPPED, SYNTHETIC)
+    label = np.array([1, 0, 2, 1, 0, 1, 0, 3])
+    none = np.zeros(len(drive), np.bool_)
+    crops = Crops(np.zeros((len(drive), 3), np.float32), np.arange(len(drive) + 1))
+    data = Dataset(crops, label, none, none, none, variant, drive, np.array([1, 2, 1]), np.array([0, 1, 2]), [], [])
+    fold = folds(data, 3)
+    assert (fold[4:] == NONE).all()
+    assert sorted(set(fold[:4].tolist())) == [0, 1, 2]
+    assert len(set(fold[:3].tolist())) == 3  # the objects are spread
 
 
 def test_inside_is_clear_of_the_ground_and_turned_with_the_box() -> None:
