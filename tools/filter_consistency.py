@@ -19,12 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from modt.cli.replay import frames as number_range
 from modt.geometry import wrap
 from modt.sources.synthetic.stream import SyntheticStream
 from modt.sources.synthetic.world import MOVING_MPS
 from modt.types import CLASS_NAMES, Float64
-from truth_replay import Seen, replay
+from truth_replay import Seen, add_drives, replay
 
 SETTLED = 6
 """Proposals that a track has had before it is judged."""
@@ -137,11 +136,7 @@ def study(all_lives: Sequence[Life]) -> dict[str, dict[str, Consistency]]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scene", nargs="+", default=["street", "crossing"])
-    parser.add_argument("--sensor", default="hdl-64e", help="there must be a profile of its name")
-    parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
-    parser.add_argument("--fov", choices=("camera", "full"), default="full")
+    add_drives(parser)
     arguments = parser.parse_args()
     found: list[Life] = []
     for seed in range(*arguments.seeds):

@@ -18,12 +18,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from modt.cli.assemble import MODES
-from modt.cli.replay import frames as number_range
 from modt.sources.synthetic.stream import SyntheticStream
 from modt.tracking.followed import Followed
 from modt.tracking.memory import NoMemory
 from modt.types import CLASS_NAMES, NONE, Int, ObjectClass
-from truth_replay import Seen, replay
+from truth_replay import Seen, add_drives, replay
 
 PURE = 0.5
 """Share of a proposal's points that make it one of their body."""
@@ -109,11 +108,7 @@ def table_of(with_memory: Tally, without: Tally) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scene", nargs="+", default=["street", "crossing"])
-    parser.add_argument("--sensor", default="hdl-64e", help="there must be a profile of its name")
-    parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
-    parser.add_argument("--fov", choices=("camera", "full"), default="full")
+    add_drives(parser)
     parser.add_argument("--mode", choices=tuple(MODES), default="efficient")
     arguments = parser.parse_args()
     for scene in arguments.scene:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from argparse import ArgumentParser
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from modt.cli import assemble
+from modt.cli.replay import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
@@ -35,6 +37,15 @@ class Seen:
     body: Int
     share: np.ndarray
     tracker: Tracker
+
+
+def add_drives(parser: ArgumentParser) -> None:
+    """Options that say which synthetic drives to study."""
+    parser.add_argument("--scene", nargs="+", default=["street", "crossing"])
+    parser.add_argument("--sensor", default="hdl-64e", help="there must be a profile of its name")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
+    parser.add_argument("--fov", choices=("camera", "full"), default="full")
 
 
 def replay(

@@ -3,7 +3,7 @@
 A pole before a car, or the edge of a bush, cuts it in two; each part has a track, and which of them is the larger
 changes from frame to frame. Two tracks of one class whose boxes fit together into the room of a single such object,
 one of them within what was once seen of the other or around it, are not two objects: the elder goes with the larger
-part, and takes the whole when only one is seen.
+part, and takes the whole when only one is seen. A part that may be a person, and has a settled track, stays with it.
 """
 
 from __future__ import annotations
