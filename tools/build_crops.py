@@ -21,11 +21,12 @@ from pathlib import Path
 import numpy as np
 
 import modt
-from dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC
+from dataset import CLUSTERED, NOBODYS, PASTED, SHIPPED, SYNTHETIC
 from labelled import Scan, argoverse_scans, object_scans, raw_scans, semantic_scans
 from modt import profile
 from modt.classification.crops import gather
 from modt.config import ProfileConfig
+from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Bool, Int, ObjectClass, Proposals
 from paste import library, pasted
@@ -97,7 +98,8 @@ class Writer:
         proposals = Segmenter(stage, self.config.sensor, scan.fov).segment(scan.points)
         labels = label(scan, proposals)
         objects = (labels.kind > 0) & ~labels.partial
-        kept = np.flatnonzero(objects if variant == PASTED else np.ones(len(proposals), np.bool_))
+        nobodys = labels.unknown & (labels.kind == 0) & ~labels.partial
+        kept = np.flatnonzero({PASTED: objects, NOBODYS: nobodys}.get(variant, np.ones(len(proposals), np.bool_)))
         crops = gather(scan.points, proposals, kept, MAX_POINTS)
         n = len(kept)
         row = {"xyz": crops.xyz, "count": crops.count, "label": labels.kind[kept].astype(np.int8)}
@@ -146,6 +148,7 @@ def add_kitti(writer: Writer, root: Path, pastes: int, seed: int) -> None:
         writer.add(scan, SHIPPED, judged=True)
         for scale in CELL_SCALES:
             writer.add(scan, CLUSTERED, scale)
+        writer.add(dataclasses.replace(scan, fov=FieldOfView()), NOBODYS)
     for scan in (*semantic_scans(root / "odometry"), *argoverse_scans(root / "argoverse2")):
         writer.add(scan, CLUSTERED)
     items = library(scans)

@@ -14,12 +14,13 @@ from pathlib import Path
 
 TOOLS = Path(__file__).resolve().parent
 MODELS = TOOLS.parent / "models"
-WORLDS, PASTES = "120", "120"
+WORLDS, PASTES, TEACHERS = "120", "120", "3"
 KITTI_DATA = (
     "106 + 2 object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; "
     "SemanticKITTI labels, J. Behley et al., ICCV 2019) and 3 sweeps of Argoverse 2 (B. Wilson et al., 2021), as our "
-    "segmentation cuts them up, their objects pasted into other scans and moved to other ranges, and the synthetic "
-    "world, part of it with objects where KITTI's label files have them; nothing of drive 0005"
+    "segmentation cuts them up, what the camera of the former did not see included, their objects pasted into other "
+    "scans and moved to other ranges, and the synthetic world, part of it with objects where KITTI's label files have "
+    "them; nothing of drive 0005"
 )
 SYNTHETIC_DATA = "the synthetic world alone: no recording went into it"
 
@@ -46,7 +47,7 @@ def main() -> None:
         tool("build_synthetic_crops", placed, "--worlds", WORLDS,
              "--labels", args.kitti / "object" / "training_all_labels")  # fmt: skip
         tool("train_pointnet", args.work / "kitti", real, placed,
-             "--epochs", "100", "--fold-epochs", "40", "--folds", "3")  # fmt: skip
+             "--epochs", "100", "--fold-epochs", "40", "--folds", "3", "--teachers", TEACHERS)  # fmt: skip
         tool("export_pointnet", args.work / "kitti", MODELS / "pointnet-kitti.onnx",
              "--data", KITTI_DATA, "--licence", "CC BY-NC-SA 3.0, as its data: not for commercial use")  # fmt: skip
 

@@ -13,9 +13,9 @@ import numpy as np
 from modt.classification.crops import Crops
 from modt.types import N_CLASSES, NONE, Bool, Int
 
-SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
+SHIPPED, CLUSTERED, PASTED, SYNTHETIC, NOBODYS = range(5)
 """Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
-there for training alone."""
+there for training alone, and so is what nobody labelled."""
 
 APART = ("offsets", "provenance")
 

@@ -88,7 +88,7 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
             for made, digest in zip(report["provenance"], report["crops_sha256"], strict=True)
         ),
         f"- training: tools/train_pointnet.py, seed {report['seed']}, {report['epochs']} epochs, "
-        f"torch {report['torch']}, {report['cpu_s']} s on one core",
+        f"{report['teachers']} teachers, torch {report['torch']}, {report['cpu_s']} s on one core",
         f"- calibration: temperature {report['calibration']['temperature']}, "
         f"class offsets {report['calibration']['offset']}",
         "",

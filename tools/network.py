@@ -7,15 +7,43 @@ the maximum, with a positive scale: then maximum, normalisation and ReLU commute
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 from torch import Tensor, nn
 
 SHARED = (3, 32, 64, 512)
 HEAD = (512, 256, 128, 4)
 Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
+
+
+class MaxOfLinear(torch.autograd.Function):
+    """Maximum over each crop of a linear layer, which is most of the network.
+
+    A channel's gradient goes to the point that is its maximum alone: sparse products carry it back in a fraction of
+    the time of dense ones.
+    """
+
+    @staticmethod
+    def forward(ctx: Any, x: Tensor, weight: Tensor, count: Tensor) -> Tensor:
+        """(R, out) of (K, in) points of R crops, an (out, in) weight and (R,) points of each crop."""
+        y = (x.detach() @ weight.detach().T).numpy()
+        most = np.stack([own.max(axis=0) for own in np.split(y, np.cumsum(count.numpy())[:-1])])
+        ctx.kept = x.detach().numpy(), weight.detach().numpy(), y, most, count.numpy()
+        return torch.from_numpy(most)
+
+    @staticmethod
+    def backward(ctx: Any, *grad: Tensor) -> tuple[Tensor, Tensor, None]:
+        """Gradients of points and weight."""
+        x, weight, y, most, count = ctx.kept
+        crop = np.repeat(np.arange(len(count)), count)
+        point, channel = np.divmod(np.flatnonzero(y == most[crop]), y.shape[1])
+        starts = np.append(0, np.cumsum(np.bincount(point, minlength=len(y))))
+        d_y = csr_matrix((grad[0].numpy()[crop[point], channel], channel, starts), shape=y.shape)
+        return torch.from_numpy(d_y @ weight), torch.from_numpy(d_y.T @ x), None
 
 
 class PositiveNorm(nn.Module):
@@ -57,7 +85,7 @@ class PointNet(nn.Module):
         h = xyz
         for layer, norm in zip(self.shared[:-1], self.norms, strict=False):
             h = torch.relu(norm(layer(h)))
-        h = torch.segment_reduce(self.shared[-1](h), "max", lengths=count, axis=0)
+        h = MaxOfLinear.apply(h, self.shared[-1].weight, count)
         h = torch.relu(self.norms[len(self.shared) - 1](h))
         for layer, norm in zip(self.head, self.norms[len(self.shared) :], strict=True):
             h = torch.relu(norm(layer(h)))

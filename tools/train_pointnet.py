@@ -1,10 +1,11 @@
 """Train the PointNet on a data set of crops; seeded and resumable (extra [train]).
 
-    train_pointnet.py OUT_DIR CROPS.npz... [--epochs N] [--folds K] [--seed S]
+    train_pointnet.py OUT_DIR CROPS.npz... [--epochs N] [--folds K] [--teachers T] [--seed S]
 
 Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json: loss curve, and with --folds the
 out-of-fold average precision, confusion and calibration (drives are never split between folds). The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
+With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written.
 An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
 40 epochs (weak) and 100 (converged).
 """
@@ -23,11 +24,12 @@ from numpy.random import Generator
 
 from augment import Beams, augment, limit
 from calibration import Calibration, expected_error, fit
-from dataset import Dataset, folds, load
+from dataset import NOBODYS, Dataset, folds, load
 from modt.classification.crops import Crops, canonical
-from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
+from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 from network import PointNet
 from scores import average_precision, confusion
+from teaching import Ensemble, Labels, Teaching
 
 SENSOR_HEIGHT_M = 1.73
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
@@ -38,7 +40,9 @@ rarer a class is in real scans, the more of it is made."""
 TALL = 0.3
 """Of vans among the cars."""
 BATCH, POINTS, MOST_POINTS = 128, 128, 400
-"""Crops of a step, points of each, and points that are augmented at most."""
+"""Labelled crops of a step, points of each, and points that are augmented at most."""
+UNLABELLED = 38
+"""Crops of a step besides that nobody labelled, where there are teachers."""
 
 
 def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
@@ -65,14 +69,16 @@ def draw(pools: list[tuple[Int, Float64]], rng: Generator) -> Int:
     return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in zip(pools, number, strict=True)])
 
 
-def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -> tuple[PointNet, list[float]]:
+def train(
+    data: Dataset, rows: Int, steps: int, seed: int, state: Path | None, teaching: Teaching
+) -> tuple[PointNet, list[float]]:
     """A network trained on these rows, and its loss every 50 steps; taken up again where state was left."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     net = PointNet()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
-    criterion = torch.nn.CrossEntropyLoss(label_smoothing=0.02)
+    criterion = torch.nn.CrossEntropyLoss()
     pools = odds(data, rows)
     losses: list[float] = []
     first = 0
@@ -87,8 +93,9 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
     running = 0.0
     for step in range(first, steps):
         chosen = draw(pools, rng)
-        crops = limit(augment(limit(data.take(chosen), MOST_POINTS, rng), Beams(), rng), POINTS, rng)
-        loss = criterion(net(*tensors(crops)), torch.from_numpy(data.label[chosen]))
+        shown = data.take(np.append(chosen, teaching.further(rng)))
+        seen = tensors(limit(augment(limit(shown, MOST_POINTS, rng), Beams(), rng), POINTS, rng))
+        loss = criterion(net(*seen), teaching.targets(*seen, data.label[chosen]))
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
@@ -105,6 +112,27 @@ def train(data: Dataset, rows: Int, steps: int, seed: int, state: Path | None) -
     return net.eval(), losses
 
 
+def educate(
+    data: Dataset, among: Bool, steps: tuple[int, int], teachers: int, seed: int, folder: Path | None
+) -> tuple[PointNet, list[float]]:
+    """A network trained on what is labelled among these, by as many teachers trained on the same.
+
+    Args:
+        data: all crops.
+        among: (R,) those that may be seen.
+        steps: of the network, and of each teacher.
+        teachers: how many; without any the network goes by the labels.
+        seed: of the network; the teachers' follow from it.
+        folder: where states are kept.
+    """
+    rows = np.flatnonzero(among & data.clear)
+    states = [folder / f"teacher{t}.pt" if folder else None for t in range(teachers)]
+    taught = [train(data, rows, steps[1], seed + 100 * t, s, Labels())[0] for t, s in enumerate(states, start=1)]
+    unlabelled = np.flatnonzero(among & (data.variant == NOBODYS))
+    teaching = Ensemble(taught, unlabelled, UNLABELLED) if taught else Labels()
+    return train(data, rows, steps[0], seed, folder / "state.pt" if folder else None, teaching)
+
+
 @torch.no_grad()
 def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     """(R, 4) of these rows, as they are."""
@@ -113,14 +141,13 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     return torch.cat(parts).double().numpy()
 
 
-def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
+def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
     """Out-of-fold calibration and scores; missed objects count as false negatives."""
     fold = folds(data, k)
     judged = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)  # of real scans where there are any
     out = np.zeros((len(judged), N_CLASSES))
     for i in range(k):
-        rows = np.flatnonzero(data.clear & (fold[data.drive] != i))
-        net, _ = train(data, rows, steps, seed + i, None)
+        net, _ = educate(data, fold[data.drive] != i, (steps, steps), teachers, seed + i, None)
         mine = np.flatnonzero(fold[data.drive[judged]] == i)
         out[mine] = logits(net, data, judged[mine])
     label, clear = data.label[judged], ~data.partial[judged]
@@ -144,6 +171,7 @@ def main() -> None:
     parser.add_argument("--epochs", type=float, default=40)
     parser.add_argument("--fold-epochs", type=float, help="of each fold's network; as many as --epochs without it")
     parser.add_argument("--folds", type=int, default=0, help="cross-validate first; 0: leave that out")
+    parser.add_argument("--teachers", type=int, default=0, help="networks that teach the one that is written")
     parser.add_argument("--judged", type=Path, help="report.json of a cross-validated run whose calibration to take")
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
@@ -154,8 +182,8 @@ def main() -> None:
     clear = np.flatnonzero(data.clear)
     per_epoch = np.count_nonzero(data.variant[clear] == data.variant[clear].min()) / BATCH
     started = time.process_time()
-    report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "crops_sha256": data.sha256}
-    report |= {"provenance": data.provenance, "torch": torch.__version__}
+    report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "teachers": args.teachers}
+    report |= {"crops_sha256": data.sha256, "provenance": data.provenance, "torch": torch.__version__}
     calibration = Calibration.none()
     if args.judged:
         earlier = json.loads(args.judged.read_text(encoding="utf-8"))
@@ -163,9 +191,11 @@ def main() -> None:
         report["cross_validation"] = earlier["cross_validation"]
     elif args.folds:
         steps = round(per_epoch * (args.fold_epochs or args.epochs) * (1 - 1 / args.folds))
-        calibration, report["cross_validation"] = cross_validate(data, args.folds, steps, args.seed)
+        calibration, report["cross_validation"] = cross_validate(data, args.folds, steps, args.teachers, args.seed)
         print(json.dumps(report["cross_validation"]))
-    net, losses = train(data, clear, round(per_epoch * args.epochs), args.seed, args.out / "state.pt")
+    everything = np.ones(len(data), np.bool_)
+    both = round(per_epoch * args.epochs), round(per_epoch * (args.fold_epochs or args.epochs))
+    net, losses = educate(data, everything, both, args.teachers, args.seed, args.out)
     report |= {"loss": losses, "calibration": calibration.as_dict(), "cpu_s": round(time.process_time() - started)}
     layers = net.layers()
     layers[-1] = calibration.folded(layers[-1])

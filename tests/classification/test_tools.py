@@ -202,3 +202,41 @@ def test_the_exported_network_is_the_trained_one(tmp_path_factory: pytest.TempPa
         xyz = torch.randn(2 * n, 3) * 2
         expected = torch.softmax(net(xyz, torch.tensor([n, n])), dim=1).detach().numpy()
         np.testing.assert_allclose(exported.infer(xyz.reshape(2, n, 3).numpy()), expected, atol=1e-4)
+
+
+def test_an_ensemble_teaches_its_mean_and_shows_what_nobody_labelled() -> None:
+    torch = pytest.importorskip("torch", reason="extra [train] is not installed")
+    from teaching import Ensemble, Labels
+
+    rng = np.random.default_rng(0)
+    xyz, count, label = torch.randn(9, 3), torch.tensor([4, 3, 2]), np.array([1, 3])
+    said = torch.tensor([[[9.0, 0, 0, 0], [0, 9, 0, 0], [0, 0, 0, 9]], [[9, 0, 0, 0], [0, 0, 9, 0], [0, 0, 0, 9]]])
+    ensemble = Ensemble([lambda xyz, count, own=own: own for own in said], np.arange(70, 90), 5)
+    assert (np.isin(ensemble.further(rng), np.arange(70, 90))).all()
+    assert len(ensemble.further(rng)) == 5
+    expected = torch.softmax(said, dim=2).mean(dim=0)
+    assert torch.allclose(ensemble.targets(xyz, count, label), expected)
+    assert len(Ensemble([], np.zeros(0, np.int64), 5).further(rng)) == 0
+    assert len(Labels().further(rng)) == 0
+    told = Labels().targets(xyz[:7], count[:2], label)
+    assert told.argmax(dim=1).tolist() == label.tolist()
+    assert torch.allclose(told.sum(dim=1), torch.ones(2))
+
+
+def test_the_maximum_of_a_linear_layer_has_the_gradients_of_its_definition() -> None:
+    torch = pytest.importorskip("torch", reason="extra [train] is not installed")
+    from network import MaxOfLinear
+
+    torch.manual_seed(0)
+    count = torch.tensor([1, 7, 30])
+    x, weight = torch.randn(38, 5, requires_grad=True), torch.randn(11, 5, requires_grad=True)
+    outward = torch.randn(3, 11)
+    found = MaxOfLinear.apply(x, weight, count)
+    expected = torch.segment_reduce(x @ weight.T, "max", lengths=count, axis=0)
+    assert torch.allclose(found, expected)
+    for one, other in zip(
+        torch.autograd.grad(found, (x, weight), outward),
+        torch.autograd.grad(expected, (x, weight), outward),
+        strict=True,
+    ):
+        assert torch.allclose(one, other, atol=1e-6)
