@@ -19,8 +19,8 @@ KITTI_DATA = (
     "106 + 2 object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; "
     "SemanticKITTI labels, J. Behley et al., ICCV 2019) and 3 sweeps of Argoverse 2 (B. Wilson et al., 2021), as our "
     "segmentation cuts them up, what the camera of the former did not see included, their objects pasted into other "
-    "scans and moved to other ranges, and the synthetic world, part of it with objects where KITTI's label files have "
-    "them; nothing of drive 0005"
+    "scans and moved to other ranges, and the synthetic world, part of it with objects where KITTI's label files "
+    "have them; nothing of drive 0005"
 )
 SYNTHETIC_DATA = "the synthetic world alone: no recording went into it"
 
