@@ -5,6 +5,7 @@
 A proposal is an object if more than half of its points lie in the object's box and it holds more than half of those
 that do. What is neither clearly that nor clearly something else (fragments, merged objects) is kept but marked
 partial; what the annotators left out is marked unknown. Neither is trained on, and what is unknown is not judged.
+What the camera of KITTI's scans does not see is kept apart, without labels, for teachers (tools/teaching.py).
 The file carries its own provenance. tools/build_synthetic_crops.py writes the same of synthetic scans.
 """
 
@@ -21,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 import modt
-from dataset import CLUSTERED, NOBODYS, PASTED, SHIPPED, SYNTHETIC
+from dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, UNLABELLED
 from labelled import Scan, argoverse_scans, object_scans, raw_scans, semantic_scans
 from modt import profile
 from modt.classification.crops import gather
@@ -98,8 +99,8 @@ class Writer:
         proposals = Segmenter(stage, self.config.sensor, scan.fov).segment(scan.points)
         labels = label(scan, proposals)
         objects = (labels.kind > 0) & ~labels.partial
-        nobodys = labels.unknown & (labels.kind == 0) & ~labels.partial
-        kept = np.flatnonzero({PASTED: objects, NOBODYS: nobodys}.get(variant, np.ones(len(proposals), np.bool_)))
+        of_interest = {PASTED: objects, UNLABELLED: labels.unknown & (labels.kind == 0) & ~labels.partial}
+        kept = np.flatnonzero(of_interest.get(variant, np.ones(len(proposals), np.bool_)))
         crops = gather(scan.points, proposals, kept, MAX_POINTS)
         n = len(kept)
         row = {"xyz": crops.xyz, "count": crops.count, "label": labels.kind[kept].astype(np.int8)}
@@ -130,6 +131,7 @@ class Writer:
             }.items()
         }
         provenance |= {"scans": len(np.unique(table["scan"])), "crops": tally, "modt": modt.__version__}
+        provenance |= {"unlabelled": int(np.count_nonzero(table["variant"] == UNLABELLED))}
         provenance |= {"profile": profile.dump(self.config)}
         np.savez_compressed(path, provenance=np.array(json.dumps(provenance)), **table)
         return {"sha256": hashlib.sha256(path.read_bytes()).hexdigest(), **tally}
@@ -148,7 +150,7 @@ def add_kitti(writer: Writer, root: Path, pastes: int, seed: int) -> None:
         writer.add(scan, SHIPPED, judged=True)
         for scale in CELL_SCALES:
             writer.add(scan, CLUSTERED, scale)
-        writer.add(dataclasses.replace(scan, fov=FieldOfView()), NOBODYS)
+        writer.add(dataclasses.replace(scan, fov=FieldOfView()), UNLABELLED)
     for scan in (*semantic_scans(root / "odometry"), *argoverse_scans(root / "argoverse2")):
         writer.add(scan, CLUSTERED)
     items = library(scans)

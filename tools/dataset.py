@@ -13,7 +13,7 @@ import numpy as np
 from modt.classification.crops import Crops
 from modt.types import N_CLASSES, NONE, Bool, Int
 
-SHIPPED, CLUSTERED, PASTED, SYNTHETIC, NOBODYS = range(5)
+SHIPPED, CLUSTERED, PASTED, SYNTHETIC, UNLABELLED = range(5)
 """Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
 there for training alone, and so is what nobody labelled."""
 

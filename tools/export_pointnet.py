@@ -99,8 +99,9 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
 
 
 def _tally(made: dict[str, Any]) -> str:
-    """Background, car, pedestrian, cyclist of each variant."""
-    return ", ".join(f"{'/'.join(map(str, n))} {name}" for name, n in made["crops"].items() if sum(n))
+    """Background, car, pedestrian, cyclist of each variant, and how many nobody labelled."""
+    tally = [f"{'/'.join(map(str, n))} {name}" for name, n in made["crops"].items() if sum(n)]
+    return ", ".join([*tally, f"{made['unlabelled']} unlabelled"] if made["unlabelled"] else tally)
 
 
 def _scores(scores: dict[str, Any]) -> list[str]:

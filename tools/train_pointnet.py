@@ -24,7 +24,7 @@ from numpy.random import Generator
 
 from augment import Beams, augment, limit
 from calibration import Calibration, expected_error, fit
-from dataset import NOBODYS, Dataset, folds, load
+from dataset import UNLABELLED, Dataset, folds, load
 from modt.classification.crops import Crops, canonical
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 from network import PointNet
@@ -41,7 +41,7 @@ TALL = 0.3
 """Of vans among the cars."""
 BATCH, POINTS, MOST_POINTS = 128, 128, 400
 """Labelled crops of a step, points of each, and points that are augmented at most."""
-UNLABELLED = 38
+FURTHER = 38
 """Crops of a step besides that nobody labelled, where there are teachers."""
 
 
@@ -128,8 +128,8 @@ def educate(
     rows = np.flatnonzero(among & data.clear)
     states = [folder / f"teacher{t}.pt" if folder else None for t in range(teachers)]
     taught = [train(data, rows, steps[1], seed + 100 * t, s, Labels())[0] for t, s in enumerate(states, start=1)]
-    unlabelled = np.flatnonzero(among & (data.variant == NOBODYS))
-    teaching = Ensemble(taught, unlabelled, UNLABELLED) if taught else Labels()
+    unlabelled = np.flatnonzero(among & (data.variant == UNLABELLED))
+    teaching = Ensemble(taught, unlabelled, FURTHER) if taught else Labels()
     return train(data, rows, steps[0], seed, folder / "state.pt" if folder else None, teaching)
 
 
