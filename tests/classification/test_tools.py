@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from augment import Beams, augment, limit
 from build_crops import label
 from calibration import Calibration, expected_error, fit
-from dataset import SHIPPED, SYNTHETIC, Dataset, folds
+from dataset import SHIPPED, SYNTHETIC, UNLABELLED, Dataset, folds
 from labelled import Scan, argoverse_scans, inside
 from modt.classification.crops import Crops, gather
 from modt.geometry import FieldOfView
@@ -240,3 +240,12 @@ def test_the_maximum_of_a_linear_layer_has_the_gradients_of_its_definition() -> 
         strict=True,
     ):
         assert torch.allclose(one, other, atol=1e-6)
+
+
+def test_labels_are_learnt_from_where_there_are_any() -> None:
+    none, zero = np.zeros(4, np.bool_), np.zeros(4, np.int64)
+    partial, unknown = np.array([False, False, False, True]), np.array([True, False, True, False])
+    variant = np.array([UNLABELLED, SHIPPED, SHIPPED, SHIPPED])
+    crops = Crops(np.zeros((4, 3), np.float32), np.arange(5))
+    data = Dataset(crops, np.array([0, 0, 1, 0]), partial, unknown, none, variant, zero, zero[:0], zero[:0], [], [])
+    assert data.clear.tolist() == [False, True, True, False]
