@@ -14,7 +14,7 @@ from pathlib import Path
 
 TOOLS = Path(__file__).resolve().parent
 MODELS = TOOLS.parent / "models"
-WORLDS, PASTES, TEACHERS = "120", "120", "3"
+WORLDS, PASTES, TEACHERS = "120", "120", "2"
 KITTI_DATA = (
     "106 + 2 object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; "
     "SemanticKITTI labels, J. Behley et al., ICCV 2019) and 3 sweeps of Argoverse 2 (B. Wilson et al., 2021), as our "

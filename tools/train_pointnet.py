@@ -41,7 +41,7 @@ TALL = 0.3
 """Of vans among the cars."""
 BATCH, POINTS, MOST_POINTS = 128, 128, 400
 """Labelled crops of a step, points of each, and points that are augmented at most."""
-FURTHER = 38
+FURTHER = 102
 """Crops of a step besides that nobody labelled, where there are teachers."""
 
 
