@@ -91,7 +91,9 @@ def test_the_owner_of_a_proposal_is_the_body_of_most_of_its_points():
     instance = np.array([3, 3, 7, NONE, NONE, 7, 7])
     none = np.zeros(3, np.bool_)
     members, offsets = np.arange(7), np.array([0, 3, 5, 7])
-    body, share = owners(Proposals(members, offsets, np.zeros((3, 3)), np.zeros((3, 7)), none, none), instance)
+    nowhere = np.zeros((3, 7), np.float32)
+    proposals = Proposals(members, offsets, nowhere, np.zeros((3, 3)), np.zeros((3, 7)), none, none)
+    body, share = owners(proposals, instance)
     assert body.tolist() == [3, NONE, 7]
     np.testing.assert_allclose(share, [2 / 3, 1.0, 1.0])
     assert [len(a) for a in owners(Proposals.empty(), instance)] == [0, 0]

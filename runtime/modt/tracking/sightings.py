@@ -56,7 +56,7 @@ class Sightings:
 
 def sight(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> Sightings:
     """The proposals of a frame, taken to the world by T_world_sensor (4, 4)."""
-    low, high = outlines(frame, proposals, T_world_sensor)
+    low, high = outlines(proposals, T_world_sensor)
     box = transform_boxes(T_world_sensor, proposals.box)
     return Sightings(
         box=box,
@@ -123,17 +123,17 @@ def girth(low: Float64, high: Float64) -> Float64:
     return total
 
 
-def outlines(frame: Frame, proposals: Proposals, T_world_sensor: Float64) -> tuple[Float64, Float64]:
+def outlines(proposals: Proposals, T_world_sensor: Float64) -> tuple[Float64, Float64]:
     """(P, 4) least and (P, 4) greatest coordinate of each proposal's points along AXES, world frame [m]."""
     n = len(proposals)
     if not n:
         return np.zeros((0, 4)), np.zeros((0, 4))
     R = T_world_sensor[:2, :3, None].astype(np.float32)
-    points = frame.points.take(proposals.members, axis=0)[:, :3].T.copy()
-    xy = R[:, 0] * points[0]
+    x, y, z = proposals.coordinates
+    xy = R[:, 0] * x
     term = np.empty_like(xy)  # tens of thousands of points: every array less is less that leaves the cache
-    for k in (1, 2):
-        xy += np.multiply(R[:, k], points[k], out=term)
+    xy += np.multiply(R[:, 1], y, out=term)
+    xy += np.multiply(R[:, 2], z, out=term)
     x, y = xy
     one, half = np.float32(1.0), np.float32(np.sqrt(0.5))
     axes = ((x, one), (np.add(x, y, out=term[0]), half), (y, one), (np.subtract(y, x, out=term[1]), half))
