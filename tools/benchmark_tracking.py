@@ -87,7 +87,7 @@ def registration_ms(scene: list[tuple[Frame, Proposals]]) -> float:
     tracker, registration = Tracker(TrackingConfig(), EFFICIENT), Registration()
     times = []
     for frame, proposals in scene:
-        sightings = sight(frame, proposals, se3(np.eye(3), frame.T_world_sensor[:3, 3] + OFF_M))
+        sightings = sight(proposals, se3(np.eye(3), frame.T_world_sensor[:3, 3] + OFF_M))
         began = time.thread_time_ns()
         registration.correct(tracker.tracks, sightings)
         times.append(time.thread_time_ns() - began)

@@ -67,7 +67,9 @@ def test_a_proposal_is_what_it_mostly_shows_and_mostly_covers() -> None:
 def test_what_nobody_labelled_is_unknown() -> None:
     points = np.zeros((40, 4), np.float32)
     box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
-    proposals = Proposals(np.arange(40), np.array([0, 10, 20, 30, 40]), points[:, :3].T, np.zeros((4, 3)), box, none, none)
+    proposals = Proposals(
+        np.arange(40), np.array([0, 10, 20, 30, 40]), points[:, :3].T, np.zeros((4, 3)), box, none, none
+    )
     unlabelled = np.arange(40) >= 10
     assert label(scan_of(points, [], [], unlabelled), proposals).unknown.tolist() == [False, True, True, True]
 

@@ -163,14 +163,14 @@ def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
     for i in range(12):
         tracker.follow(*frame_of(street(n=3), i, np.eye(4), points=40))
         t = tracker.tracks
-        seen.append(t.low.copy())
+        seen.append(t.outline[:, 4:].copy())
         since = int(t.stood[0])
         if since:
-            np.testing.assert_allclose(t.stood_low, np.mean(seen[-since:], axis=0), atol=1e-9)
+            np.testing.assert_allclose(t.landmark[:, 4:], np.mean(seen[-since:], axis=0), atol=1e-9)
     assert since > 8
     for i in range(12, 20):  # it drives off: what it was seen as before is no landmark
         moved = street(n=3)
         moved[:, 0] += 0.4 * (i - 11)
         tracker.follow(*frame_of(moved, i, np.eye(4), points=40))
     assert not tracker.tracks.still.any()
-    np.testing.assert_allclose(tracker.tracks.stood_low, tracker.tracks.low, atol=1e-9)
+    np.testing.assert_allclose(tracker.tracks.landmark, tracker.tracks.outline, atol=1e-9)

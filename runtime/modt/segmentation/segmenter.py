@@ -77,7 +77,8 @@ class Segmenter:
         yaw = headings(cell.x[few.rows], cell.y[few.rows], few)
         groups = Groups.of(clusters.of_cell.take(clusters.cell), clusters.n)
         own = np.stack([column.take(groups.rows) for column in (raised.x, raised.y, raised.z)])
-        box = upright_boxes(*own, groups, yaw)
+        x, y, z = own
+        box = upright_boxes(x, y, z, groups, yaw)
         centroid = np.stack([groups.mean(v) for v in own], axis=1)
         truncated = np.zeros(clusters.n, np.bool_)
         if not self.fov.full:

@@ -83,9 +83,7 @@ def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
 
 def _compact(index: Int) -> tuple[Int, int]:
     """Indices renumbered without gaps, and how many there are."""
-    occurs = np.zeros(int(index.max()) + 1, np.bool_)
-    occurs[index] = True
-    number = np.cumsum(occurs)
+    number = np.cumsum(np.bincount(index) > 0)
     return number[index] - 1, int(number[-1])
 
 

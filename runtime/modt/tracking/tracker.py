@@ -12,8 +12,9 @@ from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
 from modt.tracking.kinship import reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
+from modt.tracking.outlines import WAYS
 from modt.tracking.robust import RobustAssociation
-from modt.tracking.sightings import AXES, Sightings, sight
+from modt.tracking.sightings import Sightings, sight
 from modt.tracking.states import Happening, StateMachine
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
@@ -77,8 +78,7 @@ class Tracker:
         self._tracks = Followed.blank()
         self._next_id = 0
         self._stamp_s: float | None = None
-        self._T_world_sensor = np.eye(4)
-        self._T_last_now = np.eye(4)
+        self._T_world_sensor = self._T_world_before = np.eye(4)
         self._T_world_odometry: Float64 | None = None
 
     @property
@@ -110,8 +110,9 @@ class Tracker:
         self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
-        self._bear(matches, sightings)
-        self._bury()
+        scenery = self._scenery()
+        self._bear(matches, sightings, scenery)
+        self._bury(scenery)
         return self._tracks
 
     def asking(self) -> Bool:
@@ -142,7 +143,8 @@ class Tracker:
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
         t = self._tracks
-        agility = np.where(t.fixed, AGILITY[t.posterior.argmax(axis=1)], 1.0)
+        t.kind = t.posterior.argmax(axis=1)
+        agility = np.where(t.fixed, AGILITY[t.kind], 1.0)
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
         t.x, t.P = kalman.predict(t.x, t.P, kalman.process_noise(t.x, dt_s, acceleration, turn), dt_s)
@@ -154,15 +156,15 @@ class Tracker:
             before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
         if given is not None and self._T_world_odometry is not None:
             after = self._T_world_odometry @ given
-            sightings = sight(frame, proposals, after)
+            sightings = sight(proposals, after)
         else:
-            after = before @ self._T_last_now
-            sightings = sight(frame, proposals, after)
+            after = before @ (inverse(self._T_world_before) @ before)  # as it moved last
+            sightings = sight(proposals, after)
             after = rigid(self._registration.correct(self._tracks, sightings) @ after)
-            sightings = sight(frame, proposals, after)
+            sightings = sight(proposals, after)
             if given is not None:  # odometry that begins late is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
-        self._T_world_sensor, self._T_last_now = after, inverse(before) @ after
+        self._T_world_sensor, self._T_world_before = after, before
         return sightings
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
@@ -182,12 +184,10 @@ class Tracker:
     def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
         """Note what was seen of the tracks."""
         tracks.shown[rows] = place
-        low, high = (ends.take(proposals, axis=0) for ends in (sightings.low, sightings.high))
-        tracks.low[rows], tracks.high[rows] = low, high
-        low, high = low - place @ AXES, high - place @ AXES
-        hull_low, hull_high = (FORGET * ends.take(rows, axis=0) for ends in (tracks.hull_low, tracks.hull_high))
-        tracks.hull_low[rows] = np.minimum(low, hull_low + (1 - FORGET) * low)
-        tracks.hull_high[rows] = np.maximum(high, hull_high + (1 - FORGET) * high)
+        outline = sightings.outline.take(proposals, axis=1).T
+        tracks.outline[rows] = outline
+        about = outline - place @ WAYS
+        tracks.hull[rows] = np.maximum(about, FORGET * tracks.hull.take(rows, axis=0) + (1 - FORGET) * about)
         tracks.proposal[rows] = proposals
         tracks.box[rows] = sightings.box.take(proposals, axis=0)
         tracks.points[rows] = sightings.count[proposals]
@@ -210,9 +210,9 @@ class Tracker:
         t = self._tracks
         t.stood[rows] = np.where(t.still[rows], t.stood[rows] + 1, 0)
         gain = np.maximum(1.0 / np.maximum(t.stood[rows], 1), LANDMARK_GAIN)[:, None]
-        for mean, seen in ((t.stood_low, t.low), (t.stood_high, t.high)):
-            off = seen[rows] - mean[rows]
-            mean[rows] += np.where(np.abs(off) < LANDMARK_M, gain, 1.0) * off
+        mean = t.landmark.take(rows, axis=0)
+        off = t.outline.take(rows, axis=0) - mean
+        t.landmark[rows] = mean + np.where(np.abs(off) < LANDMARK_M, gain, 1.0) * off
 
     def _miss(self, matched: Int) -> None:
         """Tracks without a proposal coast."""
@@ -233,14 +233,13 @@ class Tracker:
         t.inherited[rows] = t.fixed[rows] = False
         t.posterior[rows] = 1.0 / N_CLASSES
 
-    def _bear(self, matches: Matches, sightings: Sightings) -> None:
+    def _bear(self, matches: Matches, sightings: Sightings, scenery: Int) -> None:
         """A track for every proposal that found none; a2, or a1 and a5 where its place is remembered."""
         free = np.ones(len(sightings), np.bool_)
         free[matches.proposals] = False
         born = np.flatnonzero(free)
         if not len(born):
             return
-        scenery = self._scenery(np.arange(len(self._tracks)))
         known = self.memory.recall(self._tracks, scenery, sightings, born)
         new = Followed.blank(len(born))
         new.id[:] = self._next_id + np.arange(len(born))
@@ -256,11 +255,11 @@ class Tracker:
         new.P[:] = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
         new.age[:] = new.hits[:] = 1
         new.home[:] = new.x[:, :2]
-        new.hull_low[:], new.hull_high[:] = np.inf, -np.inf
+        new.hull[:] = -np.inf
         self._show(new, np.arange(len(born)), born, sightings, new.x[:, :2])
         self._tracks = self._tracks.append(new)
 
-    def _bury(self) -> None:
+    def _bury(self, scenery: Int) -> None:
         """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered.
 
         What was not seen often enough to be asked for is deleted after half as many: nothing is known of it.
@@ -272,14 +271,13 @@ class Tracker:
         if not len(rows):
             return
         t.state[rows] = self.machine.meet(t.state[rows], Happening.EXPIRED)
-        self.memory.keep(t, self._scenery(rows))
+        self.memory.keep(t, scenery[expired[scenery]])
         self._tracks = t.take(~expired)
 
-    def _scenery(self, rows: Int) -> Int:
-        """Those of the rows that are background, for certain, and never moved."""
+    def _scenery(self) -> Int:
+        """Rows that are background, for certain, and never moved."""
         t = self._tracks
-        fixed = rows[t.fixed[rows]]
-        background = fixed[t.posterior.take(fixed, axis=0).argmax(axis=1) == ObjectClass.BACKGROUND]
+        background = np.flatnonzero(t.fixed & (t.kind == ObjectClass.BACKGROUND.value))
         scenery: Int = background[self._away(background) < STILL_M]
         return scenery
 
