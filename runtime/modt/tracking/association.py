@@ -61,8 +61,8 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     """
     if not len(rows):
         return np.zeros(0, np.int64)
-    alone = (np.bincount(rows)[rows] == 1) & (np.bincount(columns)[columns] == 1)
-    contested = np.flatnonzero(~alone)
+    kept = (np.bincount(rows)[rows] == 1) & (np.bincount(columns)[columns] == 1)
+    contested = np.flatnonzero(~kept)
     if not len(contested):
         return np.arange(len(rows))
     i, n = _compact(rows[contested])
@@ -71,7 +71,8 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     which = np.full((n, k), NONE, np.int64)
     matrix[i, j], which[i, j] = np.minimum(cost[contested], limit), contested
     chosen = which[linear_sum_assignment(matrix)]
-    return np.sort(np.concatenate([np.flatnonzero(alone), chosen[chosen >= 0]]))
+    kept[chosen[chosen != NONE]] = True
+    return np.flatnonzero(kept)
 
 
 def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:

@@ -49,7 +49,9 @@ def process_noise(x: Float64, dt_s: float, acceleration: Float64 | float, turn: 
 def predict(x: Float64, P: Float64, Q: Float64, dt_s: float) -> tuple[Float64, Float64]:
     """States and covariances dt_s later."""
     F = motion_jacobian(x, dt_s)
-    return motion(x, dt_s), F @ P @ F.transpose(0, 2, 1) + Q
+    moved = x.copy()
+    moved[:, :2] += F[:, :2, SPEED] * x[:, SPEED, None]  # motion(), which is linear in the speed
+    return moved, F @ P @ F.transpose(0, 2, 1) + Q
 
 
 def innovation(x: Float64, P: Float64, z: Float64, R: Float64) -> tuple[Float64, Float64]:

@@ -31,8 +31,8 @@ LESS = 1.2
 """An outline shrunk by this factor is a part."""
 SETTLED = 4
 """Frames after which a velocity says something."""
-UNMEASURED_M2 = 100.0
-"""Variance of a place that another part's outline says nothing about."""
+R_UNMEASURED = 100.0 * np.eye(2)
+"""Covariance of a place that another part's outline says nothing about [m2]."""
 
 
 def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches:
@@ -122,7 +122,7 @@ def _fits(a: Float64, b: Float64, room: Float64) -> Bool:
     yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
     c, s = np.cos(yaw), np.sin(yaw)
     x, y = (b[:, :2] - a[:, :2]).T
-    apart = np.stack([x * c + y * s, y * c - x * s])
+    apart = np.array((x * c + y * s, y * c - x * s))
     half_a, half_b = (_half_widths(box, yaw) for box in (a, b))
     span = np.maximum(half_a, apart + half_b) - np.minimum(-half_a, apart - half_b)
     fits: Bool = (np.maximum(*span) < room[:, 0]) & (np.minimum(*span) < room[:, 1])
@@ -131,7 +131,7 @@ def _fits(a: Float64, b: Float64, room: Float64) -> Bool:
 
 def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
     """(2, k) how far each box (k, 7) reaches from its middle along its heading yaw and across it [m]."""
-    turn = np.stack([yaw, yaw + np.pi / 2]) - boxes[:, 6]
+    turn = np.array((yaw, yaw + np.pi / 2)) - boxes[:, 6]
     half: Float64 = (boxes[:, 3] * np.abs(np.cos(turn)) + boxes[:, 4] * np.abs(np.sin(turn))) / 2
     return half
 
@@ -141,5 +141,5 @@ def _with(tracks: Followed, matches: Matches, proposal: Int, swapped: Bool) -> M
     kept, changed = np.flatnonzero(~swapped[matches.rows]), np.flatnonzero(swapped & (proposal != NONE))
     rows = np.concatenate([matches.rows[kept], changed])
     place = np.concatenate([matches.place.take(kept, axis=0), tracks.x.take(changed, axis=0)[:, :2]])
-    unmeasured = np.broadcast_to(UNMEASURED_M2 * np.eye(2), (len(changed), 2, 2))
-    return Matches(rows, proposal[rows], place, np.concatenate([matches.R.take(kept, axis=0), unmeasured]))
+    R = np.concatenate([matches.R.take(kept, axis=0), R_UNMEASURED[None].repeat(len(changed), axis=0)])
+    return Matches(rows, proposal[rows], place, R)

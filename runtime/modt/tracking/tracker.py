@@ -34,6 +34,8 @@ LANDMARK_M = 0.2
 """An end of an outline that is off by more is another end."""
 FORGET = 0.98
 """What is kept, a frame, of an extent that is not seen again."""
+BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
+"""The posterior of what is background for certain."""
 AGILITY = np.array([0.25, 1.5, 0.75, 1.0])
 """Process noise of each class relative to what is assumed of an unknown one."""
 
@@ -75,6 +77,8 @@ class Tracker:
         self.association = association_of(config) if association is None else association
         self.memory = memory_of(config) if memory is None else memory
         self._registration = Registration()
+        place, speed = config.position_sigma_m, config.initial_speed_sigma_mps
+        self._P_born = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
         self._tracks = Followed.blank()
         self._next_id = 0
         self._stamp_s: float | None = None
@@ -229,6 +233,8 @@ class Tracker:
         t = self._tracks
         rows = np.flatnonzero(t.inherited & (t.proposal != NONE))
         rows = rows[self._away(rows) > STILL_M]
+        if not len(rows):
+            return
         t.state[rows] = self.machine.meet(t.state[rows], Happening.DOUBTED)
         t.inherited[rows] = t.fixed[rows] = False
         t.posterior[rows] = 1.0 / N_CLASSES
@@ -244,15 +250,14 @@ class Tracker:
         new = Followed.blank(len(born))
         new.id[:] = self._next_id + np.arange(len(born))
         self._next_id += len(born)
-        new.state[:] = self.machine.proposal
-        new.state[known] = self.machine.meet(new.state[known], Happening.ASSOCIATED)
+        new.state[:] = self.machine.meet(
+            np.full(len(born), self.machine.proposal), np.where(known, Happening.ASSOCIATED, Happening.UNASSOCIATED)
+        )
         new.state[known] = self.machine.meet(new.state[known], Happening.INHERITS_CLASS)
-        new.state[~known] = self.machine.meet(new.state[~known], Happening.UNASSOCIATED)
         new.inherited[:] = new.fixed[:] = known
-        new.posterior[known] = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
+        new.posterior[known] = BACKGROUND
         new.x[:, :2] = self.association.birthplace(sightings)[born]  # speed and heading begin at zero
-        place, speed = self.config.position_sigma_m, self.config.initial_speed_sigma_mps
-        new.P[:] = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
+        new.P[:] = self._P_born
         new.age[:] = new.hits[:] = 1
         new.home[:] = new.x[:, :2]
         new.hull[:] = -np.inf
