@@ -68,10 +68,11 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     i, n = _compact(rows[contested])
     j, k = _compact(columns[contested])
     matrix = np.full((n, k), limit)
-    which = np.full((n, k), NONE, np.int64)
-    matrix[i, j], which[i, j] = np.minimum(cost[contested], limit), contested
-    chosen = which[linear_sum_assignment(matrix)]
-    kept[chosen[chosen != NONE]] = True
+    matrix[i, j] = np.minimum(cost[contested], limit)
+    row, column = linear_sum_assignment(matrix)
+    partner = np.full(n, NONE, np.int64)
+    partner[row] = column
+    kept[contested] = partner[i] == j
     return np.flatnonzero(kept)
 
 
