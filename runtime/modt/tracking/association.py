@@ -26,13 +26,13 @@ class Matches:
         rows: (K,) of the tracks.
         proposals: (K,) of this frame.
         place: (K, 2) where each proposal puts its track [m, world].
-        R: (K, 2, 2) covariance of that place [m2].
+        variance: (K,) of that place, the same in every direction [m2].
     """
 
     rows: Int
     proposals: Int
     place: Float64
-    R: Float64
+    variance: Float64
 
 
 class Association(Protocol):
@@ -107,9 +107,8 @@ class PaperAssociation:
         low = cost <= self.config.t_da
         rows, columns, cost = rows[low], columns[low], cost[low]
         keep = assign(rows, columns, cost, FORBIDDEN)
-        variance = self.config.position_sigma_m**2
-        R = np.broadcast_to(np.eye(2) * variance, (len(keep), 2, 2))
-        return Matches(rows[keep], columns[keep], sightings.centroid[columns[keep]], R)
+        variance = np.full(len(keep), self.config.position_sigma_m**2)
+        return Matches(rows[keep], columns[keep], sightings.centroid[columns[keep]], variance)
 
     def cost(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Float64:
         """(K,) cost of the pairs."""

@@ -49,11 +49,14 @@ class RobustAssociation:
     def match(self, tracks: Followed, sightings: Sightings) -> Matches:
         """Pairs within the gate; then, among what is left, those that overlap although they changed their shape."""
         expected = carried(tracks)
-        R = self.noise(sightings)
+        variance = self.noise(sightings)
         rows, columns = self._near(tracks, expected, sightings)
         a, b = expected.take(rows, axis=1), sightings.outline.take(columns, axis=1)
         size, overlap, cover = likeness(a, b)
-        S = tracks.P[:, :2, :2].copy().take(rows, axis=0) + R.take(columns, axis=0) + JUMP_M**2 * np.eye(2)
+        S = tracks.P[:, :2, :2].copy().take(rows, axis=0)
+        for k in (0, 1):
+            S[:, k, k] += variance[columns]
+            S[:, k, k] += JUMP_M**2
         distance = kalman.mahalanobis_squared((AXES @ least(a, b) / 2).T, S)  # what changed its shape may be far off
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
@@ -70,7 +73,7 @@ class RobustAssociation:
         shift = shift_between(a.take(kept, axis=1), b.take(kept, axis=1))
         place = tracks.x.take(rows[kept], axis=0)[:, :2] + shift
         loose = np.maximum(1.0, distance[kept] / 4)  # the tails are heavy: what lies far off says less
-        return Matches(rows[kept], columns[kept], place, R.take(columns[kept], axis=0) * loose[:, None, None])
+        return Matches(rows[kept], columns[kept], place, variance[columns[kept]] * loose)
 
     def _swallowed(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Bool:
         """(K,) pairs in which an object would become a part of something larger: it waits until they part again."""
@@ -85,12 +88,12 @@ class RobustAssociation:
         return sightings.place
 
     def noise(self, sightings: Sightings) -> Float64:
-        """(P, 2, 2) covariance of a place: ends of outlines jitter by the spacing of returns, and more where cut."""
+        """(P,) variance of a place [m2]: ends of outlines jitter by the spacing of returns, and more where cut."""
         extent = girth(sightings.outline) / 4
         sigma = 0.06 + 0.001 * sightings.range_m + 0.03 * np.minimum(extent, 3.0)
         sigma = np.where(sightings.cut, 1.5 * sigma, sigma)
-        R: Float64 = np.square(sigma)[:, None, None] * np.eye(2)
-        return R
+        variance: Float64 = np.square(sigma)
+        return variance
 
     def _near(self, tracks: Followed, expected: Float64, sightings: Sightings) -> tuple[Int, Int]:
         """Pairs whose outlines come near enough along x and along y."""

@@ -178,7 +178,8 @@ class Tracker:
         slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
         step = matches.place - x[:, :2]
         heading = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
-        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, matches.R)
+        R = matches.variance[:, None, None] * np.eye(2)
+        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, R)
         t.x[rows], t.P[rows] = kalman.turn_about(x, P)
         t.state[rows] = self.machine.meet(t.state[rows], Happening.ASSOCIATED)
         t.missed[rows] = 0
@@ -188,7 +189,7 @@ class Tracker:
     def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
         """Note what was seen of the tracks."""
         tracks.shown[rows] = place
-        outline = sightings.outline.take(proposals, axis=1).T
+        outline = sightings.outline.T.take(proposals, axis=0)
         tracks.outline[rows] = outline
         about = outline - place @ WAYS
         tracks.hull[rows] = np.maximum(about, FORGET * tracks.hull.take(rows, axis=0) + (1 - FORGET) * about)
