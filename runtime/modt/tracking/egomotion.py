@@ -127,7 +127,7 @@ def landmarks(tracks: Followed) -> tuple[Int, Float64]:
 
 
 def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
-    """Rows of outlines a and b whose middles are within reach of one another, along x and along y."""
+    """Indices of outlines a and b whose middles are within reach of one another, along x and along y."""
     middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (middles(a), middles(b)))
     return touching(middle_a + reach, middle_b)
 

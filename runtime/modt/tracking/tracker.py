@@ -283,7 +283,8 @@ class Tracker:
     def _scenery(self) -> Int:
         """Rows that are background, for certain, and never moved."""
         t = self._tracks
-        background = np.flatnonzero(t.fixed & (t.kind == ObjectClass.BACKGROUND.value))
+        likely = t.kind == ObjectClass.BACKGROUND.value  # arrays are slow to compare with an enumeration itself
+        background = np.flatnonzero(t.fixed & likely)
         scenery: Int = background[self._away(background) < STILL_M]
         return scenery
 
