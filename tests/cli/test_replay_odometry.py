@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 import pytest
+import yaml
 
 from modt.cli.assemble import Request
 from modt.cli.session import Session
@@ -134,6 +135,22 @@ def test_poses_of_a_file_do_what_the_streams_own_do(tmp_path, street, own):
 
 
 GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [({}, True), ({"odometry": "none"}, False), ({"poses": "poses.txt"}, False), ({"odometry": "unix"}, False)],
+)
+def test_a_stream_without_poses_is_said_to_have_none_unless_they_come_from_elsewhere(tmp_path, options, said):
+    places = {"poses.txt": tmp_path / "poses.txt", "unix": f"unix://{tmp_path / 's'}"}
+    (tmp_path / "poses.txt").write_text(3 * GOOD)
+    request = Request(path=layouts.bare(tmp_path), **{key: places.get(name, name) for key, name in options.items()})
+    made = Session(request, tmp_path / "run", None, ["modt"])
+    made.odometry.close()
+    assert any("no calibration" in note for note in made.notes)
+    assert any("no odometry" in note for note in made.notes) == said
+    written = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())["stream"]["notes"]
+    assert written == made.notes
 
 
 @pytest.mark.parametrize(

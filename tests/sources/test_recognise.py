@@ -67,8 +67,8 @@ def test_missing_frames_leave_gaps_and_a_note(tmp_path):
     ("lost", "named"),
     [
         ("calib_cam_to_cam.txt", "no camera"),
-        ("calib_imu_to_velo.txt", "no ego-motion"),
-        ("2011_09_26_drive_9999_sync/oxts", "no ego-motion"),
+        ("calib_imu_to_velo.txt", "no odometry"),
+        ("2011_09_26_drive_9999_sync/oxts", "no odometry"),
         ("2011_09_26_drive_9999_sync/velodyne_points/timestamps.txt", "0.1 s apart"),
     ],
 )
@@ -77,7 +77,8 @@ def test_what_is_missing_is_named_and_the_rest_works(tmp_path, lost, named):
     gone = drive.parent / lost
     shutil.rmtree(gone) if gone.is_dir() else gone.unlink()
     stream = open_stream(drive)
-    assert any(named in note and gone.name in note for note in stream.info.notes), stream.info.notes
+    notes = (*stream.info.notes, *stream.info.pose_notes)
+    assert any(named in note and gone.name in note for note in notes), notes
     assert len(list(stream)) == 4
 
 
@@ -157,7 +158,7 @@ def test_a_raw_drive_without_scans_is_named(tmp_path):
 def test_a_real_drive(drive_0005):
     stream = open_stream(drive_0005)
     assert stream.info.n_frames == 154
-    assert stream.info.notes == ()
+    assert stream.info.notes == stream.info.pose_notes == ()
     last = stream.scans[-1].T_world_sensor
     # The drive covers 69 m of street; its end is where the inertial unit says.
     assert 60 < np.linalg.norm(last[:3, 3] - stream.scans[0].T_world_sensor[:3, 3]) < 70

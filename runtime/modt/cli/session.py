@@ -58,7 +58,11 @@ class Session:
     def notes(self) -> list[str]:
         """What a user should know before it starts."""
         kept = [f"an earlier run is kept as {self.directory.kept}"] if self.directory.kept else []
-        return [*self.stream.info.notes, *kept]
+        return [*self._missing, *kept]
+
+    @property
+    def _missing(self) -> list[str]:
+        return [*self.stream.info.notes, *self.stream.info.pose_notes]
 
     def run(self, tick: Tick) -> dict[str, Any]:
         """Drive the stream through; returns the summary that was written."""
@@ -110,7 +114,7 @@ class Session:
                 "frames": info.n_frames,
                 "poses": info.has_poses,
                 "odometry": self.odometry.report()["source"],
-                "notes": list(info.notes),
+                "notes": self._missing,
             },
             "mode": self.request.mode,
             "fov": self.request.fov,

@@ -17,8 +17,8 @@ from modt.types import Float64, Frame
 class Odometry(Protocol):
     """Answers with the pose of a frame."""
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Whether frames of a stream may get one."""
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """What is known of a stream whose poses are these: whether it has any, and what is missing of them."""
         ...
 
     def pose(self, frame: Frame) -> Float64 | None:
@@ -37,9 +37,9 @@ class Odometry(Protocol):
 class OwnOdometry:
     """The stream's own."""
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Where it has one."""
-        return info.has_poses
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """What was known already."""
+        return info
 
     def pose(self, frame: Frame) -> Float64 | None:
         """What the frame carries."""
@@ -56,9 +56,9 @@ class OwnOdometry:
 class NoOdometry:
     """Nobody knows: the proposals must tell."""
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Never."""
-        return False
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """No frame has one, as was asked for."""
+        return replace(info, has_poses=False, pose_notes=())
 
     def pose(self, frame: Frame) -> Float64 | None:
         """None."""
@@ -91,9 +91,9 @@ class ListedPoses:
         if end is not None and end > len(poses):
             raise self._too_few(end - 1)
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Always."""
-        return True
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """Every frame has one."""
+        return replace(info, has_poses=True, pose_notes=())
 
     def pose(self, frame: Frame) -> Float64 | None:
         """That of the frame's number.
@@ -128,7 +128,7 @@ class PosedStream:
 
     def __init__(self, stream: Stream, odometry: Odometry) -> None:
         self._stream, self.odometry = stream, odometry
-        self.info: StreamInfo = replace(stream.info, has_poses=odometry.poses(stream.info))
+        self.info: StreamInfo = odometry.of_stream(stream.info)
         self.faults: list[Fault] = stream.faults
 
     def __iter__(self) -> Iterator[Frame]:

@@ -11,6 +11,7 @@ import logging
 import socket
 import stat
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -46,9 +47,9 @@ class PoseSocket:
         self.received = self.used = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Some frames at least, if they are sent."""
-        return True
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """Some frames at least have one, if poses are sent."""
+        return replace(info, has_poses=True, pose_notes=())
 
     def pose(self, frame: Frame) -> Float64 | None:
         """(4, 4) T_world_sensor at the frame's stamp, None where the poses sent so far do not tell."""

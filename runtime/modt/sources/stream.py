@@ -23,6 +23,7 @@ class StreamInfo:
         camera: camera that the annotations and KITTI results refer to, None where there is none.
         has_poses: frames carry T_world_sensor.
         notes: what is missing, and what that costs.
+        pose_notes: the same of its own poses; of no account where they come from elsewhere.
         end: one more than the number of the last frame, None where it is not known.
     """
 
@@ -34,6 +35,7 @@ class StreamInfo:
     camera: Camera | None
     has_poses: bool
     notes: tuple[str, ...] = ()
+    pose_notes: tuple[str, ...] = ()
     end: int | None = None
 
 
