@@ -60,7 +60,6 @@ class Feeder:
         self.todo, self.done = queue.Queue(), queue.Queue()
         self.frame = 0
         threading.Thread(target=self.work, daemon=True).start()
-        self.send(0)
 
     def work(self):
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
@@ -76,9 +75,9 @@ class Feeder:
         assert self.done.get(timeout=60) == number
 
     def wait(self):
-        """The frame in hand has been posed; the next one's pose may come."""
-        self.frame += 1
+        """The next frame is about to be taken: its pose comes now."""
         self.send(self.frame)
+        self.frame += 1
 
     def report(self):
         return {}
