@@ -11,7 +11,7 @@ import yaml
 
 from modt.cli.assemble import Request
 from modt.cli.session import Session
-from modt.geometry import inverse
+from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt.sources.synthetic.stream import SyntheticStream
@@ -103,6 +103,14 @@ def test_a_sender_that_falls_silent_is_bridged(tmp_path, street, own):
     summary, tracks = fed(tmp_path, street, silent=(4, 5, 6, 7, 8))
     assert summary["odometry"]["used"] == FRAMES - 5
     assert 1 <= summary["odometry"]["frames_unposed"] <= 5
+    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+
+
+def test_a_sender_that_begins_anew_moves_no_track(tmp_path, street, own):
+    T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
+    played = [(stamp_s, T if i < 5 else T_elsewhere @ T) for i, (stamp_s, T) in enumerate(street)]
+    summary, tracks = fed(tmp_path, played)
+    assert summary["odometry"]["restarts"] == 1
     assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
 
 

@@ -63,9 +63,9 @@ def test_poses_of_a_camera_are_brought_to_the_sensor_and_others_taken_as_they_ar
     frame = next(iter(open_stream(layouts.bare(tmp_path))))
     T_sensor = se3(rotation_zyx(0.01, -0.02, 0.7), np.array([3.0, -2.0, 0.1]))
     path = write(tmp_path / "p.txt", [T_CAMERA_SENSOR @ T_sensor @ inverse(T_CAMERA_SENSOR)])
-    np.testing.assert_allclose(ListedPoses(path, CAMERA, 1).pose(frame), T_sensor, atol=1e-9)
+    np.testing.assert_allclose(ListedPoses(path, CAMERA, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
     path = write(tmp_path / "q.txt", [T_sensor])
-    np.testing.assert_allclose(ListedPoses(path, None, 1).pose(frame), T_sensor, atol=1e-9)
+    np.testing.assert_allclose(ListedPoses(path, None, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
 
 
 def test_a_line_belongs_to_the_frame_of_its_number(tmp_path):

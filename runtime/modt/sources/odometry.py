@@ -11,18 +11,18 @@ from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.poses import read_poses, sensor_poses
 from modt.sources.stream import Fault, Stream, StreamInfo
-from modt.types import Float64, Frame
+from modt.types import Frame
 
 
 class Odometry(Protocol):
-    """Answers with the pose of a frame."""
+    """Places frames."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
         """What is known of a stream whose poses are these: whether it has any, and what is missing of them."""
         ...
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """(4, 4) T_world_sensor of a frame, None where it is not known. Frames are asked for in their order."""
+    def place(self, frame: Frame) -> Frame:
+        """The frame with its pose, None where it is not known. Frames come in their order."""
         ...
 
     def report(self) -> dict[str, Any]:
@@ -41,9 +41,9 @@ class OwnOdometry:
         """What was known already."""
         return info
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """What the frame carries."""
-        return frame.T_world_sensor
+    def place(self, frame: Frame) -> Frame:
+        """As it is."""
+        return frame
 
     def report(self) -> dict[str, Any]:
         """Which one it was."""
@@ -60,9 +60,9 @@ class NoOdometry:
         """No frame has one, as was asked for."""
         return replace(info, has_poses=False, pose_notes=())
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """None."""
-        return None
+    def place(self, frame: Frame) -> Frame:
+        """Without a pose."""
+        return replace(frame, T_world_sensor=None)
 
     def report(self) -> dict[str, Any]:
         """Which one it was."""
@@ -95,16 +95,15 @@ class ListedPoses:
         """Every frame has one."""
         return replace(info, has_poses=True, pose_notes=())
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """That of the frame's number.
+    def place(self, frame: Frame) -> Frame:
+        """With the pose of its number.
 
         Raises:
             MisuseError: there are fewer.
         """
         if frame.index >= len(self._poses):
             raise self._too_few(frame.index)
-        pose: Float64 = self._poses[frame.index]
-        return pose
+        return replace(frame, T_world_sensor=self._poses[frame.index])
 
     def report(self) -> dict[str, Any]:
         """Which file it was."""
@@ -133,7 +132,7 @@ class PosedStream:
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames, posed."""
-        return (replace(frame, T_world_sensor=self.odometry.pose(frame)) for frame in self._stream)
+        return (self.odometry.place(frame) for frame in self._stream)
 
     def between(self, first: int, last: int | None) -> Self:
         """The frames with first <= index < last."""
