@@ -15,6 +15,7 @@ from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt.sources.synthetic.stream import SyntheticStream
+from modt.supervisor import NoSupervisor
 
 from ..sources import layouts
 from .commands import modt
@@ -36,7 +37,7 @@ def session(out, **options):
 
 def run(out, **options):
     """Summary of a run and the bytes of its tracks."""
-    summary = session(out, **options).run(lambda result: None)
+    summary = session(out, **options).run(lambda result: None, NoSupervisor())
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
@@ -87,7 +88,7 @@ def fed(tmp_path, street, **options):
     url = f"unix://{tmp_path / 's'}"
     played = session(tmp_path / "run", odometry=url)
     played.pace = Feeder(tmp_path / "s", street, **options)
-    summary = played.run(lambda result: None)
+    summary = played.run(lambda result: None, NoSupervisor())
     assert not (tmp_path / "s").exists()
     return summary, (tmp_path / "run" / "tracks.jsonl").read_bytes()
 

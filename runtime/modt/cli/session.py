@@ -19,6 +19,7 @@ from modt.sinks.labels import PointLabels
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.sink import Sink
 from modt.sources.odometry import PosedStream
+from modt.supervisor import Supervisor
 from modt.types import FrameResult
 
 HELPER_SHARE = 0.01
@@ -64,7 +65,7 @@ class Session:
     def _missing(self) -> list[str]:
         return [*self.stream.info.notes, *self.stream.info.pose_notes]
 
-    def run(self, tick: Tick) -> dict[str, Any]:
+    def run(self, tick: Tick, supervisor: Supervisor) -> dict[str, Any]:
         """Drive the stream through; returns the summary that was written."""
         summary = Summary()
         ledger_lines = self.directory.ledger()
@@ -77,6 +78,7 @@ class Session:
             window = windows.add(ledger_line)
             if window is not None:
                 ledger_lines.write(window)
+            supervisor.frame_done()
             tick(result)
 
         budget = self.mode.budget(self.profile)
@@ -86,6 +88,7 @@ class Session:
             stack.callback(ledger_lines.close)
             for sink in sinks:
                 stack.callback(sink.close)
+            stack.callback(supervisor.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
             ledger_lines.write(windows.close())
