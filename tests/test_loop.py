@@ -15,7 +15,7 @@ from modt.energy.ledger import NullLedger
 from modt.loop import FixedPeriod, FullSpeed, Stop, drive
 from modt.sources.odometry import PosedStream
 from modt.sources.pose_socket import PoseSocket
-from modt.sources.stream import StreamInfo
+from modt.sources.stream import Faults, StreamInfo
 from modt.types import UNLIMITED, Frame
 
 from .results import result
@@ -134,7 +134,7 @@ class Sender(Time):
 
 class Frames(list):
     info = StreamInfo("frames", "made up", 0, 4, 0.125, None, False)
-    faults = ()
+    faults = Faults()
 
 
 def test_poses_that_come_while_the_loop_waits_are_those_of_the_frame_that_follows():

@@ -104,7 +104,7 @@ def test_faults_of_the_stream_are_those_of_the_posed_one(tmp_path):
     (drive / "velodyne_points" / "data" / f"{1:010d}.bin").write_bytes(b"short")
     posed = PosedStream(open_stream(drive), NoOdometry()).between(0, 3)
     list(posed)
-    assert [f.frame for f in posed.faults] == [1]
+    assert [f.frame for f in posed.faults.first] == [1]
 
 
 def test_the_poses_beside_a_sequence_given_again_are_the_same(tmp_path):

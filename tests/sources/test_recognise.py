@@ -7,6 +7,7 @@ import pytest
 
 from modt.errors import MisuseError, ModtError
 from modt.sources.recognise import open_stream
+from modt.sources.stream import FIRST
 
 from . import layouts
 
@@ -113,9 +114,21 @@ def test_bad_scans_are_counted_and_skipped(tmp_path, caplog):
     (data / f"{2:010d}.bin").write_bytes(broken.tobytes())
     stream = open_stream(drive)
     assert [f.index for f in stream] == [0, 2, 3]
-    assert [(f.frame, f.skipped) for f in stream.faults] == [(1, True), (2, False)]
+    assert [(f.frame, f.skipped) for f in stream.faults.first] == [(1, True), (2, False)]
     assert "truncated" in caplog.text
     assert "not finite" in caplog.text
+
+
+def test_faults_without_end_are_counted_and_the_first_kept(tmp_path, caplog):
+    folder, n = layouts.bare(tmp_path), 3 * FIRST
+    for k in range(n):
+        (folder / f"{k:06d}.bin").write_bytes(layouts.scan(k).tobytes() + b"cut" * (k % 3 > 0))
+    stream = open_stream(folder)
+    assert len(list(stream)) == FIRST
+    assert (stream.faults.count, stream.faults.skipped, len(stream.faults.first)) == (2 * FIRST, 2 * FIRST, FIRST)
+    assert [f.frame for f in stream.faults.first[:3]] == [1, 2, 4]
+    assert len(caplog.records) == FIRST
+    assert [("only counted" in r.getMessage()) for r in caplog.records] == [False] * (FIRST - 1) + [True]
 
 
 def test_a_stream_without_one_good_scan_fails(tmp_path):

@@ -154,8 +154,8 @@ class Session:
                 "peak_rss_mb": host.peak_rss_mb(),
             },
             "faults": {
-                "count": len(faults),
-                "skipped": sum(f.skipped for f in faults),
-                "first": f"{faults[0].subject}: {faults[0].cause}" if faults else None,
+                "count": faults.count,
+                "skipped": faults.skipped,
+                "first": next((f"{f.subject}: {f.cause}" for f in faults.first), None),
             },
         }

@@ -10,7 +10,7 @@ from typing import Any, Protocol, Self
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.poses import read_poses, sensor_poses
-from modt.sources.stream import Fault, Stream, StreamInfo
+from modt.sources.stream import Faults, Stream, StreamInfo
 from modt.types import Frame
 
 
@@ -128,7 +128,7 @@ class PosedStream:
     def __init__(self, stream: Stream, odometry: Odometry) -> None:
         self._stream, self.odometry = stream, odometry
         self.info: StreamInfo = odometry.of_stream(stream.info)
-        self.faults: list[Fault] = stream.faults
+        self.faults: Faults = stream.faults
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames, posed."""
