@@ -47,12 +47,14 @@ class Frame:
         points: (N, 4) float32 x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1]. Finite
             throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
+        restarts: times that the odometry has begun anew, in a world of which the one before says nothing.
     """
 
     index: int
     stamp_s: float
     points: Float32
     T_world_sensor: Float64 | None = None
+    restarts: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,9 +11,10 @@ import pytest
 import sweep_fusion
 from labelled import TEST_DRIVE, Scan
 from modt import profile
-from modt.classification.fusion import EveryFrame, FirstView, Fusion, KeyViews
+from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.config import FusionConfig
 from modt.geometry import FieldOfView
+from modt.pipeline import Fusion
 from modt.types import NONE, ObjectClass, Proposals
 from recording import Moment, Recording, owners, record
 from replayed import CALLS, Outcome, replay

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -69,6 +71,17 @@ def test_odometry_that_begins_late_finds_the_tracks_where_they_are():
     for i in range(20):
         T = None if i < 6 or i in (12, 13) else T_elsewhere @ drive(i)
         tracker.follow(*frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150))
+    assert len(tracker.tracks) == 40
+    assert tracker.tracks.age.min() == 20
+    np.testing.assert_allclose(tracker.T_world_sensor, drive(19), atol=0.15)
+
+
+def test_odometry_that_begins_anew_moves_no_track():
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    for i in range(20):
+        T = drive(i) if i < 8 else None if i in (8, 9) else inverse(drive(10)) @ drive(i)
+        frame, proposals = frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150)
+        tracker.follow(replace(frame, restarts=int(i >= 8)), proposals)
     assert len(tracker.tracks) == 40
     assert tracker.tracks.age.min() == 20
     np.testing.assert_allclose(tracker.T_world_sensor, drive(19), atol=0.15)

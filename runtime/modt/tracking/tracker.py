@@ -84,6 +84,7 @@ class Tracker:
         self._stamp_s: float | None = None
         self._T_world_sensor = self._T_world_before = np.eye(4)
         self._T_world_odometry: Float64 | None = None
+        self._restarts = 0
 
     @property
     def tracks(self) -> Tracks:
@@ -156,6 +157,8 @@ class Tracker:
     def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
         """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
         before, given, first = self._T_world_sensor, frame.T_world_sensor, self._stamp_s is None
+        if frame.restarts != self._restarts:
+            self._restarts, self._T_world_odometry = frame.restarts, None
         if first and given is not None:
             before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
         if given is not None and self._T_world_odometry is not None:
@@ -166,7 +169,7 @@ class Tracker:
             sightings = sight(proposals, after)
             after = rigid(self._registration.correct(self._tracks, sightings) @ after)
             sightings = sight(proposals, after)
-            if given is not None:  # odometry that begins late is brought to where the tracks are
+            if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
         self._T_world_sensor, self._T_world_before = after, before
         return sightings
