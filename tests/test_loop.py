@@ -1,15 +1,22 @@
 """Pace, stop and the order of things in the loop."""
 
+import json
 import os
 import signal
+import socket
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.config import OdometryConfig
 from modt.energy.ledger import NullLedger
 from modt.loop import FixedPeriod, FullSpeed, Stop, drive
-from modt.types import UNLIMITED
+from modt.sources.odometry import PosedStream
+from modt.sources.pose_socket import PoseSocket
+from modt.sources.stream import Faults, StreamInfo
+from modt.types import UNLIMITED, Frame
 
 from .results import result
 
@@ -110,6 +117,42 @@ def test_every_frame_reaches_every_sink_and_the_observer():
     assert [s.indices for s in sinks] == [[0, 1, 2, 3]] * 2
     assert [line["frame"] for line in observed] == [0, 1, 2, 3]
     assert pipe.seen == [(i, UNLIMITED) for i in range(4)]
+
+
+class Sender(Time):
+    """Time in which another process says where the sensor is whenever the loop has slept."""
+
+    def __init__(self, out):
+        super().__init__()
+        self.out = out
+
+    def sleep(self, seconds):
+        super().sleep(seconds)
+        stamp_s = self.now - 100.0
+        self.out.send(json.dumps({"stamp": stamp_s, "x": 8 * stamp_s, "y": 0.0, "yaw": 0.0}).encode())
+
+
+class Frames(list):
+    info = StreamInfo("frames", "made up", 0, 4, 0.125, None, False)
+    faults = Faults()
+
+
+def test_poses_that_come_while_the_loop_waits_are_those_of_the_frame_that_follows():
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    time, placed = Sender(there), []
+    frames = Frames(Frame(i, 0.125 * i, np.zeros((0, 4), np.float32)) for i in range(4))
+    stream = PosedStream(frames, PoseSocket(here, OdometryConfig(), "test"))
+
+    class Placed(Pipe):
+        def step(self, frame, budget):
+            placed.append(None if frame.T_world_sensor is None else frame.T_world_sensor[0, 3])
+            return super().step(frame, budget)
+
+    pace = FixedPeriod(0.125, time, time.sleep)
+    drive(stream, Placed(), [], NullLines(), UNLIMITED, pace, Stop(), lambda r, line: None)
+    assert placed == [None, 1.0, 2.0, 3.0]
+    there.close()
+    stream.odometry.close()
 
 
 def test_a_signal_ends_the_loop_after_the_frame_in_hand():

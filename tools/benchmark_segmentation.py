@@ -1,6 +1,6 @@
 """What segmentation costs, beside what one would otherwise install: same scans, same thread, turn by turn.
 
-    benchmark_segmentation.py PATH [PATH ...] [--rounds N] [--slow] [--json FILE]
+    benchmark_segmentation.py PATH [PATH ...] [--rounds N] [--slow]
     benchmark_segmentation.py --beams
 
 Each PATH is a .bin scan or a folder of them. Ours is the whole stage (ground, clusters, boxes) on the full circle.
@@ -152,7 +152,6 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=20)
     parser.add_argument("--slow", action="store_true", help="also the clusterings that take seconds")
     parser.add_argument("--beams", action="store_true", help="cost by number of beams, on synthetic sweeps")
-    parser.add_argument("--json", type=Path)
     args = parser.parse_args()
     found: dict[str, object] = {}
     if args.beams:
@@ -171,10 +170,7 @@ def main() -> None:
             found["slow"] = summary(measure(dict(slow(stage)), above, 1), base)
     if not found:
         parser.error("give scans, or --beams")
-    text = json.dumps(found, indent=2)
-    if args.json:
-        args.json.write_text(text + "\n", encoding="utf-8")
-    print(text)
+    print(json.dumps(found, indent=2))
 
 
 if __name__ == "__main__":

@@ -58,7 +58,8 @@ def frames(n: int, count: int, alive: float, seed: int = 0) -> list[tuple[Frame,
         xyz = np.stack([x, y, local[..., 2]], axis=-1) + boxes[:, None, :3]
         points = np.concatenate([xyz.reshape(-1, 3), np.zeros((n * POINTS, 1))], axis=1).astype(np.float32)
         flags = np.zeros(n, np.bool_)
-        proposals = Proposals(np.arange(n * POINTS), np.arange(n + 1) * POINTS, xyz.mean(axis=1), boxes, flags, flags)
+        members, offsets, coordinates = np.arange(n * POINTS), np.arange(n + 1) * POINTS, points[:, :3].T.copy()
+        proposals = Proposals(members, offsets, coordinates, xyz.mean(axis=1), boxes, flags, flags)
         out.append((Frame(i, 0.1 * i, points, T), proposals))
     return out
 
@@ -86,7 +87,7 @@ def registration_ms(scene: list[tuple[Frame, Proposals]]) -> float:
     tracker, registration = Tracker(TrackingConfig(), EFFICIENT), Registration()
     times = []
     for frame, proposals in scene:
-        sightings = sight(frame, proposals, se3(np.eye(3), frame.T_world_sensor[:3, 3] + OFF_M))
+        sightings = sight(proposals, se3(np.eye(3), frame.T_world_sensor[:3, 3] + OFF_M))
         began = time.thread_time_ns()
         registration.correct(tracker.tracks, sightings)
         times.append(time.thread_time_ns() - began)

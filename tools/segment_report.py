@@ -1,6 +1,6 @@
 """How well segmentation finds what is labelled, and how long each of its stages takes.
 
-    segment_report.py PATH [--profile NAME] [--fov camera|full] [--scans N] [--json FILE] [--picture NAME FILE]
+    segment_report.py PATH [--profile NAME] [--fov camera|full] [--scans N] [--picture NAME FILE]
 
 PATH is a folder of KITTI's object benchmark (velodyne/, label_2/, calib/), a folder of SemanticKITTI sequences
 (*/velodyne, */labels), the name of a synthetic scene, or a .bin scan or a folder of them (times only).
@@ -214,7 +214,6 @@ def main() -> None:
         "--fov", choices=("camera", "full"), default="camera", help="where objects are labelled, or all"
     )
     parser.add_argument("--scans", type=int, default=20, help="of a synthetic scene")
-    parser.add_argument("--json", type=Path)
     parser.add_argument("--picture", nargs=2, metavar=("NAME", "FILE"), help="bird's-eye PNG of a scan")
     args = parser.parse_args()
     picture = (args.picture[0], Path(args.picture[1])) if args.picture else None
@@ -222,10 +221,7 @@ def main() -> None:
     found = report(scenes, profile.load(args.profile), args.fov == "full", picture)
     if not found["scans"]:
         raise SystemExit(f"{args.path}: no scans; give a folder that holds some, or the name of a scene")
-    text = json.dumps(found, indent=2)
-    if args.json:
-        args.json.write_text(text + "\n", encoding="utf-8")
-    print(text)
+    print(json.dumps(found, indent=2))
 
 
 if __name__ == "__main__":

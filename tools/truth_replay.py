@@ -65,10 +65,10 @@ def replay(
     pipeline = replace(pipeline, tracker=tracker)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, mode.budget(profile))
-        yield Seen(result, truth, *owners(result.proposals, truth.instance), tracker)
+        yield Seen(result, truth, *majority_bodies(result.proposals, truth.instance), tracker)
 
 
-def owners(proposals: Proposals, instance: Int) -> tuple[Int, np.ndarray]:
+def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, np.ndarray]:
     """(P,) body that most points of each proposal are of, NONE for the ground, and (P,) their share."""
     n = len(proposals)
     if not n:

@@ -112,7 +112,9 @@ class TrackingConfig(StageConfig):
     beta: float = _number(0.01, 0.0, 10.0, "", "weight of the difference of point number")
     gamma: float = _number(0.1, 0.0, 10.0, "", "weight of the difference of size")
     t_da: float = _number(0.95, 0.0, 100.0, "", "highest cost of an association")
-    max_missed: int = _number(8, 0, 100, "frames", "without a proposal before a track is deleted (N of a9 and a14)")
+    max_missed: int = _number(
+        8, 0, 100, "frames", "without a proposal that end a track (N of a9, a14); half if its class was never asked"
+    )
     ask_from: int = _number(3, 1, 100, "frames", "with a proposal before a class is asked for; flicker never asks")
     position_sigma_m: float = _number(0.3, 0.01, 5.0, "m", "of a measured position")
     acceleration_sigma_mps2: float = _number(2.0, 0.01, 50.0, "m/s2", "process noise of the speed")
@@ -220,6 +222,9 @@ class OdometryConfig(StageConfig):
 
     max_age_s: float = _number(0.3, 0.001, 10.0, "s", "from a pose, beyond which it says nothing")
     max_ahead_s: float = _number(60.0, 0.1, 3600.0, "s", "of a pose before its frame; more is another clock")
+    max_speed_mps: float = _number(
+        60.0, 0.1, 1000.0, "m/s", "of the sensor; poses farther apart: a sender begun anew"
+    )
     capacity: int = _number(256, 2, 65536, "", "poses kept, and taken in one frame at most")
 
 

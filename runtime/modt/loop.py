@@ -24,7 +24,7 @@ class Pace(Protocol):
     """When the next frame may start."""
 
     def wait(self) -> None:
-        """Return at the frame's start."""
+        """Return when it may be taken from its source."""
         ...
 
     def report(self) -> dict[str, Any]:
@@ -135,10 +135,10 @@ def drive(
     gc.freeze()
     done = 0
     while stop.signal is None:
+        pace.wait()  # before the frame is taken, so that it gets the poses that came meanwhile
         frame: Frame | None = run(SOURCE, next, frames, None)
         if frame is None:
             break
-        pace.wait()
         result = pipeline.step(frame, budget)
         for sink in sinks:
             run(SINK, sink.write, result)

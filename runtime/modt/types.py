@@ -47,12 +47,14 @@ class Frame:
         points: (N, 4) float32 x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1]. Finite
             throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
+        restarts: times that the odometry has begun anew, in a world of which the one before says nothing.
     """
 
     index: int
     stamp_s: float
     points: Float32
     T_world_sensor: Float64 | None = None
+    restarts: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +64,7 @@ class Proposals:
     Attributes:
         members: (K,) indices of points in the frame, grouped by proposal.
         offsets: (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]].
+        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once for all.
         centroid: (P, 3) mean of each proposal's points [m, sensor frame].
         box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
         truncated: (P,) cut by the edge of the field of view.
@@ -71,6 +74,7 @@ class Proposals:
 
     members: Int
     offsets: Int
+    coordinates: Float32
     centroid: Float64
     box: Float64
     truncated: Bool
@@ -97,6 +101,7 @@ class Proposals:
         return cls(
             members=np.zeros(0, np.int64),
             offsets=np.zeros(1, np.int64),
+            coordinates=np.zeros((3, 0), np.float32),
             centroid=np.zeros((0, 3)),
             box=np.zeros((0, 7)),
             truncated=np.zeros(0, np.bool_),

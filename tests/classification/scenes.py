@@ -19,7 +19,8 @@ def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposa
     points[members, :3] = xyz
     box = np.c_[centre, np.full((n, 3), 1.5), np.zeros(n)].reshape(n, 7)
     none = np.zeros(n, np.bool_)
-    return points, Proposals(members, np.append(0, np.cumsum(counts)).astype(np.int64), centre, box, none, none)
+    offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
+    return points, Proposals(members, offsets, points[members, :3].T, centre, box, none, none)
 
 
 def seen(proposals: Proposals) -> Tracks:

@@ -10,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.classification.fusion import EveryFrame, FirstView, Fusion, KeyViews
+from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.config import FusionConfig
+from modt.pipeline import Fusion
 from modt.types import NONE, Float64, Proposals, Tracks
 from tests.classification.scenes import blobs, seen
 

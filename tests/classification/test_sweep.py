@@ -11,9 +11,10 @@ import pytest
 import sweep_fusion
 from labelled import TEST_DRIVE, Scan
 from modt import profile
-from modt.classification.fusion import EveryFrame, FirstView, Fusion, KeyViews
+from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.config import FusionConfig
 from modt.geometry import FieldOfView
+from modt.pipeline import Fusion
 from modt.types import NONE, ObjectClass, Proposals
 from recording import Moment, Recording, owners, record
 from replayed import CALLS, Outcome, replay
@@ -109,12 +110,12 @@ def test_only_large_proposals_are_judged_on_request(played: Recording) -> None:
 
 
 def test_the_ideal_tracker_follows_the_largest_piece_of_an_object() -> None:
-    box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
-    proposals = Proposals(np.arange(40), np.array([0, 10, 30, 35, 40]), np.zeros((4, 3)), box, none, none)
+    box, none, points = np.zeros((4, 7)), np.zeros(4, np.bool_), np.zeros((40, 4), np.float32)
+    offsets = np.array([0, 10, 30, 35, 40])
+    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none, none)
     car, rider = np.arange(2, 28), np.arange(36, 40)  # pieces of 8 and of 18 points; 4 of 5 points
     kinds = (ObjectClass.CAR, ObjectClass.CYCLIST)
     unlabelled = np.zeros(40, np.bool_)
-    points = np.zeros((40, 4), np.float32)
     scan = Scan("s", "d", points, (car, rider), kinds, np.zeros((2, 7)), FieldOfView(), unlabelled, (70, 8))
     assert owners(scan, proposals).tolist() == [NONE, 70, NONE, 8]
 

@@ -52,7 +52,7 @@ def test_a_proposal_is_what_it_mostly_shows_and_mostly_covers() -> None:
     points = np.zeros((40, 4), np.float32)
     offsets = np.array([0, 10, 20, 30, 40])
     box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
-    proposals = Proposals(np.arange(40), offsets, np.zeros((4, 3)), box, none, none)
+    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none, none)
     car = np.arange(0, 9)  # nearly the first proposal
     walker = np.arange(10, 14)  # too few points to count
     rider = np.arange(17, 40)  # three points of the second, all of the third and of the fourth: neither is whole
@@ -67,7 +67,9 @@ def test_a_proposal_is_what_it_mostly_shows_and_mostly_covers() -> None:
 def test_what_nobody_labelled_is_unknown() -> None:
     points = np.zeros((40, 4), np.float32)
     box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
-    proposals = Proposals(np.arange(40), np.array([0, 10, 20, 30, 40]), np.zeros((4, 3)), box, none, none)
+    proposals = Proposals(
+        np.arange(40), np.array([0, 10, 20, 30, 40]), points[:, :3].T, np.zeros((4, 3)), box, none, none
+    )
     unlabelled = np.arange(40) >= 10
     assert label(scan_of(points, [], [], unlabelled), proposals).unknown.tolist() == [False, True, True, True]
 

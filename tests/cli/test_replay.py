@@ -4,6 +4,7 @@ import json
 import os
 import resource
 import signal
+import socket
 import time
 
 import numpy as np
@@ -17,7 +18,7 @@ from modt.sinks.tracks import SCHEMA
 from modt.types import CLASS_NAMES
 
 from ..sources import layouts
-from .commands import begin, modt
+from .commands import begin, environment, modt
 
 MODES = ("conventional", "efficient", "accurate")
 FRAMES = 6
@@ -216,18 +217,28 @@ def wait_for_frames(run, n):
     raise AssertionError("no frames came")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_run_well(tmp_path, number):
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
+def test_a_signal_ends_the_run_well(tmp_path, number, status):
     process = begin("replay", "--rate", "10", "--out", "run", cwd=tmp_path)
     wait_for_frames(tmp_path / "run", 2)
     process.send_signal(number)
     _, errors = process.communicate(timeout=60)
-    assert process.returncode == 1
+    assert process.returncode == status
     assert "Traceback" not in errors
     assert signal.Signals(number).name in errors.splitlines()[-1]
     summary = json.loads((tmp_path / "run" / "summary.json").read_text())
     assert summary["frames"] == len(tracks(tmp_path / "run"))
     assert summary["run"]["stopped_by"] == signal.Signals(number).name
+
+
+def test_systemd_is_told_that_it_is_up_and_alive(tmp_path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind(str(tmp_path / "notify"))
+        environment_ = environment() | {"NOTIFY_SOCKET": str(tmp_path / "notify")}
+        done = modt("replay", "--frames", "0:3", "--out", "run", cwd=tmp_path, env=environment_)
+        assert done.returncode == 0, done.stderr
+        heard = [systemd.recv(4096) for _ in range(4)]
+    assert heard == [b"READY=1\nWATCHDOG=1", b"WATCHDOG=1", b"WATCHDOG=1", b"STOPPING=1"]
 
 
 def test_a_killed_run_stays_readable(tmp_path):

@@ -7,13 +7,15 @@ import threading
 
 import numpy as np
 import pytest
+import yaml
 
 from modt.cli.assemble import Request
 from modt.cli.session import Session
-from modt.geometry import inverse
+from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt.sources.synthetic.stream import SyntheticStream
+from modt.supervisor import NoSupervisor
 
 from ..sources import layouts
 from .commands import modt
@@ -35,7 +37,7 @@ def session(out, **options):
 
 def run(out, **options):
     """Summary of a run and the bytes of its tracks."""
-    summary = session(out, **options).run(lambda result: None)
+    summary = session(out, **options).run(lambda result: None, NoSupervisor())
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
@@ -59,7 +61,6 @@ class Feeder:
         self.todo, self.done = queue.Queue(), queue.Queue()
         self.frame = 0
         threading.Thread(target=self.work, daemon=True).start()
-        self.send(0)
 
     def work(self):
         with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as out:
@@ -75,9 +76,9 @@ class Feeder:
         assert self.done.get(timeout=60) == number
 
     def wait(self):
-        """The frame in hand has been posed; the next one's pose may come."""
-        self.frame += 1
+        """The next frame is about to be taken: its pose comes now."""
         self.send(self.frame)
+        self.frame += 1
 
     def report(self):
         return {}
@@ -87,7 +88,7 @@ def fed(tmp_path, street, **options):
     url = f"unix://{tmp_path / 's'}"
     played = session(tmp_path / "run", odometry=url)
     played.pace = Feeder(tmp_path / "s", street, **options)
-    summary = played.run(lambda result: None)
+    summary = played.run(lambda result: None, NoSupervisor())
     assert not (tmp_path / "s").exists()
     return summary, (tmp_path / "run" / "tracks.jsonl").read_bytes()
 
@@ -103,6 +104,14 @@ def test_a_sender_that_falls_silent_is_bridged(tmp_path, street, own):
     summary, tracks = fed(tmp_path, street, silent=(4, 5, 6, 7, 8))
     assert summary["odometry"]["used"] == FRAMES - 5
     assert 1 <= summary["odometry"]["frames_unposed"] <= 5
+    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+
+
+def test_a_sender_that_begins_anew_moves_no_track(tmp_path, street, own):
+    T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
+    played = [(stamp_s, T if i < 5 else T_elsewhere @ T) for i, (stamp_s, T) in enumerate(street)]
+    summary, tracks = fed(tmp_path, played)
+    assert summary["odometry"]["restarts"] == 1
     assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
 
 
@@ -134,6 +143,22 @@ def test_poses_of_a_file_do_what_the_streams_own_do(tmp_path, street, own):
 
 
 GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [({}, True), ({"odometry": "none"}, False), ({"poses": "poses.txt"}, False), ({"odometry": "unix"}, False)],
+)
+def test_a_stream_without_poses_is_said_to_have_none_unless_they_come_from_elsewhere(tmp_path, options, said):
+    places = {"poses.txt": tmp_path / "poses.txt", "unix": f"unix://{tmp_path / 's'}"}
+    (tmp_path / "poses.txt").write_text(3 * GOOD)
+    request = Request(path=layouts.bare(tmp_path), **{key: places.get(name, name) for key, name in options.items()})
+    made = Session(request, tmp_path / "run", None, ["modt"])
+    made.odometry.close()
+    assert any("no calibration" in note for note in made.notes)
+    assert any("no odometry" in note for note in made.notes) == said
+    written = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())["stream"]["notes"]
+    assert written == made.notes
 
 
 @pytest.mark.parametrize(

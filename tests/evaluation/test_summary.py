@@ -1,7 +1,10 @@
 """The summary's figures from hand-made records."""
 
+from array import array
+
 import pytest
 
+from modt.evaluation.spread import EXACT
 from modt.evaluation.summary import Summary, TrackLives, summarise
 from modt.evaluation.table import summary_table
 from modt.sinks.records import JsonLines
@@ -69,6 +72,28 @@ def test_only_the_living_are_remembered():
         lives.add([(i, True, False)])
     assert len(lives._alive) == 1
     assert lives.totals(foreground_only=False) == (50, 50)
+
+
+def test_a_long_run_holds_no_more_than_a_short_one():
+    """Held: the entries of every container in the summary, however deep."""
+    summary, held = Summary(), []
+    for frame in range(3 * EXACT):
+        r = result(frame, [5, 5], {0: frame, 1: frame + 1}, {})
+        summary.add_result(r)
+        summary.add_ledger(ledger_line(frame, 1 + frame))  # no two frames take as long
+        if frame in (EXACT - 1, 3 * EXACT - 1):
+            held.append(entries(summary))
+    assert held[0] > 2 * EXACT  # exact so far, wall and CPU time of a stage
+    assert held[1] < held[0]
+
+
+def entries(thing):
+    """Entries of all containers in a thing."""
+    if isinstance(thing, dict):
+        return len(thing) + sum(map(entries, thing.values()))
+    if isinstance(thing, list | tuple | set | array):
+        return len(thing) + sum(map(entries, thing))
+    return entries(vars(thing)) if hasattr(thing, "__dict__") else 0
 
 
 def test_the_table_names_what_it_prints():

@@ -49,6 +49,14 @@ def test_one_thing_alone_is_one_proposal():
     assert not proposals.occluded[0]
 
 
+@pytest.mark.parametrize("fov", [None, AHEAD], ids=["all round", "ahead"])
+def test_coordinates_are_those_of_the_members(fov):
+    points, _ = scans.scan([(12.0, 3.0, *CAR), (-9.0, 4.0, *PERSON), (15.0, -4.0, *CAR)])
+    proposals = segmenter(fov).segment(points)
+    assert len(proposals) >= 2
+    np.testing.assert_array_equal(proposals.coordinates, points[proposals.members, :3].T)
+
+
 @pytest.mark.parametrize("given_m", [0.8, None])
 def test_proposals_tell_the_height_of_the_sensor(given_m):
     points, _ = scans.scan([(8.0, 3.0, *CAR)], height_m=0.8)

@@ -26,6 +26,10 @@ def frame(stamp_s):
     return Frame(0, stamp_s, EMPTY)
 
 
+def pose_of(odometry, asked):
+    return odometry.place(asked).T_world_sensor
+
+
 def planar(stamp_s, x=0.0, y=0.0, yaw=0.0):
     return json.dumps({"stamp": stamp_s, "x": x, "y": y, "yaw": yaw}).encode()
 
@@ -82,7 +86,7 @@ def test_counters_add_up_whatever_comes(events):
             there.send(event)
             sent += 1
         else:
-            T = odometry.pose(frame(event))
+            T = pose_of(odometry, frame(event))
             frames += 1
             assert T is None or np.isfinite(T).all()
     report = odometry.report()
@@ -132,19 +136,19 @@ def test_a_frame_between_two_poses_lies_between(pair):
     there, odometry = pair
     there.send(planar(1.0, 0.0, 0.0, 3.1))
     there.send(planar(1.2, 1.0, -2.0, -3.1))
-    T = odometry.pose(frame(1.05))
+    T = pose_of(odometry, frame(1.05))
     np.testing.assert_allclose(T[:2, 3], [0.25, -0.5])
     assert abs(yaw_of(T) - (3.1 + 0.25 * (2 * np.pi - 6.2))) < 1e-9  # the short way round
-    np.testing.assert_array_equal(odometry.pose(frame(1.2)), matrix([1.0, -2.0, -3.1]))
+    np.testing.assert_array_equal(pose_of(odometry, frame(1.2)), matrix([1.0, -2.0, -3.1]))
 
 
 def test_a_frame_soon_after_the_newest_pose_goes_on_as_it_went(pair):
     there, odometry = pair
     for k in range(5):
         there.send(planar(0.1 * k, 1.0 * k, 0.0, 0.02 * k))
-    np.testing.assert_allclose(odometry.pose(frame(0.5)), matrix([5.0, 0.0, 0.1]), atol=1e-9)
-    assert odometry.pose(frame(0.4 + CONFIG.max_age_s + 0.01)) is None
-    assert odometry.pose(frame(0.4 + CONFIG.max_age_s - 0.01)) is not None
+    np.testing.assert_allclose(pose_of(odometry, frame(0.5)), matrix([5.0, 0.0, 0.1]), atol=1e-9)
+    assert pose_of(odometry, frame(0.4 + CONFIG.max_age_s + 0.01)) is None
+    assert pose_of(odometry, frame(0.4 + CONFIG.max_age_s - 0.01)) is not None
 
 
 def test_noise_between_poses_close_together_is_not_magnified():
@@ -157,14 +161,14 @@ def test_noise_between_poses_close_together_is_not_magnified():
 
 def test_one_pose_tells_no_other_time_and_long_gaps_none(pair):
     there, odometry = pair
-    assert odometry.pose(frame(0.0)) is None
+    assert pose_of(odometry, frame(0.0)) is None
     there.send(planar(0.1))
-    assert odometry.pose(frame(0.1)) is not None
-    assert odometry.pose(frame(0.15)) is None
+    assert pose_of(odometry, frame(0.1)) is not None
+    assert pose_of(odometry, frame(0.15)) is None
     there.send(planar(1.0, 5.0))
-    assert odometry.pose(frame(0.5)) is None
-    assert odometry.pose(frame(0.95)) is None
-    assert odometry.pose(frame(1.05)) is None
+    assert pose_of(odometry, frame(0.5)) is None
+    assert pose_of(odometry, frame(0.95)) is None
+    assert pose_of(odometry, frame(1.05)) is None
 
 
 def test_each_cause_is_counted_and_logged_once(pair, caplog):
@@ -173,17 +177,51 @@ def test_each_cause_is_counted_and_logged_once(pair, caplog):
     with caplog.at_level(logging.WARNING):
         for raw in [planar(10.0), *bad, *bad]:
             there.send(raw)
-        odometry.pose(frame(10.0))
+        pose_of(odometry, frame(10.0))
     assert odometry.report() == {
         "source": "test",
         "received": 11,
         "used": 1,
         "refused": {"malformed": 2, "non_finite": 2, "stale": 2, "out_of_order": 2, "ahead": 2},
+        "restarts": 0,
         "frames_posed": 1,
         "frames_unposed": 0,
     }
     assert len(caplog.records) == 5
     assert "is it the stream's clock?" in caplog.text
+
+
+def test_a_sender_begun_anew_is_told_by_its_leap(pair, caplog):
+    there, odometry = pair
+    for k in range(8):
+        x = 20 + 0.1 * k if k < 5 else 0.1 * (k - 5)  # 20 m back in 0.05 s
+        there.send(planar(0.05 * k, x))
+    with caplog.at_level(logging.WARNING):
+        placed = [odometry.place(frame(s)) for s in (0.225, 0.35)]
+    assert placed[0].T_world_sensor is None  # between both worlds, there is no place
+    np.testing.assert_allclose(placed[1].T_world_sensor[0, 3], 0.2)
+    assert [p.restarts for p in placed] == [1, 1]
+    assert odometry.report()["restarts"] == 1
+    assert odometry.report()["used"] == 8
+    assert "odometry.max_speed_mps" in caplog.text
+    there.send(planar(0.4, 500.0))
+    assert odometry.place(frame(0.4)).restarts == 2
+    assert len(caplog.records) == 1
+
+
+@given(st.lists(st.tuples(st.floats(0.001, 2), st.floats(-1, 1), st.floats(-1, 1)), max_size=40))
+def test_no_drive_at_a_speed_that_there_is_begins_anew(steps):
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    odometry, stamp_s, x, y = PoseSocket(here, CONFIG, "test"), 0.0, 0.0, 0.0
+    there.send(planar(0.0))
+    for dt_s, ahead, left in steps:  # up to the speed allowed, and noise
+        stamp_s += dt_s
+        x += (ahead * CONFIG.max_speed_mps * dt_s + 0.3 * left) / 2
+        y += (left * CONFIG.max_speed_mps * dt_s + 0.3 * ahead) / 2
+        there.send(planar(stamp_s, x, y))
+        assert odometry.place(frame(stamp_s)).restarts == 0
+    there.close()
+    odometry.close()
 
 
 def test_a_flood_takes_no_more_than_a_ringful_of_a_frame():
@@ -192,9 +230,9 @@ def test_a_flood_takes_no_more_than_a_ringful_of_a_frame():
     odometry = PoseSocket(here, OdometryConfig(capacity=4), "test")
     for k in range(6):
         there.send(planar(0.1 * k))
-    odometry.pose(frame(0.0))
+    pose_of(odometry, frame(0.0))
     assert odometry.received == 4
-    odometry.pose(frame(0.1))
+    pose_of(odometry, frame(0.1))
     assert odometry.received == 6
     there.close()
     odometry.close()
@@ -252,7 +290,7 @@ def test_a_udp_socket_hears_and_is_held(free_port):
         open_socket(url)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(planar(1.0, 4.0), ("127.0.0.1", free_port))
-    assert odometry.pose(frame(1.0))[0, 3] == 4.0
+    assert pose_of(odometry, frame(1.0))[0, 3] == 4.0
     odometry.close()
 
 
@@ -266,7 +304,7 @@ def test_a_unix_socket_goes_with_its_run_and_an_abandoned_one_is_replaced(tmp_pa
     odometry = PoseSocket(open_socket(f"unix://{path}"), CONFIG, "test")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
         sender.sendto(planar(1.0, 4.0), str(path))
-    assert odometry.pose(frame(1.0))[0, 3] == 4.0
+    assert pose_of(odometry, frame(1.0))[0, 3] == 4.0
     odometry.close()
     assert not path.exists()
 
@@ -282,7 +320,7 @@ def test_asking_never_waits(pair):
     """Nobody sends: the answer is there all the same, from another thread that would otherwise hang."""
     _, odometry = pair
     answers = []
-    asking = threading.Thread(target=lambda: answers.append(odometry.pose(frame(0.0))), daemon=True)
+    asking = threading.Thread(target=lambda: answers.append(pose_of(odometry, frame(0.0))), daemon=True)
     asking.start()
     asking.join(timeout=60)
     assert answers == [None]

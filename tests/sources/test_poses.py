@@ -63,9 +63,9 @@ def test_poses_of_a_camera_are_brought_to_the_sensor_and_others_taken_as_they_ar
     frame = next(iter(open_stream(layouts.bare(tmp_path))))
     T_sensor = se3(rotation_zyx(0.01, -0.02, 0.7), np.array([3.0, -2.0, 0.1]))
     path = write(tmp_path / "p.txt", [T_CAMERA_SENSOR @ T_sensor @ inverse(T_CAMERA_SENSOR)])
-    np.testing.assert_allclose(ListedPoses(path, CAMERA, 1).pose(frame), T_sensor, atol=1e-9)
+    np.testing.assert_allclose(ListedPoses(path, CAMERA, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
     path = write(tmp_path / "q.txt", [T_sensor])
-    np.testing.assert_allclose(ListedPoses(path, None, 1).pose(frame), T_sensor, atol=1e-9)
+    np.testing.assert_allclose(ListedPoses(path, None, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
 
 
 def test_a_line_belongs_to_the_frame_of_its_number(tmp_path):
@@ -104,7 +104,7 @@ def test_faults_of_the_stream_are_those_of_the_posed_one(tmp_path):
     (drive / "velodyne_points" / "data" / f"{1:010d}.bin").write_bytes(b"short")
     posed = PosedStream(open_stream(drive), NoOdometry()).between(0, 3)
     list(posed)
-    assert [f.frame for f in posed.faults] == [1]
+    assert [f.frame for f in posed.faults.first] == [1]
 
 
 def test_the_poses_beside_a_sequence_given_again_are_the_same(tmp_path):

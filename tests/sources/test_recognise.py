@@ -7,6 +7,7 @@ import pytest
 
 from modt.errors import MisuseError, ModtError
 from modt.sources.recognise import open_stream
+from modt.sources.stream import FIRST
 
 from . import layouts
 
@@ -67,8 +68,8 @@ def test_missing_frames_leave_gaps_and_a_note(tmp_path):
     ("lost", "named"),
     [
         ("calib_cam_to_cam.txt", "no camera"),
-        ("calib_imu_to_velo.txt", "no ego-motion"),
-        ("2011_09_26_drive_9999_sync/oxts", "no ego-motion"),
+        ("calib_imu_to_velo.txt", "no odometry"),
+        ("2011_09_26_drive_9999_sync/oxts", "no odometry"),
         ("2011_09_26_drive_9999_sync/velodyne_points/timestamps.txt", "0.1 s apart"),
     ],
 )
@@ -77,7 +78,8 @@ def test_what_is_missing_is_named_and_the_rest_works(tmp_path, lost, named):
     gone = drive.parent / lost
     shutil.rmtree(gone) if gone.is_dir() else gone.unlink()
     stream = open_stream(drive)
-    assert any(named in note and gone.name in note for note in stream.info.notes), stream.info.notes
+    notes = (*stream.info.notes, *stream.info.pose_notes)
+    assert any(named in note and gone.name in note for note in notes), notes
     assert len(list(stream)) == 4
 
 
@@ -112,9 +114,21 @@ def test_bad_scans_are_counted_and_skipped(tmp_path, caplog):
     (data / f"{2:010d}.bin").write_bytes(broken.tobytes())
     stream = open_stream(drive)
     assert [f.index for f in stream] == [0, 2, 3]
-    assert [(f.frame, f.skipped) for f in stream.faults] == [(1, True), (2, False)]
+    assert [(f.frame, f.skipped) for f in stream.faults.first] == [(1, True), (2, False)]
     assert "truncated" in caplog.text
     assert "not finite" in caplog.text
+
+
+def test_faults_without_end_are_counted_and_the_first_kept(tmp_path, caplog):
+    folder, n = layouts.bare(tmp_path), 3 * FIRST
+    for k in range(n):
+        (folder / f"{k:06d}.bin").write_bytes(layouts.scan(k).tobytes() + b"cut" * (k % 3 > 0))
+    stream = open_stream(folder)
+    assert len(list(stream)) == FIRST
+    assert (stream.faults.count, stream.faults.skipped, len(stream.faults.first)) == (2 * FIRST, 2 * FIRST, FIRST)
+    assert [f.frame for f in stream.faults.first[:3]] == [1, 2, 4]
+    assert len(caplog.records) == FIRST
+    assert [("only counted" in r.getMessage()) for r in caplog.records] == [False] * (FIRST - 1) + [True]
 
 
 def test_a_stream_without_one_good_scan_fails(tmp_path):
@@ -157,7 +171,7 @@ def test_a_raw_drive_without_scans_is_named(tmp_path):
 def test_a_real_drive(drive_0005):
     stream = open_stream(drive_0005)
     assert stream.info.n_frames == 154
-    assert stream.info.notes == ()
+    assert stream.info.notes == stream.info.pose_notes == ()
     last = stream.scans[-1].T_world_sensor
     # The drive covers 69 m of street; its end is where the inertial unit says.
     assert 60 < np.linalg.norm(last[:3, 3] - stream.scans[0].T_world_sensor[:3, 3]) < 70

@@ -7,7 +7,8 @@ from scipy.optimize import linear_sum_assignment
 
 from modt.config import TrackingConfig
 from modt.tracking.association import FORBIDDEN, PaperAssociation, assign, assign_all
-from modt.tracking.sightings import AXES, sight
+from modt.tracking.outlines import WAYS
+from modt.tracking.sightings import sight
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 
@@ -52,8 +53,8 @@ def test_no_assignment_of_few_to_few_is_cheaper(n, k, seed):
 def candidates(before, after, **counts):
     tracker = Tracker(TrackingConfig(association="paper"), EFFICIENT)
     tracker.follow(*frame_of([before], 0, EYE))
-    frame, proposals = frame_of([after], 1, EYE, **counts)
-    return tracker._tracks, sight(frame, proposals, EYE)
+    _, proposals = frame_of([after], 1, EYE, **counts)
+    return tracker._tracks, sight(proposals, EYE)
 
 
 @pytest.mark.parametrize(
@@ -84,9 +85,8 @@ def test_outlines_hold_every_point_and_touch_one_each():
         [[np.cos(yaw), -np.sin(yaw), 0, 5], [np.sin(yaw), np.cos(yaw), 0, -3], [0, 0, 1, 1.7], [0, 0, 0, 1.0]]
     )
     frame, proposals = frame_of([box(10, 0, yaw=0.3), box(-4, 7)], 0, T)
-    seen = sight(frame, proposals, T)
+    seen = sight(proposals, T)
     world = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
     for i in range(2):
-        along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ AXES
-        np.testing.assert_allclose(seen.low[i], along.min(axis=0), atol=1e-4)
-        np.testing.assert_allclose(seen.high[i], along.max(axis=0), atol=1e-4)
+        along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ WAYS
+        np.testing.assert_allclose(seen.outline[:, i], along.max(axis=0), atol=1e-4)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -69,6 +71,17 @@ def test_odometry_that_begins_late_finds_the_tracks_where_they_are():
     for i in range(20):
         T = None if i < 6 or i in (12, 13) else T_elsewhere @ drive(i)
         tracker.follow(*frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150))
+    assert len(tracker.tracks) == 40
+    assert tracker.tracks.age.min() == 20
+    np.testing.assert_allclose(tracker.T_world_sensor, drive(19), atol=0.15)
+
+
+def test_odometry_that_begins_anew_moves_no_track():
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    for i in range(20):
+        T = drive(i) if i < 8 else None if i in (8, 9) else inverse(drive(10)) @ drive(i)
+        frame, proposals = frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150)
+        tracker.follow(replace(frame, restarts=int(i >= 8)), proposals)
     assert len(tracker.tracks) == 40
     assert tracker.tracks.age.min() == 20
     np.testing.assert_allclose(tracker.T_world_sensor, drive(19), atol=0.15)
@@ -163,14 +176,14 @@ def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
     for i in range(12):
         tracker.follow(*frame_of(street(n=3), i, np.eye(4), points=40))
         t = tracker.tracks
-        seen.append(t.low.copy())
+        seen.append(t.outline[:, 4:].copy())
         since = int(t.stood[0])
         if since:
-            np.testing.assert_allclose(t.stood_low, np.mean(seen[-since:], axis=0), atol=1e-9)
+            np.testing.assert_allclose(t.landmark[:, 4:], np.mean(seen[-since:], axis=0), atol=1e-9)
     assert since > 8
     for i in range(12, 20):  # it drives off: what it was seen as before is no landmark
         moved = street(n=3)
         moved[:, 0] += 0.4 * (i - 11)
         tracker.follow(*frame_of(moved, i, np.eye(4), points=40))
     assert not tracker.tracks.still.any()
-    np.testing.assert_allclose(tracker.tracks.stood_low, tracker.tracks.low, atol=1e-9)
+    np.testing.assert_allclose(tracker.tracks.landmark, tracker.tracks.outline, atol=1e-9)

@@ -7,8 +7,8 @@ from modt.config import TrackingConfig
 from modt.geometry import corners
 from modt.tracking.kinship import _fits
 from modt.tracking.memory import BackgroundMemory, NoMemory
+from modt.tracking.outlines import AXES, WAYS
 from modt.tracking.robust import AGREE_M, SOFT_M, compare
-from modt.tracking.sightings import AXES
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, ObjectClass
@@ -40,13 +40,12 @@ def run(tracker, scenes, posterior=BACKGROUND, first=0, **options):
 
 
 def outline(centre, half):
-    middle = np.asarray(centre) @ AXES
-    return (middle - half)[None], (middle + half)[None]
+    return (np.asarray(centre) @ WAYS + half)[:, None]
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.2, 3))
 def test_what_keeps_its_shape_shifts_as_it_moved(dx, dy, half):
-    shift, size, overlap, _ = compare(*outline((0, 0), half), *outline((dx, dy), half))
+    shift, size, overlap, _ = compare(outline((0, 0), half), outline((dx, dy), half))
     np.testing.assert_allclose(shift, [[dx, dy]], atol=1e-9)
     np.testing.assert_allclose(size, 0, atol=1e-9)
     assert 0 <= overlap[0] <= 1
@@ -79,16 +78,17 @@ def test_compare_is_the_slow_one_row_by_row(n, seed):
     middle[1, ::2] = middle[0, ::2] + rng.normal(0, 0.1, middle[0, ::2].shape)  # some pairs are nearly alike
     length[1, ::2] = np.abs(length[0, ::2] + rng.normal(0, 0.1, length[0, ::2].shape))
     ends = (middle[0] - length[0], middle[0] + length[0], middle[1] - length[1], middle[1] + length[1])
-    found = compare(*ends)
+    a, b = np.split(np.concatenate([ends[1], -ends[0], ends[3], -ends[2]], axis=1).T, 2)
+    found = compare(a, b)
     for k in range(n):
         for fast, slow in zip(found, slow_compare(*(e[k] for e in ends)), strict=True):
             np.testing.assert_allclose(fast[k], slow, atol=1e-9)
 
 
 def test_what_only_grows_does_not_shift():
-    low, high = outline((0, 0), 1.0)
-    for grown in (high + np.array([[2.0, 1.5, 0, 0]]), high + np.array([[0, 1.0, 2.0, 1.0]])):
-        shift, _, _, cover = compare(low, high, low, grown)
+    before = outline((0, 0), 1.0)
+    for growth in ([2.0, 1.5, 0, 0, 0, 0, 0, 0], [0, 1.0, 2.0, 1.0, 0, 0, 0, 0]):
+        shift, _, _, cover = compare(before, before + np.array(growth)[:, None])
         np.testing.assert_allclose(shift, 0, atol=1e-9)
         assert cover[0] > 0.9
 

@@ -14,7 +14,7 @@ from modt.sources.synthetic.stream import SyntheticStream
 from modt.tracking.memory import NoMemory
 from modt.types import NONE, Proposals
 from study_inheritance import Tally, table_of
-from truth_replay import owners, replay
+from truth_replay import majority_bodies, replay
 
 
 @pytest.fixture(scope="module", name="crossing")
@@ -87,14 +87,16 @@ def test_both_sides_of_remembered_background_are_counted(crossing):
     assert table_of(on, off).count("\n") == 6
 
 
-def test_the_owner_of_a_proposal_is_the_body_of_most_of_its_points():
+def test_the_body_of_a_proposal_is_that_of_most_of_its_points():
     instance = np.array([3, 3, 7, NONE, NONE, 7, 7])
     none = np.zeros(3, np.bool_)
     members, offsets = np.arange(7), np.array([0, 3, 5, 7])
-    body, share = owners(Proposals(members, offsets, np.zeros((3, 3)), np.zeros((3, 7)), none, none), instance)
+    nowhere = np.zeros((3, 7), np.float32)
+    proposals = Proposals(members, offsets, nowhere, np.zeros((3, 3)), np.zeros((3, 7)), none, none)
+    body, share = majority_bodies(proposals, instance)
     assert body.tolist() == [3, NONE, 7]
     np.testing.assert_allclose(share, [2 / 3, 1.0, 1.0])
-    assert [len(a) for a in owners(Proposals.empty(), instance)] == [0, 0]
+    assert [len(a) for a in majority_bodies(Proposals.empty(), instance)] == [0, 0]
 
 
 def circle(n, radius=20.0, scale=1.0, turn=1.0):

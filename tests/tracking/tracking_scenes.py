@@ -13,15 +13,11 @@ def frame_of(boxes, index=0, T_world_sensor=None, points=60, seed=0, period_s=0.
     clouds = [cloud(b, n, rng) for b, n in zip(boxes, counts, strict=True)]
     xyz = np.concatenate([np.zeros((0, 3)), *clouds])
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
-    frame = Frame(
-        index,
-        index * period_s,
-        np.concatenate([xyz, np.zeros((len(xyz), 1))], axis=1).astype(np.float32),
-        T_world_sensor,
-    )
+    points = np.concatenate([xyz, np.zeros((len(xyz), 1))], axis=1).astype(np.float32)
+    frame = Frame(index, index * period_s, points, T_world_sensor)
     flags = np.zeros(len(boxes), np.bool_)
     centroid = np.array([c.mean(axis=0) for c in clouds]).reshape(-1, 3)
-    return frame, Proposals(np.arange(len(xyz)), offsets, centroid, boxes, flags, flags)
+    return frame, Proposals(np.arange(len(xyz)), offsets, points[:, :3].T.copy(), centroid, boxes, flags, flags)
 
 
 def cloud(box, n, rng):

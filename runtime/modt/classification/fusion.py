@@ -1,12 +1,10 @@
-"""Which views are classified, and what is made of them: three objects with one interface (section V-C).
+"""Which views are classified, and what is made of them (section V-C): three objects, each a `pipeline.Fusion`.
 
 `asks` says which of the tracks that want a class show a view worth classifying, `fuse` takes what the network said
 and tells which tracks are now certain. Both work on the table of tracks in place.
 """
 
 from __future__ import annotations
-
-from typing import Protocol
 
 import numpy as np
 
@@ -16,31 +14,6 @@ from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
 _FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
-
-
-class Fusion(Protocol):
-    """How classifications become the class of a track."""
-
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
-        """(M,) tracks to classify now.
-
-        Args:
-            tracks: alive.
-            proposals: of this frame.
-            asking: (M,) tracks whose state asks for a class.
-        """
-        ...
-
-    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """(R,) which are certain now; writes the fusion's columns of the tracks.
-
-        Args:
-            tracks: alive.
-            proposals: of this frame.
-            rows: (R,) tracks that were classified.
-            likelihood: (R, 4) what the network said of each.
-        """
-        ...
 
 
 class EveryFrame:

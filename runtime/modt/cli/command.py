@@ -11,6 +11,9 @@ from typing import Any, Protocol
 from modt import __version__
 from modt.errors import ModtError
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as shells have it: 128 and the number of SIGINT."""
+
 
 class Command(Protocol):
     """A module with a subcommand; it sets `run` to a function of the parsed arguments that returns the status."""
@@ -21,7 +24,7 @@ class Command(Protocol):
 
 
 def dispatch(name: str, description: str, commands: Sequence[Command], argv: Sequence[str] | None) -> int:
-    """Run a subcommand; returns the exit status: 0 well, 1 failed, 2 misused."""
+    """Run a subcommand; returns the exit status: 0 well, 1 failed, 2 misused, 130 interrupted."""
     top = argparse.ArgumentParser(prog=name, description=description)
     top.add_argument("--version", action="version", version=f"modt {__version__}")
     choice = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
@@ -44,4 +47,4 @@ def guarded(command: Callable[[], int]) -> int:
         return 1
     except KeyboardInterrupt:
         print("modt: interrupted; start it again", file=sys.stderr)
-        return 1
+        return INTERRUPTED

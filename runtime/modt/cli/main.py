@@ -15,7 +15,7 @@ COMMANDS = (replay, simulate, track)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit status: 0 well, 1 failed, 2 misused."""
+    """Run a command; returns the exit status: 0 well, 1 failed, 2 misused, 130 interrupted."""
     return dispatch("modt", "Finds and follows moving objects in a LiDAR stream.", COMMANDS, argv)
 
 

@@ -11,7 +11,7 @@ COMMANDS = (profile_meters, profile_calibrate, profile_report, profile_compare)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit status: 0 well, 1 failed, 2 misused."""
+    """Run a command; returns the exit status: 0 well, 1 failed, 2 misused, 130 interrupted."""
     return dispatch("modt-profile", "Accounts for the energy of modt.", COMMANDS, argv)
 
 

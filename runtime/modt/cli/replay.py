@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
 from modt import host
-from modt.errors import ModtError
+from modt.cli.command import INTERRUPTED
 
 MODES = ("conventional", "efficient", "accurate")
 
@@ -79,13 +80,14 @@ def core(text: str) -> int | None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Replay; exit status 1 when it was interrupted, its records are whole all the same."""
+    """Replay; a signal that ends it leaves whole records, SIGTERM with exit status 0 and SIGINT with 130."""
     pinned = host.confine(arguments.core)
     # NumPy loads from here on, after the process is confined.
     from modt.cli.assemble import Request
     from modt.cli.progress import progress
     from modt.cli.session import Session
     from modt.evaluation.table import summary_table
+    from modt.supervisor import supervisor_of
 
     request = Request(
         path=arguments.path,
@@ -98,19 +100,19 @@ def run(arguments: argparse.Namespace) -> int:
         odometry=arguments.odometry,
         poses=arguments.poses,
     )
+    supervisor = supervisor_of(os.environ)
     session = Session(request, arguments.out, pinned, command=["modt", *sys.argv[1:]])
     show = not arguments.quiet
     if show:
         for note in session.notes:
             print(f"modt: {note}", file=sys.stderr)
     with progress(session.stream.info.n_frames, shown=show and sys.stderr.isatty()) as tick:
-        summary = session.run(tick)
+        summary = session.run(tick, supervisor)
     if show:
         print(summary_table(summary))
         print(f"  results in {session.directory.path}")
-    if session.stop.signal is not None:
-        done = f"after {summary['frames']} frames"
-        raise ModtError(
-            "replay", f"stopped by {session.stop.signal} {done}", f"what was recorded is in {session.directory.path}"
-        )
-    return 0
+    stopped_by = session.stop.signal
+    if stopped_by is not None:
+        frames_done = f"after {summary['frames']} frames"
+        print(f"modt: stopped by {stopped_by} {frames_done}: {session.directory.path} is whole", file=sys.stderr)
+    return INTERRUPTED if stopped_by == "SIGINT" else 0

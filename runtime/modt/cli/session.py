@@ -19,6 +19,7 @@ from modt.sinks.labels import PointLabels
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.sink import Sink
 from modt.sources.odometry import PosedStream
+from modt.supervisor import Supervisor
 from modt.types import FrameResult
 
 HELPER_SHARE = 0.01
@@ -58,9 +59,13 @@ class Session:
     def notes(self) -> list[str]:
         """What a user should know before it starts."""
         kept = [f"an earlier run is kept as {self.directory.kept}"] if self.directory.kept else []
-        return [*self.stream.info.notes, *kept]
+        return [*self._missing, *kept]
 
-    def run(self, tick: Tick) -> dict[str, Any]:
+    @property
+    def _missing(self) -> list[str]:
+        return [*self.stream.info.notes, *self.stream.info.pose_notes]
+
+    def run(self, tick: Tick, supervisor: Supervisor) -> dict[str, Any]:
         """Drive the stream through; returns the summary that was written."""
         summary = Summary()
         ledger_lines = self.directory.ledger()
@@ -73,6 +78,7 @@ class Session:
             window = windows.add(ledger_line)
             if window is not None:
                 ledger_lines.write(window)
+            supervisor.frame_done()
             tick(result)
 
         budget = self.mode.budget(self.profile)
@@ -82,6 +88,7 @@ class Session:
             stack.callback(ledger_lines.close)
             for sink in sinks:
                 stack.callback(sink.close)
+            stack.callback(supervisor.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
             ledger_lines.write(windows.close())
@@ -110,7 +117,7 @@ class Session:
                 "frames": info.n_frames,
                 "poses": info.has_poses,
                 "odometry": self.odometry.report()["source"],
-                "notes": list(info.notes),
+                "notes": self._missing,
             },
             "mode": self.request.mode,
             "fov": self.request.fov,
@@ -147,8 +154,8 @@ class Session:
                 "peak_rss_mb": host.peak_rss_mb(),
             },
             "faults": {
-                "count": len(faults),
-                "skipped": sum(f.skipped for f in faults),
-                "first": f"{faults[0].subject}: {faults[0].cause}" if faults else None,
+                "count": faults.count,
+                "skipped": faults.skipped,
+                "first": next((f"{f.subject}: {f.cause}" for f in faults.first), None),
             },
         }

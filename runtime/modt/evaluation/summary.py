@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from array import array
 from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
+from modt.evaluation.spread import Spread
 from modt.pipeline import CLASSIFICATION, SEGMENTATION
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, TRACKS
@@ -19,7 +17,7 @@ from modt.types import CLASS_NAMES, NONE, FrameResult, ObjectClass
 
 SCHEMA = "modt.summary/1"
 LEDGER_SCHEMA = "modt.ledger/1"
-QUANTILES = {"p50": 0.5, "p95": 0.95, "p99": 0.99, "max": 1.0}
+QUANTILES = {"p50": 0.5, "p95": 0.95, "p99": 0.99}
 BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
 
 
@@ -51,14 +49,12 @@ class TrackLives:
 
 
 class Summary:
-    """Adds up the records of a run."""
+    """Adds up the records of a run, however long it lasts: what is held is bounded (`Spread`, `TrackLives`)."""
 
     def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
         self.lives = TrackLives()
-        self._span: dict[str, dict[str, array[int]]] = defaultdict(
-            lambda: {"wall_ns": array("q"), "cpu_ns": array("q")}
-        )
+        self._span: dict[str, dict[str, Spread]] = defaultdict(lambda: {"wall_ns": Spread(), "cpu_ns": Spread()})
         self._calls: dict[str, int] = defaultdict(int)
         self._items: dict[str, int] = defaultdict(int)
 
@@ -85,8 +81,8 @@ class Summary:
         for stage, entry in record["stages"].items():
             self._calls[stage] += entry["calls"]
             self._items[stage] += entry["items"]
-            for quantity, values in self._span[stage].items():
-                values.append(entry[quantity])
+            for quantity, spread in self._span[stage].items():
+                spread.add(entry[quantity])
 
     def result(self) -> dict[str, Any]:
         """The figures; a ratio without a denominator is null.
@@ -119,10 +115,11 @@ class Summary:
     def _stage(self, stage: str) -> dict[str, Any]:
         times = {
             quantity.replace("_ns", "_ms"): {
-                "mean": float(np.mean(values)) / 1e6,
-                **{name: float(np.quantile(values, q)) / 1e6 for name, q in QUANTILES.items()},
+                "mean": spread.mean / 1e6,
+                **{name: spread.quantile(q) / 1e6 for name, q in QUANTILES.items()},
+                "max": spread.greatest / 1e6,
             }
-            for quantity, values in self._span[stage].items()
+            for quantity, spread in self._span[stage].items()
         }
         return {"calls": self._calls[stage], "items": self._items[stage], **times}
 

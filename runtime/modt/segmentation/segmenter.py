@@ -76,14 +76,15 @@ class Segmenter:
         few = outline.thinned(OUTLINE)
         yaw = headings(cell.x[few.rows], cell.y[few.rows], few)
         groups = Groups.of(clusters.of_cell.take(clusters.cell), clusters.n)
-        own = raised.take(groups.rows)
-        box = upright_boxes(own.x, own.y, own.z, groups, yaw)
-        centroid = np.stack([groups.mean(v) for v in (own.x, own.y, own.z)], axis=1)
+        own = np.stack([column.take(groups.rows) for column in (raised.x, raised.y, raised.z)])
+        x, y, z = own
+        box = upright_boxes(x, y, z, groups, yaw)
+        centroid = np.stack([groups.mean(v) for v in own], axis=1)
         truncated = np.zeros(clusters.n, np.bool_)
         if not self.fov.full:
             truncated = outline.least(self.fov.depth(cell.xyz())[outline.rows]) < EDGE_M - MARGIN_M
         hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
-        return Proposals(index[groups.rows], groups.offsets, centroid, box, truncated, hidden)
+        return Proposals(index[groups.rows], groups.offsets, own, centroid, box, truncated, hidden)
 
     def _in_view(self, clusters: Clusters, cell: Columns) -> Bool:
         """(n,) whether a cluster reaches into the field of view, or nearly."""

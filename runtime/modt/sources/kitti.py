@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
@@ -18,9 +19,18 @@ from modt.sources.stream import StreamInfo
 from modt.types import Float64
 
 PERIOD_S = 0.1
+NO_POSES = "no odometry, the proposals must tell how the sensor moves"
 
 Poses = dict[int, Float64]
 """T_world_sensor by frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Notes:
+    """What is missing: of the stream, and of its poses, which may come from elsewhere."""
+
+    of_stream: list[str] = field(default_factory=list)
+    of_poses: list[str] = field(default_factory=list)
 
 
 def raw_drive(drive: Path) -> ScanStream:
@@ -29,7 +39,7 @@ def raw_drive(drive: Path) -> ScanStream:
     Raises:
         MisuseError: it holds no scans, or a file that is there is broken.
     """
-    notes: list[str] = []
+    notes = Notes()
     camera = _camera(calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
     poses = _poses_of_raw(drive, notes)
     stamps = _raw_stamps(drive / "velodyne_points" / "timestamps.txt", notes)
@@ -43,15 +53,15 @@ def tracking_sequence(scans: Path) -> ScanStream:
         MisuseError: it holds no scans, or a file that is there is broken.
     """
     root, number = scans.parent.parent, scans.name
-    notes: list[str] = []
+    notes = Notes()
     calib = root / "calib" / f"{number}.txt"
     camera = _camera(calibration.camera_of_sequence, calib, notes)
     records = root / "oxts" / f"{number}.txt"
     poses: Poses = {}
     if not records.is_file():
-        notes.append(f"{records} is missing: no ego-motion")
+        notes.of_poses.append(f"{records} is missing: {NO_POSES}")
     elif not calib.is_file():
-        notes.append(f"{calib} is missing: no ego-motion without its Tr_imu_velo")
+        notes.of_poses.append(f"{calib} is missing, and its Tr_imu_velo: {NO_POSES}")
     else:
         T_imu_sensor = calibration.T_imu_sensor_of_sequence(calib)
         poses = dict(enumerate(oxts.poses(oxts.read_sequence(records)) @ T_imu_sensor))
@@ -64,14 +74,14 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     Raises:
         MisuseError: it holds no scans, or a file that is there is broken.
     """
-    notes: list[str] = []
+    notes = Notes()
     calib = sequence / "calib.txt"
     camera = _camera(calibration.camera_of_sequence, calib, notes)
     places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
     found = next((p for p in places if p.is_file()), None)
     poses: Poses = {}
     if found is None or camera is None:
-        notes.append(f"{places[0] if found is None else calib} is missing: no ego-motion")
+        notes.of_poses.append(f"{places[0] if found is None else calib} is missing: {NO_POSES}")
     else:
         poses = dict(enumerate(sensor_poses(read_poses(found), camera.T_camera_sensor)))
     times = sequence / "times.txt"
@@ -79,7 +89,7 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     if times.is_file():
         stamps = dict(enumerate(_numbers(times, columns=1)[:, 0].tolist()))
     else:
-        notes.append(f"{times} is missing: frames {PERIOD_S} s apart")
+        notes.of_stream.append(f"{times} is missing: frames {PERIOD_S} s apart")
     return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
 
 
@@ -89,7 +99,7 @@ def scan_folder(folder: Path) -> ScanStream:
     Raises:
         MisuseError: it holds none.
     """
-    notes = ["a bare folder: no calibration, no ego-motion, frames 0.1 s apart"]
+    notes = Notes([f"a bare folder: no calibration, frames {PERIOD_S} s apart"], [f"a bare folder: {NO_POSES}"])
     return _stream(folder.name, "folder of scans", folder, None, {}, {}, notes)
 
 
@@ -100,7 +110,7 @@ def _stream(
     camera: Camera | None,
     poses: Poses,
     stamps: dict[int, float],
-    notes: list[str],
+    notes: Notes,
     sequence: int = 0,
 ) -> ScanStream:
     files = sorted(data.glob("*.bin"))
@@ -110,19 +120,30 @@ def _stream(
     indices = [int(f.stem) for f in files] if numbered else list(range(len(files)))
     gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
     if gaps:
-        notes.append(f"{len(gaps)} frames are missing (the first is {gaps[0]})")
+        notes.of_stream.append(f"{len(gaps)} frames are missing (the first is {gaps[0]})")
     if poses:
         lost = [i for i in indices if i not in poses]
         if lost:
-            notes.append(f"{len(lost)} frames without a pose keep the pose before them (the first is {lost[0]})")
+            held = f"{len(lost)} frames without a pose keep the pose before them (the first is {lost[0]})"
+            notes.of_poses.append(held)
         poses = _held(poses, indices)
     scans = [
         ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i)) for i, f in zip(indices, files, strict=True)
     ]
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
-        notes.append(f"time stamps run backwards: frames {PERIOD_S} s apart instead")
+        notes.of_stream.append(f"time stamps run backwards: frames {PERIOD_S} s apart instead")
         scans = [ScanReference(s.index, s.path, s.index * PERIOD_S, s.T_world_sensor) for s in scans]
-    info = StreamInfo(name, layout, sequence, len(scans), PERIOD_S, camera, bool(poses), tuple(notes))
+    info = StreamInfo(
+        name=name,
+        layout=layout,
+        sequence=sequence,
+        n_frames=len(scans),
+        period_s=PERIOD_S,
+        camera=camera,
+        has_poses=bool(poses),
+        notes=tuple(notes.of_stream),
+        pose_notes=tuple(notes.of_poses),
+    )
     return ScanStream(info, scans)
 
 
@@ -133,21 +154,21 @@ def _held(poses: Poses, indices: list[int]) -> Poses:
     return {i: poses[int(known[k])] for i, k in zip(indices, at, strict=True)}
 
 
-def _poses_of_raw(drive: Path, notes: list[str]) -> Poses:
+def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
     records = sorted((drive / "oxts" / "data").glob("*.txt"))
     calib = drive.parent / "calib_imu_to_velo.txt"
     if not records or not calib.is_file():
-        notes.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: no ego-motion")
+        notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
     T_imu_sensor = calibration.T_imu_sensor_of_raw(drive.parent)
     T_world_imu = oxts.poses(np.stack([oxts.read_record(r)[: len(oxts.FIELDS)] for r in records]))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 
-def _raw_stamps(path: Path, notes: list[str]) -> dict[int, float]:
+def _raw_stamps(path: Path, notes: Notes) -> dict[int, float]:
     """Seconds since the first stamp, by frame."""
     if not path.is_file():
-        notes.append(f"{path} is missing: frames {PERIOD_S} s apart")
+        notes.of_stream.append(f"{path} is missing: frames {PERIOD_S} s apart")
         return {}
     try:
         whole = [
@@ -155,14 +176,14 @@ def _raw_stamps(path: Path, notes: list[str]) -> dict[int, float]:
             for second, _, fraction in (line.partition(".") for line in path.read_text().splitlines() if line)
         ]
     except ValueError:
-        notes.append(f"{path} is no list of time stamps: frames {PERIOD_S} s apart")
+        notes.of_stream.append(f"{path} is no list of time stamps: frames {PERIOD_S} s apart")
         return {}
     return {i: round(second - whole[0][0] + fraction - whole[0][1], 9) for i, (second, fraction) in enumerate(whole)}
 
 
-def _camera(read: Callable[[Path], Camera], calib: Path, notes: list[str]) -> Camera | None:
+def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera | None:
     if not calib.is_file():
-        notes.append(f"{calib} is missing: no camera, hence no --fov camera")
+        notes.of_stream.append(f"{calib} is missing: no camera, hence no --fov camera")
         return None
     return read(calib)
 

@@ -10,19 +10,19 @@ from typing import Any, Protocol, Self
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.poses import read_poses, sensor_poses
-from modt.sources.stream import Fault, Stream, StreamInfo
-from modt.types import Float64, Frame
+from modt.sources.stream import Faults, Stream, StreamInfo
+from modt.types import Frame
 
 
 class Odometry(Protocol):
-    """Answers with the pose of a frame."""
+    """Places frames."""
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Whether frames of a stream may get one."""
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """What is known of a stream whose poses are these: whether it has any, and what is missing of them."""
         ...
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """(4, 4) T_world_sensor of a frame, None where it is not known. Frames are asked for in their order."""
+    def place(self, frame: Frame) -> Frame:
+        """The frame with its pose, None where it is not known. Frames come in their order."""
         ...
 
     def report(self) -> dict[str, Any]:
@@ -37,13 +37,13 @@ class Odometry(Protocol):
 class OwnOdometry:
     """The stream's own."""
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Where it has one."""
-        return info.has_poses
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """What was known already."""
+        return info
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """What the frame carries."""
-        return frame.T_world_sensor
+    def place(self, frame: Frame) -> Frame:
+        """As it is."""
+        return frame
 
     def report(self) -> dict[str, Any]:
         """Which one it was."""
@@ -56,13 +56,13 @@ class OwnOdometry:
 class NoOdometry:
     """Nobody knows: the proposals must tell."""
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Never."""
-        return False
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """No frame has one, as was asked for."""
+        return replace(info, has_poses=False, pose_notes=())
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """None."""
-        return None
+    def place(self, frame: Frame) -> Frame:
+        """Without a pose."""
+        return replace(frame, T_world_sensor=None)
 
     def report(self) -> dict[str, Any]:
         """Which one it was."""
@@ -91,20 +91,19 @@ class ListedPoses:
         if end is not None and end > len(poses):
             raise self._too_few(end - 1)
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Always."""
-        return True
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """Every frame has one."""
+        return replace(info, has_poses=True, pose_notes=())
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """That of the frame's number.
+    def place(self, frame: Frame) -> Frame:
+        """With the pose of its number.
 
         Raises:
             MisuseError: there are fewer.
         """
         if frame.index >= len(self._poses):
             raise self._too_few(frame.index)
-        pose: Float64 = self._poses[frame.index]
-        return pose
+        return replace(frame, T_world_sensor=self._poses[frame.index])
 
     def report(self) -> dict[str, Any]:
         """Which file it was."""
@@ -128,12 +127,12 @@ class PosedStream:
 
     def __init__(self, stream: Stream, odometry: Odometry) -> None:
         self._stream, self.odometry = stream, odometry
-        self.info: StreamInfo = replace(stream.info, has_poses=odometry.poses(stream.info))
-        self.faults: list[Fault] = stream.faults
+        self.info: StreamInfo = odometry.of_stream(stream.info)
+        self.faults: Faults = stream.faults
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames, posed."""
-        return (replace(frame, T_world_sensor=self.odometry.pose(frame)) for frame in self._stream)
+        return (self.odometry.place(frame) for frame in self._stream)
 
     def between(self, first: int, last: int | None) -> Self:
         """The frames with first <= index < last."""

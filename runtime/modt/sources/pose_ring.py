@@ -10,6 +10,9 @@ from scipy.spatial.transform import Rotation
 from modt.geometry import se3
 from modt.types import Float64
 
+NOISE_M = 0.5
+"""Poses close together in time may be this far apart whatever the speed."""
+
 
 class PoseRing:
     """Poses in the order of their stamps, the oldest making room.
@@ -39,6 +42,18 @@ class PoseRing:
         self._stamps.append(stamp_s)
         self._poses.append(T)
         return True
+
+    def speed_to(self, stamp_s: float, T: Float64) -> float:
+        """Speed at which the sensor came to a (4, 4) pose from the newest one, not counting noise [m/s]."""
+        if stamp_s <= self.newest_s or not self._poses:
+            return 0.0
+        way_m = float(np.linalg.norm(T[:3, 3] - self._poses[-1][:3, 3]))
+        return max(way_m - NOISE_M, 0.0) / (stamp_s - self.newest_s)
+
+    def clear(self) -> None:
+        """Forget all poses."""
+        self._stamps.clear()
+        self._poses.clear()
 
     def at(self, stamp_s: float) -> Float64 | None:
         """(4, 4) pose at a time: between the two around it, or on from the last ones; None where they are too old."""

@@ -11,6 +11,7 @@ import logging
 import socket
 import stat
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -30,9 +31,12 @@ FORM = "write own, none, udp://HOST:PORT or unix:///PATH"
 class PoseSocket:
     """Drained once a frame, never waited for; what cannot be used is counted, and logged once of each kind.
 
+    A pose that the sensor cannot have come to at any speed it has is the first of a sender begun anew, whose world is
+    another one: what it sent before is forgotten, and the frame says so (`Frame.restarts`).
+
     Args:
         bound: where the datagrams arrive; it is made non-blocking.
-        config: how old a pose may be, and how many are kept.
+        config: how old a pose may be, how fast the sensor, and how many are kept.
         name: of the socket, for people.
     """
 
@@ -43,27 +47,28 @@ class PoseSocket:
         bound.setblocking(False)
         self.name, self.config, self._socket = name, config, bound
         self._ring = PoseRing(config.capacity, config.max_age_s)
-        self.received = self.used = self.posed = self.unposed = 0
+        self.received = self.used = self.restarts = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
 
-    def poses(self, info: StreamInfo) -> bool:
-        """Some frames at least, if they are sent."""
-        return True
+    def of_stream(self, info: StreamInfo) -> StreamInfo:
+        """Some frames at least have one, if poses are sent."""
+        return replace(info, has_poses=True, pose_notes=())
 
-    def pose(self, frame: Frame) -> Float64 | None:
-        """(4, 4) T_world_sensor at the frame's stamp, None where the poses sent so far do not tell."""
+    def place(self, frame: Frame) -> Frame:
+        """With T_world_sensor at the frame's stamp, None where the poses sent so far do not tell."""
         self._drain(frame.stamp_s)
         T = self._ring.at(frame.stamp_s)
         self.posed, self.unposed = self.posed + (T is not None), self.unposed + (T is None)
-        return T
+        return replace(frame, T_world_sensor=T, restarts=self.restarts)
 
     def report(self) -> dict[str, Any]:
-        """Datagrams received, used and refused, frames with and without a pose."""
+        """Datagrams received, used and refused, restarts of the sender, frames with and without a pose."""
         return {
             "source": self.name,
             "received": self.received,
             "used": self.used,
             "refused": {kind: self.refused[kind] for kind in self.KINDS},
+            "restarts": self.restarts,
             "frames_posed": self.posed,
             "frames_unposed": self.unposed,
         }
@@ -95,9 +100,20 @@ class PoseSocket:
             cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s: is it the stream's clock?"
             raise DatagramError("ahead", cause)
         newest_s = self._ring.newest_s
+        speed_mps = self._ring.speed_to(stamp_s, T)
+        if speed_mps > self.config.max_speed_mps:
+            self._begin_anew(f"{speed_mps:.0f} m/s from the pose before, at stamp {stamp_s:.3f} s")
         if not self._ring.add(stamp_s, T):
             raise DatagramError("out_of_order", f"stamp {stamp_s:.3f} s after {newest_s:.3f} s")
         self.used += 1
+
+    def _begin_anew(self, cause: str) -> None:
+        self._ring.clear()
+        self.restarts += 1
+        if self.restarts == 1:
+            meaning = "taken for a sender begun anew, tracks stay where they are"
+            remedy = "have it keep its origin, or raise odometry.max_speed_mps if the robot is that fast"
+            log.warning("%s: %s: %s; %s; more of them are only counted", self.name, cause, meaning, remedy)
 
     def _refuse(self, error: DatagramError) -> None:
         self.refused[error.kind] += 1

@@ -10,7 +10,7 @@ from typing import Self
 
 from modt.errors import ModtError, ScanError
 from modt.sources.scan_file import read_scan
-from modt.sources.stream import Fault, StreamInfo
+from modt.sources.stream import FIRST, Fault, Faults, StreamInfo
 from modt.types import Float64, Frame
 
 log = logging.getLogger(__name__)
@@ -34,7 +34,7 @@ class ScanReference:
 
 
 class ScanStream:
-    """Frames from scan files; a scan that cannot be used is counted, logged and skipped.
+    """Frames from scan files; a scan that cannot be used is counted and skipped, the first few are logged.
 
     Args:
         info: what is known beforehand.
@@ -44,7 +44,7 @@ class ScanStream:
     def __init__(self, info: StreamInfo, scans: list[ScanReference]) -> None:
         self.info = replace(info, n_frames=len(scans), end=scans[-1].index + 1 if scans else 0)
         self.scans = scans
-        self.faults: list[Fault] = []
+        self.faults = Faults()
 
     def __iter__(self) -> Iterator[Frame]:
         used = 0
@@ -59,7 +59,7 @@ class ScanStream:
             used += 1
             yield Frame(scan.index, scan.stamp_s, points, scan.T_world_sensor)
         if self.scans and not used:
-            cause = f"none of its {len(self.scans)} scans can be used ({self.faults[0].cause})"
+            cause = f"none of its {len(self.scans)} scans can be used ({self.faults.first[0].cause})"
             raise ModtError(self.info.name, cause, "give a stream of float32 x, y, z, reflectance scans")
 
     def between(self, first: int, last: int | None) -> Self:
@@ -67,5 +67,6 @@ class ScanStream:
         return type(self)(self.info, [s for s in self.scans if s.index >= first and (last is None or s.index < last)])
 
     def _fault(self, scan: ScanReference, cause: str, *, skipped: bool) -> None:
-        self.faults.append(Fault(scan.index, str(scan.path), cause, skipped))
-        log.warning("%s: %s%s", scan.path, cause, "; frame skipped" if skipped else "")
+        if self.faults.add(Fault(scan.index, str(scan.path), cause, skipped)):
+            more = "; more faults are only counted" if self.faults.count == FIRST else ""
+            log.warning("%s: %s%s%s", scan.path, cause, "; frame skipped" if skipped else "", more)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol, Self
 
 from modt.geometry import Camera
@@ -23,6 +23,7 @@ class StreamInfo:
         camera: camera that the annotations and KITTI results refer to, None where there is none.
         has_poses: frames carry T_world_sensor.
         notes: what is missing, and what that costs.
+        pose_notes: the same of its own poses; of no account where they come from elsewhere.
         end: one more than the number of the last frame, None where it is not known.
     """
 
@@ -34,6 +35,7 @@ class StreamInfo:
     camera: Camera | None
     has_poses: bool
     notes: tuple[str, ...] = ()
+    pose_notes: tuple[str, ...] = ()
     end: int | None = None
 
 
@@ -54,11 +56,39 @@ class Fault:
     skipped: bool
 
 
+FIRST = 20
+"""Faults that are kept; of those after them only the number is."""
+
+
+@dataclass(slots=True)
+class Faults:
+    """Scans, or parts of some, that could not be used.
+
+    Attributes:
+        count: of all.
+        skipped: scans left out.
+        first: the FIRST of them.
+    """
+
+    count: int = 0
+    skipped: int = 0
+    first: list[Fault] = field(default_factory=list)
+
+    def add(self, fault: Fault) -> bool:
+        """One more; whether it is among the first."""
+        self.count += 1
+        self.skipped += fault.skipped
+        early = self.count <= FIRST
+        if early:
+            self.first.append(fault)
+        return early
+
+
 class Stream(Protocol):
     """A source of frames, in the order of time."""
 
     info: StreamInfo
-    faults: list[Fault]
+    faults: Faults
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames; what had to be left out is added to faults meanwhile."""

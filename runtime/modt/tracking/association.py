@@ -26,13 +26,13 @@ class Matches:
         rows: (K,) of the tracks.
         proposals: (K,) of this frame.
         place: (K, 2) where each proposal puts its track [m, world].
-        R: (K, 2, 2) covariance of that place [m2].
+        variance: (K,) of that place, the same in every direction [m2].
     """
 
     rows: Int
     proposals: Int
     place: Float64
-    R: Float64
+    variance: Float64
 
 
 class Association(Protocol):
@@ -61,17 +61,19 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     """
     if not len(rows):
         return np.zeros(0, np.int64)
-    alone = (np.bincount(rows)[rows] == 1) & (np.bincount(columns)[columns] == 1)
-    contested = np.flatnonzero(~alone)
+    kept = (np.bincount(rows)[rows] == 1) & (np.bincount(columns)[columns] == 1)
+    contested = np.flatnonzero(~kept)
     if not len(contested):
         return np.arange(len(rows))
     i, n = _compact(rows[contested])
     j, k = _compact(columns[contested])
     matrix = np.full((n, k), limit)
-    which = np.full((n, k), NONE, np.int64)
-    matrix[i, j], which[i, j] = np.minimum(cost[contested], limit), contested
-    chosen = which[linear_sum_assignment(matrix)]
-    return np.sort(np.concatenate([np.flatnonzero(alone), chosen[chosen >= 0]]))
+    matrix[i, j] = np.minimum(cost[contested], limit)
+    row, column = linear_sum_assignment(matrix)
+    partner = np.full(n, NONE, np.int64)
+    partner[row] = column
+    kept[contested] = partner[i] == j
+    return np.flatnonzero(kept)
 
 
 def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
@@ -83,9 +85,7 @@ def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
 
 def _compact(index: Int) -> tuple[Int, int]:
     """Indices renumbered without gaps, and how many there are."""
-    occurs = np.zeros(int(index.max()) + 1, np.bool_)
-    occurs[index] = True
-    number = np.cumsum(occurs)
+    number = np.cumsum(np.bincount(index) > 0)
     return number[index] - 1, int(number[-1])
 
 
@@ -107,9 +107,8 @@ class PaperAssociation:
         low = cost <= self.config.t_da
         rows, columns, cost = rows[low], columns[low], cost[low]
         keep = assign(rows, columns, cost, FORBIDDEN)
-        variance = self.config.position_sigma_m**2
-        R = np.broadcast_to(np.eye(2) * variance, (len(keep), 2, 2))
-        return Matches(rows[keep], columns[keep], sightings.centroid[columns[keep]], R)
+        variance = np.full(len(keep), self.config.position_sigma_m**2)
+        return Matches(rows[keep], columns[keep], sightings.centroid[columns[keep]], variance)
 
     def cost(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Float64:
         """(K,) cost of the pairs."""

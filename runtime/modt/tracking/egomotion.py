@@ -12,8 +12,9 @@ import numpy as np
 
 from modt.geometry import rotation_zyx, se3
 from modt.tracking.followed import Followed
+from modt.tracking.outlines import WAYS, middles, touching
 from modt.tracking.robust import carried, compare, likeness, shift_between
-from modt.tracking.sightings import AXES, Sightings, touching
+from modt.tracking.sightings import Sightings
 from modt.types import Float64, Int
 
 REACH_M = 2.5
@@ -84,26 +85,25 @@ class Registration:
 
     def _solve(self, tracks: Followed, sightings: Sightings, reach_m: float, choices: int) -> Fit | None:
         """The motion that most landmarks within reach say; pairs are chosen anew in the first rounds."""
-        rows, low, high = landmarks(tracks)
-        i, j = _pairs(low, high, sightings, reach_m)
+        rows, known = landmarks(tracks)
+        i, j = _pairs(known, sightings.outline, reach_m)
         if len(i) < MINIMUM:
             return None
         motion = np.zeros(3)
         if not self._begun:
-            shift, size, _, _ = compare(low[i], high[i], sightings.low[j], sightings.high[j])
+            shift, size, _, _ = compare(known[:, i], sightings.outline[:, j])
             motion[:2] = -_vote(shift[size < ALIKE])
         levers = sightings.place - sightings.eye
         variance = 0.05**2 + tracks.P[rows, 0, 0]
         for k in range(ROUNDS):
             lever = levers.take(j, axis=0)
-            carry = (motion[:2] + motion[2] * _turned(lever)) @ AXES
-            known = low.take(i, axis=0), high.take(i, axis=0)
-            seen = sightings.low.take(j, axis=0) + carry, sightings.high.take(j, axis=0) + carry
-            shift = shift_between(*known, *seen)
+            carry = (motion[:2] + motion[2] * _turned(lever)) @ WAYS
+            a, b = known.take(i, axis=1), sightings.outline.take(j, axis=1) + carry.T
+            shift = shift_between(a, b)
             error = np.hypot(shift[:, 0], shift[:, 1])
             best = np.arange(len(i))
             if k < choices:
-                size, overlap, _ = likeness(*known, *seen)
+                size, overlap, _ = likeness(a, b)
                 best = _mutual(i, j, error + size - overlap)
             weight = 1.0 / (variance[i[best]] + (0.003 * sightings.range_m[j[best]]) ** 2)
             motion = motion + _fit(shift.take(best, axis=0), lever.take(best, axis=0), weight)
@@ -113,23 +113,23 @@ class Registration:
         return Fit(motion, int((agree < INLIER_M).sum()), len(agree))
 
 
-def landmarks(tracks: Followed) -> tuple[Int, Float64, Float64]:
-    """Rows of what stands or may, and (n, 4) least and (n, 4) greatest coordinates of their outlines.
+def landmarks(tracks: Followed) -> tuple[Int, Float64]:
+    """Rows of what stands or may, and their (8, n) outlines.
 
     What has stood for a while lies where it was seen on average, not where it was seen last: then an error of one
     frame is not handed on to all that follow.
     """
     rows = np.flatnonzero((tracks.still | (tracks.hits < 3)) & (tracks.missed <= 2))
-    low, high = (a[rows] for a in carried(tracks))
+    outline = carried(tracks).take(rows, axis=1)
     known = (tracks.still & (tracks.stood >= STOOD))[rows]
-    low[known], high[known] = tracks.stood_low[rows[known]], tracks.stood_high[rows[known]]
-    return rows, low, high
+    outline[:, known] = tracks.landmark[rows[known]].T
+    return rows, outline
 
 
-def _pairs(low: Float64, high: Float64, sightings: Sightings, reach: float) -> tuple[Int, Int]:
-    """Rows and sightings whose middles are within reach of one another, along x and along y."""
-    middle, other = (low + high) / 2, (sightings.low + sightings.high) / 2
-    return touching(middle - reach, middle + reach, other, other)
+def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
+    """Indices of outlines a and b whose middles are within reach of one another, along x and along y."""
+    middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (middles(a), middles(b)))
+    return touching(middle_a + reach, middle_b)
 
 
 def _turned(lever: Float64) -> Float64:

@@ -8,18 +8,21 @@ part, and takes the whole when only one is seen. A part that may be a person, an
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from modt.tracking.association import Matches
 from modt.tracking.followed import Followed
 from modt.tracking.kalman import HEADING, SPEED
-from modt.tracking.sightings import AXES, Sightings, covered, girth, touching
+from modt.tracking.outlines import WAYS, covered, girth, touching
+from modt.tracking.sightings import Sightings
 from modt.types import NONE, Bool, Float64, Int, ObjectClass
 
 ROOM_M = np.array([[6.0, 2.7], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
 """Greatest length and width of one object of each class; what counts as background may be a car not known as one."""
+PERSON_M = float(ROOM_M[ObjectClass.PEDESTRIAN, 0])
+"""What is longer is no person."""
+BULKY = np.array([True, True, False, False])
+"""Classes that are easily taken for one another: background and cars."""
 APART_MPS, SIGMAS = 1.5, 2.0
 """Parts of one object do not differ so much in velocity, and by so many standard deviations of their speeds."""
 WITHIN = 0.6
@@ -60,47 +63,42 @@ def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
     """Rows, eldest first, of what was seen more than once and is now not seen, or less of it than before."""
     rows = np.flatnonzero(tracks.hits > 1)
     own = proposal[rows]
-    now = girth(sightings.low, sightings.high)[own]
-    known = girth(tracks.hull_low, tracks.hull_high)[rows]
-    less = rows[(own == NONE) | (known > LESS * now)]
-    eldest_first: Int = less[np.argsort(tracks.id[less])]
-    return eldest_first
+    now = girth(sightings.outline)[own]
+    known = girth(tracks.hull.T)[rows]
+    less: Int = rows[(own == NONE) | (known > LESS * now)]
+    return less  # tracks are in the order of their birth
 
 
 def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
     """Rows and proposals: an elder track, and a larger part of its object that it does not have."""
     if not len(elders):
         return elders, elders
-    about = tracks.x[elders, :2] @ AXES
-    hull_low, hull_high = (ends.take(elders, axis=0) + about for ends in (tracks.hull_low, tracks.hull_high))
-    i, part = touching(hull_low, hull_high, sightings.low, sightings.high)
+    hull = (tracks.hull.take(elders, axis=0) + tracks.x.take(elders, axis=0)[:, :2] @ WAYS).T
+    i, part = touching(hull, sightings.outline)
     elder, rival = elders[i], owner[part]
     size = np.where(proposal == NONE, 0, sightings.count[proposal])
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
     larger = np.flatnonzero(junior & (rival != elder) & (sightings.count[part] > size[elder]))
     larger = larger[_free(tracks, elder[larger], rival[larger])]
-    person = ROOM_M[ObjectClass.PEDESTRIAN, 0]
-    stout = (sightings.box[part[larger], 3] > person) & (tracks.box[elder[larger], 3] > person)
+    stout = (sightings.box[part[larger], 3] > PERSON_M) & (tracks.box[elder[larger], 3] > PERSON_M)
     larger = larger[stout | _gives_way(tracks, elder[larger], rival[larger])]
     i, elder, part = i[larger], elder[larger], part[larger]
-    moved = tracks.x[elder, :2] - tracks.shown[elder]
-    box = tracks.box[elder]
+    moved = tracks.x.take(elder, axis=0)[:, :2] - tracks.shown.take(elder, axis=0)
+    box = tracks.box.take(elder, axis=0)
     box[:, :2] += moved
-    fits = _fits(box, sightings.box[part], ROOM_M[tracks.posterior[elder].argmax(axis=1)])
-    part_low, part_high = sightings.low[part], sightings.high[part]
-    within = covered(part_low, part_high, hull_low[i], hull_high[i]) > WITHIN
-    moved = moved @ AXES
-    whole = covered(tracks.low[elder] + moved, tracks.high[elder] + moved, part_low, part_high) > WITHIN
+    fits = _fits(box, sightings.box.take(part, axis=0), ROOM_M[tracks.kind[elder]])
+    outline = sightings.outline.take(part, axis=1)
+    within = covered(outline, hull.take(i, axis=1)) > WITHIN
+    whole = covered((tracks.outline.take(elder, axis=0) + moved @ WAYS).T, outline) > WITHIN
     related = fits & (within | whole)
     return elder[related], part[related]
 
 
 def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
     """(k,) whether the elder may take the part that the rival (NONE: nobody) has: they may be one object."""
-    class_, other = (tracks.posterior[rows].argmax(axis=1) for rows in (elder, rival))
-    bulky = (class_ <= ObjectClass.CAR) & (other <= ObjectClass.CAR)  # one is easily taken for the other
-    alike = ~tracks.fixed[rival] | (class_ == other) | bulky
-    (vx, vy), (wx, wy) = (_velocity(tracks.x[rows]) for rows in (elder, rival))
+    kind, other = tracks.kind[elder], tracks.kind[rival]
+    alike = ~tracks.fixed[rival] | (kind == other) | (BULKY[kind] & BULKY[other])
+    (vx, vy), (wx, wy) = (_velocity(tracks.x.take(rows, axis=0)) for rows in (elder, rival))
     doubt = SIGMAS * np.sqrt(tracks.P[elder, SPEED, SPEED] + tracks.P[rival, SPEED, SPEED])
     together = np.hypot(wx - vx, wy - vy) <= APART_MPS + doubt
     free: Bool = (rival == NONE) | alike & (together | (tracks.hits[rival] < SETTLED))
@@ -114,7 +112,7 @@ def _velocity(x: Float64) -> tuple[Float64, Float64]:
 
 def _gives_way(tracks: Followed, elder: Int, rival: Int) -> Bool:
     """(k,) whether a part that may be a person goes to the elder: nobody settled has it, or the elder is a car."""
-    car = tracks.fixed[elder] & (tracks.posterior[elder].argmax(axis=1) == ObjectClass.CAR)
+    car = tracks.fixed[elder] & (tracks.kind[elder] == ObjectClass.CAR.value)
     way: Bool = (rival == NONE) | (tracks.hits[rival] < SETTLED) | car
     return way
 
@@ -123,31 +121,25 @@ def _fits(a: Float64, b: Float64, room: Float64) -> Bool:
     """(k,) whether boxes a and b (k, 7) lie within one box of the room (k, 2), along the heading of the longer."""
     yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
     c, s = np.cos(yaw), np.sin(yaw)
-    offset = b[:, :2] - a[:, :2]
-    lengths = []
-    for apart, turn in ((offset[:, 0] * c + offset[:, 1] * s, 0.0), (offset[:, 1] * c - offset[:, 0] * s, np.pi / 2)):
-        half_a, half_b = (_half_width(box, yaw + turn) for box in (a, b))
-        lengths.append(np.maximum(half_a, apart + half_b) - np.minimum(-half_a, apart - half_b))
-    fits: Bool = (np.maximum(*lengths) < room[:, 0]) & (np.minimum(*lengths) < room[:, 1])
+    x, y = (b[:, :2] - a[:, :2]).T
+    apart = np.array((x * c + y * s, y * c - x * s))
+    half_a, half_b = (_half_widths(box, yaw) for box in (a, b))
+    span = np.maximum(half_a, apart + half_b) - np.minimum(-half_a, apart - half_b)
+    fits: Bool = (np.maximum(*span) < room[:, 0]) & (np.minimum(*span) < room[:, 1])
     return fits
 
 
-def _half_width(boxes: Float64, direction_rad: Float64) -> Float64:
-    """(k,) how far each box (k, 7) reaches from its middle in its direction, bird's-eye view [m]."""
-    turn = direction_rad - boxes[:, 6]
+def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
+    """(2, k) how far each box (k, 7) reaches from its middle along its heading yaw and across it [m]."""
+    turn = np.array((yaw, yaw + np.pi / 2)) - boxes[:, 6]
     half: Float64 = (boxes[:, 3] * np.abs(np.cos(turn)) + boxes[:, 4] * np.abs(np.sin(turn))) / 2
     return half
 
 
 def _with(tracks: Followed, matches: Matches, proposal: Int, swapped: Bool) -> Matches:
     """The matches after the exchange: what changed hands measures nothing."""
-    match = np.full(len(tracks), NONE, np.int64)
-    match[matches.rows] = np.arange(len(matches.rows))
-    match[swapped] = NONE
-    rows = np.flatnonzero(proposal != NONE)
-    kept = match[rows] != NONE
-    measured = match[rows[kept]]
-    place, R = tracks.x[rows, :2], np.zeros((len(rows), 2, 2))
-    R[:, 0, 0] = R[:, 1, 1] = UNMEASURED_M2
-    place[kept], R[kept] = matches.place[measured], matches.R[measured]
-    return replace(matches, rows=rows, proposals=proposal[rows], place=place, R=R)
+    kept, changed = np.flatnonzero(~swapped[matches.rows]), np.flatnonzero(swapped & (proposal != NONE))
+    rows = np.concatenate([matches.rows[kept], changed])
+    place = np.concatenate([matches.place.take(kept, axis=0), tracks.x.take(changed, axis=0)[:, :2]])
+    variance = np.concatenate([matches.variance[kept], np.full(len(changed), UNMEASURED_M2)])
+    return Matches(rows, proposal[rows], place, variance)

@@ -15,7 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from modt.tracking.followed import Followed
-from modt.tracking.sightings import AXES, Sightings, covered, touching
+from modt.tracking.outlines import WAYS, covered, touching
+from modt.tracking.sightings import Sightings
 from modt.types import Bool, Int
 
 CAPACITY = 2048
@@ -45,7 +46,7 @@ class BackgroundMemory:
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
-        self._low, self._high = np.full((capacity, 4), np.inf), np.full((capacity, 4), -np.inf)
+        self._outline = np.full((8, capacity), -np.inf)
         self._top = np.full(capacity, -np.inf)
         self._next = self._filled = 0
 
@@ -55,8 +56,7 @@ class BackgroundMemory:
     def keep(self, tracks: Followed, rows: Int) -> None:
         """Remember the places of tracks that end: background all of them, and at rest."""
         slots = (self._next + np.arange(len(rows))) % len(self._top)
-        self._low[slots], self._high[slots] = tracks.low[rows], tracks.high[rows]
-        self._top[slots] = tracks.top[rows]
+        self._outline[:, slots], self._top[slots] = tracks.outline.take(rows, axis=0).T, tracks.top[rows]
         self._next = int(self._next + len(rows)) % len(self._top)
         self._filled = min(self._filled + len(rows), len(self._top))
 
@@ -70,12 +70,12 @@ class BackgroundMemory:
             which: (n,) those that no track claims.
         """
         n = self._filled
-        about = tracks.x[rows, :2] @ AXES
-        low = np.concatenate([self._low[:n], tracks.hull_low[rows] + about])
-        high = np.concatenate([self._high[:n], tracks.hull_high[rows] + about])
+        alive = tracks.hull.take(rows, axis=0) + tracks.x.take(rows, axis=0)[:, :2] @ WAYS
+        place = np.concatenate([self._outline[:, :n], alive.T], axis=1)
         top = np.concatenate([self._top[:n], tracks.top[rows]])
-        i, j = touching(sightings.low[which], sightings.high[which], low, high)
-        within = covered(sightings.low[which[i]], sightings.high[which[i]], low[j], high[j]) >= COVER
+        seen = sightings.outline.take(which, axis=1)
+        i, j = touching(seen, place)
+        within = covered(seen.take(i, axis=1), place.take(j, axis=1)) >= COVER
         known = np.zeros(len(which), np.bool_)
         known[i[within & (sightings.top[which[i]] < top[j] + RISE_M)]] = True
         return known

@@ -8,7 +8,8 @@ from modt.config import TrackingConfig
 from modt.tracking import kalman
 from modt.tracking.association import Matches, assign
 from modt.tracking.followed import Followed
-from modt.tracking.sightings import AXES, Sightings, touching
+from modt.tracking.outlines import AXES, WAYS, girth, lengths, touching
+from modt.tracking.sightings import Sightings
 from modt.types import Bool, Float64, Int, ObjectClass
 
 SOFT_M = 0.3
@@ -47,16 +48,16 @@ class RobustAssociation:
 
     def match(self, tracks: Followed, sightings: Sightings) -> Matches:
         """Pairs within the gate; then, among what is left, those that overlap although they changed their shape."""
-        low, high = carried(tracks)
-        R = self.noise(sightings)
-        rows, columns = self._near(tracks, low, high, sightings)
-        ends = (
-            *(end.take(rows, axis=0) for end in (low, high)),
-            *(end.take(columns, axis=0) for end in (sightings.low, sightings.high)),
-        )
-        shift, size, overlap, cover = compare(*ends)
-        S = tracks.P[:, :2, :2].copy().take(rows, axis=0) + R.take(columns, axis=0) + JUMP_M**2 * np.eye(2)
-        distance = kalman.mahalanobis_squared(least(*ends) @ AXES.T / 2, S)  # what changed its shape may be far off
+        expected = carried(tracks)
+        variance = self.noise(sightings)
+        rows, columns = self._near(tracks, expected, sightings)
+        a, b = expected.take(rows, axis=1), sightings.outline.take(columns, axis=1)
+        size, overlap, cover = likeness(a, b)
+        S = tracks.P[:, :2, :2].copy().take(rows, axis=0)
+        for k in (0, 1):
+            S[:, k, k] += variance[columns]
+            S[:, k, k] += JUMP_M**2
+        distance = kalman.mahalanobis_squared((AXES @ least(a, b) / 2).T, S)  # what changed its shape may be far off
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
         count = np.abs(np.log(tracks.points[rows] / sightings.count[columns]))
@@ -69,15 +70,16 @@ class RobustAssociation:
         second = second[~self._swallowed(tracks, sightings, rows[second], columns[second])]
         second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
         kept = np.concatenate([first, second])
-        place = tracks.x[rows[kept], :2] + shift[kept]
+        shift = shift_between(a.take(kept, axis=1), b.take(kept, axis=1))
+        place = tracks.x.take(rows[kept], axis=0)[:, :2] + shift
         loose = np.maximum(1.0, distance[kept] / 4)  # the tails are heavy: what lies far off says less
-        return Matches(rows[kept], columns[kept], place, R[columns[kept]] * loose[:, None, None])
+        return Matches(rows[kept], columns[kept], place, variance[columns[kept]] * loose)
 
     def _swallowed(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Bool:
         """(K,) pairs in which an object would become a part of something larger: it waits until they part again."""
-        grown = (sightings.high[columns] - sightings.low[columns]).max(axis=1)
-        known = (tracks.hull_high[rows] - tracks.hull_low[rows]).max(axis=1)
-        scenery = tracks.fixed[rows] & (tracks.posterior[rows].argmax(axis=1) == ObjectClass.BACKGROUND)
+        grown = lengths(sightings.outline.take(columns, axis=1)).max(axis=0)
+        known = lengths(tracks.hull.take(rows, axis=0).T).max(axis=0)
+        scenery = tracks.fixed[rows] & (tracks.kind[rows] == ObjectClass.BACKGROUND.value)
         swallowed: Bool = ~scenery & (grown > GROWTH * known + 1.0)
         return swallowed
 
@@ -86,29 +88,27 @@ class RobustAssociation:
         return sightings.place
 
     def noise(self, sightings: Sightings) -> Float64:
-        """(P, 2, 2) covariance of a place: ends of outlines jitter by the spacing of returns, and more where cut."""
-        extent = (sightings.high - sightings.low).mean(axis=1)
+        """(P,) variance of a place [m2]: ends of outlines jitter by the spacing of returns, and more where cut."""
+        extent = girth(sightings.outline) / 4
         sigma = 0.06 + 0.001 * sightings.range_m + 0.03 * np.minimum(extent, 3.0)
         sigma = np.where(sightings.cut, 1.5 * sigma, sigma)
-        R: Float64 = np.square(sigma)[:, None, None] * np.eye(2)
-        return R
+        variance: Float64 = np.square(sigma)
+        return variance
 
-    def _near(self, tracks: Followed, low: Float64, high: Float64, sightings: Sightings) -> tuple[Int, Int]:
+    def _near(self, tracks: Followed, expected: Float64, sightings: Sightings) -> tuple[Int, Int]:
         """Pairs whose outlines come near enough along x and along y."""
-        reach = (0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1])))[:, None]
-        return touching(low - reach, high + reach, sightings.low, sightings.high)
+        reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
+        return touching(expected + reach, sightings.outline)
 
 
-def carried(tracks: Followed) -> tuple[Float64, Float64]:
-    """(M, 4) low and high ends of the outlines last seen, where the filter expects them now."""
-    moved = (tracks.x[:, :2] - tracks.shown) @ AXES
-    return tracks.low + moved, tracks.high + moved
+def carried(tracks: Followed) -> Float64:
+    """(8, M) the outlines last seen, where the filter expects them now."""
+    outline: Float64 = (tracks.outline + (tracks.x[:, :2] - tracks.shown) @ WAYS).T
+    return outline
 
 
-def compare(
-    low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64
-) -> tuple[Float64, Float64, Float64, Float64]:
-    """How outlines b (K, 4) lie to outlines a (K, 4), row by row.
+def compare(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64, Float64]:
+    """How outlines b (8, K) lie to outlines a (8, K), one by one.
 
     Returns:
         shift: (K, 2) from a to b [m], by both ends along each axis where they agree, else by that which moved less.
@@ -116,37 +116,42 @@ def compare(
         overlap: (K,) intersection over union.
         cover: (K,) intersection over the smaller of the two.
     """
-    return shift_between(low_a, high_a, low_b, high_b), *likeness(low_a, high_a, low_b, high_b)
+    return shift_between(a, b), *likeness(a, b)
 
 
-def shift_between(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> Float64:
+def shift_between(a: Float64, b: Float64) -> Float64:
     """(K, 2) compare's shift alone."""
-    ahead, behind = high_b - high_a, low_b - low_a
-    a, b, c, d = np.maximum(high_a - low_a, high_b - low_b).T  # a reduction of so short an axis is slow
-    reach = AGREE_M / np.maximum(np.maximum(np.maximum(a, b), np.maximum(c, d)), 1.0)
-    both = np.square(np.maximum(1 - np.square((ahead - behind) / reach[:, None]), 0.0))
-    moved = both * (ahead + behind) / 2 + (1 - both) * least(low_a, high_a, low_b, high_b)
-    shift: Float64 = moved @ AXES.T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    ahead, behind = moves(a, b)
+    longest = np.maximum(lengths(a), lengths(b)).max(axis=0)
+    reach = AGREE_M / np.maximum(longest, 1.0)
+    both = np.square(np.maximum(1 - np.square((ahead - behind) / reach), 0.0))
+    moved = both * (ahead + behind) / 2 + (1 - both) * least(a, b)
+    shift: Float64 = (AXES @ moved).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     return shift
 
 
-def likeness(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> tuple[Float64, Float64, Float64]:
+def likeness(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
     """(K,) compare's size, overlap and cover."""
-    length_a, length_b = high_a - low_a, high_b - low_b
-    ratio = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).T
-    size = (ratio[0] + ratio[1] + ratio[2] + ratio[3]) / 4
+    length_a, length_b = lengths(a), lengths(b)
+    size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).sum(axis=0) / 4
     pad = SOFT_M / 3
-    common = np.maximum(np.minimum(high_a, high_b) - np.maximum(low_a, low_b) + pad, 0.0)
-    squares = [(length + pad)[:, :2] * (length + pad)[:, 2:] for length in (length_a, length_b)]
-    shared = common[:, :2] * common[:, 2:]  # in the upright square, and in the one on its corner
-    overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)).T)  # a reduction of so short an axis is slow
-    cover = np.minimum(*(shared / np.minimum(*squares)).T)
+    common = np.maximum(lengths(np.minimum(a, b)) + pad, 0.0)
+    squares = [(length + pad)[:2] * (length + pad)[2:] for length in (length_a, length_b)]
+    shared = common[:2] * common[2:]  # in the upright square, and in the one on its corner
+    overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)))
+    cover = np.minimum(*(shared / np.minimum(*squares)))
     return size, overlap, cover
 
 
-def least(low_a: Float64, high_a: Float64, low_b: Float64, high_b: Float64) -> Float64:
-    """(K, 4) along each axis, how far the end moved that moved less from outlines a to b (K, 4) [m]."""
-    ahead, behind = high_b - high_a, low_b - low_a
+def moves(a: Float64, b: Float64) -> tuple[Float64, Float64]:
+    """(4, K) and (4, K) along each axis, how far the end ahead and the end behind moved from outlines a to b [m]."""
+    gain = b - a
+    return gain[:4], -gain[4:]
+
+
+def least(a: Float64, b: Float64) -> Float64:
+    """(4, K) along each axis, how far the end moved that moved less from outlines a to b (8, K) [m]."""
+    ahead, behind = moves(a, b)
     return np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
 
 

@@ -178,6 +178,16 @@ class StateMachine:
 
 _H = Happening
 
+WAITING = (
+    Transition("unmatched", "e1", "unmatched", _H.ASSOCIATED, "followed while it waits for the budget"),
+    Transition("matched", "e2", "unmatched", _H.INHERITS_NOTHING, "joins an object that waits"),
+    Transition("unmatched", "e3", "lost_unmatched", _H.UNASSOCIATED, "no proposal while it waits"),
+    Transition("lost_unmatched", "e4", "unmatched", _H.ASSOCIATED, "re-associated, still waiting"),
+    Transition("lost_unmatched", "e5", "lost_unmatched", _H.UNASSOCIATED, "still no proposal"),
+    Transition("lost_unmatched", "e6", "deleted", _H.EXPIRED, "no proposal for N frames"),
+)
+"""What neither table tells: a track without a class waits for the frame's budget."""
+
 EFFICIENT = StateMachine(
     title="Table I",
     names=("proposal", "matched", "unmatched", "tracked", "lost", "lost_unmatched", "deleted"),
@@ -193,12 +203,7 @@ EFFICIENT = StateMachine(
         Transition("lost", "a7", "tracked", _H.ASSOCIATED, "re-associated"),
         Transition("lost", "a8", "lost", _H.UNASSOCIATED, "still no proposal"),
         Transition("lost", "a9", "deleted", _H.EXPIRED, "no proposal for N frames"),
-        Transition("unmatched", "e1", "unmatched", _H.ASSOCIATED, "followed while it waits for the budget"),
-        Transition("matched", "e2", "unmatched", _H.INHERITS_NOTHING, "joins an object that waits"),
-        Transition("unmatched", "e3", "lost_unmatched", _H.UNASSOCIATED, "no proposal while it waits"),
-        Transition("lost_unmatched", "e4", "unmatched", _H.ASSOCIATED, "re-associated, still waiting"),
-        Transition("lost_unmatched", "e5", "lost_unmatched", _H.UNASSOCIATED, "still no proposal"),
-        Transition("lost_unmatched", "e6", "deleted", _H.EXPIRED, "no proposal for N frames"),
+        *WAITING,
         Transition("tracked", "e7", "unmatched", _H.DOUBTED, "an inherited class did not hold"),
     ),
 )
@@ -235,12 +240,7 @@ ACCURATE = StateMachine(
         Transition("lost_unclassified", "a13", "tracked_unclassified", _H.ASSOCIATED, "re-associated"),
         Transition("lost_classified", "a14", "deleted", _H.EXPIRED, "no proposal for N frames"),
         Transition("lost_unclassified", "a14", "deleted", _H.EXPIRED, "no proposal for N frames"),
-        Transition("unmatched", "e1", "unmatched", _H.ASSOCIATED, "followed while it waits for the budget"),
-        Transition("matched", "e2", "unmatched", _H.INHERITS_NOTHING, "joins an object that waits"),
-        Transition("unmatched", "e3", "lost_unmatched", _H.UNASSOCIATED, "no proposal while it waits"),
-        Transition("lost_unmatched", "e4", "unmatched", _H.ASSOCIATED, "re-associated, still waiting"),
-        Transition("lost_unmatched", "e5", "lost_unmatched", _H.UNASSOCIATED, "still no proposal"),
-        Transition("lost_unmatched", "e6", "deleted", _H.EXPIRED, "no proposal for N frames"),
+        *WAITING,
         Transition("tracked_classified", "e7", "unmatched", _H.DOUBTED, "an inherited class did not hold"),
         Transition("lost_classified", "e8", "lost_classified", _H.UNASSOCIATED, "still no proposal"),
         Transition("lost_unclassified", "e9", "lost_unclassified", _H.UNASSOCIATED, "still no proposal"),

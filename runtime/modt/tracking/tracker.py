@@ -12,8 +12,9 @@ from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
 from modt.tracking.kinship import reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
+from modt.tracking.outlines import WAYS
 from modt.tracking.robust import RobustAssociation
-from modt.tracking.sightings import AXES, Sightings, sight
+from modt.tracking.sightings import Sightings, sight
 from modt.tracking.states import Happening, StateMachine
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
@@ -33,6 +34,8 @@ LANDMARK_M = 0.2
 """An end of an outline that is off by more is another end."""
 FORGET = 0.98
 """What is kept, a frame, of an extent that is not seen again."""
+BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
+"""The posterior of what is background for certain."""
 AGILITY = np.array([0.25, 1.5, 0.75, 1.0])
 """Process noise of each class relative to what is assumed of an unknown one."""
 
@@ -74,12 +77,14 @@ class Tracker:
         self.association = association_of(config) if association is None else association
         self.memory = memory_of(config) if memory is None else memory
         self._registration = Registration()
+        place, speed = config.position_sigma_m, config.initial_speed_sigma_mps
+        self._P_born = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
         self._tracks = Followed.blank()
         self._next_id = 0
         self._stamp_s: float | None = None
-        self._T_world_sensor = np.eye(4)
-        self._T_last_now = np.eye(4)
+        self._T_world_sensor = self._T_world_before = np.eye(4)
         self._T_world_odometry: Float64 | None = None
+        self._restarts = 0
 
     @property
     def tracks(self) -> Tracks:
@@ -110,8 +115,9 @@ class Tracker:
         self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
-        self._bear(matches, sightings)
-        self._bury()
+        scenery = self._scenery()
+        self._bear(matches, sightings, scenery)
+        self._bury(scenery)
         return self._tracks
 
     def asking(self) -> Bool:
@@ -142,7 +148,8 @@ class Tracker:
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
         t = self._tracks
-        agility = np.where(t.fixed, AGILITY[t.posterior.argmax(axis=1)], 1.0)
+        t.kind = t.posterior.argmax(axis=1)
+        agility = np.where(t.fixed, AGILITY[t.kind], 1.0)
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
         t.x, t.P = kalman.predict(t.x, t.P, kalman.process_noise(t.x, dt_s, acceleration, turn), dt_s)
@@ -150,19 +157,21 @@ class Tracker:
     def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
         """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
         before, given, first = self._T_world_sensor, frame.T_world_sensor, self._stamp_s is None
+        if frame.restarts != self._restarts:
+            self._restarts, self._T_world_odometry = frame.restarts, None
         if first and given is not None:
             before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
         if given is not None and self._T_world_odometry is not None:
             after = self._T_world_odometry @ given
-            sightings = sight(frame, proposals, after)
+            sightings = sight(proposals, after)
         else:
-            after = before @ self._T_last_now
-            sightings = sight(frame, proposals, after)
+            after = before @ (inverse(self._T_world_before) @ before)  # as it moved last
+            sightings = sight(proposals, after)
             after = rigid(self._registration.correct(self._tracks, sightings) @ after)
-            sightings = sight(frame, proposals, after)
-            if given is not None:  # odometry that begins late is brought to where the tracks are
+            sightings = sight(proposals, after)
+            if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
-        self._T_world_sensor, self._T_last_now = after, inverse(before) @ after
+        self._T_world_sensor, self._T_world_before = after, before
         return sightings
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
@@ -172,7 +181,8 @@ class Tracker:
         slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
         step = matches.place - x[:, :2]
         heading = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
-        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, matches.R)
+        R = matches.variance[:, None, None] * np.eye(2)
+        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, R)
         t.x[rows], t.P[rows] = kalman.turn_about(x, P)
         t.state[rows] = self.machine.meet(t.state[rows], Happening.ASSOCIATED)
         t.missed[rows] = 0
@@ -182,12 +192,10 @@ class Tracker:
     def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
         """Note what was seen of the tracks."""
         tracks.shown[rows] = place
-        low, high = (ends.take(proposals, axis=0) for ends in (sightings.low, sightings.high))
-        tracks.low[rows], tracks.high[rows] = low, high
-        low, high = low - place @ AXES, high - place @ AXES
-        hull_low, hull_high = (FORGET * ends.take(rows, axis=0) for ends in (tracks.hull_low, tracks.hull_high))
-        tracks.hull_low[rows] = np.minimum(low, hull_low + (1 - FORGET) * low)
-        tracks.hull_high[rows] = np.maximum(high, hull_high + (1 - FORGET) * high)
+        outline = sightings.outline.T.take(proposals, axis=0)
+        tracks.outline[rows] = outline
+        about = outline - place @ WAYS
+        tracks.hull[rows] = np.maximum(about, FORGET * tracks.hull.take(rows, axis=0) + (1 - FORGET) * about)
         tracks.proposal[rows] = proposals
         tracks.box[rows] = sightings.box.take(proposals, axis=0)
         tracks.points[rows] = sightings.count[proposals]
@@ -210,9 +218,9 @@ class Tracker:
         t = self._tracks
         t.stood[rows] = np.where(t.still[rows], t.stood[rows] + 1, 0)
         gain = np.maximum(1.0 / np.maximum(t.stood[rows], 1), LANDMARK_GAIN)[:, None]
-        for mean, seen in ((t.stood_low, t.low), (t.stood_high, t.high)):
-            off = seen[rows] - mean[rows]
-            mean[rows] += np.where(np.abs(off) < LANDMARK_M, gain, 1.0) * off
+        mean = t.landmark.take(rows, axis=0)
+        off = t.outline.take(rows, axis=0) - mean
+        t.landmark[rows] = mean + np.where(np.abs(off) < LANDMARK_M, gain, 1.0) * off
 
     def _miss(self, matched: Int) -> None:
         """Tracks without a proposal coast."""
@@ -229,38 +237,38 @@ class Tracker:
         t = self._tracks
         rows = np.flatnonzero(t.inherited & (t.proposal != NONE))
         rows = rows[self._away(rows) > STILL_M]
+        if not len(rows):
+            return
         t.state[rows] = self.machine.meet(t.state[rows], Happening.DOUBTED)
         t.inherited[rows] = t.fixed[rows] = False
         t.posterior[rows] = 1.0 / N_CLASSES
 
-    def _bear(self, matches: Matches, sightings: Sightings) -> None:
+    def _bear(self, matches: Matches, sightings: Sightings, scenery: Int) -> None:
         """A track for every proposal that found none; a2, or a1 and a5 where its place is remembered."""
         free = np.ones(len(sightings), np.bool_)
         free[matches.proposals] = False
         born = np.flatnonzero(free)
         if not len(born):
             return
-        scenery = self._scenery(np.arange(len(self._tracks)))
         known = self.memory.recall(self._tracks, scenery, sightings, born)
         new = Followed.blank(len(born))
         new.id[:] = self._next_id + np.arange(len(born))
         self._next_id += len(born)
-        new.state[:] = self.machine.proposal
-        new.state[known] = self.machine.meet(new.state[known], Happening.ASSOCIATED)
+        new.state[:] = self.machine.meet(
+            np.full(len(born), self.machine.proposal), np.where(known, Happening.ASSOCIATED, Happening.UNASSOCIATED)
+        )
         new.state[known] = self.machine.meet(new.state[known], Happening.INHERITS_CLASS)
-        new.state[~known] = self.machine.meet(new.state[~known], Happening.UNASSOCIATED)
         new.inherited[:] = new.fixed[:] = known
-        new.posterior[known] = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
+        new.posterior[known] = BACKGROUND
         new.x[:, :2] = self.association.birthplace(sightings)[born]  # speed and heading begin at zero
-        place, speed = self.config.position_sigma_m, self.config.initial_speed_sigma_mps
-        new.P[:] = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
+        new.P[:] = self._P_born
         new.age[:] = new.hits[:] = 1
         new.home[:] = new.x[:, :2]
-        new.hull_low[:], new.hull_high[:] = np.inf, -np.inf
+        new.hull[:] = -np.inf
         self._show(new, np.arange(len(born)), born, sightings, new.x[:, :2])
         self._tracks = self._tracks.append(new)
 
-    def _bury(self) -> None:
+    def _bury(self, scenery: Int) -> None:
         """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered.
 
         What was not seen often enough to be asked for is deleted after half as many: nothing is known of it.
@@ -272,14 +280,14 @@ class Tracker:
         if not len(rows):
             return
         t.state[rows] = self.machine.meet(t.state[rows], Happening.EXPIRED)
-        self.memory.keep(t, self._scenery(rows))
+        self.memory.keep(t, scenery[expired[scenery]])
         self._tracks = t.take(~expired)
 
-    def _scenery(self, rows: Int) -> Int:
-        """Those of the rows that are background, for certain, and never moved."""
+    def _scenery(self) -> Int:
+        """Rows that are background, for certain, and never moved."""
         t = self._tracks
-        fixed = rows[t.fixed[rows]]
-        background = fixed[t.posterior.take(fixed, axis=0).argmax(axis=1) == ObjectClass.BACKGROUND]
+        likely = t.kind == ObjectClass.BACKGROUND.value  # arrays are slow to compare with an enumeration itself
+        background = np.flatnonzero(t.fixed & likely)
         scenery: Int = background[self._away(background) < STILL_M]
         return scenery
 

@@ -40,7 +40,7 @@ def test_the_reader_gives_back_points_times_poses_and_camera(written, layout):
             atol=1e-4,
         )
     np.testing.assert_allclose(read.info.camera.P_image_sensor, stream.info.camera.P_image_sensor, atol=1e-9)
-    assert read.info.notes == ()
+    assert read.info.notes == read.info.pose_notes == ()
 
 
 def test_tracklets_hold_the_boxes_that_the_camera_sees(written):

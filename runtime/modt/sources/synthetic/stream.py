@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.sources.stream import Fault, StreamInfo
+from modt.sources.stream import Faults, StreamInfo
 from modt.sources.synthetic.placement import placed, read_placements
 from modt.sources.synthetic.scenes import SCENES
 from modt.sources.synthetic.sensors import sensor as sensor_model
@@ -68,7 +68,7 @@ class SyntheticStream:
             world = placed(read_placements(Path(scene)), rng, seconds, model.height_m)
         self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
-        self.faults: list[Fault] = []
+        self.faults = Faults()
         self.info = StreamInfo(
             name=f"{scene}, {sensor}, seed {seed}",
             layout="synthetic",
@@ -91,7 +91,7 @@ class SyntheticStream:
     def between(self, first: int, last: int | None) -> Self:
         """The frames with first <= index < last; the others are not rendered."""
         part, whole = copy.copy(self), self._indices
-        part.faults = []
+        part.faults = Faults()
         part._indices = range(max(first, whole.start), whole.stop if last is None else min(last, whole.stop))
         part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
         return part

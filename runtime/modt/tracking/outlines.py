@@ -1,0 +1,111 @@
+"""Outlines: how far points reach in eight directions, bird's-eye view.
+
+An outline is eight numbers: the greatest coordinate of its points along each of WAYS. What lies opposite is four
+further on, so the ends along axis k are at outline[k] and at -outline[k + 4]. As all eight say how far something
+reaches, the outline of two things together is the greater of theirs in each direction, and both ends of an axis are
+treated alike. Many are an (8, n) array, a contiguous row a direction: arithmetic along an axis of eight is slow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.types import Bool, Float32, Float64, Int, Proposals
+
+DIRECTIONS = np.deg2rad([0.0, 45.0, 90.0, 135.0])
+"""Bearings of the axes along which an outline is measured, world frame [rad]."""
+AXES = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+"""(2, 4) their unit vectors."""
+WAYS = np.concatenate([AXES, -AXES], axis=1)
+"""(2, 8) the directions: each axis forth, then each axis back."""
+PAD_M = 0.15
+"""Outlines jitter by this much."""
+FEW_PAIRS = 200_000
+"""Up to this many, looking at every pair costs less than sorting."""
+
+
+def outlines(proposals: Proposals, T_world_sensor: Float64) -> Float64:
+    """(8, P) outlines of the proposals in the world [m]."""
+    n = len(proposals)
+    if not n:
+        return np.zeros((8, 0))
+    R = T_world_sensor[:2, :3, None].astype(np.float32)
+    x, y, z = proposals.coordinates
+    xy = R[:, 0] * x
+    term = np.empty_like(xy)  # tens of thousands of points: every array less is less that leaves the cache
+    xy += np.multiply(R[:, 1], y, out=term)
+    xy += np.multiply(R[:, 2], z, out=term)
+    x, y = xy
+    one, half = np.float32(1.0), np.float32(np.sqrt(0.5))
+    axes = ((x, one), (np.add(x, y, out=term[0]), half), (y, one), (np.subtract(y, x, out=term[1]), half))
+    starts = proposals.offsets[:-1]
+    reach = np.empty((8, n))
+    for k, (along, scale) in enumerate(axes):
+        reach[k] = scale * np.maximum.reduceat(along, starts)
+        reach[k + 4] = -scale * np.minimum.reduceat(along, starts)
+    reach += (T_world_sensor[:2, 3] @ WAYS)[:, None]
+    return reach
+
+
+def lengths(outline: Float64) -> Float64:
+    """(4, n) from end to end of each outline (8, n) along each axis [m]."""
+    length: Float64 = outline[:4] + outline[4:]
+    return length
+
+
+def girth(outline: Float64) -> Float64:
+    """(n,) sum of the four lengths of each outline (8, n) [m]."""
+    total: Float64 = lengths(outline).sum(axis=0)
+    return total
+
+
+def middles(outline: Float64) -> Float64:
+    """(4, n) middle of each outline (8, n) along each axis [m]."""
+    middle: Float64 = (outline[:4] - outline[4:]) / 2
+    return middle
+
+
+def covered(outline: Float64, place: Float64) -> Float64:
+    """(n,) part of each outline (8, n) within its place (8, n): the lesser for the two squares that hold them."""
+    common = np.maximum(lengths(np.minimum(outline, place + PAD_M)), 0.0)
+    part = common / np.maximum(lengths(outline), PAD_M)
+    least: Float64 = np.minimum(part[0] * part[2], part[1] * part[3])
+    return least
+
+
+def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
+    """Pairs of outlines a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order."""
+    n, k = a.shape[1], b.shape[1]
+    ends, facing = np.ascontiguousarray(a[::2], np.float32), -np.ascontiguousarray(b[::2], np.float32)
+    pair = (compare_all if n * k < FEW_PAIRS else sweep)(ends, facing)
+    i = pair // max(k, 1)
+    return i, pair - i * k
+
+
+def compare_all(ends: Float32, facing: Float32) -> Int:
+    """Pairs i * k + j, in order, of which ends (4, n) reach what faces them (4, k) on every side, all looked at.
+
+    What faces an end is the other's opposite one, two further on and with its sign reversed.
+    """
+    near: Bool = ends[0][:, None] >= facing[2]
+    for side in (1, 2, 3):
+        near &= ends[side][:, None] >= facing[side - 2]
+    return np.flatnonzero(near)
+
+
+def sweep(ends: Float32, facing: Float32) -> Int:
+    """The same pairs: sorted along the first axis, those that can overlap an interval are a stretch of the others.
+
+    It ends where they begin beyond the interval, and begins where the first of them reaches it.
+    """
+    order = facing[2].argsort()
+    facing = facing.take(order, axis=1)
+    first = np.maximum.accumulate(-facing[0]).searchsorted(-ends[2])
+    n = np.maximum(facing[2].searchsorted(ends[0], side="right") - first, 0)
+    i = np.repeat(np.arange(len(n)), n)
+    j = np.arange(len(i)) + np.repeat(first + n - np.cumsum(n), n)
+    near = (ends[1].take(i) >= facing[3].take(j)) & (ends[3].take(i) >= facing[1].take(j))
+    near &= ends[2].take(i) >= facing[0].take(j)  # the first reaches it, not all that come after
+    pair: Int = i[near] * len(order) + order[j[near]]
+    pair.sort()
+    return pair
