@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.random import Generator
 
+from dataset import SENSOR_HEIGHT_M
 from modt.classification.crops import Crops
 from modt.types import Bool, Float64, Int
 
@@ -63,7 +64,7 @@ def _reshape(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float
     local = _turn(local, rng.normal(0, np.deg2rad(6), n)[owner])
     size = rng.uniform(0.9, 1.1, n)
     local[:, :2] *= size[owner, None]
-    ground = -1.73
+    ground = -SENSOR_HEIGHT_M
     local[:, 2] = ground + (local[:, 2] - ground) * (size * rng.uniform(0.96, 1.04, n))[owner]
     out: Float64 = _turn(local, bearing[owner]) + np.c_[centre[:, :2], np.zeros(n)][owner]
     return out

@@ -17,6 +17,8 @@ SHIPPED, CLUSTERED, PASTED, SYNTHETIC, UNLABELLED = range(5)
 """Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
 there for training alone, and so is what nobody labelled."""
 
+SENSOR_HEIGHT_M = 1.73
+"""Of KITTI's, which the synthetic sensors stand at as well."""
 APART = ("offsets", "provenance")
 
 

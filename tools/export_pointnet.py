@@ -2,6 +2,8 @@
 
     export_pointnet.py TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
 
+TRAINED_DIR is what tools/train_pointnet.py and tools/train_boxes.py wrote. The box prior goes into the metadata.
+
 Two identities make the exported graph cheap without changing a digit that matters: the maximum commutes with adding a
 bias and with ReLU, so both come after it, on one row instead of one a point; and it is idempotent, so that the point
 axis may be as long as a proposal has points. Batch and point axes are dynamic.
@@ -19,6 +21,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from modt.classification.prior import METADATA, encode
 from modt.types import CLASS_NAMES, Float32
 
 Layers = list[tuple[Float32, Float32]]
@@ -95,6 +98,7 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
     ]
     if "cross_validation" in report:
         lines += ["## Out of fold (drives never split)", "", *_scores(report["cross_validation"])]
+    lines += ["## The box alone, out of fold", "", *_ruled_out(report["boxes"])]
     return "\n".join(lines)
 
 
@@ -127,6 +131,23 @@ def _scores(scores: dict[str, Any]) -> list[str]:
     ]
 
 
+def _ruled_out(boxes: dict[str, Any]) -> list[str]:
+    precision = ", ".join(f"{name} {100 * value:.1f}" for name, value in boxes["average_precision"].items())
+    rows = [
+        f"| {row['likely']} | " + " | ".join(f"{100 * row['share'][c]:.1f} %" for c in CLASS_NAMES) + " |"
+        for row in boxes["ruled_out"]
+    ]
+    return [
+        f"What a box says (modt.classification.prior), in the metadata; average precision {precision} %.",
+        "By its box an object with less than the probability in the first column:",
+        "",
+        f"| | {' | '.join(CLASS_NAMES)} |",
+        "|---|" + "---|" * len(CLASS_NAMES),
+        *rows,
+        "",
+    ]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("trained", type=Path, help="folder that tools/train_pointnet.py wrote")
@@ -134,9 +155,12 @@ def main() -> None:
     parser.add_argument("--data", required=True, help="what it was trained on, for the card")
     parser.add_argument("--licence", required=True)
     args = parser.parse_args()
-    model = graph(load_layers(args.trained / "weights.npz")).SerializeToString(deterministic=True)
+    network = graph(load_layers(args.trained / "weights.npz"))
+    helper.set_model_props(network, {METADATA: encode(load_layers(args.trained / "boxes.npz"))})
+    model = network.SerializeToString(deterministic=True)
     args.out.write_bytes(model)
     report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
+    report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
     text = card(args.out.stem, hashlib.sha256(model).hexdigest(), report, args.data, args.licence)
     args.out.with_suffix(".md").write_text(text, encoding="utf-8")
 

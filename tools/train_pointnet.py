@@ -24,14 +24,13 @@ from numpy.random import Generator
 
 from augment import Beams, augment, limit
 from calibration import Calibration, expected_error, fit
-from dataset import UNLABELLED, Dataset, folds, load
+from dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, folds, load
 from modt.classification.crops import Crops, canonical
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 from network import PointNet
 from scores import average_precision, confusion
 from teaching import Ensemble, Labels, Teaching
 
-SENSOR_HEIGHT_M = 1.73
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
 MIX = np.array([[0.4, 0.35, 0.0, 0.25], [0.3, 0.25, 0.3, 0.15], [0.2, 0.15, 0.3, 0.35], [0.2, 0.15, 0.3, 0.35]])

@@ -40,6 +40,7 @@ class PointNet:
     Attributes:
         path: the model file.
         sha256: its hash, which its card (the file beside it that ends in .md) must name.
+        metadata: what else the model brings along.
 
     Raises:
         MisuseError: no such model, not the one that its card describes, no ONNX, or not (batch, points, 3) to
@@ -53,6 +54,7 @@ class PointNet:
         self.sha256 = _checked_hash(self.path)
         self._session = _session(self.path)
         self._input = self._session.get_inputs()[0].name
+        self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) probability of each class for each of the proposals given, in their order.

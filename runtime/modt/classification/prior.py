@@ -1,0 +1,144 @@
+"""What is thought of a proposal before its points are looked at: by what is common, or by its box.
+
+A wall of twelve metres, a canopy, a pole: most background is known by its size. A few numbers a proposal tell it
+apart for next to nothing, and the network need not be asked.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+from scipy.special import softmax
+
+from modt.config import SensorConfig
+from modt.types import N_CLASSES, Float64, Int, Proposals
+
+METADATA = "box_prior"
+"""Key of an ONNX model's metadata under which the weights of its BoxPrior are found."""
+N_FEATURES = 7
+MOST_POINTS = 1000
+"""What shows more points than this is large; how large, its box says."""
+SMALL_M = 0.05
+"""Added to lengths, so that those of thin things have logarithms that mean something."""
+
+Layers = Sequence[tuple[Float64, Float64]]
+
+
+class Prior(Protocol):
+    """P(class) of proposals that nobody has looked at."""
+
+    def of(self, proposals: Proposals) -> Float64:
+        """(P, 4) for each proposal of a frame."""
+        ...
+
+
+class Frequency:
+    """As common as the classes are among proposals, whatever the proposal.
+
+    Args:
+        objects: share of car, pedestrian and cyclist.
+    """
+
+    def __init__(self, objects: Sequence[float]) -> None:
+        self._share = np.append(1.0 - np.sum(objects), objects)
+
+    def of(self, proposals: Proposals) -> Float64:
+        """(P, 4), the same for each."""
+        return np.tile(self._share, (len(proposals), 1))
+
+
+class BoxPrior:
+    """P(class | box): a network of a thousand weights over the size of a proposal and where it stands.
+
+    Args:
+        layers: (in, out) weight and (out,) bias of each layer, hyperbolic tangents between them, softmax at the end.
+        sensor: its resolution, and how high it stands, for proposals that do not say.
+    """
+
+    def __init__(self, layers: Layers, sensor: SensorConfig) -> None:
+        self._layers = layers
+        self._step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
+        self._height_m = sensor.height_m or SensorConfig().height_m or 0.0
+
+    def of(self, proposals: Proposals) -> Float64:
+        """(P, 4) for each proposal of a frame."""
+        found_at = proposals.sensor_height_m
+        height_m = self._height_m if found_at is None else found_at
+        score = logits(self._layers, features(proposals.count, proposals.box, height_m, self._step_sr))
+        probability: Float64 = softmax(score, axis=1)
+        return probability
+
+
+def beam_sr(azimuth_step_deg: float, elevation_step_deg: float) -> float:
+    """Solid angle between neighbouring beams [sr]."""
+    return float(np.deg2rad(azimuth_step_deg) * np.deg2rad(elevation_step_deg))
+
+
+def features(count: Int, box: Float64, sensor_height_m: float, step_sr: float) -> Float64:
+    """(P, 7) what is known of proposals without their points.
+
+    The points count by the area that they cover, so that sensors of different resolution see alike: logarithms of
+    that area [m2], of the distance, the length and the width [m]; height, foot and top above the ground [m].
+
+    Args:
+        count: (P,) points.
+        box: (P, 7) sensor frame.
+        sensor_height_m: of the sensor above the ground.
+        step_sr: solid angle that a point stands for [sr].
+    """
+    distance = np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
+    foot = box[:, 2] - box[:, 5] / 2 + sensor_height_m
+    return np.stack(
+        [
+            np.log(np.clip(count, 1, MOST_POINTS) * distance**2 * step_sr),
+            np.log(distance),
+            np.log(box[:, 3] + SMALL_M),
+            np.log(box[:, 4] + SMALL_M),
+            box[:, 5],
+            foot,
+            foot + box[:, 5],
+        ],
+        axis=1,
+    )
+
+
+def logits(layers: Layers, feature: Float64) -> Float64:
+    """(P, 4) of features (P, 7)."""
+    *hidden, (weight, bias) = layers
+    value = feature
+    for hidden_weight, hidden_bias in hidden:
+        value = np.tanh(value @ hidden_weight + hidden_bias)
+    score: Float64 = value @ weight + bias
+    return score
+
+
+def encode(layers: Layers) -> str:
+    """The layers as a model's metadata holds them."""
+    return json.dumps([[weight.tolist(), bias.tolist()] for weight, bias in layers])
+
+
+def decode(text: str) -> Layers:
+    """Layers from a model's metadata.
+
+    Raises:
+        ValueError: they are none, or not of these features and classes.
+    """
+    layers = [(np.array(weight, np.float64), np.array(bias, np.float64)) for weight, bias in json.loads(text)]
+    widths = [N_FEATURES, *(len(bias) for _, bias in layers)]
+    if widths[-1] != N_CLASSES or [weight.shape for weight, _ in layers] != [*pairwise(widths)]:
+        raise ValueError(f"layers of {' x '.join(map(str, widths))}, wanted {N_FEATURES} to {N_CLASSES}")
+    return layers
+
+
+def prior_of(metadata: Mapping[str, str], frequency: Sequence[float], sensor: SensorConfig) -> Prior:
+    """The prior that a model brings along in its metadata; the frequency of the classes where it brings none.
+
+    Raises:
+        ValueError: it brings one that cannot be used.
+    """
+    text = metadata.get(METADATA)
+    return Frequency(frequency) if text is None else BoxPrior(decode(text), sensor)

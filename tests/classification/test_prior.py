@@ -1,0 +1,104 @@
+"""What is thought of a proposal before its points are looked at."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from modt.classification.pointnet import PointNet
+from modt.classification.prior import (
+    METADATA,
+    N_FEATURES,
+    BoxPrior,
+    Frequency,
+    beam_sr,
+    decode,
+    encode,
+    features,
+    logits,
+    prior_of,
+)
+from modt.config import ClassificationConfig, SensorConfig
+from modt.types import Float64, ObjectClass, Proposals
+from tests.classification.scenes import blobs
+
+RNG = np.random.default_rng(5)
+LAYERS = [(RNG.normal(size=(N_FEATURES, 5)), RNG.normal(size=5)), (RNG.normal(size=(5, 4)), RNG.normal(size=4))]
+SHIPPED = ("pointnet-kitti", "pointnet-synthetic")
+
+
+def standing(points: int, distance_m: float, length_m: float, width_m: float, height_m: float) -> Proposals:
+    """One proposal on the ground ahead of a sensor at 1.73 m."""
+    _, proposals = blobs([points], np.random.default_rng(0))
+    foot_m = 0.3
+    box = np.array([[distance_m, 0.0, foot_m + height_m / 2 - 1.73, length_m, width_m, height_m, 0.0]])
+    return dataclasses.replace(proposals, box=box)
+
+
+@given(arrays(np.float64, (6, N_FEATURES), elements=st.floats(-5, 5)))
+def test_the_network_is_what_its_layers_say(feature: Float64) -> None:
+    (w0, b0), (w1, b1) = LAYERS
+    for row, found in zip(feature, logits(LAYERS, feature), strict=True):
+        hidden = [np.tanh(sum(row[i] * w0[i, j] for i in range(N_FEATURES)) + b0[j]) for j in range(5)]
+        expected = [sum(hidden[j] * w1[j, k] for j in range(5)) + b1[k] for k in range(4)]
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_layers_survive_the_metadata() -> None:
+    for (weight, bias), (held, held_bias) in zip(LAYERS, decode(encode(LAYERS)), strict=True):
+        np.testing.assert_array_equal(weight, held)
+        np.testing.assert_array_equal(bias, held_bias)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "[[[[1]], [1]]]", json.dumps([[[[0.0] * 4] * 6, [0.0] * 4]]), "{}"])
+def test_what_is_no_such_network_is_refused(text: str) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        decode(text)
+
+
+def test_without_one_the_classes_are_as_common_as_they_are() -> None:
+    _, proposals = blobs([10, 20], np.random.default_rng(0))
+    prior = prior_of({}, (0.08, 0.02, 0.01), SensorConfig())
+    np.testing.assert_allclose(prior.of(proposals), [[0.89, 0.08, 0.02, 0.01]] * 2)
+    assert isinstance(prior, Frequency)
+    assert isinstance(prior_of({METADATA: encode(LAYERS)}, (0.1, 0.1, 0.1), SensorConfig()), BoxPrior)
+
+
+def test_sensors_of_different_resolution_see_alike() -> None:
+    near = standing(40, 20.0, 4.0, 1.6, 1.4)
+    fine = features(np.array([160]), near.box, 1.73, beam_sr(0.1, 0.2))
+    coarse = features(np.array([40]), near.box, 1.73, beam_sr(0.2, 0.4))
+    np.testing.assert_allclose(fine, coarse)
+
+
+def test_the_height_at_which_proposals_were_found_goes_before_that_of_the_profile() -> None:
+    prior = BoxPrior(LAYERS, SensorConfig(height_m=1.0))
+    seen = standing(40, 20.0, 4.0, 1.6, 1.4)
+    found = dataclasses.replace(seen, sensor_height_m=2.0)
+    assert (prior.of(found) == BoxPrior(LAYERS, SensorConfig(height_m=2.0)).of(seen)).all()
+    assert (prior.of(found) != prior.of(seen)).all()
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_models_that_ship_know_what_is_no_object(name: str) -> None:
+    sensor = SensorConfig()
+    model = PointNet(ClassificationConfig(model=name), sensor)
+    prior = prior_of(model.metadata, (0.08, 0.02, 0.02), sensor)
+    car = prior.of(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
+    person = prior.of(standing(120, 12.0, 0.6, 0.5, 1.4))[0]
+    wall = prior.of(standing(600, 15.0, 12.0, 0.5, 2.3))[0]
+    speck = prior.of(standing(5, 60.0, 0.1, 0.1, 0.3))[0]
+    assert car.argmax() == ObjectClass.CAR
+    assert person[ObjectClass.PEDESTRIAN] > 0.1
+    assert max(1 - wall[0], 1 - speck[0]) < 0.02
+
+
+def test_an_empty_frame_has_no_priors() -> None:
+    assert BoxPrior(LAYERS, SensorConfig()).of(Proposals.empty()).shape == (0, 4)
+    assert Frequency((0.1, 0.1, 0.1)).of(Proposals.empty()).shape == (0, 4)
