@@ -2,7 +2,7 @@
 
 So that only key views and fusion act, the tracker is an ideal one: a proposal goes to the true object that holds most
 of its points; of several, the one with the most points. What belongs to no object, and what broke off one, is
-followed by our own tracker.
+followed by our own tracker; and so is everything where that is asked for.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 
 from build_crops import label
 from labelled import Scan
+from modt.classification.prior import Prior
 from modt.config import ProfileConfig
 from modt.geometry import transform_boxes
 from modt.pipeline import Classifier
@@ -30,15 +31,17 @@ class Moment:
     Attributes:
         proposals: its segments.
         box: (P, 7) their boxes in the world.
-        track: (P,) row of the ideal track of each.
+        track: (P,) row of the track of each.
+        prior: (P, 4) what is thought of each by its box.
         likelihood: (P, 4) what the network says of each.
         kind: (P,) true class.
-        judged: (P,) clearly one object, or clearly none.
+        judged: (P,) clearly one object, or clearly none; of our own tracker pieces and mergers too, as background.
     """
 
     proposals: Proposals
     box: Float64
     track: Int
+    prior: Float64
     likelihood: Float64
     kind: Int
     judged: Bool
@@ -46,7 +49,7 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A drive: its moments, and how many ideal tracks they show."""
+    """A drive: its moments, and how many tracks they show."""
 
     name: str
     moments: tuple[Moment, ...]
@@ -63,7 +66,15 @@ class Recording:
         return replace(self, moments=tuple(large))
 
 
-def record(name: str, drive: Iterable[tuple[Frame, Scan]], config: ProfileConfig, network: Classifier) -> Recording:
+def record(
+    name: str,
+    drive: Iterable[tuple[Frame, Scan]],
+    config: ProfileConfig,
+    network: Classifier,
+    prior: Prior,
+    *,
+    ideal: bool = True,
+) -> Recording:
     """Everything before fusion, once.
 
     Args:
@@ -71,6 +82,8 @@ def record(name: str, drive: Iterable[tuple[Frame, Scan]], config: ProfileConfig
         drive: frames, and their labels with the objects' numbers.
         config: of segmentation and of our own tracker.
         network: that says what each proposal is.
+        prior: that says what it may be by its box.
+        ideal: objects are followed by the ideal tracker.
     """
     tracker = Tracker(config.tracking, ACCURATE)
     rows: dict[tuple[str, int], int] = {}
@@ -80,7 +93,7 @@ def record(name: str, drive: Iterable[tuple[Frame, Scan]], config: ProfileConfig
         own = tracker.follow(frame, proposals)
         ids = own.id[own.row_of_proposal(len(proposals))]
         keys = [
-            ("track", i) if body == NONE else ("body", body)
+            ("body", body) if ideal and body != NONE else ("track", i)
             for i, body in zip(ids.tolist(), owners(scan, proposals).tolist(), strict=True)
         ]
         labels = label(scan, proposals)
@@ -89,9 +102,10 @@ def record(name: str, drive: Iterable[tuple[Frame, Scan]], config: ProfileConfig
                 proposals=proposals,
                 box=transform_boxes(tracker.T_world_sensor, proposals.box),
                 track=np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64),
+                prior=prior.of(proposals),
                 likelihood=network.classify(frame.points, proposals, np.arange(len(proposals))),
                 kind=labels.kind,
-                judged=~labels.partial & ~labels.unknown,
+                judged=~labels.unknown & ~(labels.partial & ideal),
             )
         )
     return Recording(name, tuple(moments), len(rows))
@@ -111,7 +125,7 @@ def owners(scan: Scan, proposals: Proposals) -> Int:
 
 
 class Player:
-    """Segmenter, tracker and classifier of a pipeline, from a recording, frame by frame.
+    """Segmenter, tracker, classifier and prior of a pipeline, from a recording, frame by frame.
 
     The table has a row for every track of the drive, before its birth and after its end as well.
 
@@ -156,6 +170,10 @@ class Player:
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) what the network said when the drive was recorded."""
         return self._moment.likelihood[which]
+
+    def of(self, proposals: Proposals) -> Float64:
+        """(P, 4) what was thought of them then."""
+        return self._moment.prior
 
     def facts(self) -> dict[str, str]:
         """No model runs."""

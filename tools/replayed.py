@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modt.classification.prior import Prior
 from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import NullLedger
 from modt.pipeline import Fusion, Pipeline
@@ -67,13 +68,13 @@ class Outcome:
 
 
 def replay(
-    recordings: Sequence[Recording], fusion: Callable[[], Fusion], ask_from: int, judged_from: int | None = None
+    recordings: Sequence[Recording], fusion: Callable[[Prior], Fusion], ask_from: int, judged_from: int | None = None
 ) -> Outcome:
     """Play drives to a fusion, without a budget.
 
     Args:
         recordings: the drives.
-        fusion: makes one for each drive.
+        fusion: makes one for each drive, which may ask the prior.
         ask_from: frames with a proposal before a track asks for a class.
         judged_from: frames from which proposals are judged, those of ask_from where it is not given: before it no
             setting of the fusion has a say.
@@ -81,8 +82,9 @@ def replay(
     calls = dict.fromkeys(CALLS, 0)
     parts: list[tuple[Float64, Int]] = []
     for recording in recordings:
-        counting = Counting(fusion())
-        parts.append(_played(recording, counting, ask_from, judged_from or ask_from))
+        player = Player(recording, ask_from)
+        counting = Counting(fusion(player))
+        parts.append(_played(recording, player, counting, judged_from or ask_from))
         calls = {name: n + counting.calls[name] for name, n in calls.items()}
     probability, kind = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     total = sum(recording.n_proposals for recording in recordings)
@@ -90,16 +92,15 @@ def replay(
     return Outcome(_precision(probability, kind), calls, sum(calls.values()) / max(total, 1), each)
 
 
-def _played(recording: Recording, fusion: Fusion, ask_from: int, judged_from: int) -> tuple[Float64, Int]:
-    """(R, 4) what is said of the judged proposals, nothing where no view was classified, and (R,) what they are."""
-    player = Player(recording, ask_from)
+def _played(recording: Recording, player: Player, fusion: Fusion, judged_from: int) -> tuple[Float64, Int]:
+    """(R, 4) what is said of the judged proposals, and (R,) what they are."""
     pipeline = Pipeline(player, player, fusion, Scheduler(), player, NullLedger())
     nothing = np.zeros((0, 4), np.float32)
     said, true = [np.zeros((0, N_CLASSES))], [np.zeros(0, np.int64)]
     for index, moment in enumerate(recording.moments):
         tracks = pipeline.step(Frame(index, 0.0, nothing)).tracks
         rows = moment.track[moment.judged & (tracks.hits[moment.track] >= judged_from)]
-        said.append(np.where(tracks.key_points[rows, None] > 0, tracks.posterior[rows], 0.0))
+        said.append(tracks.posterior[rows])
         true.append(moment.kind[tracks.proposal[rows]])
     return np.concatenate(said), np.concatenate(true)
 

@@ -1,6 +1,7 @@
 """Sweep the parameters of key views and fusion over drives with truth, followed by an ideal tracker.
 
     sweep_fusion.py [--world SCENE:SEED ...] [--check SCENE:SEED ...] [--frames N] [--points N] [--page FILE] [--docs]
+    sweep_fusion.py --own
     sweep_fusion.py --paper
     sweep_fusion.py --drive KITTI_RAW_DRIVE
 
@@ -10,8 +11,9 @@ precision over the proposals that are clearly one object or clearly none, from t
 for; calls relative to tracking by detection. No network was trained on the worlds (tools/build_models.py takes seeds
 from 100000 on). What --world suggests --check must confirm: these are other worlds.
 
---paper is the setting of Figs. 10 and 11: asked from the first frame, the number of points alone makes a view
-independent, and a class that is settled stays so. --docs writes what belongs there into docs/classification.md.
+--own takes our own tracker in place of the ideal one, and pieces of objects and mergers for background. --paper is
+the setting of Figs. 10 and 11: asked from the first frame, the number of points alone makes a view independent, and a
+class that is settled stays so. --docs writes what belongs there into docs/classification.md.
 
 A KITTI drive with tracklets stands in for the worlds, in the camera's view. Drive 0001 is five scans, of those that
 pointnet-kitti was trained on. Drive 0005 is the test drive: it is refused unless --confirm is given, and then nothing
@@ -34,6 +36,7 @@ from labelled import TEST_DRIVE, Scan, raw_scans
 from modt import profile
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
+from modt.classification.prior import Prior, prior_of
 from modt.config import FusionConfig, ProfileConfig
 from modt.evaluation import page, svg
 from modt.pipeline import Fusion
@@ -51,6 +54,8 @@ DOCUMENT = Path(__file__).parent.parent / "docs" / "classification.md"
 BEGIN, END = "<!-- tools/sweep_fusion.py -->\n", "<!-- end of tools/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
 ALPHAS = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
+ONCE = "likely_once"
+"""The one that is mode efficient's."""
 SWEEPS: dict[str, tuple[float | None, ...]] = {
     "background_alpha": (0.2, 0.5, 1.0, 2.0, 4.0),
     "start_frame": (1, 2, 3, 4, 5, 6, 7, 8),
@@ -59,6 +64,10 @@ SWEEPS: dict[str, tuple[float | None, ...]] = {
     "view_weight": (0.25, 0.5, 0.75, 1.0),
     "reopen_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
     "reopen_points": (30, 50, 100, 200, 400, 800),
+    "likely": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
+    ONCE: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
+    "likely_again": (0.0, 0.02, 0.05, 0.1, 0.2),
+    "box_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
 }
 NO_BETTER = "No setting is better on both sets at no more calls."
 DOUBTS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
@@ -77,7 +86,7 @@ class Setting:
 
     sweep: str
     value: str
-    fusion: Callable[[], Fusion]
+    fusion: Callable[[Prior], Fusion]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,11 +109,13 @@ def variants(config: FusionConfig) -> list[Setting]:
     never = dataclasses.replace(config, reopen_ratio=None)
     title = "what makes the difference"
     return [
-        Setting(title, "conventional", EveryFrame),
-        Setting(title, "first view (efficient)", FirstView),
-        Setting(title, "uniform prior", lambda: KeyViews(uniform)),
-        Setting(title, "never doubting", lambda: KeyViews(never)),
-        Setting(title, "defaults", lambda: KeyViews(config)),
+        Setting(title, "conventional", lambda prior: EveryFrame()),
+        Setting(title, "first view (efficient)", lambda prior: FirstView(config, prior)),
+        Setting(title, "first view, boxes unseen", lambda prior: FirstView(config)),
+        Setting(title, "boxes unseen", lambda prior: KeyViews(config)),
+        Setting(title, "uniform prior of views", lambda prior: KeyViews(uniform, prior)),
+        Setting(title, "never doubting", lambda prior: KeyViews(never, prior)),
+        Setting(title, "defaults", lambda prior: KeyViews(config, prior)),
     ]
 
 
@@ -124,7 +135,8 @@ def sweeps(config: FusionConfig) -> Iterator[Setting]:
 
 def _moved(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
     moved = dataclasses.replace(config, **changes)
-    return Setting(sweep, f"{text} *" if moved == config else text, lambda: KeyViews(moved))
+    made = FirstView if sweep == ONCE else KeyViews
+    return Setting(sweep, f"{text} *" if moved == config else text, lambda prior: made(moved, prior))
 
 
 def _text(value: float | None) -> str:
@@ -132,8 +144,9 @@ def _text(value: float | None) -> str:
 
 
 def papers(config: ProfileConfig) -> ProfileConfig:
-    """Alpha alone makes a view independent, from the first frame on, and nothing settled is doubted."""
+    """Alpha alone makes a view independent, from the first frame on; nothing is doubted, boxes say nothing."""
     off = {"bearing_deg": 180.0, "range_ratio": 10.0, "extent_ratio": 10.0, "reopen_ratio": None}
+    off |= {"likely": 0.0, "likely_once": 0.0, "box_weight": 0.0}
     return dataclasses.replace(
         config,
         fusion=dataclasses.replace(config.fusion, **off),
@@ -141,18 +154,22 @@ def papers(config: ProfileConfig) -> ProfileConfig:
     )
 
 
-def world(name: str, frames: int, config: ProfileConfig, network: PointNet) -> Recording:
+def world(name: str, frames: int, config: ProfileConfig, network: PointNet, *, ideal: bool) -> Recording:
     """A synthetic drive, scene:seed, in the nominal camera's view."""
     scene, _, seed = name.partition(":")
     stream = SyntheticStream(scene, "hdl-64e", frames * PERIOD_S, int(seed))
     drive = ((frame, scan_of(frame, truth, name, name, camera=True)) for frame, truth in stream.sweeps())
-    return record(name, drive, config, network)
+    return record(name, drive, config, network, _prior(config, network), ideal=ideal)
 
 
-def real(path: Path, config: ProfileConfig, network: PointNet, *, confirm: bool) -> Recording:
+def real(path: Path, config: ProfileConfig, network: PointNet, *, ideal: bool, confirm: bool) -> Recording:
     """A KITTI raw drive."""
     drive: Iterator[tuple[Frame, Scan]] = zip(open_stream(path), raw_scans(path, confirm=confirm), strict=True)
-    return record(path.name, drive, config, network)
+    return record(path.name, drive, config, network, _prior(config, network), ideal=ideal)
+
+
+def _prior(config: ProfileConfig, network: PointNet) -> Prior:
+    return prior_of(network.metadata, config.fusion.prior, config.sensor)
 
 
 def tried(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording], *when: int) -> Tried:
@@ -293,6 +310,7 @@ def main() -> None:
     parser.add_argument("--confirm", action="store_true", help="open the test drive, to confirm what is settled")
     parser.add_argument("--model", default="pointnet-kitti")
     parser.add_argument("--profile", default=profile.DEFAULT)
+    parser.add_argument("--own", action="store_true", help="our own tracker in place of the ideal one")
     parser.add_argument("--paper", action="store_true", help="as the paper swept alpha and the starting frame")
     parser.add_argument("--points", type=int, default=0, help="judge only proposals of so many points or more")
     parser.add_argument("--page", type=Path, help="draw precision against calls into this HTML file")
@@ -301,18 +319,17 @@ def main() -> None:
     testing = args.drive is not None and args.drive.resolve().name == TEST_DRIVE
     if testing and not args.confirm:
         parser.error(f"{TEST_DRIVE} is the test drive: tune elsewhere, and give --confirm to confirm what is settled")
-    if args.docs and (args.paper or args.drive or args.points):
-        parser.error(
-            "--docs writes the figures of the whole sweep over worlds: leave out --paper, --drive and --points"
-        )
+    if args.docs and (args.own or args.paper or args.drive or args.points):
+        parser.error("--docs is of the whole sweep over worlds: leave out --own, --paper, --drive and --points")
     shipped = profile.load(args.profile)
     config = papers(shipped) if args.paper else shipped
     network = PointNet(dataclasses.replace(config.classification, model=args.model), config.sensor)
     if args.drive:
-        drives, checks = [real(args.drive, config, network, confirm=args.confirm)], []
+        drives, checks = [real(args.drive, config, network, ideal=not args.own, confirm=args.confirm)], []
     else:
         drives, checks = (
-            [world(name, args.frames, config, network) for name in names] for names in (args.world, args.check)
+            [world(name, args.frames, config, network, ideal=not args.own) for name in names]
+            for names in (args.world, args.check)
         )
     drives, checks = ([d.judged_from(args.points) for d in of] for of in (drives, checks))
     when = config.tracking.ask_from, shipped.tracking.ask_from

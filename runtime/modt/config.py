@@ -113,9 +113,13 @@ class TrackingConfig(StageConfig):
     gamma: float = _number(0.1, 0.0, 10.0, "", "weight of the difference of size")
     t_da: float = _number(0.95, 0.0, 100.0, "", "highest cost of an association")
     max_missed: int = _number(
-        8, 0, 100, "frames", "without a proposal that end a track (N of a9, a14); half if its class was never asked"
+        8,
+        0,
+        100,
+        "frames",
+        "without a proposal that end a track (N of a9, a14); half if seen but once or twice",
     )
-    ask_from: int = _number(3, 1, 100, "frames", "with a proposal before a class is asked for; flicker never asks")
+    ask_from: int = _number(1, 1, 100, "frames", "with a proposal before a class is asked for")
     position_sigma_m: float = _number(0.3, 0.01, 5.0, "m", "of a measured position")
     acceleration_sigma_mps2: float = _number(2.0, 0.01, 50.0, "m/s2", "process noise of the speed")
     turn_sigma_radps: float = _number(0.3, 0.001, 10.0, "rad/s", "process noise of the heading")
@@ -168,20 +172,24 @@ class FusionConfig(StageConfig):
     """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
 
     threshold: float = _number(0.9, 0.25, 1.0, "", "posterior at which an object's class is fixed")
-    background_threshold: float = _number(0.4, 0.25, 1.0, "", "that of background, were all classes as common")
+    background_threshold: float = _number(0.6, 0.25, 1.0, "", "that of background, were all classes as common")
     view_weight: float = _number(1.0, 0.0, 1.0, "", "share of a further view's evidence; 1: as if independent")
     alpha: tuple[float, float, float] = _per_class(
         0.2, 0.16, 0.22, 0.0, 10.0, "change of points of car, pedestrian, cyclist"
     )
-    background_alpha: float = _number(1.0, 0.0, 10.0, "", "the same, of what looks like background")
+    background_alpha: float = _number(0.5, 0.0, 10.0, "", "the same, of what looks like background")
     prior: tuple[float, float, float] = _per_class(
         0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
     )
+    likely: float = _number(0.01, 0.0, 1.0, "", "probability of an object, by its box, from which it is classified")
+    likely_once: float = _number(0.1, 0.0, 1.0, "", "the same where the first view is the only one (efficient)")
+    likely_again: float = _number(0.1, 0.0, 1.0, "", "the same of what is settled already")
+    box_weight: float = _number(0.75, 0.0, 1.0, "", "say of a box that has changed since the view fused last")
     bearing_deg: float = _number(40.0, 0.0, 180.0, "deg", "change of view that makes it independent")
     range_ratio: float = _number(0.4, 0.0, 10.0, "", "change of distance that makes it independent")
     extent_ratio: float = _number(0.6, 0.0, 10.0, "", "change of size that makes it independent")
     reopen_ratio: float | None = _number(
-        3.0, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
+        1.5, 1.0, 1000.0, "", "times the points at which a class is doubted; none: never"
     )
     reopen_points: int = _number(400, 0, 10000, "", "a class settled from so many is never doubted")
     start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")

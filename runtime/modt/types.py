@@ -125,10 +125,12 @@ class Tracks:
         hits: frames with a proposal.
         missed: frames since the last proposal.
     Columns of the fusion:
-        posterior: (M, 4) P(class | views), uniform before any.
+        prior: (M, 4) P(class | box) of the last box seen, uniform before any.
+        posterior: (M, 4) P(class | views, box), the prior before any view.
         fixed: the class is settled and not asked for again.
         views: key observations fused.
-        key_points: points of the last key observation, 0 before any.
+        key_prior, key_posterior: (M, 4) prior and posterior at the last key observation.
+        key_points: points of it, 0 before any.
         key_bearing: direction from which it was seen, relative to the object [rad].
         key_range: distance from which it was seen [m].
         key_extent: (M, 3) its box l, w, h [m].
@@ -145,9 +147,12 @@ class Tracks:
     age: Int
     hits: Int
     missed: Int
+    prior: Float64
     posterior: Float64
     fixed: Bool
     views: Int
+    key_prior: Float64
+    key_posterior: Float64
     key_points: Int
     key_bearing: Float64
     key_range: Float64
@@ -157,15 +162,24 @@ class Tracks:
     def __len__(self) -> int:
         return len(self.id)
 
+    @property
+    def known(self) -> Bool:
+        """(M,) whether the class is that of a view, or of the place, and not of the box alone."""
+        known: Bool = self.fixed | (self.key_points > 0)
+        return known
+
     @classmethod
     def blank(cls, m: int = 0) -> Self:
-        """M rows: no identity, no proposal, no view yet, uniform posterior."""
+        """M rows: no identity, no proposal, no view yet, all classes alike."""
 
         def zero(*shape: int) -> Float64:
             return np.zeros((m, *shape))
 
         def count() -> Int:
             return np.zeros(m, np.int64)
+
+        def uniform() -> Float64:
+            return np.full((m, N_CLASSES), 1.0 / N_CLASSES)
 
         return cls(
             id=np.full(m, NONE, np.int64),
@@ -178,9 +192,12 @@ class Tracks:
             age=count(),
             hits=count(),
             missed=count(),
-            posterior=np.full((m, N_CLASSES), 1.0 / N_CLASSES),
+            prior=uniform(),
+            posterior=uniform(),
             fixed=np.zeros(m, np.bool_),
             views=count(),
+            key_prior=uniform(),
+            key_posterior=uniform(),
             key_points=count(),
             key_bearing=zero(),
             key_range=zero(),

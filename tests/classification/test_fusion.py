@@ -24,8 +24,9 @@ PAPER = FusionConfig(
     bearing_deg=20.0,
     range_ratio=0.2,
     extent_ratio=0.3,
+    box_weight=0.0,
 )
-ALL = (EveryFrame(), FirstView(), KeyViews(FusionConfig()), KeyViews(PAPER))
+ALL = (EveryFrame(), FirstView(FusionConfig()), KeyViews(FusionConfig()), KeyViews(PAPER))
 
 
 def scene(counts: tuple[int, ...] = (50, 50)) -> tuple[Proposals, Tracks]:
@@ -94,7 +95,7 @@ def test_every_frame_asks_for_whatever_is_seen() -> None:
 
 def test_first_view_is_final() -> None:
     proposals, tracks = scene()
-    fusion = FirstView()
+    fusion = FirstView(FusionConfig())
     asking = np.array([True, True])
     assert fusion.asks(tracks, proposals, asking).all()
     certain = fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
@@ -191,7 +192,7 @@ def test_alpha_is_that_of_the_likeliest_class() -> None:
     fusion, proposals, tracks = after_a_view(config)
     more = moved(proposals, offsets=np.array([0, 60]))
     assert not asks(fusion, tracks, more)
-    tracks.posterior[0] = [0.2, 0.2, 0.5, 0.1]
+    tracks.key_posterior[0] = [0.2, 0.2, 0.5, 0.1]
     assert asks(fusion, tracks, more)
 
 
@@ -235,3 +236,84 @@ def test_no_tracks_are_no_trouble(fusion: Fusion) -> None:
     tracks = seen(proposals)
     assert len(fusion.asks(tracks, proposals, np.zeros(0, np.bool_))) == 0
     assert len(fusion.fuse(tracks, proposals, np.zeros(0, np.int64), np.zeros((0, 4)))) == 0
+
+
+class Told:
+    """A prior that says what a test tells it."""
+
+    def __init__(self, *rows: list[float]) -> None:
+        self.rows = np.array(rows)
+
+    def of(self, proposals: Proposals) -> Float64:
+        return self.rows
+
+
+WALL, DOUBTFUL, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
+
+
+@pytest.mark.parametrize(
+    ("fusion", "asked"),
+    [
+        (KeyViews(FusionConfig(), Told(WALL, DOUBTFUL, CAR)), [False, True, True]),
+        (FirstView(FusionConfig(), Told(WALL, DOUBTFUL, CAR)), [False, False, True]),  # its only view can wait
+    ],
+)
+def test_before_it_is_classified_a_track_is_what_its_box_makes_it(
+    fusion: KeyViews | FirstView, asked: list[bool]
+) -> None:
+    proposals, tracks = scene((50, 50, 50))
+    assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
+    np.testing.assert_allclose(tracks.posterior, [WALL, DOUBTFUL, CAR])
+    assert not tracks.known.any()
+
+
+def test_what_by_its_box_is_no_object_is_not_doubted() -> None:
+    proposals, tracks = scene((20, 20))
+    prior = Told(CAR, CAR)
+    fusion = KeyViews(FusionConfig(reopen_ratio=2.0), prior)
+    fusion.asks(tracks, proposals, np.ones(2, np.bool_))
+    assert fusion.fuse(tracks, proposals, np.arange(2), np.array([[0.991, 0.003, 0.003, 0.003]] * 2)).all()
+    prior.rows = np.array([WALL, CAR])
+    nearer = moved(proposals, offsets=np.array([0, 100, 200]))
+    assert fusion.asks(tracks, nearer, np.zeros(2, np.bool_)).tolist() == [False, True]
+
+
+def test_a_class_goes_with_what_the_box_says_since_the_view() -> None:
+    proposals, tracks = scene((50,))
+    prior = Told(DOUBTFUL)
+    fusion, view = KeyViews(FusionConfig(box_weight=1.0), prior), np.array([[0.5, 0.3, 0.1, 0.1]])
+    asking = np.array([True])
+    fusion.asks(tracks, proposals, asking)
+    fusion.fuse(tracks, proposals, np.array([0]), view)
+    prior.rows = np.array([CAR])
+    fusion.asks(tracks, proposals, asking)
+    expected = view[0] * np.array(CAR) / np.array(DOUBTFUL)
+    np.testing.assert_allclose(tracks.posterior[0], expected / expected.sum(), rtol=1e-6)
+    prior.rows = np.array([DOUBTFUL])
+    fusion.asks(tracks, proposals, asking)
+    np.testing.assert_allclose(tracks.posterior[0], view[0], rtol=1e-6)
+
+
+def test_a_further_view_takes_the_place_of_what_the_box_said_since_the_last() -> None:
+    views = np.array([[0.5, 0.3, 0.1, 0.1], [0.4, 0.4, 0.1, 0.1]])
+    fused = []
+    for between in (DOUBTFUL, CAR):
+        proposals, tracks = scene((50,))
+        prior = Told(DOUBTFUL)
+        fusion = KeyViews(dataclasses.replace(PAPER, box_weight=1.0), prior)
+        for said, view in zip((DOUBTFUL, between), views, strict=True):
+            prior.rows = np.array([said])
+            fusion.asks(tracks, proposals, np.array([True]))
+            fusion.fuse(tracks, proposals, np.array([0]), view[None])
+        fused.append(tracks.posterior[0].copy())
+    np.testing.assert_allclose(fused[0], fused[1])
+
+
+def test_what_took_its_class_over_is_looked_at_where_its_box_may_be_an_objects() -> None:
+    proposals, tracks = scene((50, 50))
+    tracks.fixed[:] = True
+    tracks.posterior[:] = [1.0, 0.0, 0.0, 0.0]
+    settled = np.zeros(2, np.bool_)
+    assert KeyViews(FusionConfig(), Told(WALL, CAR)).asks(tracks, proposals, settled).tolist() == [False, True]
+    assert tracks.posterior[:, 0].tolist() == [1.0, 1.0]  # until it is classified, the class taken over stands
+    assert not FirstView(FusionConfig(), Told(WALL, CAR)).asks(tracks, proposals, settled).any()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import sweep_fusion
 from labelled import TEST_DRIVE, Scan
 from modt import profile
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.prior import Frequency, Prior
 from modt.config import FusionConfig
 from modt.geometry import FieldOfView
 from modt.pipeline import Fusion
@@ -39,7 +41,9 @@ def played() -> Recording:
         likelihood[np.arange(6), kind] += 0.3
         likelihood /= likelihood.sum(axis=1, keepdims=True)
         shown = proposals.box.copy()
-        moments.append(Moment(proposals, shown, np.arange(6), likelihood, kind, np.ones(6, np.bool_)))
+        moments.append(
+            Moment(proposals, shown, np.arange(6), np.full((6, 4), 0.25), likelihood, kind, np.ones(6, np.bool_))
+        )
     return Recording("played", tuple(moments), 6)
 
 
@@ -47,19 +51,19 @@ def calls(outcome: Outcome) -> int:
     return sum(outcome.calls.values())
 
 
-def keyed(config: FusionConfig) -> Fusion:
-    return KeyViews(config)
+def keyed(config: FusionConfig) -> Callable[[Prior], Fusion]:
+    return lambda prior: KeyViews(config, prior)
 
 
 def test_conventional_classifies_whatever_it_sees(played: Recording) -> None:
-    outcome = replay([played, played], EveryFrame, ASK_FROM)
+    outcome = replay([played, played], lambda prior: EveryFrame(), ASK_FROM)
     assert outcome.share == 1.0
     assert calls(outcome) == 2 * played.n_proposals == 120
     assert len(outcome.each) == 2
 
 
 def test_efficient_classifies_each_track_once(played: Recording) -> None:
-    outcome = replay([played], FirstView, ASK_FROM)
+    outcome = replay([played], lambda prior: FirstView(FusionConfig(), prior), ASK_FROM)
     assert outcome.calls == dict(zip(CALLS, (6, 0, 0, 0), strict=True))
 
 
@@ -67,10 +71,10 @@ def test_without_an_independent_view_none_is_taken_after_the_first(played: Recor
     never = dataclasses.replace(
         ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=1, threshold=1.0, background_threshold=1.0
     )
-    few = replay([played], lambda: keyed(never), ASK_FROM)
+    few = replay([played], keyed(never), ASK_FROM)
     assert few.calls == dict(zip(CALLS, (6, 0, 0, 0), strict=True))
     always = dataclasses.replace(never, alpha=(0.0,) * 3, background_alpha=0.0)
-    many = replay([played], lambda: keyed(always), ASK_FROM)
+    many = replay([played], keyed(always), ASK_FROM)
     assert many.calls == dict(zip(CALLS, (6, 0, 48, 0), strict=True))  # each of the nine frames that may ask
 
 
@@ -78,14 +82,14 @@ def test_a_late_start_replaces_the_first_view(played: Recording) -> None:
     late = dataclasses.replace(
         ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=5, threshold=1.0, background_threshold=1.0
     )
-    assert replay([played], lambda: keyed(late), ASK_FROM).calls == dict(zip(CALLS, (6, 6, 0, 0), strict=True))
+    assert replay([played], keyed(late), ASK_FROM).calls == dict(zip(CALLS, (6, 6, 0, 0), strict=True))
 
 
 def test_what_is_settled_from_few_points_is_doubted(played: Recording) -> None:
     settled = dataclasses.replace(
         ALONE, threshold=0.25, background_threshold=0.25, prior=(0.25,) * 3, reopen_ratio=2.0
     )
-    outcome = replay([played], lambda: keyed(settled), ASK_FROM)
+    outcome = replay([played], keyed(settled), ASK_FROM)
     assert outcome.calls["first views"] == 6
     assert outcome.calls["doubts"] == 6 * 2  # 18 points at first, then 42 and 86: each more than twice the last
     assert calls(outcome) == 18
@@ -93,15 +97,17 @@ def test_what_is_settled_from_few_points_is_doubted(played: Recording) -> None:
 
 def test_replays_repeat_themselves_and_leave_the_recording_alone(played: Recording) -> None:
     before = [moment.likelihood.tobytes() for moment in played.moments]
-    once, again = (replay([played], lambda: keyed(FusionConfig()), ASK_FROM) for _ in range(2))
+    once, again = (replay([played], keyed(FusionConfig()), ASK_FROM) for _ in range(2))
     assert once == again
     assert before == [moment.likelihood.tobytes() for moment in played.moments]
 
 
 def test_what_was_never_asked_counts_as_missed(played: Recording) -> None:
-    late = replay([played], FirstView, ask_from=6, judged_from=1)
+    late = replay([played], lambda prior: FirstView(FusionConfig(), prior), ask_from=6, judged_from=1)
     assert max(late.precision.values()) <= 0.5 + 0.3  # five of ten views come before the first answer
-    assert min(replay([played], FirstView, ask_from=6).precision.values()) > max(late.precision.values())
+    assert min(replay([played], lambda prior: FirstView(FusionConfig(), prior), ask_from=6).precision.values()) > max(
+        late.precision.values()
+    )
 
 
 def test_only_large_proposals_are_judged_on_request(played: Recording) -> None:
@@ -128,7 +134,7 @@ def test_a_drive_is_recorded_with_one_track_a_body() -> None:
     network = PointNet(config.classification, config.sensor)
     sweeps = list(SyntheticStream("crossing", "hdl-64e", 0.4, 7).sweeps())
     drive = [(frame, scan_of(frame, truth, "x", "x", camera=True)) for frame, truth in sweeps]
-    recording = record("x", drive, config, network)
+    recording = record("x", drive, config, network, Frequency(config.fusion.prior))
     assert len(recording.moments) == 4
     bodies: dict[int, set[int]] = {}
     for moment, (frame, scan) in zip(recording.moments, drive, strict=True):
@@ -141,7 +147,12 @@ def test_a_drive_is_recorded_with_one_track_a_body() -> None:
         assert again.tobytes() == moment.likelihood.tobytes()
     assert bodies
     assert all(len(tracks) == 1 for tracks in bodies.values())
-    assert replay([recording], EveryFrame, 1).share == 1.0
+    assert replay([recording], lambda prior: EveryFrame(), 1).share == 1.0
+    own = record("x", drive, config, network, Frequency(config.fusion.prior), ideal=False)
+    for moment, ideal in zip(own.moments, recording.moments, strict=True):
+        assert len(np.unique(moment.track)) == len(moment.track)
+        assert (moment.judged | ~ideal.judged).all()
+    assert sum(int(m.judged.sum()) for m in own.moments) > sum(int(m.judged.sum()) for m in recording.moments)
 
 
 def test_each_sweep_holds_the_default_once_where_its_values_do() -> None:
@@ -157,7 +168,7 @@ def tried(mean: float, share: float, checked: tuple[float, float] | None = None)
         Outcome({"car": value}, dict.fromkeys(CALLS, 1), part, (value,))
         for value, part in ((mean, share), *([checked] if checked else []))
     )
-    return Tried(Setting("sweep", "value", EveryFrame), found, check[0] if check else None)
+    return Tried(Setting("sweep", "value", lambda prior: EveryFrame()), found, check[0] if check else None)
 
 
 def test_the_front_holds_what_nothing_cheaper_equals() -> None:

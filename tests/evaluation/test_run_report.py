@@ -50,6 +50,7 @@ def track(id_, proposal, named):
         "state": "tracked",
         "class": "car" if named else "background",
         "posterior": [0.1, 0.7, 0.1, 0.1] if named else [0.25] * 4,
+        "known": named,
         "fixed": named,
         "proposal": proposal,
         "points": 40,
@@ -104,7 +105,7 @@ def write_run(path, *, windows=True, mode="efficient", frames=20, energy=None):
         for k in range(frames):
             tracks = [track(id_, id_, named=id_ < 15) for id_ in range(20)]
             record = {"frame": k, "proposals": 20, "classified": (k * 7) % 5, "deferred": 0, "tracks": tracks}
-            out.write(json.dumps({"schema": "modt.frame/1", **record}) + "\n")
+            out.write(json.dumps({"schema": "modt.frame/2", **record}) + "\n")
     (path / "summary.json").write_text("{}")
     return path
 

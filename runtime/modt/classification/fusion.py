@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classification.belief import FLOOR, expect, likely, normal, sane
+from modt.classification.prior import Frequency, Prior
 from modt.config import FusionConfig
 from modt.geometry import wrap
 from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
-_FLOOR = 1e-4
-"""Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
+CHANCE = 5
+"""Points that come and go by chance: so many more are no closer look."""
 
 
 class EveryFrame:
@@ -26,23 +28,33 @@ class EveryFrame:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Takes this view for all there is."""
-        tracks.posterior[rows] = _sane(likelihood)
+        tracks.posterior[rows] = sane(likelihood)
         tracks.views[rows] = 1
         _remember(tracks, proposals, rows)
         return np.ones(len(rows), np.bool_)
 
 
 class FirstView:
-    """Efficient: the first classification is final (Table I)."""
+    """Efficient: the first classification is final (Table I), so it waits for a box that may well be an object's.
+
+    Args:
+        config: from when on it may, and what a box has to say.
+        prior: what is thought of a proposal unseen; by default as common as the classes are.
+    """
+
+    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
+        self.config = config
+        self.prior = prior or Frequency(config.prior)
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """The tracks that have no class."""
+        expect(tracks, proposals, self.prior, self.config.box_weight)
         asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
-        return asks
+        return asks & likely(tracks, self.config.likely_once)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Settles the class."""
-        tracks.posterior[rows] = _sane(likelihood)
+        tracks.posterior[rows] = sane(likelihood)
         tracks.views[rows] = 1
         tracks.fixed[rows] = True
         _remember(tracks, proposals, rows)
@@ -59,37 +71,42 @@ class KeyViews:
     The network's word is a posterior under the frequency of the classes among proposals, the prior; Equation 6
     multiplies likelihoods, so each further view is divided by the prior, lest that be counted once a view. Views of
     one object are never wholly independent: a further one may be given less than its full weight. And a class that
-    was settled from afar is looked at again when the object shows several times the points, and what was known counts
-    only by its share of these.
+    was settled from afar is looked at again when the object shows clearly more points, and what was known counts only
+    by its share of these; so is what took its class over from its place. What by its box is no object is neither
+    classified nor looked at again.
 
     Args:
         config: thresholds of independence and certainty.
+        prior: what is thought of a proposal unseen; by default as common as the classes are.
     """
 
-    def __init__(self, config: FusionConfig) -> None:
+    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         self.config = config
+        self.prior = prior or Frequency(config.prior)
         self._alpha = np.array([config.background_alpha, *config.alpha])
         objects = np.array(config.prior)
-        prior = np.maximum(np.append(1.0 - objects.sum(), objects), _FLOOR)
-        self._log_prior = np.log(prior / prior.sum())
+        share = np.maximum(np.append(1.0 - objects.sum(), objects), FLOOR)
+        self._log_prior = np.log(share / share.sum())
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """Those asking that were never classified or show an independent view, and the settled that came close."""
+        expect(tracks, proposals, self.prior, self.config.box_weight)
         seen = tracks.proposal != NONE
         asks: Bool = (asking | (tracks.key_points > 0)) & ~tracks.fixed & seen
         rows = np.flatnonzero(asks)
-        first = tracks.key_points[rows] == 0
         started = tracks.age[rows] >= self.config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
-        asks[rows] = first | (started & fresh)
+        first = tracks.key_points[rows] == 0
+        asks[rows] = np.where(first, likely(tracks, self.config.likely)[rows], started & fresh)
         return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.fixed))
 
     def _reopened(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(M,) which of these rows, settled as they are, show so much more that they are worth another look."""
         again = np.zeros(len(tracks), np.bool_)
         if self.config.reopen_ratio is not None:
-            again[rows] = proposals.count[tracks.proposal[rows]] > self.config.reopen_ratio * tracks.key_points[rows]
-            again &= tracks.key_points < self.config.reopen_points
+            many = self.config.reopen_ratio * tracks.key_points[rows] + CHANCE
+            again[rows] = proposals.count[tracks.proposal[rows]] > many
+            again &= (tracks.key_points < self.config.reopen_points) & likely(tracks, self.config.likely_again)
         return again
 
     def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
@@ -112,13 +129,13 @@ class KeyViews:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiplies the view into the posterior, in logarithms (Equation 6), and fixes what is certain."""
-        view = np.log(_sane(likelihood))
+        view = np.log(sane(likelihood))
         evidence = self.config.view_weight * (view - self._log_prior)
         fused = (tracks.views[rows] > 0)[:, None]
-        past = np.log(_sane(tracks.posterior[rows])) - self._log_prior
+        past = np.log(sane(tracks.key_posterior[rows])) - self._log_prior
         share = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
         past *= np.where(tracks.fixed[rows], np.minimum(share, 1.0), 1.0)[:, None]
-        posterior = _normal(np.where(fused, self._log_prior + past + evidence, view))
+        posterior = normal(np.where(fused, self._log_prior + past + evidence, view))
         certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
         tracks.fixed[rows] = certain
@@ -133,23 +150,8 @@ class KeyViews:
         what it would be if all classes were equally common.
         """
         objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self.config.threshold
-        evidence = _normal(np.log(posterior) - self._log_prior)[:, 0]
+        evidence = normal(np.log(posterior) - self._log_prior)[:, 0]
         return objects | (evidence >= self.config.background_threshold)
-
-
-def _sane(probability: Float64) -> Float64:
-    """Rows that are distributions, no entry below the floor; a row that is none (NaN, all zero) says nothing."""
-    finite = np.where(np.isfinite(probability), np.maximum(probability, 0.0), 0.0)
-    greatest = finite.max(axis=1, keepdims=True, initial=0.0)
-    relative = np.divide(finite, greatest, out=np.ones_like(finite), where=greatest > 0)
-    floored = np.maximum(relative / relative.sum(axis=1, keepdims=True), _FLOOR)
-    sane: Float64 = floored / floored.sum(axis=1, keepdims=True)
-    return sane
-
-
-def _normal(log_weight: Float64) -> Float64:
-    """Rows of log weights as distributions."""
-    return _sane(np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf)))
 
 
 def _relative(now: Float64 | Int, before: Float64 | Int) -> Float64:
@@ -169,6 +171,7 @@ def _view(tracks: Tracks, proposals: Proposals, rows: Int) -> tuple[Float64, Flo
 
 def _remember(tracks: Tracks, proposals: Proposals, rows: Int) -> None:
     own = tracks.proposal[rows]
+    tracks.key_prior[rows], tracks.key_posterior[rows] = tracks.prior[rows], tracks.posterior[rows]
     tracks.key_bearing[rows], tracks.key_range[rows] = _view(tracks, proposals, rows)
     tracks.key_points[rows] = proposals.count[own]
     tracks.key_extent[rows] = proposals.box[own, 3:6]

@@ -10,8 +10,9 @@ from pathlib import Path
 from modt.classification.costed import CostedClassifier
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
+from modt.classification.prior import Prior, prior_of
 from modt.classification.scheduler import LinearCost, Scheduler
-from modt.config import OdometryConfig, ProfileConfig
+from modt.config import FusionConfig, OdometryConfig, ProfileConfig
 from modt.energy.counted import CountedClassifier
 from modt.energy.ledger import StageLedger
 from modt.errors import MisuseError
@@ -59,7 +60,7 @@ class Mode:
     """
 
     machine: StateMachine
-    fusion: Callable[[ProfileConfig], Fusion]
+    fusion: Callable[[FusionConfig, Prior], Fusion]
     budget: Callable[[ProfileConfig], Budget]
 
 
@@ -68,9 +69,9 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
 
 
 MODES = {
-    "conventional": Mode(EFFICIENT, lambda profile: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, lambda profile: FirstView(), _profile_budget),
-    "accurate": Mode(ACCURATE, lambda profile: KeyViews(profile.fusion), _profile_budget),
+    "conventional": Mode(EFFICIENT, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
+    "efficient": Mode(EFFICIENT, FirstView, _profile_budget),
+    "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 
@@ -130,12 +131,21 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     """
     cost = LinearCost(profile.classification.max_points)
     limits = profile.classification
-    network = CostedClassifier(PointNet(limits, profile.sensor), cost, time.thread_time_ns)
+    network = PointNet(limits, profile.sensor)
+    classifier = CostedClassifier(network, cost, time.thread_time_ns)
     return Pipeline(
         segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
         tracker=Tracker(profile.tracking, mode.machine),
-        fusion=mode.fusion(profile),
+        fusion=mode.fusion(profile.fusion, _prior(network, profile)),
         scheduler=Scheduler(cost),
-        classifier=CountedClassifier(network, ledger, limits.max_points, limits.batch),
+        classifier=CountedClassifier(classifier, ledger, limits.max_points, limits.batch),
         ledger=ledger,
     )
+
+
+def _prior(network: PointNet, profile: ProfileConfig) -> Prior:
+    """What the model thinks of proposals unseen."""
+    try:
+        return prior_of(network.metadata, profile.fusion.prior, profile.sensor)
+    except (TypeError, ValueError) as error:
+        raise MisuseError(network.path, f"its box prior cannot be used ({error})", "export the model again") from None

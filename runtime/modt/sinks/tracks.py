@@ -18,7 +18,7 @@ from modt.sinks.output import LineFile
 from modt.sinks.records import line
 from modt.types import CLASS_NAMES, NONE, FrameResult
 
-SCHEMA = "modt.frame/1"
+SCHEMA = "modt.frame/2"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 
@@ -34,6 +34,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
         tracks.state.tolist(),
         tracks.posterior.argmax(axis=1).tolist(),
         np.round(tracks.posterior, 6).tolist(),
+        tracks.known.tolist(),
         tracks.fixed.tolist(),
         tracks.proposal.tolist(),
         tracks.points.tolist(),
@@ -50,6 +51,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "state": result.state_names[state],
                 "class": CLASS_NAMES[class_],
                 "posterior": posterior,
+                "known": known,
                 "fixed": fixed,
                 "proposal": None if proposal == NONE else proposal,
                 "points": points,
@@ -58,7 +60,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "box": None if proposal == NONE else dict(zip(BOX_KEYS, box, strict=True)),
                 "world": dict(zip(WORLD_KEYS, world, strict=True)),
             }
-            for id_, state, class_, posterior, fixed, proposal, points, age, missed, box, world in columns
+            for id_, state, class_, posterior, known, fixed, proposal, points, age, missed, box, world in columns
         ],
     }
 
@@ -108,6 +110,8 @@ def frame_line(result: FrameResult) -> str:
         *(
             ',"posterior":',
             _listed(probabilities(tracks.posterior)),
+            ',"known":',
+            TRUTH[tracks.known.astype(np.int64)],
             ',"fixed":',
             TRUTH[tracks.fixed.astype(np.int64)],
         ),

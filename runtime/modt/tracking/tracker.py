@@ -28,6 +28,8 @@ STILL_SIGMA_MPS = 1.0
 """How surely what stands still has no speed, per frame."""
 SLOW_MPS = 0.5
 """What is slower than this has stopped."""
+FLICKER = 3
+"""What is seen less often than in so many frames comes and goes."""
 LANDMARK_GAIN = 0.03
 """Least say of a new view in the mean outline of a landmark."""
 LANDMARK_M = 0.2
@@ -271,10 +273,10 @@ class Tracker:
     def _bury(self, scenery: Int) -> None:
         """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered.
 
-        What was not seen often enough to be asked for is deleted after half as many: nothing is known of it.
+        What flickers is deleted after half as many.
         """
         t = self._tracks
-        patience = np.where(t.hits < self.config.ask_from, self.config.max_missed // 2, self.config.max_missed)
+        patience = np.where(t.hits < FLICKER, self.config.max_missed // 2, self.config.max_missed)
         expired = t.missed > patience
         rows = np.flatnonzero(expired)
         if not len(rows):
