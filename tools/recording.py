@@ -14,7 +14,7 @@ import numpy as np
 
 from build_crops import label
 from labelled import Scan
-from modt.classification.prior import Prior
+from modt.classification.prior import Prior, at_least
 from modt.config import ProfileConfig
 from modt.geometry import transform_boxes
 from modt.pipeline import Classifier
@@ -174,6 +174,10 @@ class Player:
     def of(self, proposals: Proposals) -> Float64:
         """(P, 4) what was thought of them then."""
         return self._moment.prior
+
+    def likely(self, said: Float64, least: float) -> Bool:
+        """(M,) which may be objects by what was thought of them."""
+        return at_least(said, least)
 
     def facts(self) -> dict[str, str]:
         """No model runs."""

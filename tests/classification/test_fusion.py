@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.prior import at_least
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
-from modt.types import NONE, Float64, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, ObjectClass, Proposals, Tracks
 from tests.classification.scenes import blobs, seen
 
 PAPER = FusionConfig(
@@ -247,6 +248,9 @@ class Told:
     def of(self, proposals: Proposals) -> Float64:
         return self.rows
 
+    def likely(self, said: Float64, least: float) -> Bool:
+        return at_least(said, least)
+
 
 WALL, DOUBTFUL, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
 
@@ -264,7 +268,7 @@ def test_before_it_is_classified_a_track_is_what_its_box_makes_it(
     proposals, tracks = scene((50, 50, 50))
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
     np.testing.assert_allclose(tracks.posterior, [WALL, DOUBTFUL, CAR])
-    assert not tracks.known.any()
+    assert not tracks.viewed.any()
 
 
 def test_what_by_its_box_is_no_object_is_not_doubted() -> None:
@@ -292,6 +296,21 @@ def test_a_class_goes_with_what_the_box_says_since_the_view() -> None:
     prior.rows = np.array([DOUBTFUL])
     fusion.asks(tracks, proposals, asking)
     np.testing.assert_allclose(tracks.posterior[0], view[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("make", [FirstView, KeyViews])
+def test_a_settled_class_stays_and_how_sure_it_is_goes_with_the_box(make: type[FirstView | KeyViews]) -> None:
+    proposals, tracks = scene((50,))
+    prior = Told(CAR)
+    fusion, unasked = make(FusionConfig(box_weight=1.0), prior), np.array([False])
+    fusion.asks(tracks, proposals, np.array([True]))
+    assert fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.04, 0.92, 0.02, 0.02]])).all()
+    prior.rows = np.array([WALL])
+    assert not fusion.asks(tracks, proposals, unasked).any()
+    assert tracks.posterior[0].argmax() == ObjectClass.BACKGROUND
+    assert tracks.object_class.tolist() == [ObjectClass.CAR]
+    tracks.fixed[:] = False
+    assert tracks.object_class.tolist() == [ObjectClass.BACKGROUND]
 
 
 def test_a_further_view_takes_the_place_of_what_the_box_said_since_the_last() -> None:

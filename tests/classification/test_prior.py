@@ -56,7 +56,22 @@ def test_layers_survive_the_metadata() -> None:
         np.testing.assert_array_equal(bias, held_bias)
 
 
-@pytest.mark.parametrize("text", ["", "[]", "[[[[1]], [1]]]", json.dumps([[[[0.0] * 4] * 6, [0.0] * 4]]), "{}"])
+def test_a_box_is_ruled_out_below_a_threshold() -> None:
+    said = np.array([[0.995, 0.005, 0.0, 0.0], [0.97, 0.01, 0.01, 0.01], [0.1, 0.9, 0.0, 0.0]])
+    assert BoxPrior(LAYERS, SensorConfig()).likely(said, 0.02).tolist() == [False, True, True]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "[]",
+        "[[[[1]], [1]]]",
+        "[[[[NaN, 0, 0, 0]], [0, 0, 0, 0]]]",
+        json.dumps([[[[0.0] * 4] * 6, [0.0] * 4]]),
+        "{}",
+    ],
+)
 def test_what_is_no_such_network_is_refused(text: str) -> None:
     with pytest.raises((TypeError, ValueError)):
         decode(text)
@@ -66,6 +81,7 @@ def test_without_one_the_classes_are_as_common_as_they_are() -> None:
     _, proposals = blobs([10, 20], np.random.default_rng(0))
     prior = prior_of({}, (0.08, 0.02, 0.01), SensorConfig())
     np.testing.assert_allclose(prior.of(proposals), [[0.89, 0.08, 0.02, 0.01]] * 2)
+    assert prior.likely(prior.of(proposals), 1.0).all()  # it rules nothing out
     assert isinstance(prior, Frequency)
     assert isinstance(prior_of({METADATA: encode(LAYERS)}, (0.1, 0.1, 0.1), SensorConfig()), BoxPrior)
 

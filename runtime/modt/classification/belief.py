@@ -1,7 +1,8 @@
 """Probabilities of classes: what keeps them distributions, and what moves them with the boxes.
 
 Before its first view a track is what its box makes it; afterwards what the views said, moved by what its box says now
-and did not say then. What grows to the size of a car as it comes near is more of one; a piece of a car is less.
+and did not say then. What grows to the size of a car as it comes near is more of one; a piece of a car is less. A
+class that is settled stays, but how sure it is goes with the box.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classification.prior import Prior
-from modt.types import NONE, Bool, Float64, ObjectClass, Proposals, Tracks
+from modt.types import NONE, Float64, Proposals, Tracks
 
 FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
@@ -19,17 +20,12 @@ def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float) ->
     """Takes in what the boxes of this frame say: all that is known before a view, and what is new since the last."""
     rows = np.flatnonzero(tracks.proposal != NONE)
     tracks.prior[rows] = prior.of(proposals)[tracks.proposal[rows]]
-    unknown = rows[(tracks.key_points[rows] == 0) & ~tracks.fixed[rows]]
+    viewed = tracks.viewed[rows]
+    unknown = rows[~viewed & ~tracks.fixed[rows]]
     tracks.posterior[unknown] = tracks.prior[unknown]
-    known = rows[tracks.key_points[rows] > 0]
+    known = rows[viewed]
     now, then = (np.maximum(said.take(known, axis=0), FLOOR) for said in (tracks.prior, tracks.key_prior))
     tracks.posterior[known] = normal(np.log(tracks.key_posterior.take(known, axis=0)) + weight * np.log(now / then))
-
-
-def likely(tracks: Tracks, least: float) -> Bool:
-    """(M,) which are objects, by their boxes, with this probability at least."""
-    probable: Bool = 1.0 - tracks.prior[:, ObjectClass.BACKGROUND] >= least
-    return probable
 
 
 def sane(probability: Float64) -> Float64:

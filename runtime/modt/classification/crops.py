@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modt.config import SensorConfig
 from modt.types import Float32, Int, Proposals
 
 FOOT_M = 0.3
@@ -42,6 +43,13 @@ class Crops:
         count = self.count[rows, None]
         batch: Float32 = self.xyz[self.offsets[rows, None] + np.arange(count.max(initial=1)) % count]
         return batch
+
+
+def height_of(proposals: Proposals, sensor: SensorConfig) -> float:
+    """Of the sensor above the ground [m]: as the proposals say, else as the profile does, else a car's."""
+    if proposals.sensor_height_m is not None:
+        return proposals.sensor_height_m
+    return sensor.height_m or SensorConfig().height_m or 0.0
 
 
 def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -> Crops:

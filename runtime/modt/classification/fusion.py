@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classification.belief import FLOOR, expect, likely, normal, sane
+from modt.classification.belief import FLOOR, expect, normal, sane
 from modt.classification.prior import Frequency, Prior
 from modt.config import FusionConfig
 from modt.geometry import wrap
@@ -50,7 +50,7 @@ class FirstView:
         """The tracks that have no class."""
         expect(tracks, proposals, self.prior, self.config.box_weight)
         asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
-        return asks & likely(tracks, self.config.likely_once)
+        return asks & self.prior.likely(tracks.prior, self.config.likely_once)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Settles the class."""
@@ -97,7 +97,7 @@ class KeyViews:
         started = tracks.age[rows] >= self.config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
         first = tracks.key_points[rows] == 0
-        asks[rows] = np.where(first, likely(tracks, self.config.likely)[rows], started & fresh)
+        asks[rows] = np.where(first, self.prior.likely(tracks.prior[rows], self.config.likely), started & fresh)
         return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.fixed))
 
     def _reopened(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
@@ -106,7 +106,8 @@ class KeyViews:
         if self.config.reopen_ratio is not None:
             many = self.config.reopen_ratio * tracks.key_points[rows] + CHANCE
             again[rows] = proposals.count[tracks.proposal[rows]] > many
-            again &= (tracks.key_points < self.config.reopen_points) & likely(tracks, self.config.likely_again)
+            again &= tracks.key_points < self.config.reopen_points
+            again &= self.prior.likely(tracks.prior, self.config.likely_again)
         return again
 
     def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:

@@ -11,7 +11,7 @@ import onnxruntime as ort
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 
 from modt import assets
-from modt.classification.crops import canonical, gather
+from modt.classification.crops import canonical, gather, height_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import N_CLASSES, Float32, Float64, Int, Proposals
@@ -49,7 +49,7 @@ class PointNet:
 
     def __init__(self, config: ClassificationConfig, sensor: SensorConfig) -> None:
         self.config = config
-        self.height_m = sensor.height_m or SensorConfig().height_m or 0.0
+        self._sensor = sensor
         self.path = assets.find("models", config.model, ".onnx")
         self.sha256 = _checked_hash(self.path)
         self._session = _session(self.path)
@@ -64,9 +64,8 @@ class PointNet:
             proposals: its segments.
             which: (R,) those to classify.
         """
-        found_at = proposals.sensor_height_m
-        height_m = self.height_m if found_at is None else found_at
-        crops = canonical(gather(points, proposals, which, self.config.max_points), height_m)
+        crops = gather(points, proposals, which, self.config.max_points)
+        crops = canonical(crops, height_of(proposals, self._sensor))
         out = np.empty((len(crops), N_CLASSES))
         by_size = np.argsort(crops.count, kind="stable")
         for first in range(0, len(crops), self.config.batch):

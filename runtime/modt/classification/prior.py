@@ -14,8 +14,9 @@ from typing import Protocol
 import numpy as np
 from scipy.special import softmax
 
+from modt.classification.crops import height_of
 from modt.config import SensorConfig
-from modt.types import N_CLASSES, Float64, Int, Proposals
+from modt.types import N_CLASSES, Bool, Float64, Int, ObjectClass, Proposals
 
 METADATA = "box_prior"
 """Key of an ONNX model's metadata under which the weights of its BoxPrior are found."""
@@ -35,9 +36,13 @@ class Prior(Protocol):
         """(P, 4) for each proposal of a frame."""
         ...
 
+    def likely(self, said: Float64, least: float) -> Bool:
+        """(M,) which may be objects, said (M, 4) being what it says of them: with this probability at least."""
+        ...
+
 
 class Frequency:
-    """As common as the classes are among proposals, whatever the proposal.
+    """As common as the classes are among proposals, whatever the proposal: it rules nothing out.
 
     Args:
         objects: share of car, pedestrian and cyclist.
@@ -50,9 +55,13 @@ class Frequency:
         """(P, 4), the same for each."""
         return np.tile(self._share, (len(proposals), 1))
 
+    def likely(self, said: Float64, least: float) -> Bool:
+        """(M,) all of them: it does not tell them apart."""
+        return np.ones(len(said), np.bool_)
+
 
 class BoxPrior:
-    """P(class | box): a network of a thousand weights over the size of a proposal and where it stands.
+    """P(class | box): a network of 1,444 weights over the size of a proposal and where it stands.
 
     Args:
         layers: (in, out) weight and (out,) bias of each layer, hyperbolic tangents between them, softmax at the end.
@@ -62,15 +71,24 @@ class BoxPrior:
     def __init__(self, layers: Layers, sensor: SensorConfig) -> None:
         self._layers = layers
         self._step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
-        self._height_m = sensor.height_m or SensorConfig().height_m or 0.0
+        self._sensor = sensor
 
     def of(self, proposals: Proposals) -> Float64:
         """(P, 4) for each proposal of a frame."""
-        found_at = proposals.sensor_height_m
-        height_m = self._height_m if found_at is None else found_at
+        height_m = height_of(proposals, self._sensor)
         score = logits(self._layers, features(proposals.count, proposals.box, height_m, self._step_sr))
         probability: Float64 = softmax(score, axis=1)
         return probability
+
+    def likely(self, said: Float64, least: float) -> Bool:
+        """(M,) which are objects with this probability at least, said (M, 4) being what it says of them."""
+        return at_least(said, least)
+
+
+def at_least(said: Float64, least: float) -> Bool:
+    """(M,) which rows (M, 4) give the objects together this probability."""
+    likely: Bool = 1.0 - said[:, ObjectClass.BACKGROUND] >= least
+    return likely
 
 
 def beam_sr(azimuth_step_deg: float, elevation_step_deg: float) -> float:
@@ -128,6 +146,8 @@ def decode(text: str) -> Layers:
         ValueError: they are none, or not of these features and classes.
     """
     layers = [(np.array(weight, np.float64), np.array(bias, np.float64)) for weight, bias in json.loads(text)]
+    if not all(np.isfinite(weight).all() and np.isfinite(bias).all() for weight, bias in layers):
+        raise ValueError("weights that are not finite")
     widths = [N_FEATURES, *(len(bias) for _, bias in layers)]
     if widths[-1] != N_CLASSES or [weight.shape for weight, _ in layers] != [*pairwise(widths)]:
         raise ValueError(f"layers of {' x '.join(map(str, widths))}, wanted {N_FEATURES} to {N_CLASSES}")
