@@ -163,10 +163,17 @@ class Tracks:
         return len(self.id)
 
     @property
-    def known(self) -> Bool:
-        """(M,) whether the class is that of a view, or of the place, and not of the box alone."""
-        known: Bool = self.fixed | (self.key_points > 0)
-        return known
+    def viewed(self) -> Bool:
+        """(M,) whether it was ever classified."""
+        viewed: Bool = self.key_points > 0
+        return viewed
+
+    @property
+    def object_class(self) -> Int:
+        """(M,) class: the one settled, whatever the box of the moment says; else the likeliest."""
+        settled = (self.fixed & self.viewed)[:, None]
+        object_class: Int = np.where(settled, self.key_posterior, self.posterior).argmax(axis=1)
+        return object_class
 
     @classmethod
     def blank(cls, m: int = 0) -> Self:

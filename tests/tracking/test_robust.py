@@ -198,6 +198,19 @@ def test_what_leaves_its_place_must_ask_after_all():
     assert run(t, steps[2:], first=6) == 1
 
 
+def test_what_a_view_said_since_holds_away_from_the_place_too():
+    t = tracker()
+    run(t, [[box(10, 3, 12, 2.0, 1.8)]] * 4)
+    steps = [[box(10, 3.6, 12, 0.8, 1.8), box(10, 2.8 - 0.15 * i, 0.5, 0.5, 1.7)] for i in range(8)]
+    run(t, steps[:2], first=4)
+    parted = t.tracks.id.argmax()
+    assert t.tracks.inherited[parted]
+    t.tracks.key_points[parted] = 40  # as fusion notes it, where mode accurate looks again
+    assert run(t, steps[2:], first=6) == 0
+    assert not t.tracks.inherited[t.tracks.id.argmax()]
+    assert t.tracks.fixed[t.tracks.id.argmax()]
+
+
 def test_memory_forgets_the_oldest():
     memory = BackgroundMemory(capacity=3)
     t = Tracker(TrackingConfig(ask_from=1, max_missed=0), EFFICIENT, memory=memory)

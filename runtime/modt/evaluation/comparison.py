@@ -119,7 +119,7 @@ class Contender:
         asked = np.zeros(len(tracks), np.bool_)
         asked[tracks.row_of_proposal(len(result.proposals))[self.watched.which]] = True
         new, first, refound = self._follow(tracks.id, seen, asked)
-        foreground = seen & (tracks.posterior.argmax(axis=1) != ObjectClass.BACKGROUND)
+        foreground = seen & (tracks.object_class != ObjectClass.BACKGROUND)
         row = line["stages"].get(CLASSIFICATION, {})
         self._counts.append(
             (

@@ -56,7 +56,7 @@ class Tally:
         self.points_of_all.append(padded_points(counts, self.max_points, self.batch))
         self.foreground += sum(track["class"] != BACKGROUND for track in seen)
         self.lives.update(track["id"] for track in seen)
-        self.named.update(track["id"] for track in record["tracks"] if track["known"])
+        self.named.update(track["id"] for track in record["tracks"] if track["viewed"])
 
 
 def run_tree(run: Path) -> dict[str, Any]:

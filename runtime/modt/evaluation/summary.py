@@ -67,7 +67,7 @@ class Summary:
         """What add_frame reads in the line of this result."""
         tracks = result.tracks
         self._add_counts(len(result.proposals), result.classified, result.deferred)
-        seen, foreground = tracks.proposal != NONE, tracks.posterior.argmax(axis=1) != ObjectClass.BACKGROUND
+        seen, foreground = tracks.proposal != NONE, tracks.object_class != ObjectClass.BACKGROUND
         self.lives.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))
 
     def _add_counts(self, proposals: int, classified: int, deferred: int) -> None:

@@ -43,7 +43,7 @@ class KittiResults:
             ModtError: the file cannot be written.
         """
         tracks = result.tracks
-        class_ = tracks.posterior.argmax(axis=1)
+        class_ = tracks.object_class
         rows = np.flatnonzero((tracks.proposal != NONE) & (class_ != ObjectClass.BACKGROUND))
         if not len(rows):
             return
@@ -55,7 +55,7 @@ class KittiResults:
         turn = np.arctan2(-ahead[:, 2], ahead[:, 0])
         alpha = turn - np.arctan2(foot[:, 0], foot[:, 2])
         alpha = (alpha + np.pi) % (2 * np.pi) - np.pi
-        score = tracks.posterior[rows].max(axis=1)
+        score = tracks.posterior[rows, class_[rows]]
         columns = (
             tracks.id[rows],
             class_[rows],

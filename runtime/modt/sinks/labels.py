@@ -41,7 +41,7 @@ class PointLabels:
 def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
     """(N,) label of each point of the frame."""
     rows = result.tracks.row_of_proposal(len(result.proposals))
-    classes = result.tracks.posterior.argmax(axis=1)[rows]
+    classes = result.tracks.object_class[rows]
     code = np.minimum(np.arange(len(rows)) + 1, HIGHEST) << 16 | np.where(rows == NONE, 0, classes)
     out = np.zeros(len(result.frame.points), np.uint32)
     out[result.proposals.members] = np.repeat(code, result.proposals.count).astype(np.uint32)

@@ -32,9 +32,9 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
     columns = zip(
         tracks.id.tolist(),
         tracks.state.tolist(),
-        tracks.posterior.argmax(axis=1).tolist(),
+        tracks.object_class.tolist(),
         np.round(tracks.posterior, 6).tolist(),
-        tracks.known.tolist(),
+        tracks.viewed.tolist(),
         tracks.fixed.tolist(),
         tracks.proposal.tolist(),
         tracks.points.tolist(),
@@ -51,7 +51,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "state": result.state_names[state],
                 "class": CLASS_NAMES[class_],
                 "posterior": posterior,
-                "known": known,
+                "viewed": viewed,
                 "fixed": fixed,
                 "proposal": None if proposal == NONE else proposal,
                 "points": points,
@@ -60,7 +60,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "box": None if proposal == NONE else dict(zip(BOX_KEYS, box, strict=True)),
                 "world": dict(zip(WORLD_KEYS, world, strict=True)),
             }
-            for id_, state, class_, posterior, known, fixed, proposal, points, age, missed, box, world in columns
+            for id_, state, class_, posterior, viewed, fixed, proposal, points, age, missed, box, world in columns
         ],
     }
 
@@ -105,13 +105,13 @@ def frame_line(result: FrameResult) -> str:
             ',"state":',
             _states(result.state_names)[tracks.state],
             ',"class":',
-            CLASSES[tracks.posterior.argmax(axis=1)],
+            CLASSES[tracks.object_class],
         ),
         *(
             ',"posterior":',
             _listed(probabilities(tracks.posterior)),
-            ',"known":',
-            TRUTH[tracks.known.astype(np.int64)],
+            ',"viewed":',
+            TRUTH[tracks.viewed.astype(np.int64)],
             ',"fixed":',
             TRUTH[tracks.fixed.astype(np.int64)],
         ),

@@ -15,7 +15,7 @@ class Followed(Tracks):
     """Tracks with what only the tracker needs to know of them.
 
     Columns:
-        kind: likeliest class when the frame began.
+        kind: class when the frame began.
         outline: (M, 8) last seen, see outlines.py [m, world].
         hull: (M, 8) outline of all that was seen of it, slowly forgotten, about its place [m].
         foot, top: lowest and highest point last seen [m, world].
@@ -24,7 +24,7 @@ class Followed(Tracks):
         still: the track stands.
         stood: frames with a proposal since it began to.
         landmark: (M, 8) mean outline since then, an end that jumped beginning anew [m, world].
-        inherited: its class was taken over from a remembered place, not from a classification of its own.
+        inherited: its class was taken over from a remembered place, and it was not classified itself since.
     """
 
     kind: Int

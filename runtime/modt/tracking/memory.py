@@ -2,7 +2,8 @@
 
 The rule. A proposal that no track claims, and whose outline lies for the greater part within that of something
 classified as background which stood there - a track alive (it was part of it before it split off) or one deleted
-since - takes over that class. It keeps it until it leaves the place; then its class is asked for like any other's.
+since - takes over that class. It keeps it until it leaves the place, or is classified all the same where fusion sees
+reason to; if it leaves unclassified, its class is asked for like any other's.
 
 The bound. The last CAPACITY places are kept, the oldest making room.
 

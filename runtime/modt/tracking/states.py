@@ -179,14 +179,14 @@ class StateMachine:
 _H = Happening
 
 WAITING = (
-    Transition("unmatched", "e1", "unmatched", _H.ASSOCIATED, "followed while it waits for the budget"),
+    Transition("unmatched", "e1", "unmatched", _H.ASSOCIATED, "followed while it waits to be classified"),
     Transition("matched", "e2", "unmatched", _H.INHERITS_NOTHING, "joins an object that waits"),
     Transition("unmatched", "e3", "lost_unmatched", _H.UNASSOCIATED, "no proposal while it waits"),
     Transition("lost_unmatched", "e4", "unmatched", _H.ASSOCIATED, "re-associated, still waiting"),
     Transition("lost_unmatched", "e5", "lost_unmatched", _H.UNASSOCIATED, "still no proposal"),
     Transition("lost_unmatched", "e6", "deleted", _H.EXPIRED, "no proposal for N frames"),
 )
-"""What neither table tells: a track without a class waits for the frame's budget."""
+"""What neither table tells: a track without a class waits for the frame's budget, or for a box like an object's."""
 
 EFFICIENT = StateMachine(
     title="Table I",

@@ -150,7 +150,7 @@ class Tracker:
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
         t = self._tracks
-        t.kind = t.posterior.argmax(axis=1)
+        t.kind = t.object_class
         agility = np.where(t.fixed, AGILITY[t.kind], 1.0)
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
@@ -237,6 +237,7 @@ class Tracker:
     def _doubt(self) -> None:
         """A class inherited from a place does not hold away from it."""
         t = self._tracks
+        t.inherited &= ~t.viewed  # what a view said holds anywhere
         rows = np.flatnonzero(t.inherited & (t.proposal != NONE))
         rows = rows[self._away(rows) > STILL_M]
         if not len(rows):
@@ -288,8 +289,8 @@ class Tracker:
     def _scenery(self) -> Int:
         """Rows that are background, for certain, and never moved."""
         t = self._tracks
-        likely = t.kind == ObjectClass.BACKGROUND.value  # arrays are slow to compare with an enumeration itself
-        background = np.flatnonzero(t.fixed & likely)
+        plain = t.kind == ObjectClass.BACKGROUND.value  # arrays are slow to compare with an enumeration itself
+        background = np.flatnonzero(t.fixed & plain)
         scenery: Int = background[self._away(background) < STILL_M]
         return scenery
 
