@@ -21,9 +21,9 @@ from onnx import numpy_helper
 
 from export_pointnet import Layers, graph
 from modt import profile
-from modt.classification.crops import canonical, gather
+from modt.classification.crops import canonical, gather, height_of
 from modt.classification.pointnet import PointNet
-from modt.config import ClassificationConfig
+from modt.config import ClassificationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.recognise import open_stream
@@ -39,9 +39,10 @@ def layers_of(model: Path) -> Layers:
     return [(table[f"weight{i}"], table[f"bias{i}"]) for i in range(sum(k.startswith("weight") for k in table))]
 
 
-def textbook(net: PointNet, points: Float32, proposals: Proposals, batch: int) -> Float64:
+def textbook(net: PointNet, points: Float32, proposals: Proposals, batch: int, sensor: SensorConfig) -> Float64:
     """Each proposal resampled to 400 points, in batches."""
-    crops = canonical(gather(points, proposals, np.arange(len(proposals)), TEXTBOOK_POINTS), net.height_m)
+    crops = gather(points, proposals, np.arange(len(proposals)), TEXTBOOK_POINTS)
+    crops = canonical(crops, height_of(proposals, sensor))
     step = np.arange(TEXTBOOK_POINTS) % crops.count[:, None]
     full = crops.xyz[crops.offsets[:-1, None] + step]
     parts = [net.infer(full[i : i + batch]) for i in range(0, len(full), batch)]
@@ -77,7 +78,7 @@ def main() -> None:
     }
     for size in TEXTBOOK_BATCHES:
         ways[f"textbook, batch {size}"] = lambda points, proposals, size=size: textbook(
-            naive, points, proposals, size
+            naive, points, proposals, size, config.sensor
         )
     spent: dict[str, list[float]] = {name: [] for name in ways}
     for _ in range(args.rounds):

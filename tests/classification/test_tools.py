@@ -251,3 +251,19 @@ def test_labels_are_learnt_from_where_there_are_any() -> None:
     crops = Crops(np.zeros((4, 3), np.float32), np.arange(5))
     data = Dataset(crops, np.array([0, 0, 1, 0]), partial, unknown, none, variant, zero, zero[:0], zero[:0], [], [])
     assert data.clear.tolist() == [False, True, True, False]
+
+
+def test_the_textbook_graph_says_what_ours_does(tmp_path: Path) -> None:
+    pytest.importorskip("onnx", reason="extra [train] is not installed")
+    from benchmark_classification import layers_of, textbook
+    from export_pointnet import graph
+    from modt.classification.pointnet import PointNet
+    from modt.config import ClassificationConfig, SensorConfig
+
+    ours = PointNet(ClassificationConfig(), SensorConfig())
+    path = tmp_path / "textbook.onnx"
+    path.write_bytes(graph(layers_of(ours.path), pool_first=False).SerializeToString())
+    naive = PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+    points, proposals = blobs([6, 40, 128], np.random.default_rng(1))
+    expected = ours.classify(points, proposals, np.arange(3))
+    np.testing.assert_allclose(textbook(naive, points, proposals, 2, SensorConfig()), expected, atol=1e-5)
