@@ -20,11 +20,13 @@ import torch
 from torch import nn
 
 from augment import Beams, augment, limit
-from calibration import Calibration, fit
+from calibration import Calibration
 from crop_boxes import all_described, described
-from dataset import Dataset, folds, load
+from dataset import Dataset, load
+from held_out import Model, cross_validated
 from modt.classification.prior import N_FEATURES, Layers, logits
-from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
+from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
+from network import save_layers
 from scores import average_precision
 from train_pointnet import draw, odds
 
@@ -63,25 +65,20 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
 
 def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
     """Out-of-fold calibration, and what a threshold saves and costs."""
-    fold = folds(data, k)
-    judged = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
-    feature, out = all_described(data, judged), np.zeros((len(judged), N_CLASSES))
-    for i in range(k):
-        layers = train(data, np.flatnonzero(data.clear & (fold[data.drive] != i)), steps, seed + i)
-        mine = fold[data.drive[judged]] == i
-        out[mine] = logits(layers, feature[mine])
-    label, clear = data.label[judged], ~data.partial[judged]
-    calibration = fit(out[clear], label[clear])
-    probability = calibration.apply(out)
-    there = np.isin(data.truth_drive, data.drive[judged])
-    found = np.bincount(data.truth_label[there] if there.any() else label, minlength=N_CLASSES)
-    ruled_out = [
-        {"likely": t, "share": dict(zip(CLASS_NAMES, _below(probability[clear], label[clear], t), strict=True))}
-        for t in THRESHOLDS
-    ]
-    return calibration, {
-        "average_precision": average_precision(probability, label, found),
-        "ruled_out": ruled_out,
+
+    def trained(among: Bool, i: int) -> Model:
+        layers = train(data, np.flatnonzero(among & data.clear), steps, seed + i)
+        return lambda rows: logits(layers, all_described(data, rows))
+
+    held = cross_validated(data, k, trained)
+    probability, clear = held.probability, held.clear
+    shares = [_below(probability[clear], held.label[clear], threshold) for threshold in THRESHOLDS]
+    return held.calibration, {
+        "average_precision": average_precision(probability, held.label, held.truth),
+        "ruled_out": [
+            {"likely": threshold, "share": dict(zip(CLASS_NAMES, share, strict=True))}
+            for threshold, share in zip(THRESHOLDS, shares, strict=True)
+        ],
     }
 
 
@@ -106,10 +103,7 @@ def main() -> None:
     calibration, report = cross_validate(data, args.folds, args.steps, args.seed)
     layers = train(data, np.flatnonzero(data.clear), args.steps, args.seed)
     layers = [*layers[:-1], calibration.folded(layers[-1])]
-    parts = {
-        f"{kind}{i}": a for i, layer in enumerate(layers) for kind, a in zip(("weight", "bias"), layer, strict=True)
-    }
-    np.savez(args.out / "boxes.npz", **{name: a.astype(np.float32) for name, a in parts.items()})
+    save_layers(args.out / "boxes.npz", layers)
     (args.out / "boxes.json").write_text(
         json.dumps(report | {"steps": args.steps, "seed": args.seed}, indent=1) + "\n", encoding="utf-8"
     )

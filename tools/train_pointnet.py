@@ -23,11 +23,12 @@ import torch
 from numpy.random import Generator
 
 from augment import Beams, augment, limit
-from calibration import Calibration, expected_error, fit
-from dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, folds, load
+from calibration import Calibration, expected_error
+from dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
+from held_out import Model, cross_validated
 from modt.classification.crops import Crops, canonical
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
-from network import PointNet
+from network import PointNet, save_layers
 from scores import average_precision, confusion
 from teaching import Ensemble, Labels, Teaching
 
@@ -142,24 +143,20 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
 
 def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
     """Out-of-fold calibration and scores; missed objects count as false negatives."""
-    fold = folds(data, k)
-    judged = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)  # of real scans where there are any
-    out = np.zeros((len(judged), N_CLASSES))
-    for i in range(k):
-        net, _ = educate(data, fold[data.drive] != i, (steps, steps), teachers, seed + i, None)
-        mine = np.flatnonzero(fold[data.drive[judged]] == i)
-        out[mine] = logits(net, data, judged[mine])
-    label, clear = data.label[judged], ~data.partial[judged]
-    calibration = fit(out[clear], label[clear])
-    probability = calibration.apply(out)
-    there = np.isin(data.truth_drive, data.drive[judged])
-    found = np.bincount(data.truth_label[there] if there.any() else label, minlength=N_CLASSES)
-    return calibration, {
-        "average_precision": average_precision(probability, label, found),
-        "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], found[1:], strict=True)},
-        "confusion": confusion(probability[clear], label[clear]),
-        "ece": expected_error(probability[clear], label[clear]),
-        "ece_uncalibrated": expected_error(Calibration.none().apply(out[clear]), label[clear]),
+
+    def trained(among: Bool, i: int) -> Model:
+        net, _ = educate(data, among, (steps, steps), teachers, seed + i, None)
+        return lambda rows: logits(net, data, rows)
+
+    held = cross_validated(data, k, trained)
+    probability, clear = held.probability, held.clear
+    label = held.label[clear]
+    return held.calibration, {
+        "average_precision": average_precision(probability, held.label, held.truth),
+        "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], held.truth[1:], strict=True)},
+        "confusion": confusion(probability[clear], label),
+        "ece": expected_error(probability[clear], label),
+        "ece_uncalibrated": expected_error(Calibration.none().apply(held.logits[clear]), label),
     }
 
 
@@ -198,12 +195,7 @@ def main() -> None:
     report |= {"loss": losses, "calibration": calibration.as_dict(), "cpu_s": round(time.process_time() - started)}
     layers = net.layers()
     layers[-1] = calibration.folded(layers[-1])
-    np.savez(
-        args.out / "weights.npz",
-        **{
-            f"{kind}{i}": a for i, pair in enumerate(layers) for kind, a in zip(("weight", "bias"), pair, strict=True)
-        },
-    )
+    save_layers(args.out / "weights.npz", layers)
     (args.out / "report.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(json.dumps({"loss": losses[-1:], "cpu_s": report["cpu_s"]}))
 

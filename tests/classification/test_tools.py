@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from augment import Beams, augment, limit
 from build_crops import label
 from calibration import Calibration, expected_error, fit
 from dataset import SHIPPED, SYNTHETIC, UNLABELLED, Dataset, folds
+from held_out import cross_validated
 from labelled import Scan, argoverse_scans, inside
 from modt.classification.crops import Crops, gather
 from modt.geometry import FieldOfView
@@ -251,6 +253,28 @@ def test_labels_are_learnt_from_where_there_are_any() -> None:
     crops = Crops(np.zeros((4, 3), np.float32), np.arange(5))
     data = Dataset(crops, np.array([0, 0, 1, 0]), partial, unknown, none, variant, zero, zero[:0], zero[:0], [], [])
     assert data.clear.tolist() == [False, True, True, False]
+
+
+def test_no_model_judges_a_drive_that_it_learnt_from() -> None:
+    drive = np.repeat(np.arange(6), 5)
+    label = np.tile(np.arange(5) % 4, 6)
+    none, variant = np.zeros(30, np.bool_), np.zeros(30, np.int64)
+    crops = Crops(np.zeros((30, 3), np.float32), np.arange(31))
+    data = Dataset(crops, label, none, none, none, variant, drive, label, drive, provenance=[], sha256=[])
+    judged = []
+
+    def trained(among: np.ndarray, i: int) -> Callable[[np.ndarray], np.ndarray]:
+        def model(rows: np.ndarray) -> np.ndarray:
+            assert not np.isin(drive[rows], drive[among]).any()
+            judged.extend(rows.tolist())
+            return np.eye(4)[label[rows]] * (i + 1)
+
+        return model
+
+    held = cross_validated(data, 3, trained)
+    assert sorted(judged) == list(range(30))
+    assert (held.logits.argmax(axis=1) == held.label).all()
+    assert held.truth.tolist() == np.bincount(label).tolist()
 
 
 def test_the_textbook_graph_says_what_ours_does(tmp_path: Path) -> None:
