@@ -38,7 +38,7 @@ class Counting:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """As the fusion does."""
-        new, unfused = tracks.key_points[rows] == 0, tracks.views[rows] == 0
+        new, unfused = ~tracks.classified[rows], tracks.views[rows] == 0
         reason = np.select([new, tracks.fixed[rows], unfused], [0, 3, 1], 2)
         for name, n in zip(CALLS, np.bincount(reason, minlength=len(CALLS)).tolist(), strict=True):
             self.calls[name] += n

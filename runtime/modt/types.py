@@ -163,15 +163,15 @@ class Tracks:
         return len(self.id)
 
     @property
-    def viewed(self) -> Bool:
+    def classified(self) -> Bool:
         """(M,) whether it was ever classified."""
-        viewed: Bool = self.key_points > 0
-        return viewed
+        classified: Bool = self.key_points > 0
+        return classified
 
     @property
     def object_class(self) -> Int:
         """(M,) class: the one settled, whatever the box of the moment says; else the likeliest."""
-        settled = (self.fixed & self.viewed)[:, None]
+        settled = (self.fixed & self.classified)[:, None]
         object_class: Int = np.where(settled, self.key_posterior, self.posterior).argmax(axis=1)
         return object_class
 

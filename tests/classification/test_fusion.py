@@ -268,7 +268,7 @@ def test_before_it_is_classified_a_track_is_what_its_box_makes_it(
     proposals, tracks = scene((50, 50, 50))
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
     np.testing.assert_allclose(tracks.posterior, [WALL, DOUBTFUL, CAR])
-    assert not tracks.viewed.any()
+    assert not tracks.classified.any()
 
 
 def test_what_by_its_box_is_no_object_is_not_doubted() -> None:

@@ -44,7 +44,7 @@ def test_the_only_view_of_a_track_settles_its_class(runs):
     classes = {}
     for frame in tracks(root / "efficient"):
         for t in frame["tracks"]:
-            if t["fixed"] and t["viewed"]:
+            if t["fixed"] and t["classified"]:
                 classes.setdefault(t["id"], set()).add(t["class"])
     assert classes
     assert all(len(seen) == 1 for seen in classes.values())
@@ -64,7 +64,7 @@ def test_a_run_leaves_what_the_formats_say(runs, mode):
         for t in frame["tracks"]:
             assert sum(t["posterior"]) == pytest.approx(1, abs=1e-5)
             likeliest = CLASS_NAMES[int(np.argmax(t["posterior"]))]
-            assert t["class"] == likeliest or (t["fixed"] and t["viewed"])
+            assert t["class"] == likeliest or (t["fixed"] and t["classified"])
             assert (t["box"] is None) == (t["proposal"] is None) == (t["missed"] > 0)
 
 

@@ -24,7 +24,7 @@ def test_a_record_holds_what_the_format_says():
         "state": "tracked",
         "class": "car",
         "posterior": CAR,
-        "viewed": False,
+        "classified": False,
         "fixed": False,
         "proposal": 0,
         "points": 0,

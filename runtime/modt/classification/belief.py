@@ -20,10 +20,10 @@ def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float) ->
     """Takes in what the boxes of this frame say: all that is known before a view, and what is new since the last."""
     rows = np.flatnonzero(tracks.proposal != NONE)
     tracks.prior[rows] = prior.of(proposals)[tracks.proposal[rows]]
-    viewed = tracks.viewed[rows]
-    unknown = rows[~viewed & ~tracks.fixed[rows]]
+    classified = tracks.classified[rows]
+    unknown = rows[~classified & ~tracks.fixed[rows]]
     tracks.posterior[unknown] = tracks.prior[unknown]
-    known = rows[viewed]
+    known = rows[classified]
     now, then = (np.maximum(said.take(known, axis=0), FLOOR) for said in (tracks.prior, tracks.key_prior))
     tracks.posterior[known] = normal(np.log(tracks.key_posterior.take(known, axis=0)) + weight * np.log(now / then))
 

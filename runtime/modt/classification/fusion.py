@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classification.belief import FLOOR, expect, normal, sane
-from modt.classification.prior import Frequency, Prior
+from modt.classification.prior import Frequency, Prior, shares
 from modt.config import FusionConfig
 from modt.geometry import wrap
 from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
@@ -84,19 +84,18 @@ class KeyViews:
         self.config = config
         self.prior = prior or Frequency(config.prior)
         self._alpha = np.array([config.background_alpha, *config.alpha])
-        objects = np.array(config.prior)
-        share = np.maximum(np.append(1.0 - objects.sum(), objects), FLOOR)
+        share = np.maximum(shares(config.prior), FLOOR)
         self._log_prior = np.log(share / share.sum())
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """Those asking that were never classified or show an independent view, and the settled that came close."""
         expect(tracks, proposals, self.prior, self.config.box_weight)
         seen = tracks.proposal != NONE
-        asks: Bool = (asking | (tracks.key_points > 0)) & ~tracks.fixed & seen
+        asks: Bool = (asking | tracks.classified) & ~tracks.fixed & seen
         rows = np.flatnonzero(asks)
         started = tracks.age[rows] >= self.config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
-        first = tracks.key_points[rows] == 0
+        first = ~tracks.classified[rows]
         asks[rows] = np.where(first, self.prior.likely(tracks.prior[rows], self.config.likely), started & fresh)
         return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.fixed))
 

@@ -49,7 +49,7 @@ class Frequency:
     """
 
     def __init__(self, objects: Sequence[float]) -> None:
-        self._share = np.append(1.0 - np.sum(objects), objects)
+        self._share = shares(objects)
 
     def of(self, proposals: Proposals) -> Float64:
         """(P, 4), the same for each."""
@@ -58,6 +58,11 @@ class Frequency:
     def likely(self, said: Float64, least: float) -> Bool:
         """(M,) all of them: it does not tell them apart."""
         return np.ones(len(said), np.bool_)
+
+
+def shares(objects: Sequence[float]) -> Float64:
+    """(4,) of background, car, pedestrian and cyclist, the objects' being given."""
+    return np.append(1.0 - np.sum(objects), objects)
 
 
 class BoxPrior:

@@ -44,7 +44,7 @@ class Tally:
     points_of_all: list[int] = field(default_factory=list)
     foreground: int = 0
     lives: Counter[int] = field(default_factory=Counter)
-    named: set[int] = field(default_factory=set)
+    classified_ids: set[int] = field(default_factory=set)
 
     def add(self, record: dict[str, Any]) -> None:
         """A line of tracks.jsonl."""
@@ -56,7 +56,7 @@ class Tally:
         self.points_of_all.append(padded_points(counts, self.max_points, self.batch))
         self.foreground += sum(track["class"] != BACKGROUND for track in seen)
         self.lives.update(track["id"] for track in seen)
-        self.named.update(track["id"] for track in record["tracks"] if track["viewed"])
+        self.classified_ids.update(track["id"] for track in record["tracks"] if track["classified"])
 
 
 def run_tree(run: Path) -> dict[str, Any]:
@@ -224,7 +224,7 @@ def _saved(
         proposals=int(counts[:, COUNTS.index("proposals")].sum()),
         foreground=tally.foreground,
         tracks=len(tally.lives),
-        classified_tracks=len(tally.named),
+        classified_tracks=len(tally.classified_ids),
         classified=int(counts[:, COUNTS.index("classified")].sum()),
         refound=0,
         points=int(counts[:, COUNTS.index("points")].sum()),

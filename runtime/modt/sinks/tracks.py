@@ -34,7 +34,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
         tracks.state.tolist(),
         tracks.object_class.tolist(),
         np.round(tracks.posterior, 6).tolist(),
-        tracks.viewed.tolist(),
+        tracks.classified.tolist(),
         tracks.fixed.tolist(),
         tracks.proposal.tolist(),
         tracks.points.tolist(),
@@ -51,7 +51,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "state": result.state_names[state],
                 "class": CLASS_NAMES[class_],
                 "posterior": posterior,
-                "viewed": viewed,
+                "classified": classified,
                 "fixed": fixed,
                 "proposal": None if proposal == NONE else proposal,
                 "points": points,
@@ -60,7 +60,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "box": None if proposal == NONE else dict(zip(BOX_KEYS, box, strict=True)),
                 "world": dict(zip(WORLD_KEYS, world, strict=True)),
             }
-            for id_, state, class_, posterior, viewed, fixed, proposal, points, age, missed, box, world in columns
+            for id_, state, class_, posterior, classified, fixed, proposal, points, age, missed, box, world in columns
         ],
     }
 
@@ -110,8 +110,8 @@ def frame_line(result: FrameResult) -> str:
         *(
             ',"posterior":',
             _listed(probabilities(tracks.posterior)),
-            ',"viewed":',
-            TRUTH[tracks.viewed.astype(np.int64)],
+            ',"classified":',
+            TRUTH[tracks.classified.astype(np.int64)],
             ',"fixed":',
             TRUTH[tracks.fixed.astype(np.int64)],
         ),

@@ -237,7 +237,7 @@ class Tracker:
     def _doubt(self) -> None:
         """A class inherited from a place does not hold away from it."""
         t = self._tracks
-        t.inherited &= ~t.viewed  # what a view said holds anywhere
+        t.inherited &= ~t.classified  # what a view said holds anywhere
         rows = np.flatnonzero(t.inherited & (t.proposal != NONE))
         rows = rows[self._away(rows) > STILL_M]
         if not len(rows):
