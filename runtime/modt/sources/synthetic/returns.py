@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.sources.synthetic.materials import LOSS, REFLECTIVITY
+from modt.sources.synthetic.materials import GLOSS, LEVEL, LOSS, REFLECTIVITY, TEXTURE
 from modt.sources.synthetic.sensors import SensorModel
-from modt.types import Bool, Float32
+from modt.types import Bool, Float32, Int
+
+SHINY = np.float32(0.25)
+"""Loss towards grazing from which on the slope from beam to beam counts as well: roofs and bonnets."""
 
 
 class Receiver:
@@ -25,14 +28,20 @@ class Receiver:
         self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
 
     def receive(
-        self, distance: Float32, material: NDArray[np.uint8], group: NDArray[np.int32], rng: np.random.Generator
-    ) -> tuple[Float32, Float32, Bool]:
-        """Distance [m, horizontal], intensity [0, 1] and whether there is a return, of every ray.
+        self,
+        distance: Float32,
+        material: NDArray[np.uint8],
+        group: NDArray[np.int32],
+        shade: Float32,
+        rng: np.random.Generator,
+    ) -> tuple[Float32, Float32, Int]:
+        """Distance [m, horizontal] of every ray, brightness of those that return [0, 1], and which (flat) these are.
 
         Args:
             distance: (B, A) horizontal distance met [m], infinite where nothing was.
             material: (B, A) of the surface met.
             group: (B, A) which surface it is, to tell an edge from a slope.
+            shade: (P + 1,) how much brighter than others of its material each surface is; the last is the ground.
             rng: of this sweep.
         """
         sensor = self.sensor
@@ -41,7 +50,8 @@ class Receiver:
         met = np.isfinite(distance)
         near = np.where(met, distance, np.float32(1e4))
         head_on = self._incidence(near, group)
-        reflectivity = REFLECTIVITY[material] * self.gain * (1 + np.float32(0.15) * noise[:, ::-1])
+        grain = noise[:, ::-1]
+        reflectivity = REFLECTIVITY[material] * self.gain * (1 + np.float32(0.15) * grain)
         slant = near * self.secant
         signal = reflectivity * head_on * np.float32(10 * sensor.detect_m**2) / (slant * slant)
         lost = LOSS[material] + np.float32(sensor.misfire)
@@ -51,8 +61,13 @@ class Receiver:
             near + (self.bias + np.float32(sensor.range_sigma_m) * noise).astype(np.float32) / self.secant
         )
         self._smear(ranged, near, heard, chance)
-        bright = np.clip(reflectivity * (np.float32(0.75) + np.float32(0.25) * head_on), 0, 1)
-        return ranged, bright, heard
+        ray = np.flatnonzero(heard)
+        row = ray // distance.shape[1]
+        what, which = material.ravel()[ray], group.ravel()[ray]
+        cosine = self._from_above(near, group, head_on.ravel()[ray], ray, GLOSS[what] > SHINY)
+        strength = LEVEL[what] * self.gain[row, 0] + shade[which]
+        strength += TEXTURE[what] * grain.reshape(-1)[ray] - GLOSS[what] * (1 - cosine)
+        return ranged, sensor.response.report(strength, slant.ravel()[ray]), ray
 
     def _incidence(self, near: Float32, group: NDArray[np.int32]) -> Float32:
         """Cosine of the angle at which each surface is met, from the slope of the range image along the beam."""
@@ -66,6 +81,24 @@ class Receiver:
         ground = group < 0
         tangent = np.abs(self.sensor.tangent[:, None]) / self.secant
         return np.where(ground, tangent + np.float32(0.05), np.where(same, level, np.float32(0.7))).astype(np.float32)
+
+    def _from_above(
+        self, near: Float32, group: NDArray[np.int32], head_on: Float32, ray: Int, shiny: Bool
+    ) -> Float32:
+        """(n,) the cosine of each return, that of shiny surfaces with the slope from beam to beam as well."""
+        rows, columns = near.shape
+        here = ray[shiny]
+        here = here[here < (rows - 1) * columns]
+        ahead = here + columns
+        s, below, part = near.ravel(), near.ravel()[ahead], group.ravel()
+        row = here // columns
+        tangent = self.sensor.tangent
+        slope = (below - s[here]) / (s[here] * (tangent[row + 1] - tangent[row]))
+        slope *= part[ahead] == part[here]
+        cosine = head_on.copy()
+        place = np.flatnonzero(shiny)[: len(here)]
+        cosine[place] /= np.sqrt(1 + np.square(slope * cosine[place]))
+        return cosine
 
     def _smear(self, ranged: Float32, near: Float32, heard: Bool, chance: Float32) -> None:
         """Where a beam is split by an edge, some returns mix both surfaces and some of the nearer one come late."""
