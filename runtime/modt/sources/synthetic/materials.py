@@ -53,28 +53,28 @@ LEVEL, SHADE, TEXTURE, GLOSS = np.array(
         (0.32, 0.00, 0.09, 0.00),  # paving
         (0.36, 0.00, 0.11, 0.00),  # grass
         (0.55, 0.00, 0.12, 0.00),  # paint
-        (0.40, 0.08, 0.10, 0.15),  # wall
-        (0.38, 0.05, 0.15, 0.10),  # foliage
-        (0.32, 0.06, 0.11, 0.15),  # bark
-        (0.36, 0.13, 0.12, 0.30),  # metal
-        (1.20, 0.00, 0.15, 0.00),  # sign
-        (0.42, 0.08, 0.13, 0.55),  # car paint
-        (0.24, 0.06, 0.13, 0.55),  # car, dark
+        (0.40, 0.10, 0.10, 0.15),  # wall
+        (0.38, 0.07, 0.15, 0.10),  # foliage
+        (0.28, 0.08, 0.11, 0.15),  # bark
+        (0.32, 0.14, 0.12, 0.30),  # metal
+        (1.05, 0.20, 0.15, 0.00),  # sign
+        (0.41, 0.08, 0.13, 0.50),  # car paint
+        (0.21, 0.06, 0.13, 0.45),  # car, dark
         (0.02, 0.00, 0.10, 0.20),  # glass
         (0.05, 0.04, 0.10, 0.10),  # rubber
         (0.43, 0.06, 0.15, 0.25),  # cloth
         (0.40, 0.04, 0.12, 0.15),  # skin
         (0.38, 0.08, 0.12, 0.15),  # wood
         (0.35, 0.00, 0.08, 0.00),  # floor
-        (0.12, 0.05, 0.13, 0.40),  # car, black
+        (0.14, 0.05, 0.13, 0.35),  # car, black
         (0.00, 0.00, 0.10, 0.00),  # interior
         (1.00, 0.08, 0.15, 0.00),  # retroreflector
         (0.60, 0.20, 0.20, 0.00),  # lamp
     ],
     np.float32,
 ).T.copy()
-"""What a sensor reports: the level head-on where it is in focus, the spread from body to body, that from point to point,
-and what is lost until a ray grazes. Fitted to the labelled frames of KITTI's object benchmark."""
+"""What a sensor reports: its level head-on and in focus, its spread from body to body and from point to point, and
+what is lost of it until a ray grazes. Fitted to the labelled frames of KITTI's object benchmark."""
 
 SEMANTIC = np.array([40, 48, 72, 60, 50, 70, 71, 80, 81, 0, 0, 0, 0, 0, 0, 51, 48, 0, 0, 0, 0], np.uint32)
 """SemanticKITTI class of the material where the body it belongs to has none of its own."""

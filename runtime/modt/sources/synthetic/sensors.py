@@ -21,7 +21,7 @@ class Response:
         near_loss, far_loss: taken off for every metre nearer or farther.
         least: what is weaker reads 0.
         most: what is stronger reads this.
-        step: between two values reported.
+        steps: from 0 to 1.
     """
 
     near_m: float = 0.0
@@ -30,16 +30,15 @@ class Response:
     far_loss: float = 0.0
     least: float = 0.0
     most: float = 1.0
-    step: float = 1 / 255
+    steps: int = 255
 
     def report(self, strength: Float32, slant_m: Float32) -> Float32:
-        """(n,) brightness reported [0, most] of returns as strong as this head-on and in focus, at such distances."""
-        off = np.maximum(self.near_m - slant_m, 0) * np.float32(self.near_loss)
-        if np.isfinite(self.far_m):
-            off += np.maximum(slant_m - self.far_m, 0) * np.float32(self.far_loss)
-        left = strength - off
-        steps = np.rint(np.clip(left, 0, self.most) / np.float32(self.step))
-        return np.where(left < self.least, 0, steps * np.float32(self.step)).astype(np.float32)
+        """(n,) brightness read [0, most] of returns that would be as strong as this in focus, at such distances."""
+        short, beyond = np.maximum(self.near_m - slant_m, 0), np.maximum(slant_m - self.far_m, 0)
+        left = strength - self.near_loss * short - self.far_loss * beyond
+        steps = np.rint(np.clip(left, 0, self.most) * self.steps)
+        read: Float32 = (steps / self.steps * (left >= self.least)).astype(np.float32)
+        return read
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,7 @@ def hdl_64e() -> SensorModel:
     """
     elevation = np.concatenate([np.linspace(1.94, -8.71, 32), np.linspace(-9.03, -25.0, 32)])
     origin = np.concatenate([np.linspace(0.209, 0.198, 32), np.linspace(0.126, 0.116, 32)])
-    response = Response(12.0, 17.0, near_loss=0.016, far_loss=0.009, least=0.08, most=0.99, step=0.01)
+    response = Response(12.0, 17.0, near_loss=0.012, far_loss=0.009, least=0.08, most=0.99, steps=100)
     return _spinner("hdl-64e", elevation, 2083, 80.0, origin_m=origin, min_range_m=2.0, response=response)
 
 
