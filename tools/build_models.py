@@ -14,6 +14,8 @@ from pathlib import Path
 
 TOOLS = Path(__file__).resolve().parent
 MODELS = TOOLS.parent / "models"
+SENSOR = "hdl-64e"
+"""On whose scale the crops' reflectances are."""
 WORLDS, PASTES, TEACHERS = "120", "120", "2"
 KITTI_DATA = (
     "106 + 2 object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; "
@@ -41,6 +43,7 @@ def main() -> None:
     tool("build_synthetic_crops", free, "--worlds", WORLDS)
     tool("train_pointnet", args.work / "synthetic", free, "--epochs", "6", "--fold-epochs", "3", "--folds", "2")
     tool("train_boxes", args.work / "synthetic", free)
+    tool("train_reflectance", args.work / "synthetic", free, "--sensor", SENSOR, "--folds", "2")
     tool("export_pointnet", args.work / "synthetic", MODELS / "pointnet-synthetic.onnx",
          "--data", SYNTHETIC_DATA, "--licence", "Apache-2.0: free for any use")  # fmt: skip
     if args.kitti:
@@ -50,7 +53,7 @@ def main() -> None:
         tool("train_pointnet", args.work / "kitti", real, placed,
              "--epochs", "100", "--fold-epochs", "40", "--folds", "3", "--teachers", TEACHERS)  # fmt: skip
         tool("train_boxes", args.work / "kitti", real, placed)
-        tool("train_reflectance", args.work / "kitti", real, placed, "--sensor", "hdl-64e")
+        tool("train_reflectance", args.work / "kitti", real, placed, "--sensor", SENSOR)
         tool("export_pointnet", args.work / "kitti", MODELS / "pointnet-kitti.onnx",
              "--data", KITTI_DATA, "--licence", "CC BY-NC-SA 3.0, as its data: not for commercial use")  # fmt: skip
 

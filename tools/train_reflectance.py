@@ -31,7 +31,7 @@ from small_network import Batch, trained
 from train_pointnet import draw, odds
 from weights import load_layers, save_layers
 
-JITTER = 0.2
+JITTER = 0.1
 """Of each feature in a batch, of how it is spread: few crops, seen often."""
 
 
@@ -123,7 +123,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("crops", type=Path, nargs="+")
     parser.add_argument("--sensor", required=True, help="on whose scale the reflectances are, as profiles name it")
-    parser.add_argument("--steps", type=int, default=600)
+    parser.add_argument("--steps", type=int, default=1500)
     parser.add_argument("--folds", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
