@@ -204,7 +204,7 @@ class Tracker:
         tracks.hull[rows] = np.maximum(about, FORGET * tracks.hull.take(rows, axis=0) + (1 - FORGET) * about)
         off = tracks.shape.take(rows, axis=0) - about
         kept = np.minimum(1.0 - 1.0 / tracks.hits[rows], SHAPE_KEPT)[:, None]
-        tracks.shape[rows] = about + np.where(np.abs(off) < AGREE_M, kept, 0.0) * off
+        tracks.shape[rows] = about + (np.abs(off) < AGREE_M) * kept * off
         tracks.proposal[rows] = proposals
         tracks.box[rows] = sightings.box.take(proposals, axis=0)
         tracks.points[rows] = sightings.count[proposals]
