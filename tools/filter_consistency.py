@@ -98,6 +98,7 @@ class Consistency:
     Attributes:
         tracks, samples: how many.
         mean: of the tracks' own means; consistent if it is about the degrees of freedom.
+        median: of all samples.
         low, high: within which it lies with CONFIDENCE, for as many independent samples as tracks.
         beyond: share of samples above the chi-square quantile of CONFIDENCE; 1 - CONFIDENCE if consistent.
         rms: of the error's length.
@@ -106,6 +107,7 @@ class Consistency:
     tracks: int
     samples: int
     mean: float
+    median: float
     low: float
     high: float
     beyond: float
@@ -119,7 +121,8 @@ def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
     low, high = chi2(DEGREES * n).ppf([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]) / n
     beyond = float((all_ > chi2(DEGREES).ppf(CONFIDENCE)).mean())
     rms = float(np.sqrt((np.concatenate(error) ** 2).sum(axis=1).mean()))
-    return Consistency(n, len(all_), float(np.mean([e.mean() for e in each])), float(low), float(high), beyond, rms)
+    mean, median = float(np.mean([e.mean() for e in each])), float(np.median(all_))
+    return Consistency(n, len(all_), mean, median, float(low), float(high), beyond, rms)
 
 
 def study(all_lives: Sequence[Life]) -> dict[str, dict[str, Consistency]]:
@@ -146,7 +149,7 @@ def main() -> None:
     for kind, parts in study(found).items():
         for part, c in parts.items():
             line = {"tracks": c.tracks, "samples": c.samples, "nees": c.mean, "bounds": [c.low, c.high]}
-            line |= {"beyond": c.beyond, "rms": c.rms}
+            line |= {"median": c.median, "beyond": c.beyond, "rms": c.rms}
             rounded = {k: [round(b, 2) for b in v] if isinstance(v, list) else round(v, 3) for k, v in line.items()}
             print(f"{kind:<22}{part:<8}", json.dumps(rounded))
 

@@ -8,7 +8,8 @@ from modt.geometry import corners
 from modt.tracking.kinship import _fits
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.outlines import AXES, WAYS
-from modt.tracking.robust import AGREE_M, SOFT_M, compare
+from modt.tracking.robust import SOFT_M, compare
+from modt.tracking.shifts import AGREE_M
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, ObjectClass

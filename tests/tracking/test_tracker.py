@@ -173,3 +173,17 @@ def test_two_runs_are_the_same():
     first, second = (run(Tracker(TrackingConfig(), EFFICIENT), frames) for _ in range(2))
     for (name, a), (_, b) in zip(first.columns(), second.columns(), strict=True):
         np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+def test_background_that_went_away_is_as_agile_as_anything():
+    """It was not what it was taken for."""
+    grown = []
+    for step_m in (0.0, 0.15):
+        tracker = Tracker(TrackingConfig(), EFFICIENT)
+        for i in range(12):
+            tracks = tracker.follow(*frame_of([box(12 + step_m * i, 3, 0.6, 0.6, 1.7)], i, EYE))
+            tracks.posterior[:], tracks.fixed[:] = np.eye(4)[0], True
+        before = tracks.P[0, 3, 3]
+        grown.append(tracker.follow(*frame_of([], 12, EYE)).P[0, 3, 3] - before)
+    assert grown[1] == pytest.approx(np.square(0.1 * TrackingConfig().acceleration_sigma_mps2))
+    assert grown[0] == pytest.approx(grown[1] / 16)

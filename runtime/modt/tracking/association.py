@@ -26,13 +26,15 @@ class Matches:
         rows: (K,) of the tracks.
         proposals: (K,) of this frame.
         place: (K, 2) where each proposal puts its track [m, world].
-        variance: (K,) of that place, the same in every direction [m2].
+        covariance: (K, 2, 2) of that place [m2].
+        doubt: (K, 4) what there is in it of ends of the outline that disagree, along each axis [m2].
     """
 
     rows: Int
     proposals: Int
     place: Float64
-    variance: Float64
+    covariance: Float64
+    doubt: Float64
 
 
 class Association(Protocol):
@@ -107,8 +109,9 @@ class PaperAssociation:
         low = cost <= self.config.t_da
         rows, columns, cost = rows[low], columns[low], cost[low]
         keep = assign(rows, columns, cost, FORBIDDEN)
-        variance = np.full(len(keep), self.config.position_sigma_m**2)
-        return Matches(rows[keep], columns[keep], sightings.centroid[columns[keep]], variance)
+        covariance = np.square(self.config.position_sigma_m) * np.eye(2)[None].repeat(len(keep), axis=0)
+        rows, columns = rows[keep], columns[keep]
+        return Matches(rows, columns, sightings.centroid[columns], covariance, np.zeros((len(keep), 4)))
 
     def cost(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Float64:
         """(K,) cost of the pairs."""

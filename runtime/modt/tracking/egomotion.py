@@ -13,7 +13,8 @@ import numpy as np
 from modt.geometry import rotation_zyx, se3
 from modt.tracking.followed import Followed
 from modt.tracking.outlines import WAYS, middles, touching
-from modt.tracking.robust import carried, compare, likeness, shift_between
+from modt.tracking.robust import carried, compare, likeness
+from modt.tracking.shifts import shift_between
 from modt.tracking.sightings import Sightings
 from modt.types import Float64, Int
 

@@ -18,6 +18,8 @@ class Followed(Tracks):
         kind: class when the frame began.
         outline: (M, 8) last seen, see outlines.py [m, world].
         hull: (M, 8) outline of all that was seen of it, slowly forgotten, about its place [m].
+        shape: (M, 8) mean outline about its place, an end that jumped beginning anew [m].
+        doubt: (M, 4) variance along each axis of where the outline puts it, by what its ends disagreed [m2].
         foot, top: lowest and highest point last seen [m, world].
         shown: (M, 2) place that the outline was taken to show [m, world].
         home: (M, 2) place at which the track was last known to stand [m, world].
@@ -30,6 +32,8 @@ class Followed(Tracks):
     kind: Int
     outline: Float64
     hull: Float64
+    shape: Float64
+    doubt: Float64
     foot: Float64
     top: Float64
     shown: Float64
@@ -48,6 +52,8 @@ class Followed(Tracks):
             kind=np.zeros(m, np.int64),
             outline=np.zeros((m, 8)),
             hull=np.zeros((m, 8)),
+            shape=np.zeros((m, 8)),
+            doubt=np.zeros((m, 4)),
             foot=np.zeros(m),
             top=np.zeros(m),
             shown=np.zeros((m, 2)),

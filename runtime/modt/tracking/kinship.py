@@ -31,8 +31,8 @@ LESS = 1.2
 """An outline shrunk by this factor is a part."""
 SETTLED = 4
 """Frames after which a velocity says something."""
-UNMEASURED_M2 = 100.0
-"""Variance of a place that another part's outline says nothing about."""
+UNMEASURED_M2 = 100.0 * np.eye(2)
+"""Covariance of a place that another part's outline says nothing about."""
 
 
 def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches:
@@ -141,5 +141,7 @@ def _with(tracks: Followed, matches: Matches, proposal: Int, swapped: Bool) -> M
     kept, changed = np.flatnonzero(~swapped[matches.rows]), np.flatnonzero(swapped & (proposal != NONE))
     rows = np.concatenate([matches.rows[kept], changed])
     place = np.concatenate([matches.place.take(kept, axis=0), tracks.x.take(changed, axis=0)[:, :2]])
-    variance = np.concatenate([matches.variance[kept], np.full(len(changed), UNMEASURED_M2)])
-    return Matches(rows, proposal[rows], place, variance)
+    unmeasured = UNMEASURED_M2[None].repeat(len(changed), axis=0)
+    covariance = np.concatenate([matches.covariance.take(kept, axis=0), unmeasured])
+    doubt = np.concatenate([matches.doubt.take(kept, axis=0), tracks.doubt.take(changed, axis=0)])
+    return Matches(rows, proposal[rows], place, covariance, doubt)

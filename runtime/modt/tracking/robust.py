@@ -9,6 +9,7 @@ from modt.tracking import kalman
 from modt.tracking.association import Matches, assign
 from modt.tracking.followed import Followed
 from modt.tracking.outlines import AXES, WAYS, girth, lengths, touching
+from modt.tracking.shifts import least, measured, shift_between
 from modt.tracking.sightings import Sightings
 from modt.types import Bool, Float64, Int, ObjectClass
 
@@ -16,9 +17,6 @@ SOFT_M = 0.3
 """Lengths are compared with this added: a difference of a few returns says nothing."""
 GATE = 16.0
 """Greatest squared Mahalanobis distance of a pair: one true pair in three thousand lies beyond."""
-AGREE_M = 0.6
-"""Ends of an outline that differ by less moved with the object, if it is up to a metre long and so is seen whole; of
-a longer one that comes into view by as much less as it is longer."""
 JUMP_M = 0.2
 """Outlines jump by this much beyond the filter's noise, as parts of an object come into view and go."""
 COVER = 0.3
@@ -70,10 +68,12 @@ class RobustAssociation:
         second = second[~self._swallowed(tracks, sightings, rows[second], columns[second])]
         second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
         kept = np.concatenate([first, second])
-        shift = shift_between(a.take(kept, axis=1), b.take(kept, axis=1))
-        place = tracks.x.take(rows[kept], axis=0)[:, :2] + shift
-        loose = np.maximum(1.0, distance[kept] / 4)  # the tails are heavy: what lies far off says less
-        return Matches(rows[kept], columns[kept], place, variance[columns[kept]] * loose)
+        rows, columns = rows[kept], columns[kept]
+        x = tracks.x.take(rows, axis=0)[:, :2]
+        a, b = tracks.shape.T.take(rows, axis=1) + WAYS.T @ x.T, b.take(kept, axis=1)
+        shift, covariance, doubt = measured(a, b, variance[columns], tracks.doubt.T.take(rows, axis=1))
+        covariance *= np.maximum(1.0, distance[kept] / 4)[:, None, None]  # heavy tails: what lies far off says less
+        return Matches(rows, columns, x + shift, covariance, doubt.T)
 
     def _swallowed(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Bool:
         """(K,) pairs in which an object would become a part of something larger: it waits until they part again."""
@@ -119,17 +119,6 @@ def compare(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64, Float64]
     return shift_between(a, b), *likeness(a, b)
 
 
-def shift_between(a: Float64, b: Float64) -> Float64:
-    """(K, 2) compare's shift alone."""
-    ahead, behind = moves(a, b)
-    longest = np.maximum(lengths(a), lengths(b)).max(axis=0)
-    reach = AGREE_M / np.maximum(longest, 1.0)
-    both = np.square(np.maximum(1 - np.square((ahead - behind) / reach), 0.0))
-    moved = both * (ahead + behind) / 2 + (1 - both) * least(a, b)
-    shift: Float64 = (AXES @ moved).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
-    return shift
-
-
 def likeness(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
     """(K,) compare's size, overlap and cover."""
     length_a, length_b = lengths(a), lengths(b)
@@ -141,18 +130,6 @@ def likeness(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
     overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)))
     cover = np.minimum(*(shared / np.minimum(*squares)))
     return size, overlap, cover
-
-
-def moves(a: Float64, b: Float64) -> tuple[Float64, Float64]:
-    """(4, K) and (4, K) along each axis, how far the end ahead and the end behind moved from outlines a to b [m]."""
-    gain = b - a
-    return gain[:4], -gain[4:]
-
-
-def least(a: Float64, b: Float64) -> Float64:
-    """(4, K) along each axis, how far the end moved that moved less from outlines a to b (8, K) [m]."""
-    ahead, behind = moves(a, b)
-    return np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
 
 
 def _left(all_: Int, taken: Int, n: int) -> Bool:

@@ -14,6 +14,7 @@ from modt.tracking.kinship import reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.outlines import WAYS
 from modt.tracking.robust import RobustAssociation
+from modt.tracking.shifts import AGREE_M
 from modt.tracking.sightings import Sightings, sight
 from modt.tracking.states import Happening, StateMachine
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
@@ -30,6 +31,8 @@ SLOW_MPS = 0.5
 """What is slower than this has stopped."""
 FLICKER = 3
 """What is seen less often than in so many frames comes and goes."""
+SHAPE_KEPT = 0.8
+"""What is kept at most, a frame, of the mean outline of a track about its place."""
 LANDMARK_GAIN = 0.03
 """Least say of a new view in the mean outline of a landmark."""
 LANDMARK_M = 0.2
@@ -151,7 +154,8 @@ class Tracker:
         self._stamp_s = stamp_s
         t = self._tracks
         t.kind = t.object_class
-        agility = np.where(t.fixed, AGILITY[t.kind], 1.0)
+        settled = t.fixed & ((t.kind != ObjectClass.BACKGROUND.value) | (self._away(np.arange(len(t))) < STILL_M))
+        agility = np.where(settled, AGILITY[t.kind], 1.0)  # background that went away was none
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
         t.x, t.P = kalman.predict(t.x, t.P, kalman.process_noise(t.x, dt_s, acceleration, turn), dt_s)
@@ -183,12 +187,12 @@ class Tracker:
         slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
         step = matches.place - x[:, :2]
         heading = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
-        R = matches.variance[:, None, None] * np.eye(2)
-        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, R)
+        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, matches.covariance)
         t.x[rows], t.P[rows] = kalman.turn_about(x, P)
         t.state[rows] = self.machine.meet(t.state[rows], Happening.ASSOCIATED)
         t.missed[rows] = 0
         t.hits[rows] += 1
+        t.doubt[rows] = matches.doubt
         self._show(t, rows, matches.proposals, sightings, matches.place)
 
     def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
@@ -198,6 +202,9 @@ class Tracker:
         tracks.outline[rows] = outline
         about = outline - place @ WAYS
         tracks.hull[rows] = np.maximum(about, FORGET * tracks.hull.take(rows, axis=0) + (1 - FORGET) * about)
+        off = tracks.shape.take(rows, axis=0) - about
+        kept = np.minimum(1.0 - 1.0 / tracks.hits[rows], SHAPE_KEPT)[:, None]
+        tracks.shape[rows] = about + (np.abs(off) < AGREE_M) * kept * off
         tracks.proposal[rows] = proposals
         tracks.box[rows] = sightings.box.take(proposals, axis=0)
         tracks.points[rows] = sightings.count[proposals]

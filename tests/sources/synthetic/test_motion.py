@@ -23,4 +23,5 @@ def test_a_path_is_followed_at_its_speed_and_ends_where_the_line_ends():
     assert path.at(9.0)[:2] == pytest.approx((10.0, 10.0))
     assert path.at(9.0)[2] == pytest.approx(np.pi / 2)
     assert path.speed(1.0) == pytest.approx(4.0)
+    assert path.speed(9.0) == 0.0
     assert Path.standing(1.0, 2.0, 0.5).at(3.0) == (1.0, 2.0, 0.5)

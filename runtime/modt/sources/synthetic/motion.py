@@ -59,7 +59,8 @@ class Path:
         """Speed [m/s] at a time."""
         if len(self.xy) == 1:
             return 0.0
-        s0, s1 = np.interp([time_s - 0.05, time_s + 0.05], self.time_s, self.travelled_m)
+        travelled = np.interp([time_s - 0.05, time_s + 0.05], self.time_s, self.travelled_m)
+        s0, s1 = np.clip(travelled, 0.0, self._along[-1])  # type: ignore[attr-defined]
         return float(abs(s1 - s0) / 0.1)
 
 
