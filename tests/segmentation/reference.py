@@ -41,8 +41,8 @@ def flood(row, column, low, high, root, beam_rad):
 
 
 def supported(lowest, range_m, height_m, max_slope):
-    """(rings, SECTORS) cells whose lowest return is ground, ray by ray and ring by ring."""
-    found = np.zeros(lowest.shape, bool)
+    """(rings, SECTORS) cells whose lowest return is ground, ray by ray and ring by ring; (1, SECTORS) last slopes."""
+    found, slopes = np.zeros(lowest.shape, bool), np.zeros((1, SECTORS))
     for ray in range(SECTORS):
         height, at, slope, bend = -height_m, 0.0, 0.0, max_slope
         for ring in range(len(range_m)):
@@ -55,7 +55,8 @@ def supported(lowest, range_m, height_m, max_slope):
                 found[ring, ray] = True
                 slope = float(np.clip(slope + GAIN * ((here - height) / gap - slope), -max_slope, max_slope))
                 height, at, bend = here, range_m[ring], BEND
-    return found
+        slopes[0, ray] = slope
+    return found, slopes
 
 
 def heading(x, y):
