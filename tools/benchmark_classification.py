@@ -19,7 +19,7 @@ import numpy as np
 import onnx
 from onnx import numpy_helper
 
-from export_pointnet import Layers, graph
+from export_pointnet import graph
 from modt import profile
 from modt.classification.crops import canonical, gather, height_of
 from modt.classification.pointnet import PointNet
@@ -28,12 +28,13 @@ from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.recognise import open_stream
 from modt.types import Float32, Float64, Proposals
+from weights import Layer
 
 TEXTBOOK_POINTS = 400
 TEXTBOOK_BATCHES = (1, 8, 64)
 
 
-def layers_of(model: Path) -> Layers:
+def layers_of(model: Path) -> list[Layer]:
     """Weights and biases of an exported model."""
     table = {t.name: numpy_helper.to_array(t) for t in onnx.load(model).graph.initializer}
     return [(table[f"weight{i}"], table[f"bias{i}"]) for i in range(sum(k.startswith("weight") for k in table))]

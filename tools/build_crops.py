@@ -29,7 +29,7 @@ from modt.classification.crops import gather
 from modt.config import ProfileConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.types import Bool, Int, ObjectClass, Proposals
+from modt.types import N_REFLECTANCE, Bool, Float64, Int, ObjectClass, Proposals
 from paste import library, pasted
 
 CELL_SCALES = (0.75, 1.4)
@@ -80,6 +80,13 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
     return Labels(kind, partial, unknown, tall)
 
 
+def told(proposals: Proposals) -> Float64:
+    """(P, 5) of the proposals' returns, NaN where the scan does not tell."""
+    if proposals.reflectance is None:
+        return np.full((len(proposals), N_REFLECTANCE), np.nan)
+    return proposals.reflectance
+
+
 def countable(scan: Scan) -> Bool:
     """(B,) objects that a detector should find in a scan."""
     points = [int(scan.fov.contains(scan.points[own]).sum()) for own in scan.objects]
@@ -105,7 +112,7 @@ class Writer:
         n = len(kept)
         row = {"xyz": crops.xyz, "count": crops.count, "label": labels.kind[kept].astype(np.int8)}
         row |= {"partial": labels.partial[kept], "unknown": labels.unknown[kept], "tall": labels.tall[kept]}
-        row |= {"variant": np.full(n, variant, np.int8)}
+        row |= {"variant": np.full(n, variant, np.int8), "reflectance": told(proposals)[kept]}
         row |= {"scan": np.array([scan.name] * n, np.str_), "drive": np.array([scan.drive] * n, np.str_)}
         if judged:
             truth = np.array(scan.kinds, np.int64)[countable(scan)]

@@ -50,6 +50,7 @@ def main() -> None:
         tool("train_pointnet", args.work / "kitti", real, placed,
              "--epochs", "100", "--fold-epochs", "40", "--folds", "3", "--teachers", TEACHERS)  # fmt: skip
         tool("train_boxes", args.work / "kitti", real, placed)
+        tool("train_reflectance", args.work / "kitti", real, placed, "--sensor", "hdl-64e")
         tool("export_pointnet", args.work / "kitti", MODELS / "pointnet-kitti.onnx",
              "--data", KITTI_DATA, "--licence", "CC BY-NC-SA 3.0, as its data: not for commercial use")  # fmt: skip
 

@@ -14,7 +14,7 @@ from modt.types import N_CLASSES, Float32, Float64, Int
 
 @dataclass(frozen=True)
 class Calibration:
-    """probability = softmax(logits / temperature + offset)."""
+    """probability = softmax(base + logits / temperature + offset), mostly without a base."""
 
     temperature: float
     offset: Float64
@@ -24,9 +24,9 @@ class Calibration:
         """Leaves everything as it is."""
         return cls(1.0, np.zeros(N_CLASSES))
 
-    def apply(self, logits: Float64) -> Float64:
-        """(R, 4) probabilities of logits."""
-        probability: Float64 = softmax(logits / self.temperature + self.offset, axis=1)
+    def apply(self, logits: Float64, base: Float64 | float = 0.0) -> Float64:
+        """(R, 4) probabilities of logits, added to others that are calibrated."""
+        probability: Float64 = softmax(base + logits / self.temperature + self.offset, axis=1)
         return probability
 
     def folded(self, last: tuple[Float32, Float32]) -> tuple[Float32, Float32]:
@@ -47,11 +47,17 @@ class Calibration:
         return {"temperature": round(self.temperature, 4), "offset": [round(float(v), 4) for v in self.offset]}
 
 
-def fit(logits: Float64, label: Int) -> Calibration:
-    """Maximum likelihood on held-out logits; the offsets carry how common each class is among proposals."""
+def fit(logits: Float64, label: Int, base: Float64 | float = 0.0) -> Calibration:
+    """Maximum likelihood on held-out logits; the offsets carry how common each class is among proposals.
+
+    Args:
+        logits: (R, 4) to be calibrated.
+        label: (R,) classes.
+        base: (R, 4) what they are added to.
+    """
 
     def loss(theta: Float64) -> float:
-        z = log_softmax(logits * np.exp(-theta[0]) + np.append(0.0, theta[1:]), axis=1)
+        z = log_softmax(base + logits * np.exp(-theta[0]) + np.append(0.0, theta[1:]), axis=1)
         prior = 0.05 * float(np.sum(theta**2)) / len(label)
         return prior - float(z[np.arange(len(label)), label].mean())
 

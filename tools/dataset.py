@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from modt.classification.crops import Crops
-from modt.types import N_CLASSES, NONE, Bool, Int
+from modt.types import N_CLASSES, NONE, Bool, Float64, Int
 
 SHIPPED, CLUSTERED, PASTED, SYNTHETIC, UNLABELLED = range(5)
 """Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
@@ -28,6 +28,7 @@ class Dataset:
 
     Attributes:
         crops: all of them, and label, partial, unknown, tall, variant, drive: (R,) of each.
+        reflectance: (R, 5) of their returns as they were measured, NaN where that is unknown or of another sensor.
         truth_label, truth_drive: of each labelled object, seen by the segmentation or not.
         provenance: how each file was made.
         sha256: of each file.
@@ -40,6 +41,7 @@ class Dataset:
     tall: Bool
     variant: Int
     drive: Int
+    reflectance: Float64
     truth_label: Int
     truth_drive: Int
     provenance: list[dict[str, Any]]
@@ -81,6 +83,7 @@ def load(*paths: Path) -> Dataset:
         tall=joined["tall"],
         variant=joined["variant"].astype(np.int64),
         drive=drive[:n],
+        reflectance=joined["reflectance"],
         truth_label=joined["truth_label"].astype(np.int64),
         truth_drive=drive[n:],
         provenance=[json.loads(str(part["provenance"])) for part in parts],

@@ -2,7 +2,8 @@
 
     export_pointnet.py TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
 
-TRAINED_DIR is what tools/train_pointnet.py and tools/train_boxes.py wrote. The box prior goes into the metadata.
+TRAINED_DIR is what tools/train_pointnet.py, tools/train_boxes.py and, where there is any, tools/train_reflectance.py
+wrote. What boxes and reflectance say goes into the metadata.
 
 Two identities make the exported graph cheap without changing a digit that matters: the maximum commutes with adding a
 bias and with ReLU, so both come after it, on one row instead of one a point; and it is idempotent, so that the point
@@ -17,25 +18,18 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from modt.classification.prior import METADATA, encode
-from modt.types import CLASS_NAMES, Float32
+from modt.classification import prior, reflectance
+from modt.types import CLASS_NAMES
+from weights import Layer, load_layers
 
-Layers = list[tuple[Float32, Float32]]
 N_SHARED = 3
 OPSET, IR = 17, 8
 
 
-def load_layers(path: Path) -> Layers:
-    """(in, out) weight and (out,) bias of each layer of a weights.npz."""
-    with np.load(path) as file:
-        return [(file[f"weight{i}"], file[f"bias{i}"]) for i in range(len(file.files) // 2)]
-
-
-def graph(layers: Layers, *, pool_first: bool = True) -> onnx.ModelProto:
+def graph(layers: list[Layer], *, pool_first: bool = True) -> onnx.ModelProto:
     """The network; with pool_first False the textbook order, bias and ReLU on every point."""
     nodes, value = [], "points"
     initial: list[TensorProto] = []
@@ -83,7 +77,7 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
         f"- licence: {licence}",
         f"- classes: {', '.join(CLASS_NAMES)}",
         "- input: the proposal's own points, x along and y across the line of sight from the middle of their extent",
-        "  [m], z above the ground [m]; no reflectance (modt.classification.crops)",
+        "  [m], z above the ground [m] (modt.classification.crops)",
         "- output: probability of each class, softmax with the calibration folded in",
         f"- data: {data}",
         *(
@@ -98,6 +92,8 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
     ]
     if "cross_validation" in report:
         lines += ["## Out of fold (drives never split)", "", *_scores(report["cross_validation"])]
+    if "reflectance" in report:
+        lines += ["## With the reflectance, out of fold", "", *_reflected(report["reflectance"])]
     lines += ["## The box alone, out of fold", "", *_ruled_out(report["boxes"])]
     return "\n".join(lines)
 
@@ -111,10 +107,6 @@ def _tally(made: dict[str, Any]) -> str:
 def _scores(scores: dict[str, Any]) -> list[str]:
     precision, objects = scores["average_precision"], scores["objects"]
     rows = [f"| {c} | {objects[c]} | {100 * precision[c]:.1f} % |" for c in CLASS_NAMES[1:]]
-    called = [
-        f"| {c} | " + " | ".join(map(str, row)) + " |"
-        for c, row in zip(CLASS_NAMES, scores["confusion"], strict=True)
-    ]
     return [
         "Average precision over proposals; an object that the segmentation missed is a false negative.",
         "",
@@ -124,28 +116,52 @@ def _scores(scores: dict[str, Any]) -> list[str]:
         "",
         f"Expected calibration error {scores['ece']} (before calibration {scores['ece_uncalibrated']}).",
         "",
-        "| true, called | " + " | ".join(CLASS_NAMES) + " |",
-        "|---|" + "---|" * len(CLASS_NAMES),
-        *called,
+        *_confused(scores["confusion"]),
+    ]
+
+
+def _confused(confusion: list[list[int]]) -> list[str]:
+    called = [f"| {c} | " + " | ".join(map(str, row)) + " |" for c, row in zip(CLASS_NAMES, confusion, strict=True)]
+    return ["| true, called | " + " | ".join(CLASS_NAMES) + " |", "|---|" + "---|" * len(CLASS_NAMES), *called, ""]
+
+
+def _listed(precision: dict[str, float]) -> str:
+    return ", ".join(f"{name} {100 * value:.1f} %" for name, value in precision.items())
+
+
+def _reflected(told: dict[str, Any]) -> list[str]:
+    shape = told["network"]
+    return [
+        f"What the returns' reflectance says (modt.classification.reflectance), in the metadata, on the scale of an "
+        f"{told['sensor']}; not looked at elsewhere.",
         "",
+        f"- the network and {told['weight']} of it: average precision {_listed(shape['average_precision'])}, "
+        f"calibration error {shape['ece']}, log loss {shape['log_loss']} ({shape['log_loss_without']} without)",
+        f"- the box and all of it: average precision {_listed(told['box']['average_precision'])}",
+        "",
+        *_confused(shape["confusion"]),
+        "By box and reflectance an object with less than the probability in the first column:",
+        "",
+        *_thresholds(told["box"]["ruled_out"]),
     ]
 
 
 def _ruled_out(boxes: dict[str, Any]) -> list[str]:
-    precision = ", ".join(f"{name} {100 * value:.1f}" for name, value in boxes["average_precision"].items())
-    rows = [
-        f"| {row['likely']} | " + " | ".join(f"{100 * row['share'][c]:.1f} %" for c in CLASS_NAMES) + " |"
-        for row in boxes["ruled_out"]
-    ]
     return [
-        f"What a box says (modt.classification.prior), in the metadata; average precision {precision} %.",
+        f"What a box says (modt.classification.prior), in the metadata; average precision "
+        f"{_listed(boxes['average_precision'])}.",
         "By its box an object with less than the probability in the first column:",
         "",
-        f"| | {' | '.join(CLASS_NAMES)} |",
-        "|---|" + "---|" * len(CLASS_NAMES),
-        *rows,
-        "",
+        *_thresholds(boxes["ruled_out"]),
     ]
+
+
+def _thresholds(ruled_out: list[dict[str, Any]]) -> list[str]:
+    rows = [
+        f"| {row['likely']} | " + " | ".join(f"{100 * row['share'][c]:.1f} %" for c in CLASS_NAMES) + " |"
+        for row in ruled_out
+    ]
+    return [f"| | {' | '.join(CLASS_NAMES)} |", "|---|" + "---|" * len(CLASS_NAMES), *rows, ""]
 
 
 def main() -> None:
@@ -156,11 +172,17 @@ def main() -> None:
     parser.add_argument("--licence", required=True)
     args = parser.parse_args()
     network = graph(load_layers(args.trained / "weights.npz"))
-    helper.set_model_props(network, {METADATA: encode(load_layers(args.trained / "boxes.npz"))})
-    model = network.SerializeToString(deterministic=True)
-    args.out.write_bytes(model)
     report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
     report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
+    held = {prior.METADATA: prior.encode(load_layers(args.trained / "boxes.npz"))}
+    if (args.trained / "reflectance.json").exists():
+        told = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
+        report["reflectance"] = told
+        layers = load_layers(args.trained / "reflectance.npz")
+        held[reflectance.METADATA] = reflectance.encode(layers, told["weight"], told["sensor"])
+    helper.set_model_props(network, held)
+    model = network.SerializeToString(deterministic=True)
+    args.out.write_bytes(model)
     text = card(args.out.stem, hashlib.sha256(model).hexdigest(), report, args.data, args.licence)
     args.out.with_suffix(".md").write_text(text, encoding="utf-8")
 

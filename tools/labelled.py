@@ -196,6 +196,7 @@ def argoverse_scans(folder: Path) -> Iterator[Scan]:
         with np.load(path) as file:
             points = file["points"].astype(np.float32)
         points[:, :3] -= ARGOVERSE_SENSOR
+        points[:, 3] = 0.0  # on another scale
         points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_CARRIER_M]
         with path.with_suffix(".csv").open(encoding="utf-8") as rows:
             objects = [row for row in csv.DictReader(rows) if int(row["points"]) > 0]

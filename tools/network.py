@@ -6,28 +6,18 @@ the maximum, with a positive scale: then maximum, normalisation and ReLU commute
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from torch import Tensor, nn
 
+from weights import Layer
+
 SHARED = (3, 32, 64, 512)
 HEAD = (512, 256, 128, 4)
-Layer = tuple[NDArray[np.float32], NDArray[np.float32]]
-
-
-def save_layers(path: Path, layers: Sequence[Layer]) -> None:
-    """Write weights for tools/export_pointnet.py."""
-    table: dict[str, NDArray[np.float32]] = {}
-    for i, (weight, bias) in enumerate(layers):
-        table |= {f"weight{i}": weight.astype(np.float32), f"bias{i}": bias.astype(np.float32)}
-    np.savez(path, **table)
 
 
 class MaxOfLinear(torch.autograd.Function):

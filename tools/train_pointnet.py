@@ -3,7 +3,8 @@
     train_pointnet.py OUT_DIR CROPS.npz... [--epochs N] [--folds K] [--teachers T] [--seed S]
 
 Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json: loss curve, and with --folds the
-out-of-fold average precision, confusion and calibration (drives are never split between folds). The temperature and
+out-of-fold average precision, confusion and calibration (drives are never split between folds), and the probabilities
+themselves, OUT_DIR/held_out.npy, for tools/train_reflectance.py. The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
 With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written.
 An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
@@ -25,12 +26,13 @@ from numpy.random import Generator
 from augment import Beams, augment, limit
 from calibration import Calibration, expected_error
 from dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
-from held_out import Model, cross_validated
+from held_out import HeldOut, Model, cross_validated
 from modt.classification.crops import Crops, canonical
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
-from network import PointNet, save_layers
+from network import PointNet
 from scores import average_precision, confusion
 from teaching import Ensemble, Labels, Teaching
+from weights import save_layers
 
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])
 """Of each class in a batch: objects are rare, and background has many faces."""
@@ -141,8 +143,8 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     return torch.cat(parts).double().numpy()
 
 
-def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
-    """Out-of-fold calibration and scores; missed objects count as false negatives."""
+def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) -> tuple[HeldOut, dict[str, Any]]:
+    """What is said out of fold, and its scores; missed objects count as false negatives."""
 
     def trained(among: Bool, i: int) -> Model:
         net, _ = educate(data, among, (steps, steps), teachers, seed + i, None)
@@ -151,7 +153,7 @@ def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) 
     held = cross_validated(data, k, trained)
     probability, clear = held.probability, held.clear
     label = held.label[clear]
-    return held.calibration, {
+    return held, {
         "average_precision": average_precision(probability, held.label, held.truth),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], held.truth[1:], strict=True)},
         "confusion": confusion(probability[clear], label),
@@ -187,7 +189,9 @@ def main() -> None:
         report["cross_validation"] = earlier["cross_validation"]
     elif args.folds:
         steps = round(per_epoch * (args.fold_epochs or args.epochs) * (1 - 1 / args.folds))
-        calibration, report["cross_validation"] = cross_validate(data, args.folds, steps, args.teachers, args.seed)
+        held, report["cross_validation"] = cross_validate(data, args.folds, steps, args.teachers, args.seed)
+        calibration = held.calibration
+        np.save(args.out / "held_out.npy", held.probability)
         print(json.dumps(report["cross_validation"]))
     everything = np.ones(len(data), np.bool_)
     both = round(per_epoch * args.epochs), round(per_epoch * (args.fold_epochs or args.epochs))

@@ -88,6 +88,9 @@ class SensorConfig(StageConfig):
     elevation_step_deg: float = _number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
     azimuth_step_deg: float = _number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
     period_s: float = _number(0.1, 0.001, 10.0, "s", "of a sweep, where the stream has no stamps")
+    reflectance: str = _choice(
+        "none", ("none", "hdl-64e"), "on whose scale; models use that which they learnt from; none: not looked at"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,6 +35,8 @@ class ObjectClass(IntEnum):
 
 CLASS_NAMES = tuple(c.name.lower() for c in ObjectClass)
 N_CLASSES = len(ObjectClass)
+N_REFLECTANCE = 5
+"""Numbers that tell of the reflectance of a proposal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +72,8 @@ class Proposals:
         truncated: (P,) cut by the edge of the field of view.
         occluded: (P,) cut by something nearer that stands in front of it.
         sensor_height_m: of the sensor above the ground that they were found on, None where it is not known.
+        reflectance: (P, 5) of each proposal's returns: mean, standard deviation and greatest, share of bright and of
+            dark ones; None where the sweep carries none.
     """
 
     members: Int
@@ -80,6 +84,7 @@ class Proposals:
     truncated: Bool
     occluded: Bool
     sensor_height_m: float | None = None
+    reflectance: Float64 | None = None
 
     def __len__(self) -> int:
         return len(self.offsets) - 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,8 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.synthetic import SyntheticStream
-from modt.types import Float64, Int
+from modt.types import N_REFLECTANCE, Float64, Int
+from tests.classification.datasets import data_of
 
 
 def test_crops_say_of_their_boxes_what_proposals_do() -> None:
@@ -34,13 +37,13 @@ def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
     n = len(sides_m)
     xyz = (rng.uniform(-0.5, 0.5, (n, 60, 3)) * sides_m[:, None, None] + [10.0, 0.0, -1.0]).reshape(-1, 3)
     crops = Crops(xyz.astype(np.float32), np.arange(n + 1) * 60)
-    none, variant, drive = np.zeros(n, np.bool_), np.zeros(n, np.int64), np.arange(n) % 4
-    return Dataset(crops, label, none, none, none, variant, drive, label, drive, provenance=[], sha256=[])
+    drive = np.arange(n) % 4
+    return data_of(crops, label, drive=drive, truth_label=label, truth_drive=drive)
 
 
 def test_training_finds_what_sizes_tell() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
-    from modt.classification.prior import logits
+    from modt.classification.layers import logits
     from train_boxes import cross_validate, train
 
     rng = np.random.default_rng(0)
@@ -58,3 +61,30 @@ def test_training_finds_what_sizes_tell() -> None:
     assert min(report["average_precision"].values()) > 0.8
     shares = [row["share"]["background"] for row in report["ruled_out"]]
     assert shares == sorted(shares)
+
+
+def test_training_finds_what_reflectance_tells_beyond_the_box() -> None:
+    pytest.importorskip("torch", reason="extra [train] is not installed")
+    from modt.classification.layers import logits
+    from train_reflectance import Described, cross_validate, train, weigh
+
+    rng = np.random.default_rng(0)
+    label = np.arange(160) // 2 % 4
+    alike = cubes(np.ones(160), label, rng)
+    told = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
+    told[::20] = np.nan  # of another sensor
+    data = dataclasses.replace(alike, reflectance=told)
+    seen = Described(data)
+    dumb = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
+    layers = train(data, seen, np.arange(160), dumb, 200, seed=1)
+    known = np.isfinite(told).all(axis=1)
+    assert np.mean(logits(layers, seen.whole[known]).argmax(axis=1) == label[known]) > 0.9
+
+    data = dataclasses.replace(alike, reflectance=np.nan_to_num(told, nan=0.3))
+    network = np.full((160, 4), 0.25)
+    _, report = cross_validate(data, Described(data), network, 2, 200, seed=1)
+    assert report["weight"] > 0.9  # a network that knows nothing leaves all of it
+    assert min(report["network"]["average_precision"].values()) > 0.7
+    assert report["network"]["log_loss"] < 0.5 * report["network"]["log_loss_without"]
+    sure = np.log(np.eye(4)[label] * 0.96 + 0.01)
+    assert weigh(sure, -sure, label) < 0.05  # what contradicts a network that is right is left out

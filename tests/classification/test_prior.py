@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import (
@@ -18,14 +14,12 @@ from modt.classification.prior import (
     BoxPrior,
     Frequency,
     beam_sr,
-    decode,
     encode,
     features,
-    logits,
     prior_of,
 )
 from modt.config import ClassificationConfig, SensorConfig
-from modt.types import Float64, ObjectClass, Proposals
+from modt.types import ObjectClass, Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(5)
@@ -41,40 +35,9 @@ def standing(points: int, distance_m: float, length_m: float, width_m: float, he
     return dataclasses.replace(proposals, box=box)
 
 
-@given(arrays(np.float64, (6, N_FEATURES), elements=st.floats(-5, 5)))
-def test_the_network_is_what_its_layers_say(feature: Float64) -> None:
-    (w0, b0), (w1, b1) = LAYERS
-    for row, found in zip(feature, logits(LAYERS, feature), strict=True):
-        hidden = [np.tanh(sum(row[i] * w0[i, j] for i in range(N_FEATURES)) + b0[j]) for j in range(5)]
-        expected = [sum(hidden[j] * w1[j, k] for j in range(5)) + b1[k] for k in range(4)]
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-
-
-def test_layers_survive_the_metadata() -> None:
-    for (weight, bias), (held, held_bias) in zip(LAYERS, decode(encode(LAYERS)), strict=True):
-        np.testing.assert_array_equal(weight, held)
-        np.testing.assert_array_equal(bias, held_bias)
-
-
 def test_a_box_is_ruled_out_below_a_threshold() -> None:
     said = np.array([[0.995, 0.005, 0.0, 0.0], [0.97, 0.01, 0.01, 0.01], [0.1, 0.9, 0.0, 0.0]])
     assert BoxPrior(LAYERS, SensorConfig()).likely(said, 0.02).tolist() == [False, True, True]
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "[]",
-        "[[[[1]], [1]]]",
-        "[[[[NaN, 0, 0, 0]], [0, 0, 0, 0]]]",
-        json.dumps([[[[0.0] * 4] * 6, [0.0] * 4]]),
-        "{}",
-    ],
-)
-def test_what_is_no_such_network_is_refused(text: str) -> None:
-    with pytest.raises((TypeError, ValueError)):
-        decode(text)
 
 
 def test_without_one_the_classes_are_as_common_as_they_are() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from augment import Beams, augment, limit
 from build_crops import label
 from calibration import Calibration, expected_error, fit
-from dataset import SHIPPED, SYNTHETIC, UNLABELLED, Dataset, folds
+from dataset import SHIPPED, SYNTHETIC, UNLABELLED, folds
 from held_out import cross_validated
 from labelled import Scan, argoverse_scans, inside
 from modt.classification.crops import Crops, gather
@@ -21,6 +21,7 @@ from modt.geometry import FieldOfView
 from modt.types import NONE, ObjectClass, Proposals
 from paste import Item, pasted
 from scores import average_precision, confusion
+from tests.classification.datasets import data_of
 from tests.classification.scenes import blobs
 
 EVERYWHERE = FieldOfView()
@@ -98,9 +99,10 @@ def test_folds_split_what_is_judged_by_drive_and_learn_from_the_rest_always() ->
     drive = np.array([0, 0, 1, 2, 3, 4, 4, 5])  # the last two drives are synthetic
     variant = np.where(drive < 4, SHIPPED, SYNTHETIC)
     label = np.array([1, 0, 2, 1, 0, 1, 0, 3])
-    none = np.zeros(len(drive), np.bool_)
     crops = Crops(np.zeros((len(drive), 3), np.float32), np.arange(len(drive) + 1))
-    data = Dataset(crops, label, none, none, none, variant, drive, np.array([1, 2, 1]), np.array([0, 1, 2]), [], [])
+    data = data_of(
+        crops, label, variant=variant, drive=drive, truth_label=np.array([1, 2, 1]), truth_drive=np.array([0, 1, 2])
+    )
     fold = folds(data, 3)
     assert (fold[4:] == NONE).all()
     assert sorted(set(fold[:4].tolist())) == [0, 1, 2]
@@ -247,20 +249,18 @@ def test_the_maximum_of_a_linear_layer_has_the_gradients_of_its_definition() -> 
 
 
 def test_labels_are_learnt_from_where_there_are_any() -> None:
-    none, zero = np.zeros(4, np.bool_), np.zeros(4, np.int64)
     partial, unknown = np.array([False, False, False, True]), np.array([True, False, True, False])
     variant = np.array([UNLABELLED, SHIPPED, SHIPPED, SHIPPED])
     crops = Crops(np.zeros((4, 3), np.float32), np.arange(5))
-    data = Dataset(crops, np.array([0, 0, 1, 0]), partial, unknown, none, variant, zero, zero[:0], zero[:0], [], [])
+    data = data_of(crops, np.array([0, 0, 1, 0]), partial=partial, unknown=unknown, variant=variant)
     assert data.clear.tolist() == [False, True, True, False]
 
 
 def test_no_model_judges_a_drive_that_it_learnt_from() -> None:
     drive = np.repeat(np.arange(6), 5)
     label = np.tile(np.arange(5) % 4, 6)
-    none, variant = np.zeros(30, np.bool_), np.zeros(30, np.int64)
     crops = Crops(np.zeros((30, 3), np.float32), np.arange(31))
-    data = Dataset(crops, label, none, none, none, variant, drive, label, drive, provenance=[], sha256=[])
+    data = data_of(crops, label, drive=drive, truth_label=label, truth_drive=drive)
     judged = []
 
     def trained(among: np.ndarray, i: int) -> Callable[[np.ndarray], np.ndarray]:

@@ -9,9 +9,12 @@ from pathlib import Path
 import numpy as np
 import onnxruntime as ort
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
+from scipy.special import softmax
 
 from modt import assets
 from modt.classification.crops import canonical, gather, height_of
+from modt.classification.prior import N_FEATURES, described
+from modt.classification.reflectance import Evidence, evidence_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import N_CLASSES, Float32, Float64, Int, Proposals
@@ -27,8 +30,12 @@ _UNUSABLE = (
 )
 
 
+LEAST = 1e-12
+"""Probability that stands for none, so that it has a logarithm."""
+
+
 class PointNet:
-    """P(class | points) of proposals.
+    """P(class | points, reflectance) of proposals: the network knows the shape, the evidence with it the reflectance.
 
     A proposal costs what its own points cost: crops of like size share a call, so that little is padded, and a
     call is small enough for its features to stay in the cache.
@@ -43,8 +50,8 @@ class PointNet:
         metadata: what else the model brings along.
 
     Raises:
-        MisuseError: no such model, not the one that its card describes, no ONNX, or not (batch, points, 3) to
-            (batch, 4).
+        MisuseError: no such model, not the one that its card describes, no ONNX, not (batch, points, 3) to
+            (batch, 4), or with evidence that cannot be used.
     """
 
     def __init__(self, config: ClassificationConfig, sensor: SensorConfig) -> None:
@@ -55,6 +62,7 @@ class PointNet:
         self._session = _session(self.path)
         self._input = self._session.get_inputs()[0].name
         self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
+        self._evidence = self._brought_along()
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) probability of each class for each of the proposals given, in their order.
@@ -71,7 +79,23 @@ class PointNet:
         for first in range(0, len(crops), self.config.batch):
             rows = by_size[first : first + self.config.batch]
             out[rows] = self.infer(crops.padded(rows))
-        return out
+        return self._with_evidence(out, proposals, which)
+
+    def _with_evidence(self, said: Float64, proposals: Proposals, which: Int) -> Float64:
+        """(R, 4) the network's word on the shape and what the reflectance adds (Bayes' rule)."""
+        if not self._evidence.weight:
+            return said
+        told = None if proposals.reflectance is None else proposals.reflectance[which]
+        added = self._evidence.of(described(proposals, which, self._sensor), told)
+        probability: Float64 = softmax(np.log(np.maximum(said, LEAST)) + self._evidence.weight * added, axis=1)
+        return probability
+
+    def _brought_along(self) -> Evidence:
+        try:
+            return evidence_of(self.metadata, N_FEATURES, self._sensor)
+        except (KeyError, TypeError, ValueError) as error:
+            cause = f"its evidence of reflectance cannot be used ({error})"
+            raise MisuseError(self.path, cause, "export the model again") from None
 
     def facts(self) -> dict[str, str]:
         """The model's file and hash, for the record of a run."""

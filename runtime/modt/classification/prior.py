@@ -1,4 +1,4 @@
-"""What is thought of a proposal before its points are looked at: by what is common, or by its box.
+"""What is thought of a proposal before its points are looked at: by what is common, or by its box and brightness.
 
 A wall of twelve metres, a canopy, a pole: most background is known by its size. A few numbers a proposal tell it
 apart for next to nothing, and the network need not be asked.
@@ -8,15 +8,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
 from scipy.special import softmax
 
 from modt.classification.crops import height_of
+from modt.classification.layers import Layers, as_lists, logits, of_lists
+from modt.classification.reflectance import Evidence, NoEvidence, evidence_of
 from modt.config import SensorConfig
-from modt.types import N_CLASSES, Bool, Float64, Int, ObjectClass, Proposals
+from modt.types import Bool, Float64, Int, ObjectClass, Proposals
 
 METADATA = "box_prior"
 """Key of an ONNX model's metadata under which the weights of its BoxPrior are found."""
@@ -25,8 +26,6 @@ MOST_POINTS = 1000
 """What shows more points than this is large; how large, its box says."""
 SMALL_M = 0.05
 """Added to lengths, so that those of thin things have logarithms that mean something."""
-
-Layers = Sequence[tuple[Float64, Float64]]
 
 
 class Prior(Protocol):
@@ -66,22 +65,23 @@ def shares(objects: Sequence[float]) -> Float64:
 
 
 class BoxPrior:
-    """P(class | box): a network of 1,444 weights over the size of a proposal and where it stands.
+    """P(class | box, reflectance): a network of 1,444 weights over the size of a proposal and where it stands.
 
     Args:
-        layers: (in, out) weight and (out,) bias of each layer, hyperbolic tangents between them, softmax at the end.
+        layers: of the network.
         sensor: its resolution, and how high it stands, for proposals that do not say.
+        evidence: what the reflectance adds.
     """
 
-    def __init__(self, layers: Layers, sensor: SensorConfig) -> None:
+    def __init__(self, layers: Layers, sensor: SensorConfig, evidence: Evidence | None = None) -> None:
         self._layers = layers
-        self._step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
         self._sensor = sensor
+        self._evidence = evidence or NoEvidence()
 
     def of(self, proposals: Proposals) -> Float64:
         """(P, 4) for each proposal of a frame."""
-        height_m = height_of(proposals, self._sensor)
-        score = logits(self._layers, features(proposals.count, proposals.box, height_m, self._step_sr))
+        feature = described(proposals, slice(None), self._sensor)
+        score = logits(self._layers, feature) + self._evidence.of(feature, proposals.reflectance)
         probability: Float64 = softmax(score, axis=1)
         return probability
 
@@ -129,41 +129,24 @@ def features(count: Int, box: Float64, sensor_height_m: float, step_sr: float) -
     )
 
 
-def logits(layers: Layers, feature: Float64) -> Float64:
-    """(P, 4) of features (P, 7)."""
-    *hidden, (weight, bias) = layers
-    value = feature
-    for hidden_weight, hidden_bias in hidden:
-        value = np.tanh(value @ hidden_weight + hidden_bias)
-    score: Float64 = value @ weight + bias
-    return score
+def described(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
+    """(R, 7) features of the proposals given, as the sensor shows them."""
+    step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
+    return features(proposals.count[which], proposals.box[which], height_of(proposals, sensor), step_sr)
 
 
 def encode(layers: Layers) -> str:
     """The layers as a model's metadata holds them."""
-    return json.dumps([[weight.tolist(), bias.tolist()] for weight, bias in layers])
-
-
-def decode(text: str) -> Layers:
-    """Layers from a model's metadata.
-
-    Raises:
-        ValueError: they are none, or not of these features and classes.
-    """
-    layers = [(np.array(weight, np.float64), np.array(bias, np.float64)) for weight, bias in json.loads(text)]
-    if not all(np.isfinite(weight).all() and np.isfinite(bias).all() for weight, bias in layers):
-        raise ValueError("weights that are not finite")
-    widths = [N_FEATURES, *(len(bias) for _, bias in layers)]
-    if widths[-1] != N_CLASSES or [weight.shape for weight, _ in layers] != [*pairwise(widths)]:
-        raise ValueError(f"layers of {' x '.join(map(str, widths))}, wanted {N_FEATURES} to {N_CLASSES}")
-    return layers
+    return json.dumps(as_lists(layers))
 
 
 def prior_of(metadata: Mapping[str, str], frequency: Sequence[float], sensor: SensorConfig) -> Prior:
     """The prior that a model brings along in its metadata; the frequency of the classes where it brings none.
 
     Raises:
-        ValueError: it brings one that cannot be used.
+        KeyError, TypeError, ValueError: it brings one that cannot be used.
     """
     text = metadata.get(METADATA)
-    return Frequency(frequency) if text is None else BoxPrior(decode(text), sensor)
+    if text is None:
+        return Frequency(frequency)
+    return BoxPrior(of_lists(json.loads(text), N_FEATURES), sensor, evidence_of(metadata, N_FEATURES, sensor))

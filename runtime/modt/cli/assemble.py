@@ -147,5 +147,5 @@ def _prior(network: PointNet, profile: ProfileConfig) -> Prior:
     """What the model thinks of proposals unseen."""
     try:
         return prior_of(network.metadata, profile.fusion.prior, profile.sensor)
-    except (TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise MisuseError(network.path, f"its box prior cannot be used ({error})", "export the model again") from None

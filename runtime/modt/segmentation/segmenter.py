@@ -9,13 +9,14 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.boxes import headings, upright_boxes
+from modt.segmentation.brightness import brightness
 from modt.segmentation.clusters import Clusterer, Clusters
 from modt.segmentation.columns import Columns
 from modt.segmentation.ground import Ground
 from modt.segmentation.groups import Groups
 from modt.segmentation.height import sensor_height
 from modt.segmentation.occlusion import occluded
-from modt.types import NONE, Bool, Float32, Int, Proposals
+from modt.types import NONE, Bool, Float32, Float64, Int, Proposals
 
 MARGIN_M = 6.0
 """Looked at beyond the edge of the field of view, so that what stands on the edge is segmented whole."""
@@ -55,7 +56,8 @@ class Segmenter:
         if not len(raised):
             return Proposals.empty()
         index = raised if looked_at is None else looked_at[raised]
-        return replace(self._proposals(sweep.take(raised), height[raised], index), sensor_height_m=above)
+        proposals = self._proposals(sweep.take(raised), height[raised], index)
+        return replace(proposals, sensor_height_m=above, reflectance=self._brightness(points, proposals))
 
     def raised(self, sweep: Columns, height: Float32) -> Bool:
         """(N,) within range, clear of the ground and no higher than objects reach."""
@@ -85,6 +87,13 @@ class Segmenter:
             truncated = outline.least(self.fov.depth(cell.xyz())[outline.rows]) < EDGE_M - MARGIN_M
         hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
         return Proposals(index[groups.rows], groups.offsets, own, centroid, box, truncated, hidden)
+
+    def _brightness(self, points: Float32, proposals: Proposals) -> Float64 | None:
+        """(P, 5) of the proposals' returns, where it is looked at."""
+        if self.sensor.reflectance == "none":
+            return None
+        own = points[:, 3].take(proposals.members)
+        return brightness(own, Groups(np.arange(len(own)), proposals.offsets))
 
     def _in_view(self, clusters: Clusters, cell: Columns) -> Bool:
         """(n,) whether a cluster reaches into the field of view, or nearly."""

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from modt.sources.synthetic.figures import Figures, Posture
+from modt.sources.synthetic.materials import Material
 
 
 def figures(posture, n=8):
@@ -19,6 +20,7 @@ def figures(posture, n=8):
         stride=0.35 * one,
         coat=1e-3 * one,
         pack=1e-3 * one,
+        strip=0.07 * (np.arange(n) % 2),
     )
 
 
@@ -44,3 +46,13 @@ def test_walkers_move_their_legs_and_standers_do_not():
         people = figures(posture)
         a, b = people.pieces(0.0).centre, people.pieces(0.25).centre
         assert (np.abs(a - b).max() > 0.1) == moves
+
+
+def test_a_strip_is_worn_about_the_chest_by_those_who_have_one():
+    people = figures(Posture.WALK)
+    strips = people.pieces(0.4).take(people.pieces(0.4).material == Material.RETRO)
+    assert strips.body.tolist() == np.flatnonzero(people.strip).tolist()
+    np.testing.assert_allclose(2 * strips.half[:, 2], 0.07, atol=1e-4)
+    share = strips.centre[:, 2] / people.height[strips.body]
+    assert (share > 0.6).all()
+    assert (share < 0.75).all()

@@ -19,8 +19,9 @@ EGO_SIZE = (4.6, 1.8, 1.6)
 REACH_UP_M = 2.2
 """Parts of scenery above this are in nobody's way."""
 
-
 BARE_M = 1e-3
+STRIP_M, STRIP_WALKER, STRIP_RIDER = 0.07, 0.04, 0.1
+"""A strip that throws light back, and the share of people on foot and on bicycles who wear one."""
 NOSE_DOWN_RAD = (0.007, 0.005)
 """Mean and spread of the sensor's pitch on its carrier: people 40 m ahead stand 0.3 m too high in real scans."""
 
@@ -37,6 +38,7 @@ class Builder:
         self.rng, self.seconds = rng, seconds
         self.bodies: list[Body] = []
         self._people: list[tuple[float, ...]] = []
+        self._dress = rng.spawn(1)[0]  # its own, so that scenes stay what they were
 
     def scenery(self, pieces: Pieces, x: float, y: float, heading_rad: float) -> None:
         """Something that is not annotated and never moves."""
@@ -91,7 +93,7 @@ class Builder:
         stay = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(stay)}
         people = [(number[int(p[0])], *p[1:]) for p in self._people if int(p[0]) in number]
-        columns: Float64 = np.array(people).reshape(-1, 9).T
+        columns: Float64 = np.array(people).reshape(-1, 10).T
         figures = Figures(columns[0].astype(np.int64), columns[1].astype(np.int64), *columns[2:])
         mount = float(self.rng.normal(0.0, 0.004)), float(self.rng.normal(*NOSE_DOWN_RAD))
         return World(terrain, [self.bodies[i] for i in stay], figures, ego, height_m, sway_rad, mount)
@@ -111,7 +113,8 @@ class Builder:
         phase = float(self.rng.uniform(0, 2 * np.pi))
         coat = self.rng.uniform(0.16, 0.24) if self.rng.random() < 0.35 else BARE_M
         pack = self.rng.uniform(0.08, 0.16) if self.rng.random() < 0.3 else BARE_M
-        self._people.append((len(self.bodies), posture, height, girth, phase, rate, stride, coat, pack))
+        strip = STRIP_M * (self._dress.random() < (STRIP_RIDER if posture == Posture.RIDE else STRIP_WALKER))
+        self._people.append((len(self.bodies), posture, height, girth, phase, rate, stride, coat, pack, strip))
         self.bodies.append(Body(kind, size, path, rigid))
 
 

@@ -38,6 +38,7 @@ class Figures:
         stride: (n,) reach of a step to either side [m].
         coat: (n,) breadth of a coat or skirt about the hips [m]; next to nothing without one.
         pack: (n,) depth of a bag on the back [m]; likewise.
+        strip: (n,) height of a strip about the chest that throws light back [m]; zero without one.
     """
 
     body: Int
@@ -49,6 +50,7 @@ class Figures:
     stride: Float64
     coat: Float64
     pack: Float64
+    strip: Float64
 
     def take(self, rows: Int | Bool) -> Figures:
         """The figures given, by index or mask."""
@@ -104,8 +106,11 @@ class Figures:
         bars.append((back - up, back + up, self.pack, np.minimum(1.6 * self.pack, 0.16), Material.CLOTH))
         bars.append((neck - _points(0.0, 0.0, 0.02), head, 0.055 + 0 * g, 0.055 + 0 * g, Material.SKIN))
         skull = np.tile([0.1, 0.08, 0.12], (n, 1))
+        worn = self.strip > 0
+        chest, half = (0.45 * hips + 0.55 * neck)[worn], (2.5 * up * self.strip[:, None])[worn]
+        strip = _bars(chest - half, chest + half, 0.135 * g[worn], 0.2 * g[worn], Material.RETRO, self.body[worn])
         return Pieces.join(
-            [_bars(*bar, body=self.body) for bar in bars] + [_balls(head, skull, Material.SKIN, self.body)]
+            [_bars(*bar, body=self.body) for bar in bars] + [_balls(head, skull, Material.SKIN, self.body), strip]
         )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from modt.geometry import inverse, transform, transform_boxes
 from modt.sources.synthetic.kinds import Kind
-from modt.sources.synthetic.materials import SEMANTIC
+from modt.sources.synthetic.materials import SEMANTIC, SHADE
 from modt.sources.synthetic.raycast import NOTHING, RayCaster
 from modt.sources.synthetic.returns import Receiver
 from modt.sources.synthetic.sensors import SensorModel
@@ -59,6 +59,8 @@ class Simulator:
         self.world, self.sensor, self.seed, self.distort = world, sensor, seed, distort
         self.caster = RayCaster(sensor)
         self.receiver = Receiver(sensor, np.random.default_rng([seed, 1]))
+        chance = np.random.default_rng([seed, 3]).standard_normal((len(world.bodies), len(SHADE)), np.float32)
+        self._shade = chance * SHADE
         self._object_class = np.array([b.kind.object_class for b in world.bodies] + [0], np.int64)
         self._annotated = np.array([i for i, b in enumerate(world.bodies) if b.kind.name], np.int64)
         self._kinds = tuple(world.bodies[i].kind for i in self._annotated.tolist())
@@ -76,8 +78,8 @@ class Simulator:
         image = self.caster.cast(pieces, ground, rng.standard_exponential(self.sensor.shape, np.float32))
         of_piece = np.append(pieces.material, 0).astype(np.uint8)
         material = np.where(image.piece != NOTHING, of_piece[image.piece], surface)
-        distance, intensity, heard = self.receiver.receive(image.distance, material, image.piece, rng)
-        ray = np.flatnonzero(heard)
+        shade = np.append(self._shade[pieces.body, pieces.material], np.float32(0))
+        distance, brightness, ray = self.receiver.receive(image.distance, material, image.piece, shade, rng)
         row, column = np.divmod(ray, self.sensor.shape[1])
         s = distance.ravel()[ray]
         jitter = rng.standard_normal(len(s), np.float32) * np.float32(self.sensor.azimuth_sigma_rad)
@@ -86,7 +88,7 @@ class Simulator:
         points[:, 0] = s * (cos - jitter * sin)
         points[:, 1] = s * (sin + jitter * cos)
         points[:, 2] = s * self.caster.tangent[row, 0] + self.caster.origin[row, 0]
-        points[:, 3] = intensity.ravel()[ray]
+        points[:, 3] = brightness
         instance = np.append(pieces.body, NONE)[image.piece.ravel()[ray]]
         if self.distort:
             self._distort(points, column, instance, time_s)

@@ -16,6 +16,12 @@ ROOM_M = 0.07
 LEAN = 0.1
 """How far the sides of a van lean inwards for each metre of height."""
 
+PLATE_M = (0.52, 0.11)
+"""Width and height of a number plate."""
+
+SUNK_M = 0.03
+"""How far the middles of plates and lamps lie inside the surface: beams see them a little broader than they are."""
+
 
 def car(rng: np.random.Generator, size: Size) -> Pieces:
     """A passenger car of (length, width, height): hatchback, saloon or estate by chance."""
@@ -73,6 +79,8 @@ def car(rng: np.random.Generator, size: Size) -> Pieces:
             _pillars(rng, (front, rear, rake, tail), (belt, height), width, tuck, paint),
             _wheels(rng, length, width, rng.uniform(0.3, 0.34)),
             _mirrors(front, belt, width, paint),
+            _plates(hull, 0.43, belt - 0.16),
+            _tail_lamps(hull, belt - 0.12),
         ]
     )
 
@@ -120,6 +128,8 @@ def van(rng: np.random.Generator, size: Size) -> Pieces:
             _pillars(rng, (front, rear, rake, 0.05), (belt, height), width, LEAN, paint),
             _wheels(rng, length, width, 0.34),
             _mirrors(front - 0.3, belt, width, paint),
+            _plates(hull, 0.45, 0.8),
+            _tail_lamps(hull, belt - 0.15),
         ]
     )
 
@@ -166,7 +176,33 @@ def bicycle(rng: np.random.Generator) -> Pieces:
     parts.append(box((-0.24, 0.0, 0.93), (0.25, 0.15, 0.07), Material.RUBBER))
     if rng.random() < 0.35:
         parts.append(box((-0.5, 0.0, 0.82), (0.38, 0.35, 0.3), Material.RUBBER))
+    parts.append(box((-base / 2 - 0.3, 0.0, 0.6), (0.02, 0.05, 0.05), Material.LAMP))
     return Pieces.join(parts)
+
+
+def _end(hull: Pieces, y: float, z: float, side: float) -> float:
+    """Where the outside of a hull lies along x, ahead of (1) or behind (-1) a place inside it."""
+    _, dy, dz = np.array([0.0, y, z]) - hull.centre[0]
+    half, quadric, cuts = hull.half[0], hull.quadric[0], hull.cuts[0]
+    reach = [half[0], np.sqrt(max(1 - quadric[1] * dy**2 - quadric[2] * dz**2, 0.0) / max(quadric[0], 1e-9))]
+    reach += [(d - b * dy - c * dz) / abs(a) for a, b, c, d in cuts if a * side > 0]
+    return float(hull.centre[0, 0] + side * min(reach))
+
+
+def _plates(hull: Pieces, front_z: float, rear_z: float) -> Pieces:
+    """Number plates, which throw light back to where it comes from."""
+    return Pieces.join(
+        box((_end(hull, 0.0, z, side) - side * SUNK_M, 0.0, z), (0.02, *PLATE_M), Material.RETRO)
+        for z, side in ((front_z, 1.0), (rear_z, -1.0))
+    )
+
+
+def _tail_lamps(hull: Pieces, z: float) -> Pieces:
+    """The reflectors of the tail lamps."""
+    y = 0.8 * float(hull.half[0, 1])
+    return Pieces.join(
+        box((_end(hull, s * y, z, -1.0) + SUNK_M, s * y, z), (0.02, 0.12, 0.14), Material.LAMP) for s in (-1.0, 1.0)
+    )
 
 
 def car_size(rng: np.random.Generator) -> Size:

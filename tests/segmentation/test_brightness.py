@@ -1,0 +1,46 @@
+"""How brightly clusters send light back."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.config import SegmentationConfig, SensorConfig
+from modt.geometry import FieldOfView
+from modt.segmentation.brightness import BRIGHT, DARK, brightness
+from modt.segmentation.groups import Groups
+from modt.segmentation.segmenter import Segmenter
+from modt.types import N_REFLECTANCE
+from tests.segmentation import scans
+
+VALUES = st.lists(st.lists(st.floats(0, 1, width=32), min_size=1, max_size=9), min_size=1, max_size=6)
+
+
+@given(VALUES)
+def test_each_group_is_told_by_its_own_returns(groups: list[list[float]]) -> None:
+    values = np.array([v for group in groups for v in group], np.float32)
+    offsets = np.append(0, np.cumsum([len(group) for group in groups]))
+    told = brightness(values, Groups(np.arange(len(values)), offsets))
+    if len(set(values.tolist())) == 1:
+        assert told is None  # whoever recorded them left it out
+        return
+    assert told is not None
+    assert told.shape == (len(groups), N_REFLECTANCE)
+    for row, group in zip(told, groups, strict=True):
+        own = np.array(group, np.float32)
+        expected = [own.mean(), own.std(), own.max(), (own > BRIGHT).mean(), (own < DARK).mean()]
+        np.testing.assert_allclose(row, expected, atol=2e-3)
+
+
+def test_proposals_tell_their_brightness_where_it_is_looked_at() -> None:
+    points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8), (-9.0, 4.0, 0.5, 0.5, 0.0, 1.75)])
+    points[:, 3] = np.where(on == 1, 0.25, 0.5)
+    stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), FieldOfView())
+    proposals = stage.segment(points)
+    assert proposals.reflectance is not None
+    owner = on[proposals.members[proposals.offsets[:-1]]]
+    np.testing.assert_allclose(proposals.reflectance[:, 0], np.where(owner == 1, 0.25, 0.5))
+    assert Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView()).segment(points).reflectance is None
+    points[:, 3] = 0.0
+    assert stage.segment(points).reflectance is None
