@@ -7,7 +7,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from modt.segmentation import silhouettes
+from modt.segmentation import pieces, silhouettes
 from modt.segmentation.boxes import HEADINGS, NEAREST_M
 from modt.segmentation.clusters import GAP_BEAMS, GAP_M
 from modt.segmentation.grids import SECTORS
@@ -41,8 +41,8 @@ def flood(row, column, low, high, root, beam_rad):
 
 
 def supported(lowest, range_m, height_m, max_slope):
-    """(rings, SECTORS) cells whose lowest return is ground, ray by ray and ring by ring."""
-    found = np.zeros(lowest.shape, bool)
+    """(rings, SECTORS) cells whose lowest return is ground, ray by ray and ring by ring; (1, SECTORS) last slopes."""
+    found, slopes = np.zeros(lowest.shape, bool), np.zeros((1, SECTORS))
     for ray in range(SECTORS):
         height, at, slope, bend = -height_m, 0.0, 0.0, max_slope
         for ring in range(len(range_m)):
@@ -55,7 +55,8 @@ def supported(lowest, range_m, height_m, max_slope):
                 found[ring, ray] = True
                 slope = float(np.clip(slope + GAIN * ((here - height) / gap - slope), -max_slope, max_slope))
                 height, at, bend = here, range_m[ring], BEND
-    return found
+        slopes[0, ray] = slope
+    return found, slopes
 
 
 def heading(x, y):
@@ -115,3 +116,42 @@ def people_cuts(x, y, height, step_rad, beam_rad, least_points):
         if apart and (right[3] or left[3]):
             cuts.append((right[1] + left[0] + 1) // 2)
     return column, cuts
+
+
+def whole(bounds, beam):
+    """(G,) first of the groups that make a car with each: pair by pair, then from one to the next."""
+    n = len(bounds.turn_m)
+    (right, near, low, down), (left, far, top, up) = bounds.least, bounds.most
+
+    def breadth(own):
+        return (left[own].max() - right[own].min()) * bounds.turn_m[own[0]]
+
+    def small(own):
+        size = np.hypot(far[own].max() - near[own].min(), breadth(own))
+        return size < pieces.DIAGONAL_M and breadth(own) < pieces.BREADTH_M[1] and top[own].max() < pieces.TOP_M[1]
+
+    def person(one):
+        narrow = breadth([one]) < pieces.UPRIGHT_M[0] and top[one] > pieces.UPRIGHT_M[1]
+        return narrow and top[one] - low[one] > pieces.UPRIGHT_M[2]
+
+    linked = [[] for _ in range(n)]
+    for front in range(n):
+        for back in range(n):
+            pair = [front, back]
+            if near[front] >= near[back] or person(front) or person(back) or not small(pair):
+                continue
+            meets = max(right[front], right[back]) <= min(left[front], left[back])
+            beams = (down[back] - up[front]) / beam
+            follows = near[back] - far[front] < pieces.BEHIND_M and pieces.BEAMS[0] < beams < pieces.BEAMS[1]
+            like = breadth(pair) > pieces.BREADTH_M[0] and top[pair].max() > pieces.TOP_M[0]
+            if meets and follows and like and low[pair].min() < pieces.BOTTOM_M:
+                linked[front].append(back)
+                linked[back].append(front)
+    first = np.arange(n)
+    for one in range(n):
+        reached, todo = {one}, [one]
+        while todo:
+            todo += [other for other in linked[todo.pop()] if not (other in reached or reached.add(other))]
+        if small(sorted(reached)):
+            first[one] = min(reached)
+    return first

@@ -60,6 +60,24 @@ def test_reflections_below_the_ground_do_not_lower_it():
     assert (np.abs(height[kept]) < 0.15).mean() > 0.99
 
 
+def test_a_road_that_climbs_goes_on_beyond_the_last_return_of_it():
+    direction = scans.rays(step_deg=1.0)
+    hit = scans.floor_ranges(direction, PROFILES["ramp up"])
+    near = hit < 24.0
+    road = (direction[near] * hit[near, None]).astype(np.float32)
+    far = np.array([[44.0, y, z - HEIGHT_M + 0.12 * 25] for y in np.arange(-3.0, 3.1, 0.5) for z in (0.5, 1.5)])
+    height = ground().height(Columns.of(np.concatenate([road, far.astype(np.float32)])), HEIGHT_M)
+    assert np.allclose(height[: len(road)], 0.0, atol=0.3)
+    assert np.allclose(height[len(road) :], far[:, 2] + HEIGHT_M - 0.12 * 25, atol=0.7)
+
+
+@pytest.mark.parametrize(("x", "y", "broad"), [(53.0, 1.0, 3.0), (50.0, 12.0, 3.0), (47.0, 20.0, 4.6)])
+def test_the_flank_of_a_far_car_is_no_ground(x, y, broad):
+    points, on = scans.scan([(x, y, 1.8, broad, 0.3, 1.6)], step_deg=0.17, azimuth_deg=(-60, 60))
+    height = ground().height(Columns.of(points), HEIGHT_M)
+    assert np.allclose(height[on == 1], points[on == 1, 2] + HEIGHT_M, atol=0.1)
+
+
 def test_a_small_robot_sees_its_floor():
     points, on = scans.scan(
         [(3.0, 0.0, 0.4, 0.4, 0.0, 1.7), (0.0, 4.0, 8.0, 0.2, 0.0, 2.5)], 0.3, np.deg2rad(np.linspace(-25, 15, 32))
@@ -84,8 +102,11 @@ def test_rays_are_followed_as_a_loop_would(seed):
     fast = ground()
     lowest = rng.normal(-HEIGHT_M, 0.25, (fast.grid.rings, SECTORS)).astype(np.float32)
     lowest[rng.random(lowest.shape) < 0.3] = np.inf
-    slow = reference.supported(lowest, fast.grid.range_m.astype(float), HEIGHT_M, fast.max_slope)
-    assert (fast._follow(lowest, HEIGHT_M) == slow).mean() > 0.999  # float32 against float64 at the bound
+    slow, slow_slope = reference.supported(lowest, fast.grid.range_m.astype(float), HEIGHT_M, fast.max_slope)
+    supported, slope = fast._follow(lowest, HEIGHT_M)
+    assert (supported == slow).mean() > 0.999  # float32 against float64 at the bound
+    alike = (supported == slow).all(axis=0)
+    assert slope[0, alike] == pytest.approx(slow_slope[0, alike], abs=1e-4)
 
 
 @given(angle=st.floats(-3.14, 3.14), other=st.floats(-3.14, 3.14))

@@ -11,6 +11,8 @@ from scipy.sparse.csgraph import connected_components
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.columns import Columns
 from modt.segmentation.grids import Int32, RootGrid
+from modt.segmentation.groups import Groups
+from modt.segmentation.pieces import Bounds, Pieces
 from modt.segmentation.silhouettes import Silhouettes
 from modt.types import NONE, Bool, Float32, Int
 
@@ -74,6 +76,33 @@ class Clusters:
         return replace(self, of_cell=number[self.of_cell], n=int(keep.sum()))
 
 
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """How large clusters are, some of them empty.
+
+    Attributes:
+        held: (G,) points.
+        extent: (G,) diagonal of the upright rectangle about it [m].
+        low, top: (G,) least and greatest height above ground [m].
+        root: (G,) square root of its range, about [sqrt(m)].
+        of_vast: (G,) a piece of something larger than objects are.
+    """
+
+    held: Int
+    extent: Float32
+    low: Float32
+    top: Float32
+    root: Float32
+    of_vast: Bool
+
+    def of_wholes(self, whole: Int) -> Sizes:
+        """The same with clusters gathered into others, given (G,) which; those that are gathered lie empty."""
+        n = len(whole)
+        held = np.bincount(whole, self.held, n).astype(np.int64)
+        low, top = _least(self.low, whole, n), _most(self.top, whole, n)
+        return replace(self, held=held, low=low, top=top)
+
+
 def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
     """(C,) component of each cell: those that touch at a side or a corner, and in height, belong together."""
     one, other = grid.beside(grid.place(cells.row, cells.column))
@@ -91,7 +120,7 @@ class Clusterer:
 
     A first grid joins what is one thing even where it is thinly seen. What grows vast that way (a wall, a hedge, and
     whoever stands against them) is taken apart again on a grid of half the spacing, of which it keeps what stands
-    out as an object of its own. Last, people are parted from whom and what they stand beside.
+    out as an object of its own. Then people are parted from whom and what they stand beside, and cars made whole.
 
     Args:
         sensor: its range and the spacing of its beams.
@@ -105,6 +134,7 @@ class Clusterer:
         self.coarse = RootGrid(step, sensor.max_range_m)
         self.fine = RootGrid(step / 2, sensor.max_range_m)
         self.silhouettes = Silhouettes(sensor, config)
+        self.pieces = Pieces(sensor)
 
     def cluster(self, points: Columns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, of a height above ground [m]."""
@@ -112,22 +142,33 @@ class Clusterer:
         sample, cell = self.fine.occupy(self.fine.place(row, column))
         low, high = _least(height, cell, len(sample)), _most(height, cell, len(sample))
         cells = Cells(row[sample], column[sample], low, high, points.root[sample])
-        count, x, y = np.bincount(cell), points.x[sample], points.y[sample]
+        seen = points.take(sample)
+        cluster, sizes = self._joined(cells, seen, np.bincount(cell))
+        proper = self._proper(sizes)
+        company = proper & self.silhouettes.company(sizes.extent, sizes.top, sizes.held, sizes.root)
+        parted, n = self.silhouettes.parted(points, height, cell, cluster, company)
+        piece = self.pieces.possible(sizes.extent, sizes.top, sizes.held, sizes.root) & (proper | ~sizes.of_vast)
+        piece[cluster[parted >= len(piece)]] = False
+        whole = self._whole(cells, seen, seen.z - height[sample], cluster, piece)
+        proper = np.append(self._proper(sizes.of_wholes(whole)), np.ones(n - len(piece), np.bool_))
+        number = np.where(proper, np.cumsum(proper) - 1, NONE)
+        of_cell = number[np.append(whole, np.arange(len(piece), n))[parted]]
+        return Clusters(cell, sample, cells.high, of_cell, int(proper.sum()))
 
+    def _joined(self, cells: Cells, points: Columns, count: Int) -> tuple[Int, Sizes]:
+        """(C,) cluster of each cell, given a point of each and (C,) how many it has; and how large they are."""
         cluster = self._joined_coarsely(cells)
-        extent = _extent(x, y, cluster)
+        extent = _extent(points.x, points.y, cluster)
         parts = np.flatnonzero((extent >= self.config.max_extent_m)[cluster])
         piece = join(self.fine, cells.take(parts), self.beam_rad)
         cluster[parts] = piece + len(extent)
-        extents = np.append(extent, _extent(x[parts], y[parts], piece))
-        top, held = _most(cells.high, cluster, len(extents)), np.bincount(cluster, count, len(extents))
-        proper = self._proper(cluster, cells, held, extents, top, len(extent))
-        number = np.where(proper, np.cumsum(proper) - 1, NONE)[cluster]
-        root = np.zeros(len(extents), np.float32)
+        extents = np.append(extent, _extent(points.x[parts], points.y[parts], piece))
+        n = len(extents)
+        held = np.bincount(cluster, count, n).astype(np.int64)
+        low, top = _least(cells.low, cluster, n), _most(cells.high, cluster, n)
+        root = np.zeros(n, np.float32)
         root[cluster] = cells.root
-        company = self.silhouettes.company(extents, top, held, root)[proper]
-        of_cell, n = self.silhouettes.parted(points, height, cell, number, company)
-        return Clusters(cell, sample, cells.high, of_cell, n)
+        return cluster, Sizes(held, extents, low, top, root, np.arange(n) >= len(extent))
 
     def _joined_coarsely(self, fine: Cells) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell which it is a quarter of."""
@@ -137,13 +178,29 @@ class Clusterer:
         cells = Cells(row[sample], column[sample], low, high, fine.root[sample])
         return join(self.coarse, cells, self.beam_rad)[coarse]
 
-    def _proper(self, cluster: Int, cells: Cells, points: Int, extent: Float32, top: Float32, n_coarse: int) -> Bool:
-        """(G,) clusters of an object's size; pieces of something vast, numbered from n_coarse, must stand out."""
-        low = _least(cells.low, cluster, len(extent))
-        proper: Bool = (points >= self.config.min_points) & (extent < self.config.max_extent_m)
-        proper &= top - low >= self.config.min_height_m
-        proper[n_coarse:] &= (top[n_coarse:] >= STANDS_OUT_M) & (points[n_coarse:] >= STANDS_OUT_POINTS)
+    def _proper(self, sizes: Sizes) -> Bool:
+        """(G,) clusters of an object's size; pieces of something vast must stand out."""
+        proper: Bool = (sizes.held >= self.config.min_points) & (sizes.extent < self.config.max_extent_m)
+        proper &= sizes.top - sizes.low >= self.config.min_height_m
+        proper &= ~sizes.of_vast | ((sizes.top >= STANDS_OUT_M) & (sizes.held >= STANDS_OUT_POINTS))
         return proper
+
+    def _whole(self, cells: Cells, points: Columns, ground: Float32, cluster: Int, piece: Bool) -> Int:
+        """(G,) first cluster of the car that each is a piece of, itself where it is of none.
+
+        Args:
+            cells: what clusters consist of.
+            points: (C,) a point of each cell.
+            ground: (C,) height of the ground beneath it [m, sensor frame].
+            cluster: (C,) cluster of each cell.
+            piece: (G,) clusters that may be pieces.
+        """
+        whole = np.arange(len(piece))
+        rows = np.flatnonzero(piece)
+        if len(rows):
+            groups = Groups.of(np.where(piece, np.cumsum(piece) - 1, NONE)[cluster], len(rows))
+            whole[rows] = rows[self.pieces.whole(Bounds.of(points, ground, cells.low, cells.high, groups))]
+        return whole
 
 
 def _least(values: Float32, group: Int, n: int) -> Float32:

@@ -19,6 +19,14 @@ START_M = 0.3
 """The ground beneath the sensor may lie this far from where it should."""
 BRIDGE_M = 6.0
 """Gaps beyond this widen the search no more."""
+ONWARD = 0.7
+"""Beyond the last ground that a ray meets, the ground goes on at this share of the ray's slope ..."""
+ONWARD_M = 30.0
+"""... for so long, and level from there."""
+AROUND = 3
+"""Sectors between a ray and those, left and right, beside which it may not stand up ..."""
+STANDS_UP_M = 0.25
+"""... by more than this: the flank of something broad, not ground."""
 
 
 class Ground:
@@ -42,9 +50,11 @@ class Ground:
         """(N,) height of each point above the ground [m]."""
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
-        supported = self._follow(lowest, sensor_height_m)
+        supported, slope = self._follow(lowest, sensor_height_m)
         known = np.where(supported, lowest, np.float32(-sensor_height_m))
-        surface = _across(_along(known, supported, self.grid.range_m))
+        surface = _across(_along(known, supported, _across(_across(slope), AROUND), self.grid.range_m))
+        beside = _across(surface, AROUND)
+        np.copyto(surface, beside, where=surface - beside > np.float32(STANDS_UP_M))
         height: Float32 = points.z - surface.ravel().take(cell)
         return height
 
@@ -59,8 +69,11 @@ class Ground:
         np.minimum.at(lowest, cell, np.where(plausible, points.z, np.float32(np.inf)))
         return lowest.reshape(-1, SECTORS)
 
-    def _follow(self, lowest: Float32, sensor_height_m: float) -> Bool:
-        """(rings, SECTORS) cells whose lowest return is ground: a short step a ring, all rays at once."""
+    def _follow(self, lowest: Float32, sensor_height_m: float) -> tuple[Bool, Float32]:
+        """(rings, SECTORS) cells whose lowest return is ground: a short step a ring, all rays at once.
+
+        Also the (1, SECTORS) slope at which each ray met its last ground.
+        """
         steepest, gain, noise, bridge = (np.float32(v) for v in (self.max_slope, GAIN, NOISE_M, BRIDGE_M))
         ray = np.zeros((4, SECTORS), np.float32)  # of the last ground on each ray
         height, at, slope, bend = ray
@@ -77,28 +90,31 @@ class Ground:
             step[0], step[1] = here, range_m
             step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -steepest), steepest)
             np.copyto(ray, step, where=found)
-        return supported
+        return supported, slope[None]
 
 
-def _along(ground: Float32, supported: Bool, range_m: Float32) -> Float32:
-    """The surface with its gaps filled by straight lines along each ray, level beyond the last support."""
+def _along(ground: Float32, supported: Bool, slope: Float32, range_m: Float32) -> Float32:
+    """The surface with its gaps filled by straight lines along each ray, and going on beyond the last support."""
     rings, sectors = ground.shape
     supported = supported.copy()
     supported[0] = True
     cell = np.arange(rings * sectors).reshape(rings, sectors)
     before = np.maximum.accumulate(np.where(supported, cell, 0), axis=0)
     after = np.minimum.accumulate(np.where(supported, cell, cell.size)[::-1], axis=0)[::-1]
-    after = np.where(after == cell.size, before, after)
+    beyond = after == cell.size
+    after = np.where(beyond, before, after)
     range_of = np.repeat(range_m, sectors)
     low, near = ground.take(before), range_of.take(before)
     high, far = ground.take(after), range_of.take(after)
-    line: Float32 = low + (high - low) * ((range_m[:, None] - near) / np.maximum(far - near, np.float32(1e-3)))
+    since = range_m[:, None] - near
+    line: Float32 = low + (high - low) * (since / np.maximum(far - near, np.float32(1e-3)))
+    line += beyond * np.minimum(since, np.float32(ONWARD_M)) * (np.float32(ONWARD) * slope)
     return line
 
 
-def _across(surface: Float32) -> Float32:
-    """The surface with each cell the median of itself and its two neighbours on the ring."""
-    left, right = np.roll(surface, 1, axis=1), np.roll(surface, -1, axis=1)
+def _across(surface: Float32, step: int = 1) -> Float32:
+    """The surface with each cell the median of itself and of those so many sectors to its left and right."""
+    left, right = np.roll(surface, step, axis=1), np.roll(surface, -step, axis=1)
     low, high = np.minimum(left, surface), np.maximum(left, surface)
     median: Float32 = np.maximum(low, np.minimum(high, right))
     return median
