@@ -17,6 +17,7 @@ from modt.tracking.robust import RobustAssociation
 from modt.tracking.shifts import AGREE_M
 from modt.tracking.sightings import Sightings, sight
 from modt.tracking.states import Happening, StateMachine
+from modt.tracking.turning import Motion, lateness
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
 UNKNOWN_HEADING_RAD = np.pi
@@ -169,16 +170,27 @@ class Tracker:
             before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
         if given is not None and self._T_world_odometry is not None:
             after = self._T_world_odometry @ given
-            sightings = sight(proposals, after)
+            sightings = self._seen_from(after, before, frame, proposals)
         else:
             after = before @ (inverse(self._T_world_before) @ before)  # as it moved last
-            sightings = sight(proposals, after)
+            sightings = self._seen_from(after, before, frame, proposals)
             after = rigid(self._registration.correct(self._tracks, sightings) @ after)
-            sightings = sight(proposals, after)
+            sightings = self._seen_from(after, before, frame, proposals)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
         self._T_world_sensor, self._T_world_before = after, before
         return sightings
+
+    def _seen_from(
+        self, T_world_sensor: Float64, T_world_before: Float64, frame: Frame, proposals: Proposals
+    ) -> Sightings:
+        """The proposals in the world, where they stand at the stamp; by where the sensor is then, and was before."""
+        sightings = sight(proposals, T_world_sensor)
+        if not frame.turn_s or self._stamp_s is None:
+            return sightings
+        motion = Motion.between(T_world_before, T_world_sensor, frame.stamp_s - self._stamp_s)
+        step = motion.displacement(proposals.centroid, lateness(proposals, frame.turn_s))
+        return sightings.moved(step @ T_world_sensor[:2, :2].T)
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""

@@ -8,7 +8,7 @@ from modt.geometry import FieldOfView, inverse, transform, transform_boxes
 from modt.sources.synthetic import SyntheticStream
 from modt.sources.synthetic.scenes import SCENES
 from modt.sources.synthetic.sensors import SENSORS
-from modt.sources.synthetic.simulator import SLICES
+from modt.sources.synthetic.simulator import SLICES, late_of
 from modt.types import NONE, ObjectClass
 
 
@@ -111,7 +111,7 @@ def test_distorted_scans_are_mended_by_the_motion_that_distorted_them():
     part = column * SLICES // sensor.shape[1]
     for k in range(SLICES):
         rows = still & (part == k)
-        late_s = (k + 0.5) / SLICES * sensor.period_s
+        late_s = late_of(k, sensor.period_s)
         T = inverse(world.ego_pose(a.stamp_s)) @ world.ego_pose(a.stamp_s + late_s)
         mended = transform(T, b.points[rows, :3].astype(np.float64))
         np.testing.assert_allclose(mended, a.points[rows, :3], atol=1e-4)  # what float32 leaves of 80 m
