@@ -17,7 +17,7 @@ from modt.tracking.robust import RobustAssociation
 from modt.tracking.shifts import AGREE_M
 from modt.tracking.sightings import Sightings, sight
 from modt.tracking.states import Happening, StateMachine
-from modt.tracking.turning import Motion, lateness
+from modt.tracking.turning import Motion, Skew
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
 UNKNOWN_HEADING_RAD = np.pi
@@ -91,6 +91,7 @@ class Tracker:
         self._T_world_sensor = self._T_world_before = np.eye(4)
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
+        self._first: Skew | None = None
 
     @property
     def tracks(self) -> Tracks:
@@ -168,29 +169,38 @@ class Tracker:
             self._restarts, self._T_world_odometry = frame.restarts, None
         if first and given is not None:
             before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
+        skew = Skew.of(proposals, frame.turn_s)
+        dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
+
+        def seen_from(after: Float64) -> Sightings:
+            """The proposals in the world, where they stand at the stamp."""
+            sightings = sight(proposals, after)
+            if skew is None or first:
+                return sightings
+            return sightings.moved(skew.step(Motion.between(before, after, dt_s), after))
+
         if given is not None and self._T_world_odometry is not None:
             after = self._T_world_odometry @ given
-            sightings = self._seen_from(after, before, frame, proposals)
+            self._mend_first(Motion.between(before, after, dt_s))
+            sightings = seen_from(after)
         else:
             after = before @ (inverse(self._T_world_before) @ before)  # as it moved last
-            sightings = self._seen_from(after, before, frame, proposals)
-            after = rigid(self._registration.correct(self._tracks, sightings) @ after)
-            sightings = self._seen_from(after, before, frame, proposals)
+            after = rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
+            if self._mend_first(Motion.between(before, after, dt_s)):
+                after = rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
+            sightings = seen_from(after)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
         self._T_world_sensor, self._T_world_before = after, before
+        self._first = skew if first else None
         return sightings
 
-    def _seen_from(
-        self, T_world_sensor: Float64, T_world_before: Float64, frame: Frame, proposals: Proposals
-    ) -> Sightings:
-        """The proposals in the world, where they stand at the stamp; by where the sensor is then, and was before."""
-        sightings = sight(proposals, T_world_sensor)
-        if not frame.turn_s or self._stamp_s is None:
-            return sightings
-        motion = Motion.between(T_world_before, T_world_sensor, frame.stamp_s - self._stamp_s)
-        step = motion.displacement(proposals.centroid, lateness(proposals, frame.turn_s))
-        return sightings.moved(step @ T_world_sensor[:2, :2].T)
+    def _mend_first(self, motion: Motion) -> bool:
+        """Put what the first frame showed where it stood: how the sensor moved is known from the second one on."""
+        if self._first is None:
+            return False
+        self._tracks.move(self._first.step(motion, self._T_world_sensor)[self._tracks.proposal])
+        return True
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""

@@ -47,6 +47,29 @@ class Motion:
         return np.stack([step.real, step.imag], axis=1)
 
 
+@dataclass(frozen=True, slots=True)
+class Skew:
+    """Where and when the proposals of a frame were seen; P rows.
+
+    Attributes:
+        place: (P, 2) their centroids [m, sensor frame at that time].
+        late_s: (P,) after the stamp.
+    """
+
+    place: Float64
+    late_s: Float64
+
+    @classmethod
+    def of(cls, proposals: Proposals, turn_s: float) -> Skew | None:
+        """That of a head that turns so (Frame.turn_s); none if all was seen at once."""
+        return cls(proposals.centroid[:, :2], lateness(proposals, turn_s)) if turn_s else None
+
+    def step(self, motion: Motion, T_world_sensor: Float64) -> Float64:
+        """(P, 2) from where the pose at the stamp puts them to where they stand [m, world]."""
+        step: Float64 = motion.displacement(self.place, self.late_s) @ T_world_sensor[:2, :2].T
+        return step
+
+
 def lateness(proposals: Proposals, turn_s: float) -> Float64:
     """(P,) when each proposal was seen, after the stamp of its frame [s]; turn_s as in Frame.
 
