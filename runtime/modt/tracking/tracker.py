@@ -182,25 +182,24 @@ class Tracker:
         if given is not None and self._T_world_odometry is not None:
             after = self._T_world_odometry @ given
             self._mend_first(Motion.between(before, after, dt_s))
-            sightings = seen_from(after)
         else:
-            after = before @ (inverse(self._T_world_before) @ before)  # as it moved last
-            after = rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
-            if self._mend_first(Motion.between(before, after, dt_s)):
+            predicted = before @ (inverse(self._T_world_before) @ before)  # as it moved last
+            after = rigid(self._registration.correct(self._tracks, seen_from(predicted)) @ predicted)
+            motion, expected = (Motion.between(before, T, dt_s) for T in (after, predicted))
+            self._mend_first(motion)
+            if not motion.skews_like(expected, frame.turn_s):  # what was registered stands elsewhere
                 after = rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
-            sightings = seen_from(after)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
+        sightings = seen_from(after)
         self._T_world_sensor, self._T_world_before = after, before
         self._first = skew if first else None
         return sightings
 
-    def _mend_first(self, motion: Motion) -> bool:
+    def _mend_first(self, motion: Motion) -> None:
         """Put what the first frame showed where it stood: how the sensor moved is known from the second one on."""
-        if self._first is None:
-            return False
-        self._tracks.move(self._first.step(motion, self._T_world_sensor)[self._tracks.proposal])
-        return True
+        if self._first is not None:
+            self._tracks.move(self._first.step(motion, self._T_world_sensor)[self._tracks.proposal])
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""

@@ -15,6 +15,9 @@ import numpy as np
 from modt.geometry import inverse, yaw_of
 from modt.types import Float64, Proposals
 
+LEVER_M, ALIKE_M = 20.0, 0.05
+"""Within so many metres motions that displace nothing by more are as good as one another."""
+
 
 @dataclass(frozen=True, slots=True)
 class Motion:
@@ -38,6 +41,11 @@ class Motion:
         # The way is an arc: its chord points half the turn away from where it began.
         velocity = complex(T[0, 3], T[1, 3]) * np.exp(-0.5j * turn) / dt_s
         return cls(velocity, turn / dt_s)
+
+    def skews_like(self, other: Motion, turn_s: float) -> bool:
+        """Whether sweeps of such turns (Frame.turn_s) are skewed alike by both, up to LEVER_M away."""
+        faster = abs(self.velocity_mps - other.velocity_mps) + LEVER_M * abs(self.turn_radps - other.turn_radps)
+        return bool(faster * abs(turn_s) / 2 <= ALIKE_M)
 
     def displacement(self, place_m: Float64, late_s: Float64) -> Float64:
         """(P, 2) steps of what was seen at a place (P, 2) so late (P,) to where it is seen from at the stamp [m]."""
