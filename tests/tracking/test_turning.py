@@ -14,6 +14,7 @@ from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.tracking.turning import Motion, Skew, lateness
 from modt.types import Frame, Proposals
+from sweep_skew import displacement_m
 
 from .test_egomotion import street
 from .tracking_scenes import box, frame_of
@@ -181,3 +182,14 @@ def test_sweeps_seen_at_once_are_left_as_they_are():
         )
         for (name, a), (_, b) in zip(trackers[0].tracks.columns(), trackers[1].tracks.columns(), strict=True):
             assert a.tobytes() == b.tobytes(), name
+
+
+@given(st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
+def test_compensation_is_told_by_the_bearings_at_edges(left_m, right_m):
+    bearing = np.deg2rad(np.arange(0, 360, 0.2))
+    distance = np.where(np.arange(len(bearing)) // 7 % 2, 6.0, 20.0)
+    x, y = distance * np.cos(bearing), distance * np.sin(bearing)
+    points = np.stack([x + np.where(y > 0, left_m, right_m), y, 0 * x, 0 * x], axis=1).astype(np.float32)
+    assert displacement_m(points, 90.0)[0] == pytest.approx(left_m, abs=0.02)
+    assert displacement_m(points, -90.0)[0] == pytest.approx(right_m, abs=0.02)
+    assert np.isnan(displacement_m(points[:0], 90.0)[0])
