@@ -24,7 +24,10 @@ KITTI_DATA = (
     "scans and moved to other ranges, and the synthetic world, part of it with objects where KITTI's label files "
     "have them; nothing of drive 0005"
 )
-SYNTHETIC_DATA = "the synthetic world alone: no recording went into it"
+SYNTHETIC_DATA = (
+    "the synthetic world alone: no recording went into it, save that its materials are as bright as what KITTI's "
+    "object frames show"
+)
 
 
 def tool(name: str, *arguments: str | Path) -> None:
