@@ -72,18 +72,21 @@ def by_proposals(stream: Stream, *, camera: bool) -> Float64:
 
 
 def by_kiss_icp(stream: Stream) -> Float64:
-    """(n, 4, 4) poses of KISS-ICP on the whole sweeps, as they are (KITTI's synced ones are compensated already)."""
+    """(n, 4, 4) poses of KISS-ICP on the whole sweeps, deskewed where their head took time to turn."""
     from kiss_icp.config import KISSConfig
     from kiss_icp.kiss_icp import KissICP
 
     config = KISSConfig()
-    config.data.deskew = False
+    config.data.deskew = next(iter(stream)).turn_s != 0.0
     config.data.min_range, config.data.max_range = KISS_RANGE_M
     config.mapping.voxel_size = KISS_RANGE_M[1] / 100
     config.registration.max_num_threads = 1
     odometry, poses = KissICP(config), []
     for frame in stream:
-        odometry.register_frame(frame.points[:, :3].astype(np.float64), np.zeros(0))
+        xyz = frame.points[:, :3].astype(np.float64)
+        # From 0 to 1 over the sweep, seam to seam behind the sensor.
+        when = 0.5 - np.copysign(1.0, frame.turn_s) * np.arctan2(xyz[:, 1], xyz[:, 0]) / (2 * np.pi)
+        odometry.register_frame(xyz, when if config.data.deskew else np.zeros(0))
         poses.append(odometry.last_pose.copy())
     return np.array(poses)
 

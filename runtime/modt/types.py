@@ -50,6 +50,9 @@ class Frame:
             throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
         restarts: times that the odometry has begun anew, in a world of which the one before says nothing.
+        turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
+            ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
+            stamp, compensated or by a sensor that does not turn.
     """
 
     index: int
@@ -57,6 +60,7 @@ class Frame:
     points: Float32
     T_world_sensor: Float64 | None = None
     restarts: int = 0
+    turn_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,13 @@
 """Layouts are told from what lies there, and what is missing is named."""
 
+import re
 import shutil
 
 import numpy as np
 import pytest
 
 from modt.errors import MisuseError, ModtError
+from modt.sources.odometry import NoOdometry, PosedStream
 from modt.sources.recognise import open_stream
 from modt.sources.stream import FIRST
 
@@ -57,6 +59,43 @@ def test_stamps_count_from_the_first(tmp_path):
     np.testing.assert_allclose(stamps, [0, 0.1, 0.2, 0.3], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("build", "turn_s"),
+    [(layouts.raw_drive, 0.1), (layouts.tracking, 0.1), (layouts.odometry, 0.0), (layouts.bare, 0.0)],
+)
+def test_frames_say_how_long_the_head_took_to_turn(tmp_path, build, turn_s):
+    stream = open_stream(build(tmp_path))
+    np.testing.assert_allclose([f.turn_s for f in stream], turn_s, atol=1e-9)
+    assert [f.turn_s for f in PosedStream(stream, NoOdometry())] == [f.turn_s for f in stream]
+
+
+def test_each_sweep_has_its_own_turn(tmp_path):
+    drive = layouts.raw_drive(tmp_path)
+    ends = drive / "velodyne_points" / "timestamps_end.txt"
+    ends.write_text(ends.read_text().replace("25.150000000", "25.151234567"))
+    np.testing.assert_allclose([f.turn_s for f in open_stream(drive)], [0.1, 0.101234567, 0.1, 0.1], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("end", "text", "named"),
+    [
+        ("start", "nonsense\n", "no list of time stamps"),
+        ("end", "", "4 starts and 0 ends"),
+        ("end", "2011-09-26 13:02:24.000000000\n" * 4, "4 sweeps of .*the first is 0"),
+        ("end", "2011-09-26 13:02:25.250000001\n" * 4, "2 sweeps of .*the first is 0"),
+    ],
+    ids=["broken", "short", "backwards", "too long"],
+)
+def test_turns_that_cannot_be_are_named_and_left_out(tmp_path, end, text, named):
+    drive = layouts.raw_drive(tmp_path)
+    (drive / "velodyne_points" / f"timestamps_{end}.txt").write_text(text)
+    stream = open_stream(drive)
+    (note,) = stream.info.notes
+    assert re.search(named, note)
+    assert note.endswith("seen at once")
+    assert [f.turn_s for f in stream] == [0.0] * 4
+
+
 def test_missing_frames_leave_gaps_and_a_note(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     assert [f.index for f in stream] == [0, 1, 4]
@@ -71,6 +110,8 @@ def test_missing_frames_leave_gaps_and_a_note(tmp_path):
         ("calib_imu_to_velo.txt", "no odometry"),
         ("2011_09_26_drive_9999_sync/oxts", "no odometry"),
         ("2011_09_26_drive_9999_sync/velodyne_points/timestamps.txt", "0.1 s apart"),
+        ("2011_09_26_drive_9999_sync/velodyne_points/timestamps_start.txt", "seen at once"),
+        ("2011_09_26_drive_9999_sync/velodyne_points/timestamps_end.txt", "seen at once"),
     ],
 )
 def test_what_is_missing_is_named_and_the_rest_works(tmp_path, lost, named):
@@ -172,6 +213,7 @@ def test_a_real_drive(drive_0005):
     stream = open_stream(drive_0005)
     assert stream.info.n_frames == 154
     assert stream.info.notes == stream.info.pose_notes == ()
+    assert all(0.102 < s.turn_s < 0.105 for s in stream.scans)
     last = stream.scans[-1].T_world_sensor
     # The drive covers 69 m of street; its end is where the inertial unit says.
     assert 60 < np.linalg.norm(last[:3, 3] - stream.scans[0].T_world_sensor[:3, 3]) < 70

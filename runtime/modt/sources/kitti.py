@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -19,6 +20,9 @@ from modt.sources.stream import StreamInfo
 from modt.types import Float64
 
 PERIOD_S = 0.1
+LONGEST_TURN = 2
+"""A sweep that lasts more periods than this does not."""
+AT_ONCE = "sweeps are taken for seen at once"
 NO_POSES = "no odometry, the proposals must tell how the sensor moves"
 
 Poses = dict[int, Float64]
@@ -43,11 +47,15 @@ def raw_drive(drive: Path) -> ScanStream:
     camera = _camera(calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
     poses = _poses_of_raw(drive, notes)
     stamps = _raw_stamps(drive / "velodyne_points" / "timestamps.txt", notes)
-    return _stream(drive.name, "KITTI raw drive", drive / "velodyne_points" / "data", camera, poses, stamps, notes)
+    turns = _raw_turns(drive / "velodyne_points", notes)
+    data = drive / "velodyne_points" / "data"
+    return _stream(drive.name, "KITTI raw drive", data, camera, poses, stamps, notes, turns=turns)
 
 
 def tracking_sequence(scans: Path) -> ScanStream:
     """A sequence of the tracking layout, .../training/velodyne/0005, with calib/, oxts/ beside velodyne/.
+
+    Its sweeps are those of raw drives, without their times: a turn of the head is taken to last the period.
 
     Raises:
         MisuseError: it holds no scans, or a file that is there is broken.
@@ -65,11 +73,14 @@ def tracking_sequence(scans: Path) -> ScanStream:
     else:
         T_imu_sensor = calibration.T_imu_sensor_of_sequence(calib)
         poses = dict(enumerate(oxts.poses(oxts.read_sequence(records)) @ T_imu_sensor))
-    return _stream(f"tracking {number}", "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number))
+    name = f"tracking {number}"
+    return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turn_s=PERIOD_S)
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
     """A sequence of the odometry layout, .../sequences/00, with calib.txt, times.txt and poses where there are.
+
+    Its sweeps are published as seen at once.
 
     Raises:
         MisuseError: it holds no scans, or a file that is there is broken.
@@ -111,7 +122,10 @@ def _stream(
     poses: Poses,
     stamps: dict[int, float],
     notes: Notes,
+    *,
     sequence: int = 0,
+    turns: Mapping[int, float] = MappingProxyType({}),
+    turn_s: float = 0.0,
 ) -> ScanStream:
     files = sorted(data.glob("*.bin"))
     if not files:
@@ -128,11 +142,12 @@ def _stream(
             notes.of_poses.append(held)
         poses = _held(poses, indices)
     scans = [
-        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i)) for i, f in zip(indices, files, strict=True)
+        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, turn_s))
+        for i, f in zip(indices, files, strict=True)
     ]
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
         notes.of_stream.append(f"time stamps run backwards: frames {PERIOD_S} s apart instead")
-        scans = [ScanReference(s.index, s.path, s.index * PERIOD_S, s.T_world_sensor) for s in scans]
+        scans = [replace(s, stamp_s=s.index * PERIOD_S) for s in scans]
     info = StreamInfo(
         name=name,
         layout=layout,
@@ -171,14 +186,51 @@ def _raw_stamps(path: Path, notes: Notes) -> dict[int, float]:
         notes.of_stream.append(f"{path} is missing: frames {PERIOD_S} s apart")
         return {}
     try:
-        whole = [
-            (datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp(), float(f"0.{fraction or 0}"))
-            for second, _, fraction in (line.partition(".") for line in path.read_text().splitlines() if line)
-        ]
+        times = _times_ns(path)
     except ValueError:
         notes.of_stream.append(f"{path} is no list of time stamps: frames {PERIOD_S} s apart")
         return {}
-    return {i: round(second - whole[0][0] + fraction - whole[0][1], 9) for i, (second, fraction) in enumerate(whole)}
+    return {i: (t - times[0]) / 1e9 for i, t in enumerate(times)}
+
+
+def _raw_turns(folder: Path, notes: Notes) -> dict[int, float]:
+    """Time that the head took to turn [s], by frame; nothing where that is not known, or cannot be."""
+    texts = []
+    for end in ("start", "end"):
+        path = folder / f"timestamps_{end}.txt"
+        if not path.is_file():
+            notes.of_stream.append(f"{path} is missing: {AT_ONCE}")
+            return {}
+        try:
+            texts.append(_times_ns(path))
+        except ValueError:
+            notes.of_stream.append(f"{path} is no list of time stamps: {AT_ONCE}")
+            return {}
+    starts, ends = texts
+    if len(starts) != len(ends):
+        notes.of_stream.append(f"{folder} holds {len(starts)} starts and {len(ends)} ends of sweeps: {AT_ONCE}")
+        return {}
+    turns = [(end - start) / 1e9 for start, end in zip(starts, ends, strict=True)]
+    period_s = float(np.median(np.diff(starts))) / 1e9 if len(starts) > 1 else PERIOD_S
+    odd = [i for i, turn_s in enumerate(turns) if not 0.0 <= turn_s <= LONGEST_TURN * period_s]
+    if odd:
+        impossible = f"less than nothing or more than {LONGEST_TURN} periods"
+        notes.of_stream.append(f"{len(odd)} sweeps of {folder} last {impossible} (the first is {odd[0]}): {AT_ONCE}")
+        return {}
+    return dict(enumerate(turns))
+
+
+def _times_ns(path: Path) -> list[int]:
+    """Times of a list of KITTI's, a line each [ns].
+
+    Raises:
+        ValueError: it is none.
+    """
+    parts = [line.partition(".") for line in path.read_text().splitlines() if line]
+    return [
+        int(datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp()) * 10**9 + int(fraction[:9].ljust(9, "0"))
+        for second, _, fraction in parts
+    ]
 
 
 def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera | None:

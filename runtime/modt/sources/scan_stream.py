@@ -25,12 +25,14 @@ class ScanReference:
         path: the file.
         stamp_s: its time [s].
         T_world_sensor: (4, 4) pose, None where unknown.
+        turn_s: of its head [s], as in Frame.
     """
 
     index: int
     path: Path
     stamp_s: float
     T_world_sensor: Float64 | None
+    turn_s: float = 0.0
 
 
 class ScanStream:
@@ -57,7 +59,7 @@ class ScanStream:
             if broken:
                 self._fault(scan, f"{broken} points are not finite and count as no return", skipped=False)
             used += 1
-            yield Frame(scan.index, scan.stamp_s, points, scan.T_world_sensor)
+            yield Frame(scan.index, scan.stamp_s, points, scan.T_world_sensor, turn_s=scan.turn_s)
         if self.scans and not used:
             cause = f"none of its {len(self.scans)} scans can be used ({self.faults.first[0].cause})"
             raise ModtError(self.info.name, cause, "give a stream of float32 x, y, z, reflectance scans")

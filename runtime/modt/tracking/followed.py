@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from modt.tracking.outlines import WAYS
 from modt.types import Bool, Float64, Int, Tracks
 
 
@@ -63,3 +64,10 @@ class Followed(Tracks):
             landmark=np.zeros((m, 8)),
             inherited=np.zeros(m, np.bool_),
         )
+
+    def move(self, step: Float64) -> None:
+        """Put what is somewhere elsewhere, by (M, 2) [m, world]."""
+        for column in (self.x, self.box, self.shown, self.home):
+            column[:, :2] += step
+        self.outline += step @ WAYS
+        self.landmark += step @ WAYS

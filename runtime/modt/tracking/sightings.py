@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from modt.geometry import transform, transform_boxes
-from modt.tracking.outlines import middles, outlines
+from modt.tracking.outlines import WAYS, middles, outlines
 from modt.types import Bool, Float64, Int, Proposals
 
 
@@ -43,6 +43,12 @@ class Sightings:
     def place(self) -> Float64:
         """(P, 2) middle of the outline along x and y [m]."""
         return middles(self.outline)[::2].T
+
+    def moved(self, step: Float64) -> Sightings:
+        """Each of them where it is after a step (P, 2) [m, world]."""
+        box = self.box.copy()
+        box[:, :2] += step
+        return replace(self, box=box, centroid=self.centroid + step, outline=self.outline + WAYS.T @ step.T)
 
 
 def sight(proposals: Proposals, T_world_sensor: Float64) -> Sightings:

@@ -17,6 +17,7 @@ from modt.tracking.robust import RobustAssociation
 from modt.tracking.shifts import AGREE_M
 from modt.tracking.sightings import Sightings, sight
 from modt.tracking.states import Happening, StateMachine
+from modt.tracking.turning import Motion, Skew
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
 UNKNOWN_HEADING_RAD = np.pi
@@ -90,6 +91,7 @@ class Tracker:
         self._T_world_sensor = self._T_world_before = np.eye(4)
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
+        self._first: Skew | None = None
 
     @property
     def tracks(self) -> Tracks:
@@ -167,18 +169,37 @@ class Tracker:
             self._restarts, self._T_world_odometry = frame.restarts, None
         if first and given is not None:
             before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
+        skew = Skew.of(proposals, frame.turn_s)
+        dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
+
+        def seen_from(after: Float64) -> Sightings:
+            """The proposals in the world, where they stand at the stamp."""
+            sightings = sight(proposals, after)
+            if skew is None or first:
+                return sightings
+            return sightings.moved(skew.step(Motion.between(before, after, dt_s), after))
+
         if given is not None and self._T_world_odometry is not None:
             after = self._T_world_odometry @ given
-            sightings = sight(proposals, after)
+            self._mend_first(Motion.between(before, after, dt_s))
         else:
-            after = before @ (inverse(self._T_world_before) @ before)  # as it moved last
-            sightings = sight(proposals, after)
-            after = rigid(self._registration.correct(self._tracks, sightings) @ after)
-            sightings = sight(proposals, after)
+            predicted = before @ (inverse(self._T_world_before) @ before)  # as it moved last
+            after = rigid(self._registration.correct(self._tracks, seen_from(predicted)) @ predicted)
+            motion, expected = (Motion.between(before, T, dt_s) for T in (after, predicted))
+            self._mend_first(motion)
+            if not motion.skews_like(expected, frame.turn_s):  # what was registered stands elsewhere
+                after = rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
+        sightings = seen_from(after)
         self._T_world_sensor, self._T_world_before = after, before
+        self._first = skew if first else None
         return sightings
+
+    def _mend_first(self, motion: Motion) -> None:
+        """Put what the first frame showed where it stood: how the sensor moved is known from the second one on."""
+        if self._first is not None:
+            self._tracks.move(self._first.step(motion, self._T_world_sensor)[self._tracks.proposal])
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""

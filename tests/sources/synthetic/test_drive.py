@@ -43,6 +43,21 @@ def test_the_reader_gives_back_points_times_poses_and_camera(written, layout):
     assert read.info.notes == read.info.pose_notes == ()
 
 
+@pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
+def test_a_drive_says_whether_its_sweeps_are_distorted(tmp_path, distort, turn_s):
+    stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
+    writer = DriveWriter(tmp_path, stream)
+    for frame, truth in stream.sweeps():
+        assert frame.turn_s == turn_s
+        writer.write(frame, truth)
+    writer.close()
+    read = open_stream(writer.drive)
+    assert read.info.notes == ()
+    np.testing.assert_allclose([f.turn_s for f in read], turn_s, atol=1e-9)
+    starts, stamps = ((writer.drive / "velodyne_points" / f"timestamps{k}.txt").read_text() for k in ("_start", ""))
+    assert (starts == stamps) is not distort
+
+
 def test_tracklets_hold_the_boxes_that_the_camera_sees(written):
     writer, _, sweeps = written
     items = ET.parse(writer.drive / "tracklet_labels.xml").getroot().find("tracklets").findall("item")

@@ -8,7 +8,7 @@ from modt.geometry import FieldOfView, inverse, transform, transform_boxes
 from modt.sources.synthetic import SyntheticStream
 from modt.sources.synthetic.scenes import SCENES
 from modt.sources.synthetic.sensors import SENSORS
-from modt.sources.synthetic.simulator import SLICES
+from modt.sources.synthetic.simulator import SLICES, late_of
 from modt.types import NONE, ObjectClass
 
 
@@ -111,10 +111,26 @@ def test_distorted_scans_are_mended_by_the_motion_that_distorted_them():
     part = column * SLICES // sensor.shape[1]
     for k in range(SLICES):
         rows = still & (part == k)
-        late_s = (k + 0.5) / SLICES * sensor.period_s
+        late_s = late_of(k, sensor.period_s)
         T = inverse(world.ego_pose(a.stamp_s)) @ world.ego_pose(a.stamp_s + late_s)
         mended = transform(T, b.points[rows, :3].astype(np.float64))
         np.testing.assert_allclose(mended, a.points[rows, :3], atol=1e-4)  # what float32 leaves of 80 m
+
+
+def test_the_head_looks_ahead_at_the_stamp_and_left_before_it():
+    late = [late_of(k, 0.1) for k in range(SLICES)]  # slices go counter-clockwise from straight ahead
+    assert abs(late[0]) < 0.001
+    assert late[SLICES // 4] == pytest.approx(-0.025, abs=0.001)
+    assert late[3 * SLICES // 4] == pytest.approx(0.025, abs=0.001)
+    assert (min(late), max(late)) == pytest.approx((-0.05, 0.05), abs=0.001)
+
+
+def test_what_does_not_turn_is_not_distorted():
+    (frame, _), (plain, _) = (
+        SyntheticStream("street", "solid-state", 0.1, distort=d).simulator.sweep(0) for d in (True, False)
+    )
+    assert frame.turn_s == 0.0
+    assert frame.points.tobytes() == plain.points.tobytes()
 
 
 @pytest.mark.parametrize(

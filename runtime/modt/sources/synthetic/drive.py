@@ -49,6 +49,7 @@ class DriveWriter:
         self._camera = camera
         self._tracklets = Tracklets(FieldOfView() if all_around else FieldOfView.of_camera(camera))
         self._stamps: list[float] = []
+        self._turns: list[float] = []
         self._poses: list[Float64] = []
 
     def write(self, frame: Frame, truth: Truth) -> None:
@@ -65,15 +66,21 @@ class DriveWriter:
             frame.points.tofile(copy)
         label(truth).tofile(self.sequence / "labels" / f"{frame.index:06d}.label")
         self._stamps.append(frame.stamp_s)
+        self._turns.append(frame.turn_s)
         self._poses.append(frame.T_world_sensor)
         self._tracklets.add(frame.index, truth)
 
     def close(self) -> None:
         """What can only be written at the end: poses, times, tracklets."""
-        stamps = "".join(f"{START + timedelta(seconds=s):%Y-%m-%d %H:%M:%S.%f}000\n" for s in self._stamps)
-        for place in (self._scans / "timestamps.txt", self._oxts / "timestamps.txt"):
-            place.write_text(stamps, encoding="ascii")
-        for i, record in enumerate(oxts_records(np.array(self._poses), np.array(self._stamps))):
+        stamp_s, half_s = np.array(self._stamps), np.array(self._turns) / 2
+        for place, times_s in (
+            (self._scans / "timestamps.txt", stamp_s),
+            (self._scans / "timestamps_start.txt", stamp_s - half_s),
+            (self._scans / "timestamps_end.txt", stamp_s + half_s),
+            (self._oxts / "timestamps.txt", stamp_s),
+        ):
+            place.write_text("".join(_time(s) for s in times_s.tolist()), encoding="ascii")
+        for i, record in enumerate(oxts_records(np.array(self._poses), stamp_s)):
             text = " ".join(f"{v:.14g}" for v in record[:25]) + " 4 10 4 4 0\n"
             (self._oxts / "data" / f"{i:010d}.txt").write_text(text, encoding="ascii")
         (self.sequence / "times.txt").write_text("".join(f"{s:e}\n" for s in self._stamps), encoding="ascii")
@@ -115,6 +122,10 @@ def oxts_records(T_world_sensor: Float64, stamp_s: Float64) -> Float64:
         out[:, 9] = np.cos(yaw) * north - np.sin(yaw) * east
         out[:, 19] = out[:, 22] = np.gradient(np.unwrap(yaw), stamp_s)
     return out
+
+
+def _time(seconds: float) -> str:
+    return f"{START + timedelta(seconds=seconds):%Y-%m-%d %H:%M:%S.%f}000\n"
 
 
 def _row(values: Float64) -> str:

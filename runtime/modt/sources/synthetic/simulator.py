@@ -19,6 +19,12 @@ SLICES = 64
 """Slices of a turn within which nothing moves."""
 
 
+def late_of(part: int, period_s: float) -> float:
+    """How long after the stamp the head looks at a slice [s]; slices go counter-clockwise from straight ahead."""
+    round_ = (part + 0.5) / SLICES
+    return (float(round_ > 0.5) - round_) * period_s
+
+
 @dataclass(frozen=True, slots=True)
 class Truth:
     """What a sweep really shows.
@@ -90,13 +96,18 @@ class Simulator:
         points[:, 2] = s * self.caster.tangent[row, 0] + self.caster.origin[row, 0]
         points[:, 3] = brightness
         instance = np.append(pieces.body, NONE)[image.piece.ravel()[ray]]
-        if self.distort:
+        distorted = self.distort and self.sensor.turns
+        if distorted:
             self._distort(points, column, instance, time_s)
-        frame = Frame(index, time_s, points, T_world_sensor)
+        turn_s = self.sensor.period_s if distorted else 0.0
+        frame = Frame(index, time_s, points, T_world_sensor, turn_s=turn_s)
         return frame, self._truth(time_s, T_world_sensor, instance, material.ravel()[ray])
 
     def _distort(self, points: Float32, column: Int, instance: Int, time_s: float) -> None:
-        """Move each point to where the head saw it from when it turned that way, SLICES to a turn."""
+        """Move each point to where the head saw it from when it turned that way, SLICES to a turn.
+
+        It turns clockwise, as Velodyne's and Ouster's do, and looks ahead at the stamp.
+        """
         world, last = self.world, self.sensor.shape[1]
         T_world_start = world.ego_pose(time_s)
         pose = np.vstack([world.poses(time_s), np.zeros(5)])
@@ -105,9 +116,16 @@ class Simulator:
         part = column * SLICES // last
         for k in range(SLICES):
             rows = np.flatnonzero(part == k)
-            late_s = (k + 0.5) / SLICES * self.sensor.period_s
+            late_s = late_of(k, self.sensor.period_s)
             seen = transform(T_world_start, points[rows, :3].astype(np.float64)) + late_s * velocity[rows]
-            points[rows, :3] = transform(inverse(world.ego_pose(time_s + late_s)), seen)
+            points[rows, :3] = transform(inverse(self._ego_pose(time_s, late_s)), seen)
+
+    def _ego_pose(self, time_s: float, late_s: float) -> Float64:
+        """(4, 4) pose so long after a time; before the drive begins the sensor came as it goes on."""
+        if time_s + late_s >= 0.0:
+            return self.world.ego_pose(time_s + late_s)
+        T = self.world.ego_pose(time_s)
+        return T @ inverse(self.world.ego_pose(time_s - late_s)) @ T
 
     def _truth(self, time_s: float, T_world_sensor: Float64, instance: Int, material: Int) -> Truth:
         world = self.world
