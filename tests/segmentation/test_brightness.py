@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.brightness import BRIGHT, DARK, brightness
-from modt.segmentation.groups import Groups
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE
 from tests.segmentation import scans
@@ -21,7 +20,7 @@ VALUES = st.lists(st.lists(st.floats(0, 1, width=32), min_size=1, max_size=9), m
 def test_each_group_is_told_by_its_own_returns(groups: list[list[float]]) -> None:
     values = np.array([v for group in groups for v in group], np.float32)
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
-    told = brightness(values, Groups(np.arange(len(values)), offsets))
+    told = brightness(values, offsets)
     if len(set(values.tolist())) == 1:
         assert told is None  # whoever recorded them left it out
         return

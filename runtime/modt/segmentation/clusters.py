@@ -106,11 +106,13 @@ class Sizes:
 def join(grid: RootGrid, cells: Cells, beam_rad: float) -> Int:
     """(C,) component of each cell: those that touch at a side or a corner, and in height, belong together."""
     one, other = grid.beside(grid.place(cells.row, cells.column))
-    gap = np.maximum(cells.low[one], cells.low[other]) - np.minimum(cells.high[one], cells.high[other])
+    gap = np.maximum(cells.low.take(one), cells.low.take(other))
+    gap -= np.minimum(cells.high.take(one), cells.high.take(other))
     bound = np.float32(GAP_M) + np.float32(GAP_BEAMS * beam_rad) * np.square(cells.root)
-    near = np.flatnonzero(gap < bound[one])
-    ends = np.append(0, np.cumsum(np.bincount(one[near], minlength=len(cells))))
-    graph = csr_array((np.ones(len(near)), other[near], ends), shape=(len(cells), len(cells)))
+    near = np.flatnonzero(gap < bound.take(one))
+    ends = np.zeros(len(cells) + 1, np.int32)
+    np.cumsum(np.bincount(one.take(near), minlength=len(cells)), out=ends[1:])
+    graph = csr_array((np.ones(len(near)), other.take(near), ends), shape=(len(cells), len(cells)))
     component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
     return component
 

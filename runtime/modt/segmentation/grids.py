@@ -95,11 +95,11 @@ class RootGrid:
         self._number[taken] = NONE
         return sample, cell
 
-    def beside(self, place: Int) -> tuple[Int, Int]:
+    def beside(self, place: Int) -> tuple[Int, Int32]:
         """Pairs of cells, by number, that touch at a side or a corner: each pair once, ordered by the first."""
         self._number[place] = np.arange(len(place), dtype=np.int32)
         ahead = np.array([1, self.side - 1, self.side, self.side + 1])
         found = self._number.take((place[:, None] + ahead).ravel())
         self._number[place] = NONE
         pair = np.flatnonzero(found != NONE)
-        return pair >> 2, found[pair].astype(np.int64)
+        return pair >> 2, found.take(pair)

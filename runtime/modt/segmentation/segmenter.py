@@ -16,7 +16,7 @@ from modt.segmentation.ground import Ground
 from modt.segmentation.groups import Groups
 from modt.segmentation.height import sensor_height
 from modt.segmentation.occlusion import occluded
-from modt.types import NONE, Bool, Float32, Float64, Int, Proposals
+from modt.types import NONE, Bool, Float32, Int, Proposals
 
 MARGIN_M = 6.0
 """Looked at beyond the edge of the field of view, so that what stands on the edge is segmented whole."""
@@ -56,8 +56,9 @@ class Segmenter:
         if not len(raised):
             return Proposals.empty()
         index = raised if looked_at is None else looked_at[raised]
-        proposals = self._proposals(sweep.take(raised), height[raised], index)
-        return replace(proposals, sensor_height_m=above, reflectance=self._brightness(points, proposals))
+        reflectance = points[index, 3] if self.sensor.reflectance != "none" else None
+        proposals = self._proposals(sweep.take(raised), height[raised], index, reflectance)
+        return replace(proposals, sensor_height_m=above)
 
     def raised(self, sweep: Columns, height: Float32) -> Bool:
         """(N,) within range, clear of the ground and no higher than objects reach."""
@@ -66,7 +67,7 @@ class Segmenter:
         raised &= (sweep.root > near) & (sweep.root < far)
         return raised
 
-    def _proposals(self, raised: Columns, height: Float32, index: Int) -> Proposals:
+    def _proposals(self, raised: Columns, height: Float32, index: Int, reflectance: Float32 | None) -> Proposals:
         """The clusters of what is raised, and their boxes."""
         clusters = self.clusterer.cluster(raised, height)
         cell = raised.take(clusters.sample)
@@ -86,14 +87,9 @@ class Segmenter:
         if not self.fov.full:
             truncated = outline.least(self.fov.depth(cell.xyz())[outline.rows]) < EDGE_M - MARGIN_M
         hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
-        return Proposals(index[groups.rows], groups.offsets, own, centroid, box, truncated, hidden)
-
-    def _brightness(self, points: Float32, proposals: Proposals) -> Float64 | None:
-        """(P, 5) of the proposals' returns, where it is looked at."""
-        if self.sensor.reflectance == "none":
-            return None
-        own = points[:, 3].take(proposals.members)
-        return brightness(own, Groups(np.arange(len(own)), proposals.offsets))
+        told = None if reflectance is None else brightness(reflectance.take(groups.rows), groups.offsets)
+        members = index.take(groups.rows)
+        return Proposals(members, groups.offsets, own, centroid, box, truncated, hidden, reflectance=told)
 
     def _in_view(self, clusters: Clusters, cell: Columns) -> Bool:
         """(n,) whether a cluster reaches into the field of view, or nearly."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from modt.config import TrackingConfig
@@ -172,22 +174,25 @@ class Tracker:
         skew = Skew.of(proposals, frame.turn_s)
         dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
 
+        def motion_to(after: Float64) -> Motion:
+            return Motion.between(before, after, dt_s)
+
         def seen_from(after: Float64) -> Sightings:
             """The proposals in the world, where they stand at the stamp."""
             sightings = sight(proposals, after)
             if skew is None or first:
                 return sightings
-            return sightings.moved(skew.step(Motion.between(before, after, dt_s), after))
+            return sightings.moved(skew.step(motion_to(after), after))
 
         if given is not None and self._T_world_odometry is not None:
             after = self._T_world_odometry @ given
-            self._mend_first(Motion.between(before, after, dt_s))
+            self._mend_first(motion_to, after)
         else:
             predicted = before @ (inverse(self._T_world_before) @ before)  # as it moved last
             after = rigid(self._registration.correct(self._tracks, seen_from(predicted)) @ predicted)
-            motion, expected = (Motion.between(before, T, dt_s) for T in (after, predicted))
-            self._mend_first(motion)
-            if not motion.skews_like(expected, frame.turn_s):  # what was registered stands elsewhere
+            self._mend_first(motion_to, after)
+            if skew is not None and not motion_to(after).skews_like(motion_to(predicted), frame.turn_s):
+                # What was registered stands elsewhere.
                 after = rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
@@ -196,10 +201,10 @@ class Tracker:
         self._first = skew if first else None
         return sightings
 
-    def _mend_first(self, motion: Motion) -> None:
+    def _mend_first(self, motion_to: Callable[[Float64], Motion], after: Float64) -> None:
         """Put what the first frame showed where it stood: how the sensor moved is known from the second one on."""
         if self._first is not None:
-            self._tracks.move(self._first.step(motion, self._T_world_sensor)[self._tracks.proposal])
+            self._tracks.move(self._first.step(motion_to(after), self._T_world_sensor)[self._tracks.proposal])
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""
