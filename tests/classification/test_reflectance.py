@@ -40,7 +40,8 @@ def test_the_prior_takes_all_of_it() -> None:
     boxes = described(proposals, slice(None), SENSOR)
     score = logits(BOXES, boxes) + logits(LAYERS, np.c_[boxes, BRIGHTNESS])
     expected = np.exp(score) / np.exp(score).sum(axis=1, keepdims=True)
-    prior = prior_of({BOX_PRIOR: encode_boxes(BOXES)} | HELD, (0.1, 0.1, 0.1), SENSOR)
+    evidence = evidence_of(HELD, N_FEATURES, SENSOR)
+    prior = prior_of({BOX_PRIOR: encode_boxes(BOXES)}, (0.1, 0.1, 0.1), SENSOR, evidence)
     np.testing.assert_allclose(prior.of(proposals), expected)
 
 
@@ -113,13 +114,13 @@ def test_a_model_whose_evidence_is_none_is_misuse(tmp_path: Path) -> None:
 
 def test_the_model_that_ships_knows_number_plates_from_leaves() -> None:
     model = PointNet(ClassificationConfig(), SENSOR)
-    evidence = evidence_of(model.metadata, N_FEATURES, SENSOR)
+    evidence = model.evidence
     assert isinstance(evidence, Reflectance)
     _, proposals = blobs([150], np.random.default_rng(0))
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
     seen = dataclasses.replace(proposals, box=box)
     plates, leaves = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]]), np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
-    prior = prior_of(model.metadata, (0.08, 0.02, 0.02), SENSOR)
+    prior = prior_of(model.metadata, (0.08, 0.02, 0.02), SENSOR, evidence)
     car, bush = (prior.of(dataclasses.replace(seen, reflectance=told))[0] for told in (plates, leaves))
     assert car[ObjectClass.CAR] > 0.9
     assert bush[ObjectClass.CAR] < 0.3

@@ -48,6 +48,7 @@ class PointNet:
         path: the model file.
         sha256: its hash, which its card (the file beside it that ends in .md) must name.
         metadata: what else the model brings along.
+        evidence: what it makes of the returns' reflectance.
 
     Raises:
         MisuseError: no such model, not the one that its card describes, no ONNX, not (batch, points, 3) to
@@ -62,7 +63,7 @@ class PointNet:
         self._session = _session(self.path)
         self._input = self._session.get_inputs()[0].name
         self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
-        self._evidence = self._brought_along()
+        self.evidence = self._brought_along()
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) probability of each class for each of the proposals given, in their order.
@@ -83,11 +84,11 @@ class PointNet:
 
     def _with_evidence(self, said: Float64, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) the network's word on the shape and what the reflectance adds (Bayes' rule)."""
-        if not self._evidence.weight:
+        if not self.evidence.weight:
             return said
         told = None if proposals.reflectance is None else proposals.reflectance[which]
-        added = self._evidence.of(described(proposals, which, self._sensor), told)
-        probability: Float64 = softmax(np.log(np.maximum(said, LEAST)) + self._evidence.weight * added, axis=1)
+        added = self.evidence.of(described(proposals, which, self._sensor), told)
+        probability: Float64 = softmax(np.log(np.maximum(said, LEAST)) + self.evidence.weight * added, axis=1)
         return probability
 
     def _brought_along(self) -> Evidence:

@@ -15,7 +15,7 @@ from scipy.special import softmax
 
 from modt.classification.crops import height_of
 from modt.classification.layers import Layers, as_lists, logits, of_lists
-from modt.classification.reflectance import Evidence, NoEvidence, evidence_of
+from modt.classification.reflectance import Evidence, NoEvidence
 from modt.config import SensorConfig
 from modt.types import Bool, Float64, Int, ObjectClass, Proposals
 
@@ -140,13 +140,21 @@ def encode(layers: Layers) -> str:
     return json.dumps(as_lists(layers))
 
 
-def prior_of(metadata: Mapping[str, str], frequency: Sequence[float], sensor: SensorConfig) -> Prior:
+def prior_of(
+    metadata: Mapping[str, str], frequency: Sequence[float], sensor: SensorConfig, evidence: Evidence | None = None
+) -> Prior:
     """The prior that a model brings along in its metadata; the frequency of the classes where it brings none.
 
+    Args:
+        metadata: of the model.
+        frequency: share of car, pedestrian and cyclist.
+        sensor: whose proposals are seen.
+        evidence: what their reflectance adds.
+
     Raises:
-        KeyError, TypeError, ValueError: it brings one that cannot be used.
+        TypeError, ValueError: it brings one that cannot be used.
     """
     text = metadata.get(METADATA)
     if text is None:
         return Frequency(frequency)
-    return BoxPrior(of_lists(json.loads(text), N_FEATURES), sensor, evidence_of(metadata, N_FEATURES, sensor))
+    return BoxPrior(of_lists(json.loads(text), N_FEATURES), sensor, evidence)

@@ -146,6 +146,6 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
 def _prior(network: PointNet, profile: ProfileConfig) -> Prior:
     """What the model thinks of proposals unseen."""
     try:
-        return prior_of(network.metadata, profile.fusion.prior, profile.sensor)
-    except (KeyError, TypeError, ValueError) as error:
+        return prior_of(network.metadata, profile.fusion.prior, profile.sensor, network.evidence)
+    except (TypeError, ValueError) as error:
         raise MisuseError(network.path, f"its box prior cannot be used ({error})", "export the model again") from None
