@@ -28,7 +28,7 @@ class Dataset:
 
     Attributes:
         crops: all of them, and label, partial, unknown, tall, variant, drive: (R,) of each.
-        reflectance: (R, 5) of their returns as they were measured, NaN where that is unknown or of another sensor.
+        reflectance: (R, 5) of their returns where they were measured; NaN where unknown or of another sensor.
         truth_label, truth_drive: of each labelled object, seen by the segmentation or not.
         provenance: how each file was made.
         sha256: of each file.

@@ -4,7 +4,7 @@
 
 Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json: loss curve, and with --folds the
 out-of-fold average precision, confusion and calibration (drives are never split between folds), and the probabilities
-themselves, OUT_DIR/held_out.npy, for tools/train_reflectance.py. The temperature and
+themselves, OUT_DIR/held_out.npz, for tools/train_reflectance.py. The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
 With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written.
 An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
@@ -191,7 +191,7 @@ def main() -> None:
         steps = round(per_epoch * (args.fold_epochs or args.epochs) * (1 - 1 / args.folds))
         held, report["cross_validation"] = cross_validate(data, args.folds, steps, args.teachers, args.seed)
         calibration = held.calibration
-        np.save(args.out / "held_out.npy", held.probability)
+        np.savez(args.out / "held_out.npz", probability=held.probability, crops=data.sha256)
         print(json.dumps(report["cross_validation"]))
     everything = np.ones(len(data), np.bool_)
     both = round(per_epoch * args.epochs), round(per_epoch * (args.fold_epochs or args.epochs))

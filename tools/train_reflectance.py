@@ -131,7 +131,9 @@ def main() -> None:
     torch.use_deterministic_algorithms(True)
     data = load(*args.crops)
     seen = Described(data)
-    network = np.load(args.out / "held_out.npy")
+    with np.load(args.out / "held_out.npz") as file:
+        assert file["crops"].tolist() == data.sha256, "held_out.npz is of other crops"
+        network = file["probability"]
     calibration, report = cross_validate(data, seen, network, args.folds, args.steps, args.seed)
     boxes = load_layers(args.out / "boxes.npz")
     layers = train(data, seen, np.flatnonzero(data.clear), boxes, args.steps, args.seed)

@@ -59,7 +59,7 @@ def test_a_sweep_without_reflectance_goes_by_shape_and_says_so_once(caplog: pyte
     with caplog.at_level(logging.WARNING):
         for _ in range(3):
             np.testing.assert_array_equal(
-                BoxPrior(BOXES, SENSOR, evidence).of(bare), BoxPrior(BOXES, SENSOR).of(bare)
+                BoxPrior(BOXES, SENSOR, evidence).of(bare), BoxPrior(BOXES, SENSOR, NoEvidence()).of(bare)
             )
     assert len(caplog.records) == 1
     assert "sensor.reflectance" in caplog.text

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.brightness import BRIGHT, DARK, brightness
+from modt.segmentation.brightness import BRIGHT, DARK, brightness, recorded
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE
 from tests.segmentation import scans
@@ -21,10 +21,6 @@ def test_each_group_is_told_by_its_own_returns(groups: list[list[float]]) -> Non
     values = np.array([v for group in groups for v in group], np.float32)
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
     told = brightness(values, offsets)
-    if len(set(values.tolist())) == 1:
-        assert told is None  # whoever recorded them left it out
-        return
-    assert told is not None
     assert told.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(told, groups, strict=True):
         own = np.array(group, np.float32)
@@ -43,3 +39,19 @@ def test_proposals_tell_their_brightness_where_it_is_looked_at() -> None:
     assert Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView()).segment(points).reflectance is None
     points[:, 3] = 0.0
     assert stage.segment(points).reflectance is None
+
+
+def test_dark_things_in_a_bright_sweep_are_no_lack_of_reflectance() -> None:
+    points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8)])
+    points[:, 3] = np.where(on == 1, 0.0, 0.3)
+    stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), FieldOfView())
+    told = stage.segment(points).reflectance
+    assert told is not None
+    np.testing.assert_array_equal(told[0], [0, 0, 0, 0, 1])
+
+
+@given(st.integers(1, 5000), st.floats(0, 1, width=32))
+def test_a_sweep_whose_returns_are_all_alike_carries_no_reflectance(n: int, value: float) -> None:
+    alike = np.full(n, value, np.float32)
+    assert not recorded(alike)
+    assert recorded(np.concatenate([alike, alike + np.float32(0.25)]))

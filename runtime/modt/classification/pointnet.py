@@ -30,8 +30,7 @@ _UNUSABLE = (
 )
 
 
-LEAST = 1e-12
-"""Probability that stands for none, so that it has a logarithm."""
+_LEAST_PROBABILITY = 1e-12
 
 
 class PointNet:
@@ -88,7 +87,8 @@ class PointNet:
             return said
         told = None if proposals.reflectance is None else proposals.reflectance[which]
         added = self.evidence.of(described(proposals, which, self._sensor), told)
-        probability: Float64 = softmax(np.log(np.maximum(said, LEAST)) + self.evidence.weight * added, axis=1)
+        score = np.log(np.maximum(said, _LEAST_PROBABILITY)) + self.evidence.weight * added
+        probability: Float64 = softmax(score, axis=1)
         return probability
 
     def _brought_along(self) -> Evidence:

@@ -15,7 +15,7 @@ from scipy.special import softmax
 
 from modt.classification.crops import height_of
 from modt.classification.layers import Layers, as_lists, logits, of_lists
-from modt.classification.reflectance import Evidence, NoEvidence
+from modt.classification.reflectance import Evidence
 from modt.config import SensorConfig
 from modt.types import Bool, Float64, Int, ObjectClass, Proposals
 
@@ -73,10 +73,10 @@ class BoxPrior:
         evidence: what the reflectance adds.
     """
 
-    def __init__(self, layers: Layers, sensor: SensorConfig, evidence: Evidence | None = None) -> None:
+    def __init__(self, layers: Layers, sensor: SensorConfig, evidence: Evidence) -> None:
         self._layers = layers
         self._sensor = sensor
-        self._evidence = evidence or NoEvidence()
+        self._evidence = evidence
 
     def of(self, proposals: Proposals) -> Float64:
         """(P, 4) for each proposal of a frame."""
@@ -141,7 +141,7 @@ def encode(layers: Layers) -> str:
 
 
 def prior_of(
-    metadata: Mapping[str, str], frequency: Sequence[float], sensor: SensorConfig, evidence: Evidence | None = None
+    metadata: Mapping[str, str], frequency: Sequence[float], sensor: SensorConfig, evidence: Evidence
 ) -> Prior:
     """The prior that a model brings along in its metadata; the frequency of the classes where it brings none.
 

@@ -32,11 +32,11 @@ class Evidence(Protocol):
         """Share of it that the network, which knows the shape, does not know yet."""
         ...
 
-    def of(self, box: Float64, reflectance: Float64 | None) -> Float64:
+    def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
         """(R, 4) log likelihood of each class.
 
         Args:
-            box: (R, 7) features of the boxes.
+            box_features: (R, 7) as prior.features tells them.
             reflectance: (R, 5) of the proposals, None where the sweep carries none.
         """
         ...
@@ -47,9 +47,9 @@ class NoEvidence:
 
     weight = 0.0
 
-    def of(self, box: Float64, reflectance: Float64 | None) -> Float64:
+    def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
         """(R, 4) zeros."""
-        return np.zeros((len(box), N_CLASSES))
+        return np.zeros((len(box_features), N_CLASSES))
 
 
 class Reflectance:
@@ -65,17 +65,17 @@ class Reflectance:
         self.weight = weight
         self._missed = False
 
-    def of(self, box: Float64, reflectance: Float64 | None) -> Float64:
+    def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
         """(R, 4) log likelihood of each class; zeros where the sweep carries no reflectance."""
         if reflectance is not None:
-            return logits(self._layers, np.hstack([box, reflectance]))
-        if len(box) and not self._missed:
+            return logits(self._layers, np.hstack([box_features, reflectance]))
+        if len(box_features) and not self._missed:
             log.warning(
                 "a sweep carries no reflectance: shape alone decides, wherever that is so; have the sensor's driver "
                 "write it, or set sensor.reflectance to none"
             )
             self._missed = True
-        return np.zeros((len(box), N_CLASSES))
+        return np.zeros((len(box_features), N_CLASSES))
 
 
 def encode(layers: Layers, weight: float, sensor: str) -> str:

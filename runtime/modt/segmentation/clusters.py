@@ -96,7 +96,10 @@ class Sizes:
     of_vast: Bool
 
     def of_wholes(self, whole: Int) -> Sizes:
-        """The same with clusters gathered into others, given (G,) which; those that are gathered lie empty."""
+        """The same with clusters gathered into others, given (G,) which; those that are gathered lie empty.
+
+        Extents stay those of the first pieces: Pieces makes nothing larger than an object.
+        """
         n = len(whole)
         held = np.bincount(whole, self.held, n).astype(np.int64)
         low, top = _least(self.low, whole, n), _most(self.top, whole, n)
@@ -136,7 +139,7 @@ class Clusterer:
         self.coarse = RootGrid(step, sensor.max_range_m)
         self.fine = RootGrid(step / 2, sensor.max_range_m)
         self.silhouettes = Silhouettes(sensor, config)
-        self.pieces = Pieces(sensor)
+        self.pieces = Pieces(sensor, config.max_extent_m)
 
     def cluster(self, points: Columns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, of a height above ground [m]."""

@@ -97,16 +97,16 @@ class Bounds:
         upright &= (top > UPRIGHT_M[1]) & (top - self.least[HEIGHT] > UPRIGHT_M[2])
         return upright
 
-    def small(self) -> Bool:
-        """(G,) no larger than a car."""
+    def small(self, diagonal_m: float) -> Bool:
+        """(G,) no larger than a car, nor than so much."""
         breadth, depth = self.breadth_m, self.most[RANGE] - self.least[RANGE]
-        small: Bool = np.hypot(breadth, depth) < DIAGONAL_M
+        small: Bool = np.hypot(breadth, depth) < min(DIAGONAL_M, diagonal_m)
         small &= (breadth < BREADTH_M[1]) & (self.most[HEIGHT] < TOP_M[1])
         return small
 
-    def like_cars(self) -> Bool:
-        """(G,) of a car's size."""
-        like = self.small()
+    def like_cars(self, diagonal_m: float) -> Bool:
+        """(G,) of a car's size, and no larger than so much."""
+        like = self.small(diagonal_m)
         like &= (self.breadth_m > BREADTH_M[0]) & (self.most[HEIGHT] > TOP_M[0]) & (self.least[HEIGHT] < BOTTOM_M)
         return like
 
@@ -118,9 +118,11 @@ class Pieces:
 
     Args:
         sensor: the spacing of its beams.
+        max_extent_m: of an object.
     """
 
-    def __init__(self, sensor: SensorConfig) -> None:
+    def __init__(self, sensor: SensorConfig, max_extent_m: float = DIAGONAL_M) -> None:
+        self.max_extent_m = max_extent_m
         beam = float(np.tan(np.deg2rad(sensor.elevation_step_deg)))
         self.steps = BEAMS[0] * beam, BEAMS[1] * beam
         self.range_m = TALL_M / (FEW * beam)
@@ -146,7 +148,7 @@ class Pieces:
         if len(front):
             _spread(first, front, back)
             number = (np.cumsum(first == own) - 1)[first]
-            fits = bounds.over(Groups.of(number, int(number.max()) + 1)).small()[number]
+            fits = bounds.over(Groups.of(number, int(number.max()) + 1)).small(self.max_extent_m)[number]
             first = np.where(fits, first, own)
         return first
 
@@ -162,7 +164,7 @@ class Pieces:
         upright = bounds.upright()
         joined &= ~(upright[front] | upright[back])
         front, back = front[joined], back[joined]
-        like = bounds.take(front).beside(bounds.take(back)).like_cars()
+        like = bounds.take(front).beside(bounds.take(back)).like_cars(self.max_extent_m)
         return front[like], back[like]
 
 

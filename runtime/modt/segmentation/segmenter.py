@@ -9,7 +9,7 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.boxes import headings, upright_boxes
-from modt.segmentation.brightness import brightness
+from modt.segmentation.brightness import brightness, recorded
 from modt.segmentation.clusters import Clusterer, Clusters
 from modt.segmentation.columns import Columns
 from modt.segmentation.ground import Ground
@@ -56,7 +56,8 @@ class Segmenter:
         if not len(raised):
             return Proposals.empty()
         index = raised if looked_at is None else looked_at[raised]
-        reflectance = points[index, 3] if self.sensor.reflectance != "none" else None
+        seen = self.sensor.reflectance != "none" and recorded(points[:, 3])
+        reflectance = points[index, 3] if seen else None
         proposals = self._proposals(sweep.take(raised), height[raised], index, reflectance)
         return replace(proposals, sensor_height_m=above)
 

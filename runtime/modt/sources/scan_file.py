@@ -57,6 +57,7 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, int]:
     if odd > TOLERATED_SHARE * len(points):
         cause = "its columns are not x, y, z [m], reflectance"
         raise ScanError(origin, cause, "the frame is skipped; convert it to float32 rows of these four")
-    if reflectance.max(initial=0.0) > 1.0:
-        np.clip(reflectance / np.float32(255), 0, 1, out=reflectance)
+    if reflectance.max(initial=0.0) > 1.0:  # 0 to 255, unless a few strays alone are beyond 1
+        in_bytes = np.count_nonzero(reflectance > 1.0) > TOLERATED_SHARE * len(points)
+        np.clip(reflectance / np.float32(255 if in_bytes else 1), 0, 1, out=reflectance)
     return points, bad

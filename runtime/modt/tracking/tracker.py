@@ -175,7 +175,8 @@ class Tracker:
         dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
 
         def motion_to(after: Float64) -> Motion:
-            return Motion.between(before, after, dt_s)
+            """None over a time so short beside that of a sweep that errors of the poses would be drawn out."""
+            return Motion.between(before, after, dt_s) if 2 * dt_s >= abs(frame.turn_s) else Motion()
 
         def seen_from(after: Float64) -> Sightings:
             """The proposals in the world, where they stand at the stamp."""
