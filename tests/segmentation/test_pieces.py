@@ -7,7 +7,7 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.columns import Columns
 from modt.segmentation.groups import Groups
-from modt.segmentation.pieces import Bounds, Pieces
+from modt.segmentation.pieces import RANGE, Bounds, Pieces
 from modt.segmentation.segmenter import Segmenter
 from tests.segmentation import reference, scans
 
@@ -122,3 +122,19 @@ def test_what_is_near_is_left_alone():
     size, points = np.ones(3, np.float32), np.full(3, 50.0)
     root = np.sqrt(np.array([10.0, 24.0, 27.0], np.float32))
     assert stage.possible(size, size, points, root).tolist() == [False, False, True]
+
+
+def test_nothing_is_made_larger_than_an_object_may_be():
+    larger = 0
+    for seed in range(20):
+        bounds = strips(np.random.default_rng(seed), 24)
+        for limit_m in (2.0, 6.0):
+            whole = Pieces(SensorConfig(), limit_m).whole(bounds)
+            joined = [np.flatnonzero(whole == first) for first in np.unique(whole) if np.sum(whole == first) > 1]
+            for own in joined:
+                together = bounds.take(own).over(Groups(np.arange(len(own)), np.array([0, len(own)])))
+                depth = together.most[RANGE] - together.least[RANGE]
+                diagonal_m = float(np.hypot(together.breadth_m, depth)[0])
+                assert diagonal_m < limit_m
+                larger += diagonal_m > 2.0
+    assert larger > 5  # than the lower of the limits, where the other holds

@@ -85,3 +85,14 @@ def test_two_infinities_that_cancel_are_found():
         clean, bad = sanitised(points, "scan")
     assert bad == 2
     assert np.isfinite(clean).all()
+
+
+def test_a_stray_bright_return_does_not_darken_the_others(tmp_path):
+    scan = np.zeros((1000, 4), np.float32)
+    scan[:, 3] = np.linspace(0, 1, 1000)
+    scan[7, 3] = 1.5
+    path = tmp_path / "scan.bin"
+    scan.tofile(path)
+    points, _ = read_scan(path)
+    np.testing.assert_allclose(np.delete(points[:, 3], 7), np.delete(scan[:, 3], 7))
+    assert points[7, 3] == 1.0
