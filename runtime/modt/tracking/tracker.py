@@ -194,7 +194,8 @@ class Tracker:
             self._mend_first(motion_to, after)
             if skew is not None and not motion_to(after).skews_like(motion_to(predicted), frame.turn_s):
                 # What was registered stands elsewhere.
-                after = rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
+                found, after = after, rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
+                self._mend_first(motion_to, after, instead=found)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)
         sightings = seen_from(after)
@@ -202,10 +203,21 @@ class Tracker:
         self._first = skew if first else None
         return sightings
 
-    def _mend_first(self, motion_to: Callable[[Float64], Motion], after: Float64) -> None:
-        """Put what the first frame showed where it stood: how the sensor moved is known from the second one on."""
+    def _mend_first(
+        self, motion_to: Callable[[Float64], Motion], after: Float64, instead: Float64 | None = None
+    ) -> None:
+        """Put what the first frame showed where it stood: how the sensor moved is known from the second one on.
+
+        Args:
+            motion_to: how the sensor moved to a pose.
+            after: (4, 4) its pose now.
+            instead: (4, 4) one by which it was put before.
+        """
         if self._first is not None:
-            self._tracks.move(self._first.step(motion_to(after), self._T_world_sensor)[self._tracks.proposal])
+            step = self._first.step(motion_to(after), self._T_world_sensor)
+            if instead is not None:
+                step -= self._first.step(motion_to(instead), self._T_world_sensor)
+            self._tracks.move(step[self._tracks.proposal])
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""
