@@ -22,6 +22,8 @@ Bool = NDArray[np.bool_]
 
 NONE = -1
 """Index of nothing: a track without a proposal, a proposal without a track."""
+UNRECORDED = -1.0
+"""Reflectance of a return of which none was recorded; any below 0 is none."""
 
 
 class ObjectClass(IntEnum):
@@ -46,8 +48,8 @@ class Frame:
     Attributes:
         index: number of the frame in its stream (gaps where the stream has gaps).
         stamp_s: time of the sweep [s], never decreasing within a stream.
-        points: (N, 4) float32 x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1]. Finite
-            throughout; a point without a return lies at the origin.
+        points: (N, 4) float32 x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1] or
+            UNRECORDED. Finite throughout; a point without a return lies at the origin.
         T_world_sensor: (4, 4) pose of the sensor in the world, or None where no ego-motion is known.
         restarts: times that the odometry has begun anew, in a world of which the one before says nothing.
         turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
@@ -77,7 +79,7 @@ class Proposals:
         occluded: (P,) cut by something nearer that stands in front of it.
         sensor_height_m: of the sensor above the ground that they were found on, None where it is not known.
         reflectance: (P, 5) of each proposal's returns: mean, standard deviation and greatest, share of bright and of
-            dark ones; None where the sweep carries none.
+            dark ones, NaN where none of them has any; None where the sweep carries none.
     """
 
     members: Int

@@ -65,6 +65,16 @@ def test_a_sweep_without_reflectance_goes_by_shape_and_says_so_once(caplog: pyte
     assert "sensor.reflectance" in caplog.text
 
 
+def test_a_proposal_without_reflectance_goes_by_shape_and_the_others_do_not_mind() -> None:
+    evidence = evidence_of(HELD, N_FEATURES, SENSOR)
+    prior, whole = BoxPrior(BOXES, SENSOR, evidence), lit()
+    told = BRIGHTNESS.copy()
+    told[1] = np.nan
+    found = prior.of(dataclasses.replace(whole, reflectance=told))
+    np.testing.assert_array_equal(found[1], BoxPrior(BOXES, SENSOR, NoEvidence()).of(whole)[1])
+    np.testing.assert_array_equal(found[[0, 2]], prior.of(whole)[[0, 2]])
+
+
 def test_an_empty_frame_is_no_lack_of_reflectance(caplog: pytest.LogCaptureFixture) -> None:
     evidence = evidence_of(HELD, N_FEATURES, SENSOR)
     assert BoxPrior(BOXES, SENSOR, evidence).of(Proposals.empty()).shape == (0, 4)

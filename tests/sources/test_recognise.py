@@ -160,6 +160,20 @@ def test_bad_scans_are_counted_and_skipped(tmp_path, caplog):
     assert "not finite" in caplog.text
 
 
+def test_points_that_lack_reflectance_alone_are_kept_and_counted(tmp_path, caplog):
+    folder = layouts.bare(tmp_path)
+    broken = layouts.scan(1)
+    broken[:3, 3] = np.nan
+    (folder / "000001.bin").write_bytes(broken.tobytes())
+    stream = open_stream(folder)
+    points = [f.points for f in stream][1]
+    np.testing.assert_array_equal(points[:, :3], broken[:, :3])
+    np.testing.assert_array_equal(points[3:], broken[3:])
+    assert (stream.faults.count, stream.faults.skipped) == (1, 0)
+    (record,) = caplog.records
+    assert re.search(r"000001\.bin: 3 reflectances .* not recorded: .*sensor\.reflectance", record.getMessage())
+
+
 def test_faults_without_end_are_counted_and_the_first_kept(tmp_path, caplog):
     folder, n = layouts.bare(tmp_path), 3 * FIRST
     for k in range(n):

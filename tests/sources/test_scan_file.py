@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from modt.errors import ScanError
 from modt.sources.scan_file import read_scan, sanitised
+from modt.types import UNRECORDED
 
 GOOD = np.array([[1, 2, 3, 0.5], [4, 5, 6, 0.25]], np.float32)
 
@@ -17,20 +18,46 @@ def write(path, points):
 
 
 def test_a_good_scan_is_read_as_it_is(tmp_path):
-    points, bad = read_scan(write(tmp_path / "0.bin", GOOD))
-    assert bad == 0
+    points, flaws = read_scan(write(tmp_path / "0.bin", GOOD))
+    assert flaws == []
     assert points.dtype == np.float32
     np.testing.assert_array_equal(points, GOOD)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-@pytest.mark.parametrize("column", range(4))
+@pytest.mark.parametrize("column", range(3))
 def test_points_that_are_not_finite_keep_their_row_at_the_origin(tmp_path, value, column):
     broken = GOOD.copy()
     broken[0, column] = value
-    points, bad = read_scan(write(tmp_path / "0.bin", broken))
-    assert bad == 1
+    points, flaws = read_scan(write(tmp_path / "0.bin", broken))
+    assert flaws == ["1 points are not finite and count as no return"]
     np.testing.assert_array_equal(points, [[0, 0, 0, 0], GOOD[1]])
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("scale", [1, 255])
+def test_points_whose_reflectance_alone_is_not_finite_are_points_without_one(tmp_path, value, scale):
+    scan = np.tile(GOOD, (4, 1)) * np.float32([1, 1, 1, scale])
+    scan[:2, 3] = value
+    scan[2, [0, 3]] = value
+    points, flaws = read_scan(write(tmp_path / "0.bin", scan))
+    mended = np.tile(GOOD, (4, 1))
+    mended[:2, 3] = UNRECORDED
+    mended[2] = 0.0
+    np.testing.assert_array_equal(points, mended)
+    lost, unlit = flaws
+    assert lost.startswith("1 points are not finite")
+    assert unlit.startswith("2 reflectances are not finite")
+    assert "sensor.reflectance" in unlit
+
+
+def test_a_scan_without_any_finite_reflectance_keeps_its_points(tmp_path):
+    scan = np.tile(GOOD, (100, 1))
+    scan[:, 3] = np.nan
+    points, flaws = read_scan(write(tmp_path / "0.bin", scan))
+    np.testing.assert_array_equal(points[:, :3], scan[:, :3])
+    assert (points[:, 3] == UNRECORDED).all()
+    assert len(flaws) == 1
 
 
 def test_reflectance_in_bytes_is_scaled(tmp_path):
@@ -69,21 +96,21 @@ def test_any_bytes_are_finite_points_or_one_clear_error(tmp_path_factory, conten
     path = tmp_path_factory.getbasetemp() / "fuzz.bin"
     path.write_bytes(content)
     try:
-        points, bad = read_scan(path)
+        points, flaws = read_scan(path)
     except ScanError:
         return
     assert len(points) == len(content) // 16
-    assert 0 <= bad <= len(points)
+    assert len(flaws) <= 2
     assert np.isfinite(points).all()
-    assert (points[:, 3] >= 0).mean() >= 0.98
+    assert ((points[:, 3] >= 0) | (points[:, 3] == UNRECORDED)).mean() >= 0.98
 
 
 def test_two_infinities_that_cancel_are_found():
     points = GOOD.copy()
     points[:, 0] = [np.inf, -np.inf]
     with np.errstate(invalid="ignore"):
-        clean, bad = sanitised(points, "scan")
-    assert bad == 2
+        clean, (lost,) = sanitised(points, "scan")
+    assert lost.startswith("2 points")
     assert np.isfinite(clean).all()
 
 

@@ -37,7 +37,7 @@ class Evidence(Protocol):
 
         Args:
             box_features: (R, 7) as prior.features tells them.
-            reflectance: (R, 5) of the proposals, None where the sweep carries none.
+            reflectance: (R, 5) of the proposals, NaN where one has none; None where the sweep carries none.
         """
         ...
 
@@ -66,9 +66,11 @@ class Reflectance:
         self._missed = False
 
     def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) log likelihood of each class; zeros where the sweep carries no reflectance."""
+        """(R, 4) log likelihood of each class; zeros where there is no reflectance."""
         if reflectance is not None:
-            return logits(self._layers, np.hstack([box_features, reflectance]))
+            told = logits(self._layers, np.hstack([box_features, reflectance]))
+            told[np.isnan(reflectance[:, 0])] = 0.0
+            return told
         if len(box_features) and not self._missed:
             log.warning(
                 "a sweep carries no reflectance: shape alone decides, wherever that is so; have the sensor's driver "

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import ScanError
-from modt.types import Float32
+from modt.types import UNRECORDED, Float32
 
 ROW_BYTES = 16
 FARTHEST_M = 1000.0
@@ -15,11 +15,12 @@ TOLERATED_SHARE = 0.02
 """Share of rows that may be implausible before the file is taken for something else."""
 
 
-def read_scan(path: Path) -> tuple[Float32, int]:
-    """Points of a .bin file, and how many of them were not finite.
+def read_scan(path: Path) -> tuple[Float32, list[str]]:
+    """Points of a .bin file, and what was wrong with some of them.
 
     Points that are not finite are set to the origin, where nothing is ever measured, so that every row keeps its
-    place. Reflectances given as 0 to 255 are brought to 0 to 1.
+    place; of a point whose reflectance alone is not finite, none was recorded. Reflectances given as 0 to 255 are
+    brought to 0 to 1.
 
     Raises:
         ScanError: missing, unreadable, empty, truncated, or rows of something else.
@@ -39,19 +40,25 @@ def read_scan(path: Path) -> tuple[Float32, int]:
     return sanitised(points, path)
 
 
-def sanitised(points: Float32, origin: object) -> tuple[Float32, int]:
-    """Points with the non-finite ones moved to the origin, in place, and how many these were.
+def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
+    """Points without anything that is not finite, mended in place, and what there was of it.
 
     Raises:
         ScanError: the columns are not x, y, z, reflectance.
     """
-    bad = 0
+    flaws = []
+    reflectance, unlit = points[:, 3], np.zeros(0, np.int64)
     # One sum finds any NaN or infinity at a tenth of the price of looking at each value.
     if not np.isfinite(points.sum(dtype=np.float64)):
-        broken = ~np.isfinite(points).all(axis=1)
-        bad = int(broken.sum())
+        broken = np.flatnonzero(~np.isfinite(points[:, :3]).all(axis=1))
         points[broken] = 0.0
-    reflectance = points[:, 3]
+        unlit = np.flatnonzero(~np.isfinite(reflectance))
+        reflectance[unlit] = 0.0
+        if len(broken):
+            flaws.append(f"{len(broken)} points are not finite and count as no return")
+        if len(unlit):
+            lacking = f"{len(unlit)} reflectances are not finite and count as not recorded"
+            flaws.append(f"{lacking}: have the sensor's driver write them, or set sensor.reflectance to none")
     odd = np.count_nonzero(reflectance < 0) + np.count_nonzero(np.abs(points[:, :3]) > FARTHEST_M)
     odd += np.count_nonzero(reflectance > 255)
     if odd > TOLERATED_SHARE * len(points):
@@ -60,4 +67,5 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, int]:
     if reflectance.max(initial=0.0) > 1.0:  # 0 to 255, unless a few strays alone are beyond 1
         in_bytes = np.count_nonzero(reflectance > 1.0) > TOLERATED_SHARE * len(points)
         np.clip(reflectance / np.float32(255 if in_bytes else 1), 0, 1, out=reflectance)
-    return points, bad
+    reflectance[unlit] = UNRECORDED
+    return points, flaws

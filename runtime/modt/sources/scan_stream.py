@@ -52,12 +52,12 @@ class ScanStream:
         used = 0
         for scan in self.scans:
             try:
-                points, broken = read_scan(scan.path)
+                points, flaws = read_scan(scan.path)
             except ScanError as error:
                 self._fault(scan, error.cause, skipped=True)
                 continue
-            if broken:
-                self._fault(scan, f"{broken} points are not finite and count as no return", skipped=False)
+            if flaws:
+                self._fault(scan, "; ".join(flaws), skipped=False)
             used += 1
             yield Frame(scan.index, scan.stamp_s, points, scan.T_world_sensor, turn_s=scan.turn_s)
         if self.scans and not used:
