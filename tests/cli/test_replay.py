@@ -15,6 +15,7 @@ from modt import profile
 from modt.evaluation.summary import summarise
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
+from modt.sources.synthetic.stream import SyntheticStream
 from modt.types import CLASS_NAMES
 
 from ..sources import layouts
@@ -181,6 +182,23 @@ def test_bad_scans_are_counted_and_the_rest_goes_on(tmp_path):
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["faults"]["skipped"] == 1
     assert "truncated" in done.stderr
     assert "1 of them skipped" in done.stdout
+
+
+def test_frames_without_reflectance_are_counted_where_the_sensor_has_it(tmp_path):
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    frames = list(SyntheticStream("street", "hdl-64e", 0.3, seed=0))
+    for frame in frames:
+        points = frame.points * np.float32([1, 1, 1, frame.index == 1])
+        (folder / f"{frame.index:06d}.bin").write_bytes(points.tobytes())
+    (tmp_path / "shape.yaml").write_text("sensor:\n  reflectance: none\n")
+    for profile_name, unlit in (("hdl-64e", 2), ("shape.yaml", 0)):
+        done = modt("replay", folder, "--profile", profile_name, "--out", "run", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        faults = json.loads((tmp_path / "run" / "summary.json").read_text())["faults"]
+        assert faults == {"count": 0, "skipped": 0, "first": None, "frames_without_reflectance": unlit}
+        assert ("without reflectance: 2 frames" in done.stdout) is (unlit > 0)
+        assert done.stderr.count("carries no reflectance") == (unlit > 0)
 
 
 def test_a_stream_of_bad_scans_fails(tmp_path):

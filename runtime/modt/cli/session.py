@@ -20,7 +20,7 @@ from modt.sinks.run_directory import RunDirectory
 from modt.sinks.sink import Sink
 from modt.sources.odometry import PosedStream
 from modt.supervisor import Supervisor
-from modt.types import FrameResult
+from modt.types import FrameResult, Proposals
 
 HELPER_SHARE = 0.01
 """CPU time of other threads, as a share of the loop's, up to which the process counts as single-threaded."""
@@ -52,6 +52,7 @@ class Session:
         )
         self.stop = Stop()
         self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
+        self.unlit_frames = 0
         self.directory = RunDirectory(out or Path("runs") / f"{self._stream_name()}-{request.mode}")
         self._describe(command)
 
@@ -75,6 +76,7 @@ class Session:
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_result(result)
             summary.add_ledger(ledger_line)
+            self.unlit_frames += self._unlit(result.proposals)
             window = windows.add(ledger_line)
             if window is not None:
                 ledger_lines.write(window)
@@ -96,6 +98,10 @@ class Session:
         figures = summary.result() | self._circumstances(summary.frames, elapsed_s)
         self.directory.summarise(figures)
         return figures
+
+    def _unlit(self, proposals: Proposals) -> bool:
+        """Whether they tell no reflectance, though the profile says that the sensor records it."""
+        return self.profile.sensor.reflectance != "none" and len(proposals) > 0 and proposals.reflectance is None
 
     def _further_sinks(self) -> list[Sink]:
         info, path = self.stream.info, self.directory.path
@@ -157,5 +163,6 @@ class Session:
                 "count": faults.count,
                 "skipped": faults.skipped,
                 "first": next((f"{f.subject}: {f.cause}" for f in faults.first), None),
+                "frames_without_reflectance": self.unlit_frames,
             },
         }
