@@ -80,11 +80,11 @@ def test_each_sweep_has_its_own_turn(tmp_path):
     ("end", "text", "named"),
     [
         ("start", "nonsense\n", "no list of time stamps"),
-        ("end", "", "4 starts and 0 ends"),
+        ("end", "\n\n", "no list of time stamps"),
         ("end", "2011-09-26 13:02:24.000000000\n" * 4, "4 sweeps of .*the first is 0"),
         ("end", "2011-09-26 13:02:25.250000001\n" * 4, "2 sweeps of .*the first is 0"),
     ],
-    ids=["broken", "short", "backwards", "too long"],
+    ids=["broken", "blank", "backwards", "too long"],
 )
 def test_turns_that_cannot_be_are_named_and_left_out(tmp_path, end, text, named):
     drive = layouts.raw_drive(tmp_path)
@@ -94,6 +94,65 @@ def test_turns_that_cannot_be_are_named_and_left_out(tmp_path, end, text, named)
     assert re.search(named, note)
     assert note.endswith("seen at once")
     assert [f.turn_s for f in stream] == [0.0] * 4
+
+
+def lines_of(drive, end):
+    """A list of times of a drive, and its lines."""
+    path = drive / "velodyne_points" / f"timestamps{end}.txt"
+    return path, path.read_text().splitlines(keepends=True)
+
+
+@pytest.mark.parametrize("end", ["_start", "_end"])
+@pytest.mark.parametrize("blank", ["\n", "  \n", "25.05 nonsense\n"])
+def test_a_sweep_without_its_times_is_seen_at_once_and_the_others_keep_theirs(tmp_path, end, blank):
+    drive = layouts.raw_drive(tmp_path)
+    path, lines = lines_of(drive, end)
+    path.write_text("".join([lines[0], blank, *lines[2:]]))
+    stream = open_stream(drive)
+    np.testing.assert_allclose([f.turn_s for f in stream], [0.1, 0, 0.1, 0.1], atol=1e-9)
+    (note,) = stream.info.notes
+    assert note == f"1 frames have no time in {path} (the first is 1): those sweeps are taken for seen at once"
+
+
+def test_a_frame_without_its_stamp_has_that_of_its_number_and_the_others_keep_theirs(tmp_path):
+    drive = layouts.raw_drive(tmp_path)
+    path, lines = lines_of(drive, "")
+    path.write_text("".join(["\n", lines[1], "\n", lines[3].replace("25.3", "25.31")]))
+    stream = open_stream(drive)
+    np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.2, 0.31], atol=1e-9)
+    (note,) = stream.info.notes
+    assert note == f"2 frames have no time in {path} (the first is 0): those frames 0.1 s apart"
+
+
+@pytest.mark.parametrize("end", ["", "_start", "_end"])
+def test_blank_lines_of_scans_that_are_missing_are_as_they_should_be(tmp_path, end):
+    drive = layouts.raw_drive(tmp_path, [0, 1, 4])
+    path, lines = lines_of(drive, end)
+    path.write_text("".join([*lines[:2], "\n", "\n", lines[4]]))
+    stream = open_stream(drive)
+    np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.4], atol=1e-9)
+    np.testing.assert_allclose([f.turn_s for f in stream], 0.1, atol=1e-9)
+    (note,) = stream.info.notes
+    assert "2 frames are missing" in note
+
+
+@pytest.mark.parametrize("end", ["", "_start", "_end"])
+def test_a_list_of_another_length_is_named_and_counts_line_by_line(tmp_path, end):
+    drive = layouts.raw_drive(tmp_path)
+    path, lines = lines_of(drive, end)
+    path.write_text("".join(lines[:3]))
+    stream = open_stream(drive)
+    assert len(stream.info.notes) == 2
+    assert stream.info.notes[0].startswith(f"{path} holds 3 lines for 4 scans")
+    assert "restore" in stream.info.notes[0]
+    assert stream.info.notes[1].startswith(f"1 frames have no time in {path} (the first is 3)")
+    np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.2, 0.3], atol=1e-9)
+    np.testing.assert_allclose([f.turn_s for f in stream], [0.1, 0.1, 0.1, 0.1 if end == "" else 0], atol=1e-9)
+    path.write_text("".join([*lines, lines[3]]))
+    stream = open_stream(drive)
+    (note,) = stream.info.notes
+    assert note.startswith(f"{path} holds 5 lines for 4 scans")
+    np.testing.assert_allclose([f.turn_s for f in stream], 0.1, atol=1e-9)
 
 
 def test_missing_frames_leave_gaps_and_a_note(tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -46,9 +46,10 @@ def raw_drive(drive: Path) -> ScanStream:
     notes = Notes()
     camera = _camera(calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
     poses = _poses_of_raw(drive, notes)
-    stamps = _raw_stamps(drive / "velodyne_points" / "timestamps.txt", notes)
-    turns = _raw_turns(drive / "velodyne_points", notes)
     data = drive / "velodyne_points" / "data"
+    frames, _ = _scans(data)
+    stamps = _raw_stamps(drive / "velodyne_points" / "timestamps.txt", frames, notes)
+    turns = _raw_turns(drive / "velodyne_points", frames, notes)
     return _stream(drive.name, "KITTI raw drive", data, camera, poses, stamps, notes, turns=turns)
 
 
@@ -114,6 +115,19 @@ def scan_folder(folder: Path) -> ScanStream:
     return _stream(folder.name, "folder of scans", folder, None, {}, {}, notes)
 
 
+def _scans(data: Path) -> tuple[list[int], list[Path]]:
+    """Numbers and files of a folder's scans, in the order of their names.
+
+    Raises:
+        MisuseError: it holds none.
+    """
+    files = sorted(data.glob("*.bin"))
+    if not files:
+        raise MisuseError(data, "no .bin scans", "give a folder that holds them")
+    numbered = all(f.stem.isdigit() for f in files)
+    return [int(f.stem) for f in files] if numbered else list(range(len(files))), files
+
+
 def _stream(
     name: str,
     layout: str,
@@ -127,11 +141,7 @@ def _stream(
     turns: Mapping[int, float] = MappingProxyType({}),
     turn_s: float = 0.0,
 ) -> ScanStream:
-    files = sorted(data.glob("*.bin"))
-    if not files:
-        raise MisuseError(data, "no .bin scans", "give a folder that holds them")
-    numbered = all(f.stem.isdigit() for f in files)
-    indices = [int(f.stem) for f in files] if numbered else list(range(len(files)))
+    indices, files = _scans(data)
     gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
     if gaps:
         notes.of_stream.append(f"{len(gaps)} frames are missing (the first is {gaps[0]})")
@@ -180,57 +190,66 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 
-def _raw_stamps(path: Path, notes: Notes) -> dict[int, float]:
-    """Seconds since the first stamp, by frame."""
-    if not path.is_file():
-        notes.of_stream.append(f"{path} is missing: frames {PERIOD_S} s apart")
+def _raw_stamps(path: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
+    """Seconds since scan 0, by frame."""
+    times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes)
+    if not times:
         return {}
-    try:
-        times = _times_ns(path)
-    except ValueError:
-        notes.of_stream.append(f"{path} is no list of time stamps: frames {PERIOD_S} s apart")
-        return {}
-    return {i: (t - times[0]) / 1e9 for i, t in enumerate(times)}
+    first = min(times)
+    began = times[first] - round(first * PERIOD_S * 1e9)
+    return {i: (t - began) / 1e9 for i, t in times.items()}
 
 
-def _raw_turns(folder: Path, notes: Notes) -> dict[int, float]:
+def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
     """Time that the head took to turn [s], by frame; nothing where that is not known, or cannot be."""
-    texts = []
-    for end in ("start", "end"):
-        path = folder / f"timestamps_{end}.txt"
-        if not path.is_file():
-            notes.of_stream.append(f"{path} is missing: {AT_ONCE}")
-            return {}
-        try:
-            texts.append(_times_ns(path))
-        except ValueError:
-            notes.of_stream.append(f"{path} is no list of time stamps: {AT_ONCE}")
-            return {}
-    starts, ends = texts
-    if len(starts) != len(ends):
-        notes.of_stream.append(f"{folder} holds {len(starts)} starts and {len(ends)} ends of sweeps: {AT_ONCE}")
-        return {}
-    turns = [(end - start) / 1e9 for start, end in zip(starts, ends, strict=True)]
-    period_s = float(np.median(np.diff(starts))) / 1e9 if len(starts) > 1 else PERIOD_S
-    odd = [i for i, turn_s in enumerate(turns) if not 0.0 <= turn_s <= LONGEST_TURN * period_s]
+    starts = _times_ns(folder / "timestamps_start.txt", frames, AT_ONCE, notes)
+    ends = _times_ns(folder / "timestamps_end.txt", frames, AT_ONCE, notes) if starts else {}
+    turns = {i: (ends[i] - starts[i]) / 1e9 for i in frames if i in starts and i in ends}
+    period_s = float(np.median(np.diff(list(starts.values())))) / 1e9 if len(starts) > 1 else PERIOD_S
+    odd = [i for i, turn_s in turns.items() if not 0.0 <= turn_s <= LONGEST_TURN * period_s]
     if odd:
         impossible = f"less than nothing or more than {LONGEST_TURN} periods"
         notes.of_stream.append(f"{len(odd)} sweeps of {folder} last {impossible} (the first is {odd[0]}): {AT_ONCE}")
         return {}
-    return dict(enumerate(turns))
+    return turns
 
 
-def _times_ns(path: Path) -> list[int]:
-    """Times of a list of KITTI's, a line each [ns].
+def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes) -> dict[int, int]:
+    """Times of a list of KITTI's, by frame [ns]: line i is that of scan i, or blank where that is missing.
 
-    Raises:
-        ValueError: it is none.
+    Args:
+        path: of the list.
+        frames: numbers of the scans that there are.
+        cost: what becomes of frames without a time.
+        notes: take what is wrong with it.
     """
-    parts = [line.partition(".") for line in path.read_text().splitlines() if line]
-    return [
-        int(datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp()) * 10**9 + int(fraction[:9].ljust(9, "0"))
-        for second, _, fraction in parts
-    ]
+    if not path.is_file():
+        notes.of_stream.append(f"{path} is missing: {cost}")
+        return {}
+    lines = path.read_text(encoding="utf-8", errors="replace").rstrip().split("\n")
+    times = {i: time for i, time in enumerate(map(_time_ns, lines)) if time is not None}
+    if not times:
+        notes.of_stream.append(f"{path} is no list of time stamps: {cost}")
+        return {}
+    n_scans = max(frames) + 1
+    if len(lines) != n_scans:
+        unlike = f"{path} holds {len(lines)} lines for {n_scans} scans"
+        notes.of_stream.append(f"{unlike}: line i is taken for that of scan i; restore what is missing")
+    without = [i for i in frames if i not in times]
+    if without:
+        lacking = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
+        notes.of_stream.append(f"{lacking}: those {cost}")
+    return times
+
+
+def _time_ns(line: str) -> int | None:
+    """A time as KITTI writes it [ns]; None where it is none."""
+    second, _, fraction = line.partition(".")
+    try:
+        whole = int(datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp())
+        return whole * 10**9 + int(fraction[:9].ljust(9, "0"))
+    except ValueError:
+        return None
 
 
 def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera | None:
