@@ -26,15 +26,18 @@ def test_no_proposals():
     assert empty.label(4).tolist() == [NONE] * 4
 
 
-@given(st.integers(0, 5), st.integers(0, 5))
-def test_tracks_grow_and_shrink_in_every_column(m, n):
-    a, b = Tracks.blank(m), Tracks.blank(n)
-    a.id[:], b.id[:] = np.arange(m), 100 + np.arange(n)
-    both = a.append(b)
-    assert len(both) == m + n
-    assert all(len(column) == m + n for _, column in both.columns())
-    assert both.take(both.id >= 100).id.tolist() == b.id.tolist()
-    assert {name for name, _ in both.columns()} == {f.name for f in dataclasses.fields(Tracks)}
+@given(st.lists(st.booleans(), max_size=6), st.integers(0, 5))
+def test_tracks_are_renewed_in_every_column(kept, n):
+    tracks = Tracks.blank(len(kept))
+    for _, column in tracks.columns():
+        column[:] = np.arange(1, len(kept) + 1).reshape(-1, *[1] * (column.ndim - 1))
+    rows = np.flatnonzero(kept)
+    renewed = tracks.renewed(rows, n)
+    old, blank = tracks.take(rows), Tracks.blank(n)
+    for name, column in renewed.columns():
+        np.testing.assert_array_equal(column, np.concatenate([getattr(old, name), getattr(blank, name)]))
+    assert renewed.take(renewed.id == NONE).id.tolist() == [NONE] * n
+    assert {name for name, _ in renewed.columns()} == {f.name for f in dataclasses.fields(Tracks)}
 
 
 def test_a_blank_track_knows_nothing():

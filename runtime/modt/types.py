@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int = NDArray[np.int64]
+Int16 = NDArray[np.int16]
 Bool = NDArray[np.bool_]
 
 NONE = -1
@@ -241,9 +242,21 @@ class Tracks:
         """The same rows, independent of these."""
         return type(self)(**{name: column.copy() for name, column in self.columns()})
 
-    def append(self, other: Self) -> Self:
-        """These rows, then the other's."""
-        return type(self)(**{n: np.concatenate([c, getattr(other, n)]) for n, c in self.columns()})
+    def renewed(self, kept: Int, n: int) -> Self:
+        """The rows kept, by index, then n blank ones."""
+        m = len(kept)
+        renewed = []
+        for (_, old), blank in zip(self.columns(), self._blank_row(), strict=True):
+            new = np.empty((m + n, *old.shape[1:]), old.dtype)
+            old.take(kept, axis=0, out=new[:m], mode="clip")  # unlike "raise" straight into its place
+            new[m:] = blank
+            renewed.append(new)
+        return type(self)(*renewed)
+
+    @classmethod
+    @cache
+    def _blank_row(cls) -> tuple[NDArray[Any], ...]:
+        return tuple(column for _, column in cls.blank(1).columns())
 
     def row_of_proposal(self, n_proposals: int) -> Int:
         """(n_proposals,) row of the track that owns each proposal, NONE where there is none."""

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.tracking import outlines
-from modt.tracking.outlines import PAD_M, covered, girth, lengths, middles, touching
+from modt.tracking.outlines import PAD_M, WAYS, covered, girth, lengths, middles, touching
 
 
 def ends(n, seed, longest):
@@ -43,7 +43,22 @@ def test_touching_outlines(few, n, k, seed, longest):
 def test_what_was_never_seen_touches_nothing(few, monkeypatch):
     monkeypatch.setattr(outlines, "FEW_PAIRS", few)
     something, nothing = outline(*ends(6, 0, 30)), np.full((8, 2), -np.inf)
-    assert len(touching(nothing, something)[0]) == len(touching(something, nothing)[0]) == 0
+    assert not len(touching(nothing, something)[0])
+
+
+@pytest.mark.parametrize("few", [0, 10**9], ids=["sorted", "all compared"])
+@pytest.mark.parametrize("origin", [(0, 0), (-458_000, 5_430_000)], ids=["here", "UTM"])
+def test_where_the_world_begins_does_not_matter(few, origin, monkeypatch):
+    monkeypatch.setattr(outlines, "FEW_PAIRS", few)
+    start = (origin @ WAYS)[:, None]
+    a, b = outline(*ends(15, 1, 9)) + 0.51, outline(*ends(15, 2, 9))
+    assert len(touching(a, b)[0])
+    np.testing.assert_array_equal(touching(a + start, b + start), touching(a, b))
+
+
+def test_what_lies_apart_does_not_touch_however_far_away():
+    a = outline(*ends(5, 1, 9)) + (np.array([2_000.0, 0.0]) @ WAYS)[:, None]
+    assert not len(touching(a, outline(*ends(5, 2, 9)))[0])
 
 
 @given(st.integers(0, 9), st.integers(0, 2**16))

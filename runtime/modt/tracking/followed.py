@@ -52,7 +52,7 @@ class Followed(Tracks):
             **shared,
             kind=np.zeros(m, np.int64),
             outline=np.zeros((m, 8)),
-            hull=np.zeros((m, 8)),
+            hull=np.full((m, 8), -np.inf),
             shape=np.zeros((m, 8)),
             doubt=np.zeros((m, 4)),
             foot=np.zeros(m),

@@ -101,12 +101,12 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
 
 def turn_about(x: Float64, P: Float64) -> tuple[Float64, Float64]:
     """The same motion with a speed that is not negative."""
-    sign = np.where(x[:, SPEED] < 0, -1.0, 1.0)
+    back = np.flatnonzero(x[:, SPEED] < 0)
     out, cov = x.copy(), P.copy()
-    out[:, SPEED] *= sign
-    out[:, HEADING] = np.where(sign < 0, wrap(x[:, HEADING] + np.pi), x[:, HEADING])
-    cov[:, SPEED, :] *= sign[:, None]
-    cov[:, :, SPEED] *= sign[:, None]
+    out[back, SPEED] *= -1
+    out[back, HEADING] = wrap(x[back, HEADING] + np.pi)
+    cov[back, SPEED, :] *= -1
+    cov[back, :, SPEED] *= -1
     return out, cov
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.types import Bool, Float32, Float64, Int, Proposals
+from modt.types import Bool, Float64, Int, Int16, Proposals
 
 DIRECTIONS = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 """Bearings of the axes along which an outline is measured, world frame [rad]."""
@@ -20,7 +20,9 @@ WAYS = np.concatenate([AXES, -AXES], axis=1)
 """(2, 8) the directions: each axis forth, then each axis back."""
 PAD_M = 0.15
 """Outlines jitter by this much."""
-FEW_PAIRS = 200_000
+CELL_M, FAR = 0.02, 2**15 - 1
+"""Where outlines touch is looked for in whole cells up to so many away: 16 bits are compared twice as fast as 32."""
+FEW_PAIRS = 400_000
 """Up to this many, looking at every pair costs less than sorting."""
 
 
@@ -74,15 +76,26 @@ def covered(outline: Float64, place: Float64) -> Float64:
 
 
 def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
-    """Pairs of outlines a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order."""
+    """Pairs of outlines a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
+
+    What is less than CELL_M apart may count as touching; so does nothing that is FAR cells away from the first of b.
+    """
     n, k = a.shape[1], b.shape[1]
-    ends, facing = np.ascontiguousarray(a[::2], np.float32), -np.ascontiguousarray(b[::2], np.float32)
+    if not n or not k:
+        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    origin = (b[:4:2, 0] @ WAYS[:, ::2])[:, None]
+    ends, facing = _cells(a[::2] - origin), _cells(-b[::2] + origin)
     pair = (compare_all if n * k < FEW_PAIRS else sweep)(ends, facing)
-    i = pair // max(k, 1)
+    i = pair // k
     return i, pair - i * k
 
 
-def compare_all(ends: Float32, facing: Float32) -> Int:
+def _cells(coordinate: Float64) -> Int16:
+    """Coordinates about the same origin [m], in cells of CELL_M."""
+    return np.clip(coordinate / CELL_M, -FAR, FAR).astype(np.int16)
+
+
+def compare_all(ends: Int16, facing: Int16) -> Int:
     """Pairs i * k + j, in order, of which ends (4, n) reach what faces them (4, k) on every side, all looked at.
 
     What faces an end is the other's opposite one, two further on and with its sign reversed.
@@ -93,7 +106,7 @@ def compare_all(ends: Float32, facing: Float32) -> Int:
     return np.flatnonzero(near)
 
 
-def sweep(ends: Float32, facing: Float32) -> Int:
+def sweep(ends: Int16, facing: Int16) -> Int:
     """The same pairs: sorted along the first axis, those that can overlap an interval are a stretch of the others.
 
     It ends where they begin beyond the interval, and begins where the first of them reaches it.

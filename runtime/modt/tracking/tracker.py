@@ -124,9 +124,7 @@ class Tracker:
         self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
-        scenery = self._scenery()
-        self._bear(matches, sightings, scenery)
-        self._bury(scenery)
+        self._renew(matches, sightings)
         return self._tracks
 
     def asking(self) -> Bool:
@@ -292,45 +290,45 @@ class Tracker:
         t.inherited[rows] = t.fixed[rows] = False
         t.posterior[rows] = 1.0 / N_CLASSES
 
-    def _bear(self, matches: Matches, sightings: Sightings, scenery: Int) -> None:
-        """A track for every proposal that found none; a2, or a1 and a5 where its place is remembered."""
+    def _renew(self, matches: Matches, sightings: Sightings) -> None:
+        """Deaths, and a track for every proposal that found none; a2, or a1 and a5 where its place is remembered."""
         free = np.ones(len(sightings), np.bool_)
         free[matches.proposals] = False
         born = np.flatnonzero(free)
-        if not len(born):
-            return
+        scenery = self._scenery()
         known = self.memory.recall(self._tracks, scenery, sightings, born)
-        new = Followed.blank(len(born))
-        new.id[:] = self._next_id + np.arange(len(born))
+        alive = self._bury(scenery)
+        t = self._tracks = self._tracks.renewed(alive, len(born))
+        new = np.arange(len(alive), len(t))
+        t.id[new] = self._next_id + np.arange(len(born))
         self._next_id += len(born)
-        new.state[:] = self.machine.meet(
-            np.full(len(born), self.machine.proposal), np.where(known, Happening.ASSOCIATED, Happening.UNASSOCIATED)
-        )
-        new.state[known] = self.machine.meet(new.state[known], Happening.INHERITS_CLASS)
-        new.inherited[:] = new.fixed[:] = known
-        new.posterior[known] = BACKGROUND
-        new.x[:, :2] = self.association.birthplace(sightings)[born]  # speed and heading begin at zero
-        new.P[:] = self._P_born
-        new.age[:] = new.hits[:] = 1
-        new.home[:] = new.x[:, :2]
-        new.hull[:] = -np.inf
-        self._show(new, np.arange(len(born)), born, sightings, new.x[:, :2])
-        self._tracks = self._tracks.append(new)
+        happening = np.where(known, Happening.ASSOCIATED, Happening.UNASSOCIATED)
+        t.state[new] = self.machine.meet(np.full(len(born), self.machine.proposal), happening)
+        heir = new[known]
+        t.state[heir] = self.machine.meet(t.state[heir], Happening.INHERITS_CLASS)
+        t.inherited[heir] = t.fixed[heir] = True
+        t.posterior[heir] = BACKGROUND
+        place = self.association.birthplace(sightings)[born]
+        t.x[new, :2] = t.home[new] = place  # speed and heading begin at zero
+        t.P[new] = self._P_born
+        t.age[new] = t.hits[new] = 1
+        self._show(t, new, born, sightings, place)
 
-    def _bury(self, scenery: Int) -> None:
+    def _bury(self, scenery: Int) -> Int:
         """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered.
 
         What flickers is deleted after half as many.
+
+        Returns:
+            (A,) rows that live on.
         """
         t = self._tracks
         patience = np.where(t.hits < FLICKER, self.config.max_missed // 2, self.config.max_missed)
         expired = t.missed > patience
         rows = np.flatnonzero(expired)
-        if not len(rows):
-            return
         t.state[rows] = self.machine.meet(t.state[rows], Happening.EXPIRED)
         self.memory.keep(t, scenery[expired[scenery]])
-        self._tracks = t.take(~expired)
+        return np.flatnonzero(~expired)
 
     def _scenery(self) -> Int:
         """Rows that are background, for certain, and never moved."""
