@@ -6,7 +6,8 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
-from modt.tracking.egomotion import SCALE_M, _fit, _mutual
+from modt.tracking.egomotion import SCALES, _fit, _mutual
+from modt.tracking.outlines import WAYS
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker, rigid
 
@@ -112,24 +113,46 @@ def test_products_of_poses_stay_rigid():
     np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
 
 
-def slow_fit(shift, lever, weight):
-    """Weighted least squares of shift + (x, y) + turn * turned = 0, reweighted by the residuals, solved as such."""
-    turned = np.stack([-lever[:, 1], lever[:, 0]], axis=1)
-    design = np.concatenate([np.tile(np.eye(2), (len(shift), 1)), turned.reshape(-1, 1)], axis=1)
-    motion = np.zeros(3)
-    for _ in range(3):
-        residual = (shift.ravel() + design @ motion).reshape(-1, 2)
-        w = np.repeat(weight / (1 + (residual**2).sum(axis=1) / SCALE_M**2), 2)
-        A = design.T @ (w[:, None] * design)
-        motion = -np.linalg.solve(A + 1e-6 * np.trace(A) * np.eye(3), design.T @ (w * shift.ravel()))
+def outward(lever):
+    """(3, 8, K) how far x, y and a turn take each end of outlines at the ends of levers (K, 2), one by one."""
+    out = np.zeros((3, 8, len(lever)))
+    for k, (x, y) in enumerate(lever):
+        for e in range(8):
+            out[:, e, k] = WAYS[0, e], WAYS[1, e], WAYS[0, e] * -y + WAYS[1, e] * x
+    return out
+
+
+def slow_fit(gain, ways, variance, motion, scales):
+    """Gains + ways * motion = 0, an equation an end, solved as such, reweighted by the residuals."""
+    design, sigma2 = ways.reshape(3, -1).T, np.tile(variance, 8)
+    for scale in scales:
+        w = 1 / ((gain.ravel() + design @ motion) ** 2 + scale**2 * sigma2)
+        little = np.sqrt(1e-6 * (w[:, None] * design**2).sum()) * np.eye(3)
+        rows = np.concatenate([np.sqrt(w)[:, None] * design, little])
+        motion = -np.linalg.lstsq(rows, np.append(np.sqrt(w) * gain.ravel(), np.zeros(3)))[0]
     return motion
 
 
 @given(st.integers(3, 40), st.integers(0, 2**16))
 def test_the_fit_is_weighted_least_squares(n, seed):
     rng = np.random.default_rng(seed)
-    shift, lever, weight = rng.normal(0, 0.3, (n, 2)), rng.uniform(-60, 60, (n, 2)), rng.uniform(1, 100, n)
-    np.testing.assert_allclose(_fit(shift, lever, weight), slow_fit(shift, lever, weight), rtol=1e-6, atol=1e-9)
+    gain, variance = rng.normal(0, 0.3, (8, n)), rng.uniform(0.01, 0.1, n) ** 2
+    problem = gain, outward(rng.uniform(-60, 60, (n, 2))), variance, rng.normal(0, 0.1, 3)
+    for scales in (SCALES[:1], SCALES):
+        np.testing.assert_allclose(_fit(*problem, scales), slow_fit(*problem, scales), rtol=1e-5, atol=1e-8)
+
+
+@given(st.integers(0, 2**16))
+def test_ends_that_come_into_view_do_not_mislead(seed):
+    """One end of every axis tells how the sensor moved, the other, whichever, came into view."""
+    rng = np.random.default_rng(seed)
+    ways, motion = outward(rng.uniform(-40, 40, (30, 2))), rng.uniform(-1, 1, 3) * [0.3, 0.3, 0.01]
+    gain = -np.tensordot(motion, ways, 1) + rng.normal(0, 0.01, (8, 30))
+    ahead = rng.random((4, 30)) < 0.5
+    gain += np.concatenate([ahead, ~ahead]) * rng.exponential(0.5, (8, 30))
+    off = _fit(gain, ways, np.full(30, 0.02**2), np.zeros(3), SCALES) - motion
+    assert np.abs(off).max() < 0.02
+    assert abs(off[2]) < 0.001
 
 
 @given(st.integers(0, 30), st.integers(0, 2**16))

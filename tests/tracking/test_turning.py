@@ -107,6 +107,23 @@ def test_what_lies_across_the_seam_is_seen_at_the_mean_time_of_its_parts(distanc
     assert found == pytest.approx(-mean / (2 * np.pi), abs=1e-3)
 
 
+@given(st.floats(0, 20), st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.2, 0.2), st.sampled_from([0.1, -0.1]))
+def test_what_was_seen_goes_by_its_share_of_a_correction(speed, turn, faster, turns_more, turn_s):
+    """Placing it anew by the corrected pose, and by the motion that led there, moves it as far."""
+    proposals = skewed(np.array([box(12, 4), box(-3, 8), box(-9, -9), box(2, -6)]), 0, turn_s, 0, 0, True)[1]
+    skew, before = Skew.of(proposals, turn_s), pose(0, 0, 0)
+
+    def place(after):
+        step = skew.step(Motion.between(before, after, PERIOD_S), after)
+        return sight(proposals, after).centroid + step
+
+    predicted, after = pose(PERIOD_S, speed, turn), pose(PERIOD_S, speed + faster, turn + turns_more)
+    placed = np.c_[place(predicted), np.zeros((4, 2))] + [0, 0, 0, 1]
+    whole = (placed @ (after @ inverse(predicted)).T - placed)[:, :2]
+    expected = skew.share(PERIOD_S)[:, None] * whole
+    np.testing.assert_allclose(place(after) - place(predicted), expected, atol=0.01)
+
+
 @pytest.mark.parametrize("turn_s", [0.1, -0.1])
 def test_proposals_are_where_their_points_are_one_by_one(turn_s):
     """What moving a proposal as a whole leaves, against its points each by its own time."""

@@ -16,7 +16,7 @@ from modt.tracking.outlines import WAYS, middles, touching
 from modt.tracking.robust import carried, compare, likeness
 from modt.tracking.shifts import shift_between
 from modt.tracking.sightings import Sightings
-from modt.types import Float64, Int
+from modt.types import Bool, Float64, Int
 
 REACH_M = 2.5
 """How far the prediction may be off at its first frame."""
@@ -26,9 +26,14 @@ VOTE_M = 0.25
 """Side of a cell in which shifts are counted."""
 ALIKE = 0.5
 """Difference of size beyond which a pair has no vote."""
-SCALE_M = 0.08
-"""Residuals beyond this lose their say (Cauchy)."""
+END_M, END_SPREAD = 0.02, 0.0007
+"""How far the ends of a landmark are off, near by and more for each metre of range: beyond, an end loses its say."""
+YOUNG_M = 0.07
+"""How much more those of what has no mean outline yet."""
+SCALES = (8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+"""A fit begins as if everything were off by so many times more, lest it ends where few ends agree by chance."""
 ROUNDS = 4
+"""Times that pairs are chosen anew where the prediction may be far off, with as many of the scales each time."""
 INLIER_M = 0.2
 """A landmark this near to where it should be agrees."""
 AGREEMENT = 0.3
@@ -68,11 +73,21 @@ class Registration:
     def __init__(self) -> None:
         self._begun = self._settled = False
 
-    def correct(self, tracks: Followed, sightings: Sightings) -> Float64:
-        """(4, 4) motion in the world that brings the sightings onto the tracks; identity where nothing says so."""
-        fit = self._solve(tracks, sightings, GATE_M, choices=1) if self._settled else None
+    def correct(self, tracks: Followed, sightings: Sightings, share: Float64 | float = 1.0) -> Float64:
+        """The motion in the world that brings the sightings onto the tracks.
+
+        Args:
+            tracks: what stands where, among others.
+            sightings: a frame's, by the pose that is expected.
+            share: of the motion, by which each of them goes (P,), as Skew.share.
+
+        Returns:
+            (4, 4) motion of the pose; identity where nothing says so.
+        """
+        ways = _ways(sightings) * share
+        fit = self._solve(tracks, sightings, ways, GATE_M, SCALES, choices=1) if self._settled else None
         if fit is None or not fit.shared_by(CONSENT):  # the prediction may be off: look farther
-            wide = self._solve(tracks, sightings, REACH_M, choices=ROUNDS)
+            wide = self._solve(tracks, sightings, ways, REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
             if fit is None or (wide is not None and wide.agree > fit.agree):
                 fit = wide
         self._settled = fit is not None and fit.shared_by(AGREEMENT)
@@ -84,8 +99,16 @@ class Registration:
             return np.eye(4)
         return _about(fit.motion, sightings.eye)
 
-    def _solve(self, tracks: Followed, sightings: Sightings, reach_m: float, choices: int) -> Fit | None:
-        """The motion that most landmarks within reach say; pairs are chosen anew in the first rounds."""
+    def _solve(
+        self,
+        tracks: Followed,
+        sightings: Sightings,
+        ways: Float64,
+        reach_m: float,
+        scales: tuple[float, ...],
+        choices: int,
+    ) -> Fit | None:
+        """The motion that most landmarks within reach say, pairs chosen so many times; ways as of _ways."""
         rows, known = landmarks(tracks)
         i, j = _pairs(known, sightings.outline, reach_m)
         if len(i) < MINIMUM:
@@ -94,24 +117,18 @@ class Registration:
         if not self._begun:
             shift, size, _, _ = compare(known[:, i], sightings.outline[:, j])
             motion[:2] = -_vote(shift[size < ALIKE])
-        levers = sightings.place - sightings.eye
-        variance = 0.05**2 + tracks.P[rows, 0, 0]
-        for k in range(ROUNDS):
-            lever = levers.take(j, axis=0)
-            carry = (motion[:2] + motion[2] * _turned(lever)) @ WAYS
-            a, b = known.take(i, axis=1), sightings.outline.take(j, axis=1) + carry.T
-            shift = shift_between(a, b)
-            error = np.hypot(shift[:, 0], shift[:, 1])
-            best = np.arange(len(i))
-            if k < choices:
-                size, overlap, _ = likeness(a, b)
-                best = _mutual(i, j, error + size - overlap)
-            weight = 1.0 / (variance[i[best]] + (0.003 * sightings.range_m[j[best]]) ** 2)
-            motion = motion + _fit(shift.take(best, axis=0), lever.take(best, axis=0), weight)
-            if choices == 1:
-                i, j, error = i[best], j[best], error[best]
-        agree = error if choices == 1 else error[best]
-        return Fit(motion, int((agree < INLIER_M).sum()), len(agree))
+        a, b, ways = known.take(i, axis=1), sightings.outline.take(j, axis=1), ways.take(j, axis=2)
+        gain, young = b - a, np.where(_stands(tracks), 0.0, YOUNG_M).take(rows)
+        variance = young[i] ** 2 + (END_M + END_SPREAD * sightings.range_m[j]) ** 2
+        for _ in range(choices):
+            gone = b + np.tensordot(motion, ways, 1)
+            shift = shift_between(a, gone)
+            size, overlap, _ = likeness(a, gone)
+            best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
+            motion = _fit(gain.take(best, axis=1), ways.take(best, axis=2), variance[best], motion, scales)
+        a, b, ways = a.take(best, axis=1), b.take(best, axis=1), ways.take(best, axis=2)
+        shift = shift_between(a, b + np.tensordot(motion, ways, 1))
+        return Fit(motion, int((np.hypot(shift[:, 0], shift[:, 1]) < INLIER_M).sum()), len(best))
 
 
 def landmarks(tracks: Followed) -> tuple[Int, Float64]:
@@ -122,9 +139,15 @@ def landmarks(tracks: Followed) -> tuple[Int, Float64]:
     """
     rows = np.flatnonzero((tracks.still | (tracks.hits < 3)) & (tracks.missed <= 2))
     outline = carried(tracks).take(rows, axis=1)
-    known = (tracks.still & (tracks.stood >= STOOD))[rows]
+    known = _stands(tracks)[rows]
     outline[:, known] = tracks.landmark[rows[known]].T
     return rows, outline
+
+
+def _stands(tracks: Followed) -> Bool:
+    """(M,) what has stood for a while."""
+    stands: Bool = tracks.still & (tracks.stood >= STOOD)
+    return stands
 
 
 def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
@@ -133,9 +156,13 @@ def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
     return touching(middle_a + reach, middle_b)
 
 
-def _turned(lever: Float64) -> Float64:
-    """(K, 2) how a small turn moves what is at the end of each lever, per radian."""
-    return np.stack([-lever[:, 1], lever[:, 0]], axis=1)
+def _ways(sightings: Sightings) -> Float64:
+    """(3, 8, P) how far a motion takes each end of the outlines outward, per metre of x and y and per radian."""
+    x, y = (sightings.place - sightings.eye).T
+    ways = np.empty((3, 8, len(x)))
+    ways[:2] = WAYS[:, :, None]
+    ways[2] = WAYS.T @ np.stack([-y, x])
+    return ways
 
 
 def _vote(shift: Float64) -> Float64:
@@ -159,23 +186,34 @@ def _mutual(i: Int, j: Int, cost: Float64) -> Int:
     return np.flatnonzero((best_of_i[i] == k) & (best_of_j[j] == k))
 
 
-def _fit(shift: Float64, lever: Float64, weight: Float64) -> Float64:
-    """(3,) x, y [m] and turn [rad] that undo the shifts (K, 2), by weighted least squares, outliers discounted.
+def _fit(gain: Float64, ways: Float64, variance: Float64, motion: Float64, scales: tuple[float, ...]) -> Float64:
+    """The motion that undoes what the ends of outlines gained, by least squares reweighted at each of the scales.
 
-    The normal equations are sums of the same products in every round, weighted anew; their block of x and y is a
-    multiple of the identity, so that they are solved in a line each.
+    An end that comes into view moves while the other stays. Each is a witness of its own, distributed as Cauchy has
+    it: what the others do not confirm loses its say. A millionth of the weights says that all is as expected.
+
+    Args:
+        gain: (8, K) [m].
+        ways: (3, 8, K), as of _ways.
+        variance: (K,) square of the scale of each pair's ends [m2].
+        motion: (3,) to begin with.
+        scales: factors to these scales.
+
+    Returns:
+        (3,) x, y [m] and turn [rad].
     """
-    (sx, sy), (tx, ty) = shift.T, _turned(lever).T
-    products = np.stack([np.ones(len(sx)), tx, ty, tx * tx + ty * ty, sx, sy, tx * sx + ty * sy])
-    x = y = turn = 0.0
-    for _ in range(3):
-        left = np.square(sx + x + turn * tx) + np.square(sy + y + turn * ty)
-        n, a, b, c, p, q, r = (products @ (weight / (1 + left / SCALE_M**2))).tolist()
-        little = 1e-6 * (2 * n + c)
-        n, c = n + little, c + little
-        turn = ((a * p + b * q) / n - r) / (c - (a * a + b * b) / n)
-        x, y = -(p + a * turn) / n, -(q + b * turn) / n
-    return np.array([x, y, turn])
+    J, g, variance = ways.reshape(3, -1), gain.ravel(), np.tile(variance, 8)
+    products = np.concatenate([J[0] * J, J[1] * J[1:], J[2:] * J[2], g * J])
+    for scale in scales:
+        left = motion @ J
+        left += g
+        left *= left
+        left += scale**2 * variance
+        xx, xy, xt, yy, yt, tt, x, y, t = (products @ (1.0 / left)).tolist()
+        little = 1e-6 * (xx + yy + tt)
+        normal = np.array([[xx + little, xy, xt], [xy, yy + little, yt], [xt, yt, tt + little]])
+        motion = -np.linalg.solve(normal, np.array([x, y, t]))
+    return motion
 
 
 def _about(motion: Float64, eye: Float64) -> Float64:

@@ -172,9 +172,11 @@ class Tracker:
         skew = Skew.of(proposals, frame.turn_s)
         dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
 
+        if 2 * dt_s < abs(frame.turn_s):  # over so short a time errors of the poses would be drawn out
+            dt_s = np.inf
+
         def motion_to(after: Float64) -> Motion:
-            """None over a time so short beside that of a sweep that errors of the poses would be drawn out."""
-            return Motion.between(before, after, dt_s) if 2 * dt_s >= abs(frame.turn_s) else Motion()
+            return Motion.between(before, after, dt_s)
 
         def seen_from(after: Float64) -> Sightings:
             """The proposals in the world, where they stand at the stamp."""
@@ -188,11 +190,12 @@ class Tracker:
             self._mend_first(motion_to, after)
         else:
             predicted = before @ (inverse(self._T_world_before) @ before)  # as it moved last
-            after = rigid(self._registration.correct(self._tracks, seen_from(predicted)) @ predicted)
+            share = 1.0 if skew is None or self._first is not None else skew.share(dt_s)  # the first frame goes along
+            after = rigid(self._registration.correct(self._tracks, seen_from(predicted), share) @ predicted)
             self._mend_first(motion_to, after)
             if skew is not None and not motion_to(after).skews_like(motion_to(predicted), frame.turn_s):
                 # What was registered stands elsewhere.
-                found, after = after, rigid(self._registration.correct(self._tracks, seen_from(after)) @ after)
+                found, after = after, rigid(self._registration.correct(self._tracks, seen_from(after), share) @ after)
                 self._mend_first(motion_to, after, instead=found)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
                 self._T_world_odometry = after @ inverse(given)

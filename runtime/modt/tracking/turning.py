@@ -77,6 +77,14 @@ class Skew:
         step: Float64 = motion.displacement(self.place, self.late_s) @ T_world_sensor[:2, :2].T
         return step
 
+    def share(self, dt_s: float) -> Float64:
+        """(P,) part of a correction of the pose, dt_s after the one before, by which what was seen then moves.
+
+        A sensor that went farther in that time had gone farther by the same share whenever it saw something.
+        """
+        share: Float64 = 1.0 + self.late_s / dt_s
+        return share
+
 
 def lateness(proposals: Proposals, turn_s: float) -> Float64:
     """(P,) when each proposal was seen, after the stamp of its frame [s]; turn_s as in Frame.
