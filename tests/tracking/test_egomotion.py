@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -180,6 +181,19 @@ def test_a_turn_that_begins_and_ends_at_once_is_followed():
     error = inverse(inverse(T_first) @ T) @ tracker.T_world_sensor
     assert abs(np.rad2deg(yaw_of(error))) < 0.6
     assert np.hypot(*error[:2, 3]) < 0.3
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_turn_that_begins_too_suddenly_to_be_found_at_once_is_sought_again(seed):
+    tracker, world, yaw, x, y = Tracker(TrackingConfig(), EFFICIENT), street(seed, 150), 0.0, 0.0, 0.0
+    for i in range(14):
+        yaw += 0.1 if i >= 10 else 0.0
+        x, y = x + 0.8 * np.cos(yaw), y + 0.8 * np.sin(yaw)
+        T = se3(rotation_zyx(0, 0, yaw), np.array([x - 0.8, y, 0.0]))  # from the origin
+        tracker.follow(*frame_of(transform_boxes(inverse(T), world), i, None, points=60))
+    error = inverse(T) @ tracker.T_world_sensor
+    assert abs(np.rad2deg(yaw_of(error))) < 0.1
+    assert np.hypot(*error[:2, 3]) < 0.05
 
 
 def test_the_error_of_one_frame_is_not_handed_on():

@@ -85,9 +85,13 @@ class Registration:
             (4, 4) motion of the pose; identity where nothing says so.
         """
         ways = _ways(sightings) * share
-        fit = self._solve(tracks, sightings, ways, GATE_M, SCALES, choices=1) if self._settled else None
+        rest = np.zeros(3)
+        fit = self._solve(tracks, sightings, ways, rest, GATE_M, SCALES, choices=1) if self._settled else None
         if fit is None or not fit.shared_by(CONSENT):  # the prediction may be off: look farther
-            wide = self._solve(tracks, sightings, ways, REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
+            wide = self._look_far(tracks, sightings, ways, rest)
+            if wide is not None and not wide.shared_by(AGREEMENT):  # it did not get there yet
+                again = self._look_far(tracks, sightings, ways, wide.motion)
+                wide = again if again is not None and again.agree > wide.agree else wide
             if fit is None or (wide is not None and wide.agree > fit.agree):
                 fit = wide
         self._settled = fit is not None and fit.shared_by(AGREEMENT)
@@ -99,24 +103,28 @@ class Registration:
             return np.eye(4)
         return _about(fit.motion, sightings.eye)
 
+    def _look_far(self, tracks: Followed, sightings: Sightings, ways: Float64, motion: Float64) -> Fit | None:
+        """The motion that most landmarks say that are near after another motion."""
+        return self._solve(tracks, sightings, ways, motion, REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
+
     def _solve(
         self,
         tracks: Followed,
         sightings: Sightings,
         ways: Float64,
+        motion: Float64,
         reach_m: float,
         scales: tuple[float, ...],
         choices: int,
     ) -> Fit | None:
-        """The motion that most landmarks within reach say, pairs chosen so many times; ways as of _ways."""
+        """The motion that most landmarks within reach of one say, pairs chosen so many times; ways as of _ways."""
         rows, known = landmarks(tracks)
-        i, j = _pairs(known, sightings.outline, reach_m)
+        i, j = _pairs(known, sightings.outline + np.tensordot(motion, ways, 1), reach_m)
         if len(i) < MINIMUM:
             return None
-        motion = np.zeros(3)
         if not self._begun:
             shift, size, _, _ = compare(known[:, i], sightings.outline[:, j])
-            motion[:2] = -_vote(shift[size < ALIKE])
+            motion = np.append(-_vote(shift[size < ALIKE]), 0.0)
         a, b, ways = known.take(i, axis=1), sightings.outline.take(j, axis=1), ways.take(j, axis=2)
         gain, young = b - a, np.where(_stands(tracks), 0.0, YOUNG_M).take(rows)
         variance = young[i] ** 2 + (END_M + END_SPREAD * sightings.range_m[j]) ** 2

@@ -171,8 +171,7 @@ class Tracker:
             before, self._T_world_odometry = given, np.eye(4)  # the world of the odometry is that of the tracks
         skew = Skew.of(proposals, frame.turn_s)
         dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
-
-        if 2 * dt_s < abs(frame.turn_s):  # over so short a time errors of the poses would be drawn out
+        if 2 * dt_s < abs(frame.turn_s):  # so short that errors of the poses would be drawn out: no motion
             dt_s = np.inf
 
         def motion_to(after: Float64) -> Motion:
