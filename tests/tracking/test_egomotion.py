@@ -196,6 +196,18 @@ def test_a_turn_that_begins_too_suddenly_to_be_found_at_once_is_sought_again(see
     assert np.hypot(*error[:2, 3]) < 0.05
 
 
+@pytest.mark.parametrize("turn", [0.15, -0.15])
+def test_a_sensor_that_turns_fast_from_the_outset_is_followed(turn):
+    """Where nothing is known of the motion turns are tried: a vote among shifts alone would be led astray."""
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street(n=150)
+    for i in range(4):
+        T = se3(rotation_zyx(0, 0, turn * i), np.zeros(3))
+        tracker.follow(*frame_of(transform_boxes(inverse(T), world), i, None, points=60))
+    error = inverse(T) @ tracker.T_world_sensor
+    assert abs(np.rad2deg(yaw_of(error))) < 1.0
+    assert np.hypot(*error[:2, 3]) < 0.3
+
+
 def test_the_error_of_one_frame_is_not_handed_on():
     """Landmarks keep to where they were seen on average, so a pose found wrongly does not move the world."""
     tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()

@@ -44,6 +44,8 @@ STOOD = 3
 """Frames from which the mean of what stands is its place."""
 TURN_RAD = 0.2
 """Greatest turn of a correction."""
+OUTSET_RAD = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15)
+"""Turns that are tried while nothing is known of the motion."""
 MINIMUM = 3
 """Landmarks without which nothing is corrected."""
 
@@ -89,7 +91,7 @@ class Registration:
         fit = self._solve(tracks, sightings, ways, rest, GATE_M, SCALES, choices=1) if self._settled else None
         if fit is None or not fit.shared_by(CONSENT):  # the prediction may be off: look farther
             wide = self._look_far(tracks, sightings, ways, rest)
-            if wide is not None and not wide.shared_by(AGREEMENT):  # it did not get there yet
+            if self._begun and wide is not None and not wide.shared_by(AGREEMENT):  # it did not get there yet
                 again = self._look_far(tracks, sightings, ways, wide.motion)
                 wide = again if again is not None and again.agree > wide.agree else wide
             if fit is None or (wide is not None and wide.agree > fit.agree):
@@ -104,8 +106,13 @@ class Registration:
         return _about(fit.motion, sightings.eye)
 
     def _look_far(self, tracks: Followed, sightings: Sightings, ways: Float64, motion: Float64) -> Fit | None:
-        """The motion that most landmarks say that are near after another motion."""
-        return self._solve(tracks, sightings, ways, motion, REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
+        """The motion that most landmarks say that are near after another motion, or after any turn at the outset."""
+        starts = (motion,) if self._begun else ([0.0, 0.0, turn] for turn in OUTSET_RAD)
+        fits = (
+            self._solve(tracks, sightings, ways, np.asarray(start), REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
+            for start in starts
+        )
+        return max((fit for fit in fits if fit is not None), key=lambda fit: fit.agree, default=None)
 
     def _solve(
         self,
@@ -119,12 +126,13 @@ class Registration:
     ) -> Fit | None:
         """The motion that most landmarks within reach of one say, pairs chosen so many times; ways as of _ways."""
         rows, known = landmarks(tracks)
-        i, j = _pairs(known, sightings.outline + np.tensordot(motion, ways, 1), reach_m)
+        near = sightings.outline + np.tensordot(motion, ways, 1)
+        i, j = _pairs(known, near, reach_m)
         if len(i) < MINIMUM:
             return None
         if not self._begun:
-            shift, size, _, _ = compare(known[:, i], sightings.outline[:, j])
-            motion = np.append(-_vote(shift[size < ALIKE]), 0.0)
+            shift, size, _, _ = compare(known[:, i], near[:, j])
+            motion = motion + np.append(-_vote(shift[size < ALIKE]), 0.0)
         a, b, ways = known.take(i, axis=1), sightings.outline.take(j, axis=1), ways.take(j, axis=2)
         gain, young = b - a, np.where(_stands(tracks), 0.0, YOUNG_M).take(rows)
         variance = young[i] ** 2 + (END_M + END_SPREAD * sightings.range_m[j]) ** 2
