@@ -63,6 +63,17 @@ def transform_boxes(T: Float64, boxes: Float64) -> Float64:
     return out
 
 
+def upright_box(xyz: Float64, yaw: float) -> Float64:
+    """(7,) box about (3, n) points at a heading, turned so that l >= w."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    sides = np.stack([xyz[0] * c + xyz[1] * s, xyz[1] * c - xyz[0] * s, xyz[2]])
+    low, high = sides.min(axis=1), sides.max(axis=1)
+    (u, v, w), (length, width, tall) = (low + high) / 2, high - low
+    if length < width:
+        length, width, yaw = width, length, yaw - np.pi / 2
+    return np.array([u * c - v * s, u * s + v * c, w, length, width, tall, yaw])
+
+
 def corners(boxes: Float64) -> Float64:
     """(n, 4, 2) bird's-eye corners of (n, 7) boxes, counter-clockwise."""
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2

@@ -35,8 +35,8 @@ class Tracker(Protocol):
         """Name of each value of tracks.state."""
         ...
 
-    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
-        """Predict, associate and update; afterwards every proposal belongs to one track."""
+    def follow(self, frame: Frame, proposals: Proposals) -> tuple[Proposals, Tracks]:
+        """Predict, associate and update; afterwards every proposal, parted if need be, belongs to one track."""
         ...
 
     def asking(self) -> Bool:
@@ -109,7 +109,7 @@ class Pipeline:
         """One frame, within a budget of classifications (Figs. 2 and 5)."""
         run = self.ledger.run
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
-        tracks = run(TRACKING, self.tracker.follow, frame, proposals)
+        proposals, tracks = run(TRACKING, self.tracker.follow, frame, proposals)
         asks = run(FUSION, self.fusion.asks, tracks, proposals, self.tracker.asking())
         chosen = run(SCHEDULING, self.scheduler.select, tracks, proposals, asks, budget)
         rows = chosen.rows

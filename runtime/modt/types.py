@@ -7,7 +7,7 @@ number of proposals in a frame, M the number of tracks alive, N the number of po
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache
 from typing import Any, Self
@@ -106,6 +106,23 @@ class Proposals:
         out = np.full(n_points, NONE, np.int64)
         out[self.members] = np.repeat(np.arange(len(self)), self.count)
         return out
+
+    def take(self, which: Int) -> Proposals:
+        """A copy of those given, in their order."""
+        count = self.count[which]
+        offsets = np.append(0, np.cumsum(count))
+        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[which] - offsets[:-1], count)
+        return replace(
+            self,
+            members=self.members[rows],
+            offsets=offsets,
+            coordinates=self.coordinates.take(rows, axis=1),
+            centroid=self.centroid.take(which, axis=0),
+            box=self.box.take(which, axis=0),
+            truncated=self.truncated[which],
+            occluded=self.occluded[which],
+            reflectance=None if self.reflectance is None else self.reflectance.take(which, axis=0),
+        )
 
     @classmethod
     def empty(cls) -> Proposals:

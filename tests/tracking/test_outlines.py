@@ -29,36 +29,45 @@ def slow_touching(low_a, high_a, low_b, high_b):
     ]
 
 
-@pytest.mark.parametrize("few", [0, 10**9], ids=["sorted", "all compared"])
+HOW = pytest.mark.parametrize("few", [(10**9, 0), (0, 10**9), (0, 0)], ids=["handful", "all compared", "sorted"])
+
+
+def found(patch, few, a, b):
+    """What touches, found as if so many pairs were few."""
+    patch.setattr(outlines, "HANDFUL", few[0])
+    patch.setattr(outlines, "FEW_PAIRS", few[1])
+    return touching(a, b)
+
+
+@HOW
 @given(st.integers(0, 15), st.integers(0, 15), st.integers(0, 2**16), st.integers(0, 30))
 def test_touching_outlines(few, n, k, seed, longest):
     a, b = ends(n, seed, longest), ends(k, seed + 1, longest)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(outlines, "FEW_PAIRS", few)
-        i, j = touching(outline(*a), outline(*b))
+        i, j = found(patch, few, outline(*a), outline(*b))
     assert list(zip(i.tolist(), j.tolist(), strict=True)) == slow_touching(*a, *b)
 
 
-@pytest.mark.parametrize("few", [0, 10**9], ids=["sorted", "all compared"])
+@HOW
 def test_what_was_never_seen_touches_nothing(few, monkeypatch):
-    monkeypatch.setattr(outlines, "FEW_PAIRS", few)
     something, nothing = outline(*ends(6, 0, 30)), np.full((8, 2), -np.inf)
-    assert not len(touching(nothing, something)[0])
+    assert not len(found(monkeypatch, few, nothing, something)[0])
 
 
-@pytest.mark.parametrize("few", [0, 10**9], ids=["sorted", "all compared"])
+@HOW
 @pytest.mark.parametrize("origin", [(0, 0), (-458_000, 5_430_000)], ids=["here", "UTM"])
 def test_where_the_world_begins_does_not_matter(few, origin, monkeypatch):
-    monkeypatch.setattr(outlines, "FEW_PAIRS", few)
     start = (origin @ WAYS)[:, None]
     a, b = outline(*ends(15, 1, 9)) + 0.51, outline(*ends(15, 2, 9))
-    assert len(touching(a, b)[0])
-    np.testing.assert_array_equal(touching(a + start, b + start), touching(a, b))
+    here, there = found(monkeypatch, few, a, b), found(monkeypatch, few, a + start, b + start)
+    assert len(here[0])
+    np.testing.assert_array_equal(there, here)
 
 
-def test_what_lies_apart_does_not_touch_however_far_away():
+@HOW
+def test_what_lies_apart_does_not_touch_however_far_away(few, monkeypatch):
     a = outline(*ends(5, 1, 9)) + (np.array([2_000.0, 0.0]) @ WAYS)[:, None]
-    assert not len(touching(a, outline(*ends(5, 2, 9)))[0])
+    assert not len(found(monkeypatch, few, a, outline(*ends(5, 2, 9)))[0])
 
 
 @given(st.integers(0, 9), st.integers(0, 2**16))

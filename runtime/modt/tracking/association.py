@@ -16,6 +16,8 @@ from modt.types import NONE, Float64, Int
 
 FORBIDDEN = 1e6
 """Cost of a pair that may not be."""
+UNMEASURED_M2 = 100.0 * np.eye(2)
+"""Covariance of a place that an outline says nothing about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +37,25 @@ class Matches:
     place: Float64
     covariance: Float64
     doubt: Float64
+
+    def instead(self, tracks: Followed, rows: Int, proposals: Int) -> Matches:
+        """The matches with these proposals, NONE for nothing, for those that tracks (R,) had.
+
+        What changed hands measures nothing: its outline is not that of the track.
+        """
+        changed = np.zeros(len(tracks), np.bool_)
+        changed[rows] = True
+        kept = np.flatnonzero(~changed[self.rows])
+        some = proposals != NONE
+        rows, proposals = rows[some], proposals[some]
+        unmeasured = UNMEASURED_M2[None].repeat(len(rows), axis=0)
+        return Matches(
+            np.concatenate([self.rows[kept], rows]),
+            np.concatenate([self.proposals[kept], proposals]),
+            np.concatenate([self.place.take(kept, axis=0), tracks.x.take(rows, axis=0)[:, :2]]),
+            np.concatenate([self.covariance.take(kept, axis=0), unmeasured]),
+            np.concatenate([self.doubt.take(kept, axis=0), tracks.doubt.take(rows, axis=0)]),
+        )
 
 
 class Association(Protocol):

@@ -27,6 +27,7 @@ class Followed(Tracks):
         still: the track stands.
         stood: frames with a proposal since it began to.
         landmark: (M, 8) mean outline since then, an end that jumped beginning anew [m, world].
+        takes: frames in a row for which its proposal was taken out of another.
         inherited: its class was taken over from a remembered place, and it was not classified itself since.
     """
 
@@ -42,6 +43,7 @@ class Followed(Tracks):
     still: Bool
     stood: Int
     landmark: Float64
+    takes: Int
     inherited: Bool
 
     @classmethod
@@ -62,6 +64,7 @@ class Followed(Tracks):
             still=np.zeros(m, np.bool_),
             stood=np.zeros(m, np.int64),
             landmark=np.zeros((m, 8)),
+            takes=np.zeros(m, np.int64),
             inherited=np.zeros(m, np.bool_),
         )
 

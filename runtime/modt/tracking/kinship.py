@@ -31,8 +31,6 @@ LESS = 1.2
 """An outline shrunk by this factor is a part."""
 SETTLED = 4
 """Frames after which a velocity says something."""
-UNMEASURED_M2 = 100.0 * np.eye(2)
-"""Covariance of a place that another part's outline says nothing about."""
 
 
 def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches:
@@ -54,9 +52,8 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
             proposal[younger], swapped[younger] = left, True
         if left != NONE:
             owner[left], taken[left] = younger, True
-    if not swapped.any():
-        return matches
-    return _with(tracks, matches, proposal, swapped)
+    changed = np.flatnonzero(swapped)
+    return matches.instead(tracks, changed, proposal[changed]) if len(changed) else matches
 
 
 def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
@@ -134,14 +131,3 @@ def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
     turn = np.array((yaw, yaw + np.pi / 2)) - boxes[:, 6]
     half: Float64 = (boxes[:, 3] * np.abs(np.cos(turn)) + boxes[:, 4] * np.abs(np.sin(turn))) / 2
     return half
-
-
-def _with(tracks: Followed, matches: Matches, proposal: Int, swapped: Bool) -> Matches:
-    """The matches after the exchange: what changed hands measures nothing."""
-    kept, changed = np.flatnonzero(~swapped[matches.rows]), np.flatnonzero(swapped & (proposal != NONE))
-    rows = np.concatenate([matches.rows[kept], changed])
-    place = np.concatenate([matches.place.take(kept, axis=0), tracks.x.take(changed, axis=0)[:, :2]])
-    unmeasured = UNMEASURED_M2[None].repeat(len(changed), axis=0)
-    covariance = np.concatenate([matches.covariance.take(kept, axis=0), unmeasured])
-    doubt = np.concatenate([matches.doubt.take(kept, axis=0), tracks.doubt.take(changed, axis=0)])
-    return Matches(rows, proposal[rows], place, covariance, doubt)

@@ -22,8 +22,8 @@ PAD_M = 0.15
 """Outlines jitter by this much."""
 CELL_M, FAR = 0.02, 2**15 - 1
 """Where outlines touch is looked for in whole cells up to so many away: 16 bits are compared twice as fast as 32."""
-FEW_PAIRS = 400_000
-"""Up to this many, looking at every pair costs less than sorting."""
+HANDFUL, FEW_PAIRS = 4_000, 400_000
+"""Up to so many pairs, looking at every one of them costs less than cells, and then than sorting."""
 
 
 def outlines(proposals: Proposals, T_world_sensor: Float64) -> Float64:
@@ -31,21 +31,10 @@ def outlines(proposals: Proposals, T_world_sensor: Float64) -> Float64:
     n = len(proposals)
     if not n:
         return np.zeros((8, 0))
-    R = T_world_sensor[:2, :3, None].astype(np.float32)
-    x, y, z = proposals.coordinates
-    xy = R[:, 0] * x
-    term = np.empty_like(xy)  # tens of thousands of points: every array less is less that leaves the cache
-    xy += np.multiply(R[:, 1], y, out=term)
-    xy += np.multiply(R[:, 2], z, out=term)
-    x, y = xy
-    one, half = np.float32(1.0), np.float32(np.sqrt(0.5))
-    axes = ((x, one), (np.add(x, y, out=term[0]), half), (y, one), (np.subtract(y, x, out=term[1]), half))
+    along = (AXES.T @ T_world_sensor[:2, :3]).astype(np.float32) @ proposals.coordinates
     starts = proposals.offsets[:-1]
-    reach = np.empty((8, n))
-    for k, (along, scale) in enumerate(axes):
-        reach[k] = scale * np.maximum.reduceat(along, starts)
-        reach[k + 4] = -scale * np.minimum.reduceat(along, starts)
-    reach += (T_world_sensor[:2, 3] @ WAYS)[:, None]
+    ahead, behind = np.maximum.reduceat(along, starts, axis=1), np.minimum.reduceat(along, starts, axis=1)
+    reach: Float64 = np.concatenate([ahead, -behind]) + (T_world_sensor[:2, 3] @ WAYS)[:, None]
     return reach
 
 
@@ -78,11 +67,13 @@ def covered(outline: Float64, place: Float64) -> Float64:
 def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
     """Pairs of outlines a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
 
-    What is less than CELL_M apart may count as touching; so does nothing that is FAR cells away from the first of b.
+    Of many, what is less than CELL_M apart may count as touching, and nothing does that is FAR cells away from the
+    first of b.
     """
     n, k = a.shape[1], b.shape[1]
-    if not n or not k:
-        return np.zeros(0, np.int64), np.zeros(0, np.int64)
+    if n * k <= HANDFUL:
+        rows, columns = np.nonzero((a[::2, :, None] >= -b[[4, 6, 0, 2], None]).all(axis=0))
+        return rows, columns
     origin = (b[:4:2, 0] @ WAYS[:, ::2])[:, None]
     ends, facing = _cells(a[::2] - origin), _cells(-b[::2] + origin)
     pair = (compare_all if n * k < FEW_PAIRS else sweep)(ends, facing)
@@ -92,7 +83,7 @@ def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
 
 def _cells(coordinate: Float64) -> Int16:
     """Coordinates about the same origin [m], in cells of CELL_M."""
-    return np.clip(coordinate / CELL_M, -FAR, FAR).astype(np.int16)
+    return np.minimum(np.maximum(coordinate / CELL_M, -FAR), FAR).astype(np.int16)
 
 
 def compare_all(ends: Int16, facing: Int16) -> Int:

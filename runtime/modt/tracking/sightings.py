@@ -50,6 +50,26 @@ class Sightings:
         box[:, :2] += step
         return replace(self, box=box, centroid=self.centroid + step, outline=self.outline + WAYS.T @ step.T)
 
+    def take(self, rows: Int) -> Sightings:
+        """A copy of the rows given."""
+        return Sightings(
+            box=self.box.take(rows, axis=0),
+            centroid=self.centroid.take(rows, axis=0),
+            outline=self.outline.take(rows, axis=1),
+            foot=self.foot[rows],
+            top=self.top[rows],
+            count=self.count[rows],
+            range_m=self.range_m[rows],
+            cut=self.cut[rows],
+            eye=self.eye,
+        )
+
+    def put(self, rows: Int, few: Sightings) -> None:
+        """Write others over the rows given."""
+        self.box[rows], self.centroid[rows], self.outline[:, rows] = few.box, few.centroid, few.outline
+        self.foot[rows], self.top[rows], self.count[rows] = few.foot, few.top, few.count
+        self.range_m[rows], self.cut[rows] = few.range_m, few.cut
+
 
 def sight(proposals: Proposals, T_world_sensor: Float64) -> Sightings:
     """A frame's proposals, taken to the world by T_world_sensor (4, 4)."""

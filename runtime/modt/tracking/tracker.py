@@ -15,6 +15,7 @@ from modt.tracking.followed import Followed
 from modt.tracking.kinship import reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.outlines import WAYS
+from modt.tracking.parting import ExpectedParting, Found, NoParting, Parting
 from modt.tracking.robust import RobustAssociation
 from modt.tracking.shifts import AGREE_M
 from modt.tracking.sightings import Sightings, sight
@@ -58,6 +59,11 @@ def memory_of(config: TrackingConfig) -> NoMemory | BackgroundMemory:
     return NoMemory() if config.association == "paper" else BackgroundMemory()
 
 
+def parting_of(config: TrackingConfig) -> Parting:
+    """The paper takes proposals as they are."""
+    return NoParting() if config.association == "paper" else ExpectedParting()
+
+
 def rigid(T: Float64) -> Float64:
     """(4, 4) nearest rigid transform: a pose that is its predecessor's product would drift from being one."""
     U, _, Vt = np.linalg.svd(T[:3, :3])
@@ -72,6 +78,7 @@ class Tracker:
         machine: the table that drives the states, EFFICIENT or ACCURATE.
         association: how proposals find their tracks; by default as the configuration says.
         memory: what is kept of background that is gone; by default nothing with the paper's association.
+        parting: what becomes of objects that touch others; by default nothing with the paper's association.
     """
 
     def __init__(
@@ -80,10 +87,12 @@ class Tracker:
         machine: StateMachine,
         association: Association | None = None,
         memory: NoMemory | BackgroundMemory | None = None,
+        parting: Parting | None = None,
     ) -> None:
         self.config, self.machine = config, machine
         self.association = association_of(config) if association is None else association
         self.memory = memory_of(config) if memory is None else memory
+        self.parting = parting_of(config) if parting is None else parting
         self._registration = Registration()
         place, speed = config.position_sigma_m, config.initial_speed_sigma_mps
         self._P_born = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
@@ -110,22 +119,25 @@ class Tracker:
         """(4, 4) pose that the last frame was placed by."""
         return self._T_world_sensor
 
-    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
+    def follow(self, frame: Frame, proposals: Proposals) -> tuple[Proposals, Tracks]:
         """Take a frame's proposals to the tracks; afterwards every proposal belongs to exactly one of them.
 
         Returns:
-            The live table: stages that come after write their columns into it.
+            The proposals, more of them where one was parted, and the live table: stages that come after write their
+            columns into it.
         """
         sightings = self._sight(frame, proposals)
         self._predict(frame.stamp_s)
         matches = reunite(self._tracks, sightings, self.association.match(self._tracks, sightings))
+        found = self.parting.part(self._tracks, Found(proposals, sightings, matches), self._T_world_sensor)
+        sightings, matches = found.sightings, found.matches
         self._update(matches, sightings)
         self._rest(matches.rows)
         self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
         self._renew(matches, sightings)
-        return self._tracks
+        return found.proposals, self._tracks
 
     def asking(self) -> Bool:
         """(M,) tracks with a proposal whose state asks for a class; what flickers does not live to ask."""
@@ -156,7 +168,8 @@ class Tracker:
         self._stamp_s = stamp_s
         t = self._tracks
         t.kind = t.object_class
-        settled = t.fixed & ((t.kind != ObjectClass.BACKGROUND.value) | (self._away(np.arange(len(t))) < STILL_M))
+        at_home = np.square(t.x[:, :2] - t.home).sum(axis=1) < STILL_M**2
+        settled = t.fixed & ((t.kind != ObjectClass.BACKGROUND.value) | at_home)
         agility = np.where(settled, AGILITY[t.kind], 1.0)  # background that went away was none
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps

@@ -94,9 +94,11 @@ def lateness(proposals: Proposals, turn_s: float) -> Float64:
     """
     x, y = proposals.centroid[:, 0], proposals.centroid[:, 1]
     bearing = np.arctan2(y, x)
-    breadth = np.hypot(proposals.box[:, 3], proposals.box[:, 4]) / 2
-    wide = np.arctan2(breadth, np.hypot(x, y))
-    across = np.maximum(np.abs(bearing) + wide - np.pi, 0.0)
-    bearing -= np.copysign(np.pi * across / np.maximum(wide, 1e-9), bearing)
+    length, width = proposals.box[:, 3], proposals.box[:, 4]
+    behind = np.flatnonzero((x < 0.0) & (2 * np.abs(y) < length + width))  # no others can lie across the seam
+    if len(behind):
+        wide = np.arctan2(np.hypot(length[behind], width[behind]) / 2, np.hypot(x[behind], y[behind]))
+        across = np.maximum(np.abs(bearing[behind]) + wide - np.pi, 0.0)
+        bearing[behind] -= np.copysign(np.pi * across / np.maximum(wide, 1e-9), bearing[behind])
     late: Float64 = bearing * (-turn_s / (2 * np.pi))
     return late
