@@ -7,8 +7,10 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
-from modt.tracking.egomotion import SCALES, _fit, _mutual
+from modt.tracking.egomotion import GATE_M, REACH_M, SCALES, Fit, Registration, _fit, _mutual
+from modt.tracking.followed import Followed
 from modt.tracking.outlines import WAYS
+from modt.tracking.sightings import sight
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker, rigid
 
@@ -206,6 +208,25 @@ def test_a_sensor_that_turns_fast_from_the_outset_is_followed(turn):
     error = inverse(T) @ tracker.T_world_sensor
     assert abs(np.rad2deg(yaw_of(error))) < 1.0
     assert np.hypot(*error[:2, 3]) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("near", "far", "taken"),
+    [
+        ((28, 30), (29, 45), "near"),  # it agrees: nobody looks farther
+        ((18, 30), (29, 45), "far"),  # too few of those near by agree
+        ((10, 13), (29, 45), "far"),  # most do, but there were thirty a frame ago
+        ((10, 13), (9, 45), "near"),  # they have gone, nothing better is farther off
+    ],
+)
+def test_a_fit_of_a_few_is_doubted(near, far, taken, monkeypatch):
+    registration, fits = Registration(), {GATE_M: Fit(np.full(3, 0.01), *near), REACH_M: Fit(np.full(3, 0.03), *far)}
+    registration._begun = registration._settled = True
+    registration._agreed = 30
+    monkeypatch.setattr(registration, "_solve", lambda *arguments, choices: fits[arguments[4]])
+    _, sightings = frame_of([], 0, np.eye(4))
+    motion = registration.correct(Followed.blank(), sight(sightings, np.eye(4)))
+    np.testing.assert_allclose(motion[0, 3], {"near": 0.01, "far": 0.03}[taken])
 
 
 def test_the_error_of_one_frame_is_not_handed_on():

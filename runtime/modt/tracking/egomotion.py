@@ -38,8 +38,9 @@ INLIER_M = 0.2
 """A landmark this near to where it should be agrees."""
 AGREEMENT = 0.3
 """Part of the landmarks that must agree for the prediction to be trusted next time."""
-CONSENT = 0.75
-"""Part that must agree lest the prediction is mistrusted and pairs are sought farther away."""
+CONSENT, AS_BEFORE = 0.75, 0.5
+"""Part that must agree, and so many of those of the frame before, lest the prediction is mistrusted and pairs are
+sought farther away."""
 STOOD = 3
 """Frames from which the mean of what stands is its place."""
 TURN_RAD = 0.2
@@ -74,6 +75,7 @@ class Registration:
 
     def __init__(self) -> None:
         self._begun = self._settled = False
+        self._agreed = 0
 
     def correct(self, tracks: Followed, sightings: Sightings, share: Float64 | float = 1.0) -> Float64:
         """The motion in the world that brings the sightings onto the tracks.
@@ -89,13 +91,15 @@ class Registration:
         ways = _ways(sightings) * share
         rest = np.zeros(3)
         fit = self._solve(tracks, sightings, ways, rest, GATE_M, SCALES, choices=1) if self._settled else None
-        if fit is None or not fit.shared_by(CONSENT):  # the prediction may be off: look farther
+        sure = fit is not None and fit.shared_by(CONSENT) and fit.agree >= AS_BEFORE * self._agreed
+        if not sure:  # the prediction may be off: look farther
             wide = self._look_far(tracks, sightings, ways, rest)
             if self._begun and wide is not None and not wide.shared_by(AGREEMENT):  # it did not get there yet
                 again = self._look_far(tracks, sightings, ways, wide.motion)
                 wide = again if again is not None and again.agree > wide.agree else wide
             if fit is None or (wide is not None and wide.agree > fit.agree):
                 fit = wide
+        self._agreed = 0 if fit is None else fit.agree
         self._settled = fit is not None and fit.shared_by(AGREEMENT)
         self._begun |= self._settled
         if fit is None:
