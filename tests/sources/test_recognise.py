@@ -114,14 +114,14 @@ def test_a_sweep_without_its_times_is_seen_at_once_and_the_others_keep_theirs(tm
     assert note == f"1 frames have no time in {path} (the first is 1): those sweeps are taken for seen at once"
 
 
-def test_a_frame_without_its_stamp_has_that_of_its_number_and_the_others_keep_theirs(tmp_path):
+def test_a_frame_without_its_stamp_lies_evenly_between_the_others_which_keep_theirs(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     path, lines = lines_of(drive, "")
     path.write_text("".join(["\n", lines[1], "\n", lines[3].replace("25.3", "25.31")]))
     stream = open_stream(drive)
-    np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.2, 0.31], atol=1e-9)
+    np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.105, 0.21, 0.315], atol=1e-9)
     (note,) = stream.info.notes
-    assert note == f"2 frames have no time in {path} (the first is 0): those frames 0.1 s apart"
+    assert note == f"2 frames have no time in {path} (the first is 0): those lie evenly between the others"
 
 
 @pytest.mark.parametrize("end", ["", "_start", "_end"])
@@ -143,7 +143,7 @@ def test_a_list_of_another_length_is_named_and_counts_line_by_line(tmp_path, end
     path.write_text("".join(lines[:3]))
     stream = open_stream(drive)
     assert len(stream.info.notes) == 2
-    assert stream.info.notes[0].startswith(f"{path} holds 3 lines for 4 scans")
+    assert stream.info.notes[0].startswith(f"{path} holds 3 lines where the last scan is number 3")
     assert "restore" in stream.info.notes[0]
     assert stream.info.notes[1].startswith(f"1 frames have no time in {path} (the first is 3)")
     np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.2, 0.3], atol=1e-9)
@@ -151,7 +151,7 @@ def test_a_list_of_another_length_is_named_and_counts_line_by_line(tmp_path, end
     path.write_text("".join([*lines, lines[3]]))
     stream = open_stream(drive)
     (note,) = stream.info.notes
-    assert note.startswith(f"{path} holds 5 lines for 4 scans")
+    assert note.startswith(f"{path} holds 5 lines where the last scan is number 3")
     np.testing.assert_allclose([f.turn_s for f in stream], 0.1, atol=1e-9)
 
 
@@ -230,7 +230,7 @@ def test_points_that_lack_reflectance_alone_are_kept_and_counted(tmp_path, caplo
     np.testing.assert_array_equal(points[3:], broken[3:])
     assert (stream.faults.count, stream.faults.skipped) == (1, 0)
     (record,) = caplog.records
-    assert re.search(r"000001\.bin: 3 reflectances .* not recorded: .*sensor\.reflectance", record.getMessage())
+    assert re.search(r"000001\.bin: 3 reflectances .* not recorded: .*driver", record.getMessage())
 
 
 def test_faults_without_end_are_counted_and_the_first_kept(tmp_path, caplog):

@@ -192,12 +192,18 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
 
 def _raw_stamps(path: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
     """Seconds since scan 0, by frame."""
-    times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes)
+    times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "those lie evenly between the others")
     if not times:
         return {}
-    first = min(times)
-    began = times[first] - round(first * PERIOD_S * 1e9)
-    return {i: (t - began) / 1e9 for i, t in times.items()}
+    known, began = sorted(times), min(times.values())
+    stamps_s = np.array([(times[i] - began) / 1e9 for i in known])
+    period_s = float(np.median(np.diff(stamps_s) / np.diff(known))) if len(known) > 1 else PERIOD_S
+
+    def stamp_s(i: int) -> float:
+        beyond = min(i - known[0], 0) + max(i - known[-1], 0)
+        return float(np.interp(i, known, stamps_s)) + beyond * period_s
+
+    return {i: stamp_s(i) - stamp_s(0) for i in frames}
 
 
 def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
@@ -214,14 +220,15 @@ def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, f
     return turns
 
 
-def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes) -> dict[int, int]:
+def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, of_few: str = "") -> dict[int, int]:
     """Times of a list of KITTI's, by frame [ns]: line i is that of scan i, or blank where that is missing.
 
     Args:
         path: of the list.
         frames: numbers of the scans that there are.
-        cost: what becomes of frames without a time.
+        cost: what becomes of frames if none has a time.
         notes: take what is wrong with it.
+        of_few: what becomes of few without one, by default the same.
     """
     if not path.is_file():
         notes.of_stream.append(f"{path} is missing: {cost}")
@@ -233,12 +240,12 @@ def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes) -> dic
         return {}
     n_scans = max(frames) + 1
     if len(lines) != n_scans:
-        unlike = f"{path} holds {len(lines)} lines for {n_scans} scans"
-        notes.of_stream.append(f"{unlike}: line i is taken for that of scan i; restore what is missing")
+        unlike = f"{path} holds {len(lines)} lines where the last scan is number {n_scans - 1}"
+        notes.of_stream.append(f"{unlike}: line i is taken for that of scan i, from 0; restore what is missing")
     without = [i for i in frames if i not in times]
     if without:
         lacking = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
-        notes.of_stream.append(f"{lacking}: those {cost}")
+        notes.of_stream.append(f"{lacking}: {of_few or f'those {cost}'}")
     return times
 
 
