@@ -48,7 +48,24 @@ def test_points_whose_reflectance_alone_is_not_finite_are_points_without_one(tmp
     lost, unlit = flaws
     assert lost.startswith("1 points are not finite")
     assert unlit.startswith("2 reflectances are not finite")
-    assert "sensor.reflectance" in unlit
+    assert "driver" in unlit
+
+
+@pytest.mark.parametrize("value", [np.nan, UNRECORDED])
+def test_the_scale_is_that_of_the_reflectances_that_there_are(tmp_path, value):
+    scan = np.tile(GOOD, (100, 1)) * np.float32([1, 1, 1, 255])
+    scan[2:, 3] = value
+    points, _ = read_scan(write(tmp_path / "0.bin", scan))
+    np.testing.assert_allclose(points[:2, 3], GOOD[:, 3])
+    assert (points[2:, 3] == UNRECORDED).all()
+
+
+@pytest.mark.parametrize("scale", [1, 255])
+def test_a_stray_negative_reflectance_is_none(tmp_path, scale):
+    scan = np.tile(GOOD, (100, 1)) * np.float32([1, 1, 1, scale])
+    scan[7, 3] = -0.2
+    points, _ = read_scan(write(tmp_path / "0.bin", scan))
+    assert np.flatnonzero(points[:, 3] == UNRECORDED).tolist() == [7]
 
 
 def test_a_scan_without_any_finite_reflectance_keeps_its_points(tmp_path):

@@ -52,7 +52,7 @@ class Session:
         )
         self.stop = Stop()
         self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
-        self.unlit_frames = 0
+        self._frames_without_reflectance = 0
         self.directory = RunDirectory(out or Path("runs") / f"{self._stream_name()}-{request.mode}")
         self._describe(command)
 
@@ -76,7 +76,7 @@ class Session:
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_result(result)
             summary.add_ledger(ledger_line)
-            self.unlit_frames += self._unlit(result.proposals)
+            self._frames_without_reflectance += self._lacks_reflectance(result.proposals)
             window = windows.add(ledger_line)
             if window is not None:
                 ledger_lines.write(window)
@@ -99,7 +99,7 @@ class Session:
         self.directory.summarise(figures)
         return figures
 
-    def _unlit(self, proposals: Proposals) -> bool:
+    def _lacks_reflectance(self, proposals: Proposals) -> bool:
         """Whether they tell no reflectance, though the profile says that the sensor records it."""
         return self.profile.sensor.reflectance != "none" and len(proposals) > 0 and proposals.reflectance is None
 
@@ -163,6 +163,6 @@ class Session:
                 "count": faults.count,
                 "skipped": faults.skipped,
                 "first": next((f"{f.subject}: {f.cause}" for f in faults.first), None),
-                "frames_without_reflectance": self.unlit_frames,
+                "frames_without_reflectance": self._frames_without_reflectance,
             },
         }

@@ -46,10 +46,10 @@ def summary_table(summary: dict[str, Any]) -> str:
     faults = summary.get("faults", {})
     if faults.get("count"):
         lines.append(f"  faulty scans: {faults['count']}, {faults['skipped']} of them skipped: {faults['first']}")
-    unlit = faults.get("frames_without_reflectance")
-    if unlit:
+    lacking = faults.get("frames_without_reflectance")
+    if lacking:
         remedy = "have the driver write it, or set sensor.reflectance to none"
-        lines.append(f"  without reflectance: {unlit} frames; {remedy}")
+        lines.append(f"  without reflectance: {lacking} frames; {remedy}")
     return "\n".join(lines)
 
 

@@ -19,8 +19,8 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
     """Points of a .bin file, and what was wrong with some of them.
 
     Points that are not finite are set to the origin, where nothing is ever measured, so that every row keeps its
-    place; of a point whose reflectance alone is not finite, none was recorded. Reflectances given as 0 to 255 are
-    brought to 0 to 1.
+    place; of a point whose reflectance alone is not finite, or negative, none was recorded. Reflectances given as
+    0 to 255 are brought to 0 to 1.
 
     Raises:
         ScanError: missing, unreadable, empty, truncated, or rows of something else.
@@ -46,26 +46,26 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
     Raises:
         ScanError: the columns are not x, y, z, reflectance.
     """
-    flaws = []
-    reflectance, unlit = points[:, 3], np.zeros(0, np.int64)
+    flaws, reflectance = [], points[:, 3]
     # One sum finds any NaN or infinity at a tenth of the price of looking at each value.
     if not np.isfinite(points.sum(dtype=np.float64)):
         broken = np.flatnonzero(~np.isfinite(points[:, :3]).all(axis=1))
         points[broken] = 0.0
-        unlit = np.flatnonzero(~np.isfinite(reflectance))
-        reflectance[unlit] = 0.0
+        lacking = np.flatnonzero(~np.isfinite(reflectance))
+        reflectance[lacking] = UNRECORDED
         if len(broken):
             flaws.append(f"{len(broken)} points are not finite and count as no return")
-        if len(unlit):
-            lacking = f"{len(unlit)} reflectances are not finite and count as not recorded"
-            flaws.append(f"{lacking}: have the sensor's driver write them, or set sensor.reflectance to none")
-    odd = np.count_nonzero(reflectance < 0) + np.count_nonzero(np.abs(points[:, :3]) > FARTHEST_M)
-    odd += np.count_nonzero(reflectance > 255)
+        if len(lacking):
+            unread = f"{len(lacking)} reflectances are not finite and count as not recorded"
+            flaws.append(f"{unread}: have the sensor's driver write them")
+    negative = np.flatnonzero(reflectance < 0)
+    odd = np.count_nonzero(reflectance[negative] != UNRECORDED) + np.count_nonzero(reflectance > 255)
+    odd += np.count_nonzero(np.abs(points[:, :3]) > FARTHEST_M)
     if odd > TOLERATED_SHARE * len(points):
         cause = "its columns are not x, y, z [m], reflectance"
         raise ScanError(origin, cause, "the frame is skipped; convert it to float32 rows of these four")
     if reflectance.max(initial=0.0) > 1.0:  # 0 to 255, unless a few strays alone are beyond 1
-        in_bytes = np.count_nonzero(reflectance > 1.0) > TOLERATED_SHARE * len(points)
+        in_bytes = np.count_nonzero(reflectance > 1.0) > TOLERATED_SHARE * (len(points) - len(negative))
         np.clip(reflectance / np.float32(255 if in_bytes else 1), 0, 1, out=reflectance)
-    reflectance[unlit] = UNRECORDED
+    reflectance[negative] = UNRECORDED
     return points, flaws
