@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
+from modt.tracking.egomotion import Registration
 from modt.tracking.sightings import sight
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
@@ -122,6 +123,20 @@ def test_what_was_seen_goes_by_its_share_of_a_correction(speed, turn, faster, tu
     whole = (placed @ (after @ inverse(predicted)).T - placed)[:, :2]
     expected = skew.share(PERIOD_S)[:, None] * whole
     np.testing.assert_allclose(place(after) - place(predicted), expected, atol=0.01)
+
+
+@pytest.mark.parametrize(("told", "least_deg", "most_deg"), [(True, 0.0, 0.02), (False, 0.03, 1.0)])
+def test_a_registration_that_is_told_the_shares_is_right_at_once(told, least_deg, most_deg):
+    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street(n=120)
+    for i in range(6):
+        tracker.follow(*skewed(world, i, 0.1, 8.0, 0.6, posed=True))
+    frame, proposals = skewed(world, 6, 0.1, 8.0, 0.6, posed=True)
+    before, true, skew = pose(0.5, 8.0, 0.6), frame.T_world_sensor, Skew.of(proposals, 0.1)
+    predicted = true @ se3(rotation_zyx(0, 0, 0.01), np.array([0.2, 0.0, 0.0]))
+    step = skew.step(Motion.between(before, predicted, PERIOD_S), predicted)
+    share = skew.share(PERIOD_S) if told else 1.0
+    found = Registration().correct(tracker.tracks, sight(proposals, predicted).moved(step), share) @ predicted
+    assert least_deg <= abs(np.rad2deg(yaw_of(inverse(true) @ found))) < most_deg
 
 
 @pytest.mark.parametrize("turn_s", [0.1, -0.1])

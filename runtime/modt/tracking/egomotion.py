@@ -46,7 +46,9 @@ STOOD = 3
 TURN_RAD = 0.2
 """Greatest turn of a correction."""
 OUTSET_RAD = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15)
-"""Turns that are tried while nothing is known of the motion."""
+"""Turns that are tried while nothing is known of the motion ..."""
+OUTSET = 10
+"""... in so many frames: they cost as many fits."""
 MINIMUM = 3
 """Landmarks without which nothing is corrected."""
 
@@ -75,7 +77,7 @@ class Registration:
 
     def __init__(self) -> None:
         self._begun = self._settled = False
-        self._agreed = 0
+        self._agreed = self._tried = 0
 
     def correct(self, tracks: Followed, sightings: Sightings, share: Float64 | float = 1.0) -> Float64:
         """The motion in the world that brings the sightings onto the tracks.
@@ -111,7 +113,9 @@ class Registration:
 
     def _look_far(self, tracks: Followed, sightings: Sightings, ways: Float64, motion: Float64) -> Fit | None:
         """The motion that most landmarks say that are near after another motion, or after any turn at the outset."""
-        starts = (motion,) if self._begun else ([0.0, 0.0, turn] for turn in OUTSET_RAD)
+        outset = not self._begun and self._tried < OUTSET
+        self._tried += outset and len(tracks) > 0
+        starts = ([0.0, 0.0, turn] for turn in OUTSET_RAD) if outset else (motion,)
         fits = (
             self._solve(tracks, sightings, ways, np.asarray(start), REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
             for start in starts
