@@ -20,6 +20,19 @@ def test_labels_and_counts_agree(counts):
     assert np.bincount(label + 1, minlength=len(counts) + 1).tolist() == [3, *counts]
 
 
+@given(st.lists(st.integers(1, 9), min_size=1, max_size=6), st.data())
+def test_some_of_the_proposals(counts, data):
+    found = proposals(counts)
+    which = data.draw(st.lists(st.sampled_from(range(len(counts))), min_size=1, unique=True))
+    some = found.take(np.array(which))
+    assert some.count.tolist() == [counts[k] for k in which]
+    for i, k in enumerate(which):
+        own, those = (slice(*p.offsets[n : n + 2]) for p, n in ((some, i), (found, k)))
+        assert some.members[own].tolist() == found.members[those].tolist()
+        np.testing.assert_array_equal(some.coordinates[:, own], found.coordinates[:, those])
+    np.testing.assert_array_equal(some.box, found.box[which])
+
+
 def test_no_proposals():
     empty = Proposals.empty()
     assert len(empty) == 0

@@ -90,7 +90,7 @@ def record(
     moments = []
     for frame, scan in drive:
         proposals = Segmenter(config.segmentation, config.sensor, scan.fov).segment(frame.points)
-        proposals, own = tracker.follow(frame, proposals)
+        own, proposals = tracker.follow(frame, proposals), tracker.proposals
         ids = own.id[own.row_of_proposal(len(proposals))]
         keys = [
             ("body", body) if ideal and body != NONE else ("track", i)
@@ -142,12 +142,17 @@ class Player:
         self._tracks = Tracks.blank(recording.n_tracks)
         self._tracks.id[:] = np.arange(recording.n_tracks)
 
+    @property
+    def proposals(self) -> Proposals:
+        """Those of the moment."""
+        return self._moment.proposals
+
     def segment(self, points: Float32) -> Proposals:
         """The next frame's proposals."""
         self._moment = next(self._moments)
         return self._moment.proposals
 
-    def follow(self, frame: Frame, proposals: Proposals) -> tuple[Proposals, Tracks]:
+    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
         """Each to its track."""
         t, rows = self._tracks, self._moment.track
         t.proposal[:] = NONE
@@ -156,7 +161,7 @@ class Player:
         t.hits[rows] += 1
         t.age += t.hits > 0
         t.missed = np.where(t.proposal == NONE, t.missed + 1, 0)
-        return proposals, t
+        return t
 
     def asking(self) -> Bool:
         """(M,) tracks seen often enough, whose class is not settled."""

@@ -35,8 +35,13 @@ class Tracker(Protocol):
         """Name of each value of tracks.state."""
         ...
 
-    def follow(self, frame: Frame, proposals: Proposals) -> tuple[Proposals, Tracks]:
-        """Predict, associate and update; afterwards every proposal, parted if need be, belongs to one track."""
+    @property
+    def proposals(self) -> Proposals:
+        """Those followed last: the frame's, parted where need be."""
+        ...
+
+    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
+        """Predict, associate and update; afterwards every one of its proposals belongs to one track."""
         ...
 
     def asking(self) -> Bool:
@@ -109,7 +114,8 @@ class Pipeline:
         """One frame, within a budget of classifications (Figs. 2 and 5)."""
         run = self.ledger.run
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
-        proposals, tracks = run(TRACKING, self.tracker.follow, frame, proposals)
+        tracks = run(TRACKING, self.tracker.follow, frame, proposals)
+        proposals = self.tracker.proposals
         asks = run(FUSION, self.fusion.asks, tracks, proposals, self.tracker.asking())
         chosen = run(SCHEDULING, self.scheduler.select, tracks, proposals, asks, budget)
         rows = chosen.rows

@@ -70,6 +70,16 @@ def test_a_run_leaves_what_the_formats_say(runs, mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
+def test_the_ledger_counts_what_each_stage_made(runs, mode):
+    root, _ = runs
+    lines = [json.loads(line) for line in (root / mode / "ledger.jsonl").read_text().splitlines()]
+    booked = [line["stages"] for line in lines if "frame" in line]
+    frames = tracks(root / mode)
+    assert [b["tracking"]["items"] for b in booked] == [len(f["tracks"]) for f in frames]
+    assert all(b["segmentation"]["items"] <= f["proposals"] for b, f in zip(booked, frames, strict=True))
+
+
+@pytest.mark.parametrize("mode", MODES)
 def test_labels_name_proposals_and_classes(runs, mode):
     root, _ = runs
     for frame in tracks(root / mode):

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.geometry import upright_box
 from modt.segmentation.boxes import HEADINGS, headings, upright_boxes
 from modt.segmentation.groups import Groups
 from tests.segmentation import reference
@@ -46,6 +47,17 @@ def test_a_box_holds_its_points_and_touches_them_on_every_side(seed, sizes):
     assert local.max() < 1e-4
     starts = groups.offsets[:-1]
     assert np.abs(np.maximum.reduceat(local, starts, axis=0)).max() < 1e-4
+
+
+@given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 40), min_size=1, max_size=6))
+def test_a_box_of_many_is_that_of_each_cluster_alone(seed, sizes):
+    rng = np.random.default_rng(seed)
+    (x, y, z), yaw = rng.normal(0, 2, (3, sum(sizes))).astype(np.float32), rng.uniform(-3, 3, len(sizes))
+    groups = groups_of(sizes)
+    many = upright_boxes(x, y, z, groups, yaw)
+    for i, (start, end) in enumerate(zip(groups.offsets[:-1], groups.offsets[1:], strict=True)):
+        one = upright_box(np.stack([x, y, z])[:, start:end].astype(np.float64), yaw[i])
+        np.testing.assert_allclose(many[i], one, atol=1e-4)
 
 
 @pytest.mark.parametrize("yaw_deg", [-80, -35, 0, 20, 65])

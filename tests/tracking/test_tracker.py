@@ -25,7 +25,7 @@ def names(tracker):
 
 def run(tracker, frames, settle=True):
     for frame, proposals in frames:
-        _, tracks = tracker.follow(frame, proposals)
+        tracks = tracker.follow(frame, proposals)
         if settle:
             rows = np.flatnonzero(tracker.asking())
             tracker.settle(rows, np.ones(len(rows), np.bool_))
@@ -143,7 +143,7 @@ def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine
         frame, proposals = frame_of(
             [box(x, y, max(a, b), min(a, b), yaw=c) for x, y, a, b, c in boxes], i, EYE if posed else None
         )
-        _, tracks = tracker.follow(frame, proposals)
+        tracks = tracker.follow(frame, proposals)
         owned = np.sort(tracks.proposal[tracks.proposal != NONE])
         np.testing.assert_array_equal(owned, np.arange(len(proposals)))
         assert len(set(tracks.id)) == len(tracks)
@@ -161,7 +161,7 @@ def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine
 
 def test_frames_without_anything(tracker):
     frame, _ = frame_of([], 0)
-    assert len(tracker.follow(frame, Proposals.empty())[1]) == 0
+    assert len(tracker.follow(frame, Proposals.empty())) == 0
     assert len(tracker.asking()) == 0
     tracker.settle(np.zeros(0, np.int64), np.zeros(0, np.bool_))
 
@@ -181,9 +181,9 @@ def test_background_that_went_away_is_as_agile_as_anything():
     for step_m in (0.0, 0.15):
         tracker = Tracker(TrackingConfig(), EFFICIENT)
         for i in range(12):
-            _, tracks = tracker.follow(*frame_of([box(12 + step_m * i, 3, 0.6, 0.6, 1.7)], i, EYE))
+            tracks = tracker.follow(*frame_of([box(12 + step_m * i, 3, 0.6, 0.6, 1.7)], i, EYE))
             tracks.posterior[:], tracks.fixed[:] = np.eye(4)[0], True
         before = tracks.P[0, 3, 3]
-        grown.append(tracker.follow(*frame_of([], 12, EYE))[1].P[0, 3, 3] - before)
+        grown.append(tracker.follow(*frame_of([], 12, EYE)).P[0, 3, 3] - before)
     assert grown[1] == pytest.approx(np.square(0.1 * TrackingConfig().acceleration_sigma_mps2))
     assert grown[0] == pytest.approx(grown[1] / 16)

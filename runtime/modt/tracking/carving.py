@@ -16,7 +16,7 @@ def carved(proposals: Proposals, hosts: Int, pieces: list[Int], yaw: Float64) ->
     Args:
         proposals: (P,) as they were.
         hosts: (n,) out of which each piece is taken.
-        pieces: n times members of the host, none of them twice and never all of a host's.
+        pieces: n > 0 times members of the host, none of them twice and never all of a host's.
         yaw: (n,) headings of the pieces' boxes [rad]; their hosts' keep theirs.
     """
     left = np.ones(len(proposals.members), np.bool_)

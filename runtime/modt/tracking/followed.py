@@ -27,7 +27,7 @@ class Followed(Tracks):
         still: the track stands.
         stood: frames with a proposal since it began to.
         landmark: (M, 8) mean outline since then, an end that jumped beginning anew [m, world].
-        takes: frames in a row for which its proposal was taken out of another.
+        takes: times that its proposal was taken out of another since it last had one of its own.
         inherited: its class was taken over from a remembered place, and it was not classified itself since.
     """
 

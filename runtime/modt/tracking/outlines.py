@@ -67,8 +67,8 @@ def covered(outline: Float64, place: Float64) -> Float64:
 def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
     """Pairs of outlines a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
 
-    Of many, what is less than CELL_M apart may count as touching, and nothing does that is FAR cells away from the
-    first of b.
+    Of many, what is less than CELL_M apart may count as touching, and so may all that lies more than FAR cells away
+    from the first of b, on the same side. Outlines b are finite; those of a that never saw anything touch nothing.
     """
     n, k = a.shape[1], b.shape[1]
     if n * k <= HANDFUL:

@@ -9,7 +9,7 @@ there are about as many as it had and they reach as high as it did. What changed
 goes on as it went.
 
 The risk. What is taken confirms where it was expected: somebody who stepped behind the wall would go on in it. So
-nothing is taken more than IN_A_ROW times in a row.
+nothing is taken more than AT_MOST times since the track last had a proposal of its own.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ from modt.tracking.kinship import PERSON_M, ROOM_M
 from modt.tracking.outlines import WAYS, covered, lengths, touching
 from modt.tracking.robust import carried
 from modt.tracking.sightings import Sightings, sight
+from modt.tracking.turning import Placing
 from modt.types import NONE, Bool, Float64, Int, ObjectClass, Proposals
 
 SETTLED = 4
 """Views after which it is known where a track will be."""
 FRESH = 3
 """Frames without a proposal after which it is not known any more."""
-IN_A_ROW = 5
-"""Frames for which a track may live on what it takes."""
+AT_MOST = 5
+"""Times that a track takes before it must have something of its own again."""
 SLIM_M, TALL_M, WAY_M, SIGMAS = 1.5, 0.5, 1.5, 2.5
 """What is no longer, and taller, has come so far from its home, and is faster than its speed is unsure by so many
 deviations, walks. (On synthetic drives 28 of a hundred such were people; of what is slim and moves at all, 8.)"""
@@ -69,15 +70,21 @@ class Found:
 class Parting(Protocol):
     """Takes objects out of what they touch."""
 
-    def part(self, tracks: Followed, found: Found, T_world_sensor: Float64) -> Found:
-        """What was found, with more proposals where there was something to take."""
+    def part(self, tracks: Followed, found: Found, placing: Placing) -> Found:
+        """What was found, with more proposals where there was something to take.
+
+        Args:
+            tracks: as predicted; their column of takes is kept up.
+            found: of the frame.
+            placing: by which it was put into the world.
+        """
         ...
 
 
 class NoParting:
     """Takes proposals as they are."""
 
-    def part(self, tracks: Followed, found: Found, T_world_sensor: Float64) -> Found:
+    def part(self, tracks: Followed, found: Found, placing: Placing) -> Found:
         """What was found."""
         return found
 
@@ -85,7 +92,7 @@ class NoParting:
 class ExpectedParting:
     """Takes what lies where a track is expected."""
 
-    def part(self, tracks: Followed, found: Found, T_world_sensor: Float64) -> Found:
+    def part(self, tracks: Followed, found: Found, placing: Placing) -> Found:
         """What was found, with one more proposal for each track that takes its own out of a larger one."""
         tracks.takes[found.matches.rows] = 0
         rows = _seeking(tracks, found.matches)
@@ -94,96 +101,103 @@ class ExpectedParting:
         rows, hosts = _hosts(tracks, found.sightings, rows)
         if not len(rows):
             return found
-        scene = Scene(tracks, found, T_world_sensor)
-        pieces: list[Int] = []
-        takers = []
-        for k, (row, host) in enumerate(zip(rows.tolist(), hosts.tolist(), strict=True)):
-            piece = scene.piece(row, host)
-            if piece is not None:
-                pieces.append(piece)
-                takers.append(k)
-        if not pieces:
+        scene = _Scene(tracks, found, placing, rows, hosts)
+        pieces = [scene.piece(k) for k in range(len(rows))]
+        takers = np.array([k for k, piece in enumerate(pieces) if len(piece)], np.int64)
+        if not len(takers):
             return found
-        rows, hosts = rows[takers], hosts[takers]
-        tracks.takes[rows] += 1
-        return scene.parted(rows, hosts, pieces)
+        tracks.takes[rows[takers]] += 1
+        return scene.parted(takers, [pieces[k] for k in takers])
 
 
-class Scene:
-    """A frame that objects are taken out of."""
+class _Scene:
+    """A frame in which some tracks seek their own within proposals that are too large to be them.
 
-    def __init__(self, tracks: Followed, found: Found, T_world_sensor: Float64) -> None:
-        self.tracks, self.found, self.T_world_sensor = tracks, found, T_world_sensor
-        proposals, matches = found.proposals, found.matches
+    Args:
+        tracks: as predicted.
+        found: of the frame.
+        placing: by which it was put into the world.
+        rows: (R,) of the tracks that seek.
+        hosts: (R,) proposal that each is expected in.
+    """
+
+    def __init__(self, tracks: Followed, found: Found, placing: Placing, rows: Int, hosts: Int) -> None:
+        self.tracks, self.found, self.placing, self.rows, self.hosts = tracks, found, placing, rows, hosts
         self.expected = carried(tracks)
-        self.owner = np.full(len(proposals), NONE)
-        self.owner[matches.proposals] = matches.rows
-        self.free = np.ones(len(proposals.members), np.bool_)
-        # Where a proposal stands at the stamp, seen when it was: a sensor that moves sees each from elsewhere.
-        self.step = found.sightings.centroid - transform(T_world_sensor, proposals.centroid)[:, :2]
+        self.step = placing.step(tracks.x.take(rows, axis=0)[:, :2])
+        self.owner = np.full(len(found.proposals), NONE)
+        self.owner[found.matches.proposals] = found.matches.rows
+        self.free = np.ones(len(found.proposals.members), np.bool_)
 
-    def piece(self, row: int, host: int) -> Int | None:
-        """(k,) members of the proposals that are a track's, of those of its host; None where it has no claim."""
+    def piece(self, k: int) -> Int:
+        """(n,) which members of the proposals the k-th of those who seek takes, none where it has no claim.
+
+        What lies where another is expected as well, who seeks there too or has the host and is an object, is of him
+        who is expected nearer.
+        """
+        row, host = self.rows[k], self.hosts[k]
         first, end = self.found.proposals.offsets[host : host + 2]
-        x, y, z = self._world(first, end)
-        x += self.step[host, 0]
-        y += self.step[host, 1]
-        own = self.free[first:end] & (z < self.tracks.top[row] + PAD_M) & self._within(x, y, row)
-        own[own] = ~self._rivals(x[own], y[own], row, self.owner[host])
-        n, left = np.count_nonzero(own), np.count_nonzero(self.free[first:end]) - np.count_nonzero(own)
-        if n < max(POINTS, KEPT * self.tracks.points[row]) or left < POINTS:
-            return None
+        R, t = self.placing.T_world_sensor[:3, :3], self.placing.T_world_sensor[:3, 3:]
+        x, y, z = R.astype(np.float32) @ self.found.proposals.coordinates[:, first:end] + t
+        x += self.step[k, 0]
+        y += self.step[k, 1]
+        free = self.free[first:end]
+        own = free & (z < self.tracks.top[row] + PAD_M) & self._within(x, y, row)
+        for rival in self._rivals(k):
+            own &= ~(self._nearer(x, y, rival, row) & self._within(x, y, rival))
+        n = np.count_nonzero(own)
+        if n < max(POINTS, KEPT * self.tracks.points[row]) or np.count_nonzero(free) - n < POINTS:
+            return np.zeros(0, np.int64)
         if z[own].max() < self.tracks.top[row] - FALL_M:
-            return None
+            return np.zeros(0, np.int64)
         piece: Int = first + np.flatnonzero(own)
         self.free[piece] = False
         return piece
 
-    def _rivals(self, x: Float64, y: Float64, row: int, rival: int) -> Bool:
-        """(k,) which places are rather those of the host's own track, if that is an object's."""
-        tracks = self.tracks
-        if rival == NONE or tracks.kind[rival] == ObjectClass.BACKGROUND.value:
-            return np.zeros(len(x), np.bool_)
-        own, other = (np.square(x - tracks.x[k, 0]) + np.square(y - tracks.x[k, 1]) for k in (row, rival))
-        rivals: Bool = (other < own) & self._within(x, y, rival)
-        return rivals
+    def _rivals(self, k: int) -> list[int]:
+        """Rows of the others who may claim a part of the host of the k-th."""
+        owner = self.owner[self.hosts[k]]
+        others = self.rows[(self.hosts == self.hosts[k]) & (self.rows != self.rows[k])].tolist()
+        owns = owner != NONE and self.tracks.kind[owner] != ObjectClass.BACKGROUND.value
+        return [*others, int(owner)] if owns else others
 
-    def _world(self, first: int, end: int) -> Float64:
-        """(3, k) members from first to end in the world."""
-        R, t = self.T_world_sensor[:3, :3], self.T_world_sensor[:3, 3:]
-        world: Float64 = R.astype(np.float32) @ self.found.proposals.coordinates[:, first:end] + t
-        return world
+    def _nearer(self, x: Float64, y: Float64, row: int, than: int) -> Bool:
+        """(n,) which places are nearer to where one track is expected than to where another is."""
+        one, other = (np.square(x - self.tracks.x[r, X]) + np.square(y - self.tracks.x[r, Y]) for r in (row, than))
+        nearer: Bool = one < other
+        return nearer
 
     def _within(self, x: Float64, y: Float64, row: int) -> Bool:
-        """(k,) which places lie where a track is expected."""
+        """(n,) which places lie where a track is expected."""
         reach = self.expected[:, row] + PAD_M
         within: Bool = (x <= reach[0]) & (x >= -reach[4]) & (y <= reach[2]) & (y >= -reach[6])
         near = np.flatnonzero(within)
         within[near] = (np.stack([x[near], y[near]], axis=1) @ WAYS <= reach).all(axis=1)
         return within
 
-    def parted(self, rows: Int, hosts: Int, pieces: list[Int]) -> Found:
-        """What is found once tracks have taken their pieces out of their hosts."""
-        found, n = self.found, len(self.found.proposals)
-        yaw = self.tracks.box[rows, 6] - yaw_of(self.T_world_sensor)
-        proposals = carved(found.proposals, hosts, pieces, yaw)
-        source, changed, new = np.append(np.arange(n), hosts), np.unique(hosts), np.arange(n, n + len(hosts))
-        seen = np.append(changed, new)
-        sightings = found.sightings.take(source)
-        few = sight(proposals.take(seen), self.T_world_sensor)
-        sightings.put(seen, few.moved(self.step[source[seen]]))
+    def parted(self, takers: Int, pieces: list[Int]) -> Found:
+        """What is found once some of those who seek have taken their pieces."""
+        tracks, found, T_world_sensor = self.tracks, self.found, self.placing.T_world_sensor
+        rows, hosts, n = self.rows[takers], self.hosts[takers], len(found.proposals)
+        proposals = carved(found.proposals, hosts, pieces, tracks.box[rows, 6] - yaw_of(T_world_sensor))
+        source, cut, new = np.append(np.arange(n), hosts), np.unique(hosts), np.arange(n, n + len(hosts))
+        # Where a host stands at the stamp, seen when it was: a sensor that moves sees each from elsewhere.
+        moved = found.sightings.centroid[cut] - transform(T_world_sensor, found.proposals.centroid[cut])[:, :2]
+        sightings, seen = found.sightings.take(source), np.append(cut, new)
+        few = sight(proposals.take(seen), T_world_sensor)
+        sightings.put(seen, few.moved(np.concatenate([moved, self.step[takers]])))
         # What was taken shows nothing new of the track, least of all what was taken too much.
         sightings.outline[:, new] = self.expected[:, rows]
-        sightings.foot[new], sightings.top[new] = self.tracks.foot[rows], self.tracks.top[rows]
-        owned = changed[self.owner[changed] != NONE]
-        rows, of_rows = np.append(self.owner[owned], rows), np.append(owned, new)
-        return Found(proposals, sightings, found.matches.instead(self.tracks, rows, of_rows))
+        sightings.foot[new], sightings.top[new] = tracks.foot[rows], tracks.top[rows]
+        owned = cut[self.owner[cut] != NONE]
+        changed, of_changed = np.append(self.owner[owned], rows), np.append(owned, new)
+        return Found(proposals, sightings, found.matches.instead(tracks, changed, of_changed))
 
 
 def _seeking(tracks: Followed, matches: Matches) -> Int:
     """Rows of objects, and of what walks whatever it is held for, that found nothing and had something of late."""
     thing = tracks.kind != ObjectClass.BACKGROUND.value
-    lost = (thing | ~tracks.still) & (tracks.hits >= SETTLED) & (tracks.missed < FRESH) & (tracks.takes < IN_A_ROW)
+    lost = (thing | ~tracks.still) & (tracks.hits >= SETTLED) & (tracks.missed < FRESH) & (tracks.takes < AT_MOST)
     lost[matches.rows] = False
     rows = np.flatnonzero(lost)
     seeking: Int = rows[thing[rows] | _walks(tracks, rows)]
@@ -203,8 +217,7 @@ def _walks(tracks: Followed, rows: Int) -> Bool:
 
 def _hosts(tracks: Followed, sightings: Sightings, rows: Int) -> tuple[Int, Int]:
     """Those of the rows that are expected within a proposal, and which covers each best."""
-    step = tracks.x.take(rows, axis=0)[:, :2] - tracks.shown.take(rows, axis=0)
-    expected = (tracks.outline.take(rows, axis=0) + step @ WAYS).T
+    expected = carried(tracks, rows)
     i, j = touching(expected, sightings.outline)
     cover = covered(expected.take(i, axis=1), sightings.outline.take(j, axis=1))
     room = np.where(tracks.kind == ObjectClass.BACKGROUND.value, PERSON_M, ROOM_M[tracks.kind, 0])[rows[i]]

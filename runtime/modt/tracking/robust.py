@@ -101,9 +101,9 @@ class RobustAssociation:
         return touching(expected + reach, sightings.outline)
 
 
-def carried(tracks: Followed) -> Float64:
-    """(8, M) the outlines last seen, where the filter expects them now."""
-    outline: Float64 = (tracks.outline + (tracks.x[:, :2] - tracks.shown) @ WAYS).T
+def carried(tracks: Followed, rows: Int | slice = slice(None)) -> Float64:
+    """(8, R) the outlines last seen of the rows, of all by default, where the filter expects them now."""
+    outline: Float64 = (tracks.outline[rows] + (tracks.x[rows, :2] - tracks.shown[rows]) @ WAYS).T
     return outline
 
 

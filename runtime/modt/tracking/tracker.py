@@ -20,7 +20,7 @@ from modt.tracking.robust import RobustAssociation
 from modt.tracking.shifts import AGREE_M
 from modt.tracking.sightings import Sightings, sight
 from modt.tracking.states import Happening, StateMachine
-from modt.tracking.turning import Motion, Skew
+from modt.tracking.turning import Motion, Placing, Skew
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
 UNKNOWN_HEADING_RAD = np.pi
@@ -97,9 +97,11 @@ class Tracker:
         place, speed = config.position_sigma_m, config.initial_speed_sigma_mps
         self._P_born = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
         self._tracks = Followed.blank()
+        self._proposals = Proposals.empty()
         self._next_id = 0
         self._stamp_s: float | None = None
         self._T_world_sensor = self._T_world_before = np.eye(4)
+        self._placing = Placing(self._T_world_sensor)
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
         self._first: Skew | None = None
@@ -119,25 +121,29 @@ class Tracker:
         """(4, 4) pose that the last frame was placed by."""
         return self._T_world_sensor
 
-    def follow(self, frame: Frame, proposals: Proposals) -> tuple[Proposals, Tracks]:
-        """Take a frame's proposals to the tracks; afterwards every proposal belongs to exactly one of them.
+    @property
+    def proposals(self) -> Proposals:
+        """Those that the tracks were taken to last: the frame's, more of them where one was parted."""
+        return self._proposals
+
+    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
+        """Take a frame's proposals to the tracks, parted where need be; afterwards each belongs to exactly one.
 
         Returns:
-            The proposals, more of them where one was parted, and the live table: stages that come after write their
-            columns into it.
+            The live table: stages that come after write their columns into it.
         """
         sightings = self._sight(frame, proposals)
         self._predict(frame.stamp_s)
         matches = reunite(self._tracks, sightings, self.association.match(self._tracks, sightings))
-        found = self.parting.part(self._tracks, Found(proposals, sightings, matches), self._T_world_sensor)
-        sightings, matches = found.sightings, found.matches
+        found = self.parting.part(self._tracks, Found(proposals, sightings, matches), self._placing)
+        self._proposals, sightings, matches = found.proposals, found.sightings, found.matches
         self._update(matches, sightings)
         self._rest(matches.rows)
         self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
         self._renew(matches, sightings)
-        return found.proposals, self._tracks
+        return self._tracks
 
     def asking(self) -> Bool:
         """(M,) tracks with a proposal whose state asks for a class; what flickers does not live to ask."""
@@ -213,6 +219,7 @@ class Tracker:
                 self._T_world_odometry = after @ inverse(given)
         sightings = seen_from(after)
         self._T_world_sensor, self._T_world_before = after, before
+        self._placing = Placing(after, motion_to(after), frame.turn_s)
         self._first = skew if first else None
         return sightings
 

@@ -86,6 +86,29 @@ class Skew:
         return share
 
 
+@dataclass(frozen=True, slots=True)
+class Placing:
+    """By what a frame was placed.
+
+    Attributes:
+        T_world_sensor: (4, 4) pose at the stamp.
+        motion: of the sensor up to it.
+        turn_s: as in Frame.
+    """
+
+    T_world_sensor: Float64
+    motion: Motion = Motion()
+    turn_s: float = 0.0
+
+    def step(self, place: Float64) -> Float64:
+        """(P, 2) from where the pose puts what is seen about a place (P, 2) to where that stands [m, world]."""
+        R, t = self.T_world_sensor[:2, :2], self.T_world_sensor[:2, 3]
+        local = (place - t) @ R
+        late_s = np.arctan2(local[:, 1], local[:, 0]) * (-self.turn_s / (2 * np.pi))
+        step: Float64 = self.motion.displacement(local, late_s) @ R.T
+        return step
+
+
 def lateness(proposals: Proposals, turn_s: float) -> Float64:
     """(P,) when each proposal was seen, after the stamp of its frame [s]; turn_s as in Frame.
 
