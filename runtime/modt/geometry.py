@@ -64,7 +64,7 @@ def transform_boxes(T: Float64, boxes: Float64) -> Float64:
 
 
 def upright_box(xyz: Float64, yaw: float) -> Float64:
-    """(7,) x, y, z of the centre, l >= w, h [m] and yaw [rad] of the box about (3, n) points, at a heading or across."""
+    """(7,) x, y, z of the centre, l >= w, h [m], yaw [rad] of the box about (3, n) points, at a heading or across."""
     c, s = np.cos(yaw), np.sin(yaw)
     sides = np.stack([xyz[0] * c + xyz[1] * s, xyz[1] * c - xyz[0] * s, xyz[2]])
     low, high = sides.min(axis=1), sides.max(axis=1)
