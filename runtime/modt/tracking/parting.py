@@ -4,7 +4,7 @@ Somebody who walks along a wall touches it now and then, and for a frame or two 
 wall would have the walker, whose track would find nothing.
 
 The rule. A track of an object, or of what walks whatever it is held for, that finds no proposal although it had one
-of late, and is expected within one too large to be it, takes of that the points that lie where it is expected, if
+a frame ago, and is expected within one too large to be it, takes of that the points that lie where it is expected, if
 there are about as many as it had and they reach as high as it did. What changed hands measures nothing: the track
 goes on as it went.
 
@@ -33,8 +33,6 @@ from modt.types import NONE, Bool, Float64, Int, ObjectClass, Proposals
 
 SETTLED = 4
 """Views after which it is known where a track will be."""
-FRESH = 3
-"""Frames without a proposal after which it is not known any more."""
 AT_MOST = 5
 """Times that a track takes before it must have something of its own again."""
 SLIM_M, TALL_M, WAY_M, SIGMAS = 1.5, 0.5, 1.5, 2.5
@@ -195,9 +193,9 @@ class _Scene:
 
 
 def _seeking(tracks: Followed, matches: Matches) -> Int:
-    """Rows of objects, and of what walks whatever it is held for, that found nothing and had something of late."""
+    """Rows of objects, and of what walks whatever it is held for, that found nothing and did a frame ago."""
     thing = tracks.kind != ObjectClass.BACKGROUND.value
-    lost = (thing | ~tracks.still) & (tracks.hits >= SETTLED) & (tracks.missed < FRESH) & (tracks.takes < AT_MOST)
+    lost = (thing | ~tracks.still) & (tracks.hits >= SETTLED) & (tracks.missed == 0) & (tracks.takes < AT_MOST)
     lost[matches.rows] = False
     rows = np.flatnonzero(lost)
     seeking: Int = rows[thing[rows] | _walks(tracks, rows)]

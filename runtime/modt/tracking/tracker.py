@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from modt.config import TrackingConfig
@@ -100,8 +98,8 @@ class Tracker:
         self._proposals = Proposals.empty()
         self._next_id = 0
         self._stamp_s: float | None = None
-        self._T_world_sensor = self._T_world_before = np.eye(4)
-        self._placing = Placing(self._T_world_sensor)
+        self._T_world_before = np.eye(4)
+        self._placing = Placing(np.eye(4))
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
         self._first: Skew | None = None
@@ -119,7 +117,7 @@ class Tracker:
     @property
     def T_world_sensor(self) -> Float64:
         """(4, 4) pose that the last frame was placed by."""
-        return self._T_world_sensor
+        return self._placing.T_world_sensor
 
     @property
     def proposals(self) -> Proposals:
@@ -183,7 +181,7 @@ class Tracker:
 
     def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
         """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
-        before, given, first = self._T_world_sensor, frame.T_world_sensor, self._stamp_s is None
+        before, given, first = self._placing.T_world_sensor, frame.T_world_sensor, self._stamp_s is None
         if frame.restarts != self._restarts:
             self._restarts, self._T_world_odometry = frame.restarts, None
         if first and given is not None:
@@ -193,50 +191,49 @@ class Tracker:
         if 2 * dt_s < abs(frame.turn_s):  # so short that errors of the poses would be drawn out: no motion
             dt_s = np.inf
 
-        def motion_to(after: Float64) -> Motion:
-            return Motion.between(before, after, dt_s)
+        def placed(after: Float64) -> Placing:
+            return Placing(after, Motion.between(before, after, dt_s), frame.turn_s)
 
-        def seen_from(after: Float64) -> Sightings:
+        def seen(placing: Placing) -> Sightings:
             """The proposals in the world, where they stand at the stamp."""
-            sightings = sight(proposals, after)
+            sightings = sight(proposals, placing.T_world_sensor)
             if skew is None or first:
                 return sightings
-            return sightings.moved(skew.step(motion_to(after), after))
+            return sightings.moved(skew.step(placing.motion, placing.T_world_sensor))
+
+        def corrected(placing: Placing) -> Placing:
+            """By the registration of what is seen."""
+            share = 1.0 if skew is None or self._first is not None else skew.share(dt_s)  # the first frame goes along
+            correction = self._registration.correct(self._tracks, seen(placing), share)
+            return placed(rigid(correction @ placing.T_world_sensor))
 
         if given is not None and self._T_world_odometry is not None:
-            after = self._T_world_odometry @ given
-            self._mend_first(motion_to, after)
+            placing = placed(self._T_world_odometry @ given)
+            self._mend_first(placing.motion)
         else:
-            predicted = before @ (inverse(self._T_world_before) @ before)  # as it moved last
-            share = 1.0 if skew is None or self._first is not None else skew.share(dt_s)  # the first frame goes along
-            after = rigid(self._registration.correct(self._tracks, seen_from(predicted), share) @ predicted)
-            self._mend_first(motion_to, after)
-            if skew is not None and not motion_to(after).skews_like(motion_to(predicted), frame.turn_s):
-                # What was registered stands elsewhere.
-                found, after = after, rigid(self._registration.correct(self._tracks, seen_from(after), share) @ after)
-                self._mend_first(motion_to, after, instead=found)
+            predicted = placed(before @ (inverse(self._T_world_before) @ before))  # as it moved last
+            placing = corrected(predicted)
+            self._mend_first(placing.motion)
+            if skew is not None and not placing.motion.skews_like(predicted.motion, frame.turn_s):
+                found, placing = placing, corrected(placing)  # what was registered stands elsewhere
+                self._mend_first(placing.motion, instead=found.motion)
             if given is not None:  # odometry that begins late, or anew, is brought to where the tracks are
-                self._T_world_odometry = after @ inverse(given)
-        sightings = seen_from(after)
-        self._T_world_sensor, self._T_world_before = after, before
-        self._placing = Placing(after, motion_to(after), frame.turn_s)
+                self._T_world_odometry = placing.T_world_sensor @ inverse(given)
+        self._placing, self._T_world_before = placing, before
         self._first = skew if first else None
-        return sightings
+        return seen(placing)
 
-    def _mend_first(
-        self, motion_to: Callable[[Float64], Motion], after: Float64, instead: Float64 | None = None
-    ) -> None:
+    def _mend_first(self, motion: Motion, instead: Motion | None = None) -> None:
         """Put what the first frame showed where it stood: how the sensor moved is known from the second one on.
 
         Args:
-            motion_to: how the sensor moved to a pose.
-            after: (4, 4) its pose now.
-            instead: (4, 4) one by which it was put before.
+            motion: of the sensor since.
+            instead: one by which it was put before.
         """
         if self._first is not None:
-            step = self._first.step(motion_to(after), self._T_world_sensor)
+            step = self._first.step(motion, self._placing.T_world_sensor)
             if instead is not None:
-                step -= self._first.step(motion_to(instead), self._T_world_sensor)
+                step -= self._first.step(instead, self._placing.T_world_sensor)
             self._tracks.move(step[self._tracks.proposal])
 
     def _update(self, matches: Matches, sightings: Sightings) -> None:
