@@ -194,11 +194,12 @@ class _Scene:
 
 def _seeking(tracks: Followed, matches: Matches) -> Int:
     """Rows of objects, and of what walks whatever it is held for, that found nothing and did a frame ago."""
-    thing = tracks.kind != ObjectClass.BACKGROUND.value
-    lost = (thing | ~tracks.still) & (tracks.hits >= SETTLED) & (tracks.missed == 0) & (tracks.takes < AT_MOST)
+    lost = tracks.missed == 0
     lost[matches.rows] = False
     rows = np.flatnonzero(lost)
-    seeking: Int = rows[thing[rows] | _walks(tracks, rows)]
+    rows = rows[(tracks.hits[rows] >= SETTLED) & (tracks.takes[rows] < AT_MOST)]
+    thing = tracks.kind[rows] != ObjectClass.BACKGROUND.value
+    seeking: Int = rows[thing | _walks(tracks, rows)]
     return seeking
 
 
