@@ -46,10 +46,10 @@ def test_tracks_are_renewed_in_every_column(kept, n):
         column[:] = np.arange(1, len(kept) + 1).reshape(-1, *[1] * (column.ndim - 1))
     rows = np.flatnonzero(kept)
     renewed = tracks.renewed(rows, n)
-    old, blank = tracks.take(rows), Tracks.blank(n)
+    blank = Tracks.blank(n)
     for name, column in renewed.columns():
-        np.testing.assert_array_equal(column, np.concatenate([getattr(old, name), getattr(blank, name)]))
-    assert renewed.take(renewed.id == NONE).id.tolist() == [NONE] * n
+        np.testing.assert_array_equal(column, np.concatenate([getattr(tracks, name)[rows], getattr(blank, name)]))
+    assert (renewed.id[len(rows) :] == NONE).all()
     assert {name for name, _ in renewed.columns()} == {f.name for f in dataclasses.fields(Tracks)}
 
 

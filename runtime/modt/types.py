@@ -250,11 +250,6 @@ class Tracks:
     def _names(cls) -> tuple[str, ...]:
         return tuple(f.name for f in fields(cls))
 
-    def take(self, rows: Int | Bool) -> Self:
-        """A copy of the rows given, by index or mask."""
-        index = np.flatnonzero(rows) if rows.dtype == np.bool_ else rows
-        return type(self)(**{name: column.take(index, axis=0) for name, column in self.columns()})
-
     def copy(self) -> Self:
         """The same rows, independent of these."""
         return type(self)(**{name: column.copy() for name, column in self.columns()})
@@ -262,13 +257,13 @@ class Tracks:
     def renewed(self, kept: Int, n: int) -> Self:
         """The rows kept, by index, then n blank ones."""
         m = len(kept)
-        renewed = []
+        columns = []
         for (_, old), blank in zip(self.columns(), self._blank_row(), strict=True):
             new = np.empty((m + n, *old.shape[1:]), old.dtype)
             old.take(kept, axis=0, out=new[:m], mode="clip")  # unlike "raise" straight into its place
             new[m:] = blank
-            renewed.append(new)
-        return type(self)(*renewed)
+            columns.append(new)
+        return type(self)(*columns)
 
     @classmethod
     @cache

@@ -19,11 +19,12 @@ def carved(proposals: Proposals, hosts: Int, pieces: list[Int], yaw: Float64) ->
         pieces: n > 0 times members of the host, none of them twice and never all of a host's.
         yaw: (n,) headings of the pieces' boxes [rad]; their hosts' keep theirs.
     """
+    cut = np.unique(hosts)
     left = np.ones(len(proposals.members), np.bool_)
     left[np.concatenate(pieces)] = False
     kept: list[slice | Int] = []  # whole stretches of what is left are copied faster than one by one
     end = 0
-    for host in np.unique(hosts):
+    for host in cut:
         begin, stop = proposals.offsets[host : host + 2]
         kept += [slice(end, begin), begin + np.flatnonzero(left[begin:stop])]
         end = stop
@@ -37,14 +38,14 @@ def carved(proposals: Proposals, hosts: Int, pieces: list[Int], yaw: Float64) ->
     source = np.append(np.arange(n), hosts)
     box, centroid = proposals.box.take(source, axis=0), proposals.centroid.take(source, axis=0)
     box[n:, 6] = yaw
-    for k in [*np.unique(hosts), *range(n, n + len(hosts))]:
+    for k in [*cut, *range(n, n + len(hosts))]:
         xyz = coordinates[:, offsets[k] : offsets[k + 1]].astype(np.float64)
         box[k], centroid[k] = upright_box(xyz, box[k, 6]), xyz.mean(axis=1)
     occluded = proposals.occluded[source]
     occluded[n:] = True
-    reflectance = None if proposals.reflectance is None else proposals.reflectance.take(source, axis=0)
+    reflectance = proposals.reflectance
     if reflectance is not None:
-        reflectance[n:] = np.nan  # their hosts'
+        reflectance = np.pad(reflectance, ((0, len(hosts)), (0, 0)), constant_values=np.nan)
     return replace(
         proposals,
         members=np.concatenate([proposals.members[rows] for rows in order]),

@@ -39,7 +39,7 @@ INLIER_M = 0.2
 AGREEMENT = 0.3
 """Part of the landmarks that must agree for the prediction to be trusted next time."""
 CONSENT, AS_BEFORE = 0.75, 0.5
-"""Part that must agree, and so many of those of the frame before, lest the prediction is mistrusted and pairs are
+"""Part that must agree, and so many of those that agreed last time, lest the prediction is mistrusted and pairs are
 sought farther away."""
 STOOD = 3
 """Frames from which the mean of what stands is its place."""

@@ -24,15 +24,13 @@ from modt.tracking.association import Matches
 from modt.tracking.carving import carved
 from modt.tracking.followed import Followed
 from modt.tracking.kalman import SPEED, X, Y
-from modt.tracking.kinship import PERSON_M, ROOM_M
+from modt.tracking.kinship import PERSON_M, ROOM_M, SETTLED
 from modt.tracking.outlines import WAYS, covered, lengths, touching
 from modt.tracking.robust import carried
 from modt.tracking.sightings import Sightings, sight
 from modt.tracking.turning import Placing
 from modt.types import NONE, Bool, Float64, Int, ObjectClass, Proposals
 
-SETTLED = 4
-"""Views after which it is known where a track will be."""
 AT_MOST = 5
 """Times that a track takes before it must have something of its own again."""
 SLIM_M, TALL_M, WAY_M, SIGMAS = 1.5, 0.5, 1.5, 2.5
