@@ -2,11 +2,13 @@ import argparse
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from modt.cli import track
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
-from modt.sources.detections import T_LEVEL_CAMERA, kitti, read
+from modt.sources.detections import T_LEVEL_CAMERA, Detections, kitti, read
 
 
 def run(*arguments):
@@ -23,11 +25,11 @@ def parked(n, T_world_level):
         yield transform_boxes(inverse(T_world_level(i)), world)
 
 
-def write(path, n=20, T_world_level=lambda i: np.eye(4)):
+def write(path, n=20, T_world_level=lambda i: np.eye(4), score=9):
     with path.open("w") as out:
         for i, boxes in enumerate(parked(n, T_world_level)):
             for d in kitti(boxes):
-                print(i, 2, 100, 100, 200, 200, 9, *d, 0, sep=",", file=out)
+                print(i, 2, 100, 100, 200, 200, score, *d, 0, sep=",", file=out)
 
 
 def turning(i):
@@ -64,6 +66,37 @@ def test_two_runs_are_the_same(tmp_path):
     assert (tmp_path / "one/a.txt").read_bytes() == (tmp_path / "two/a.txt").read_bytes()
 
 
+def test_what_is_not_sure_is_left_out_unless_it_is_asked_for(tmp_path, caplog):
+    write(tmp_path / "a.txt", score=0.5)
+    run(tmp_path / "a.txt", "--out", tmp_path / "none", "--quiet")
+    assert (tmp_path / "none/a.txt").read_text() == ""
+    assert "lower --sure" in caplog.text
+    run(tmp_path / "a.txt", "--out", tmp_path / "all", "--quiet", "--sure", "-1000")
+    assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
+
+
+def test_boxes_without_a_score_are_followed(tmp_path):
+    lines = [f"{i} {k} Car 0 0 0 1 1 9 9 1.5 1.8 4 {5 * k} 1.6 12 0" for i in range(5) for k in range(2)]
+    (tmp_path / "a.txt").write_text("\n".join(lines))
+    run(tmp_path / "a.txt", "--out", tmp_path / "out", "--quiet")
+    assert len((tmp_path / "out/a.txt").read_text().splitlines()) == 2 * 5
+
+
+@given(
+    st.lists(st.lists(st.tuples(st.floats(-20, 20), st.floats(-2, 12)), max_size=4), min_size=2, max_size=9),
+    st.data(),
+)
+def test_what_is_written_of_a_frame_depends_on_no_later_one(scene, data):
+    rows = [(i, x, score) for i, seen in enumerate(scene) for x, score in seen]
+    box = np.array([[x, 2.0, -1.0, 4.0, 1.8, 1.5, 0.0] for _, x, _ in rows]).reshape(-1, 7)
+    frame = np.array([i for i, _, _ in rows], np.int64)
+    score = np.array([s for _, _, s in rows], np.float64)
+    whole = Detections("a", frame, np.ones(len(rows), np.int64), np.zeros((len(rows), 4)), score, box)
+    until = data.draw(st.integers(0, len(scene) - 1))
+    early = [line for line in track.follow(whole, None, 0.1)[0].splitlines() if int(line.split()[0]) <= until]
+    assert track.follow(whole.take(frame <= until), None, 0.1)[0].splitlines() == early
+
+
 @pytest.mark.parametrize(
     ("options", "cause"),
     [
@@ -71,6 +104,7 @@ def test_two_runs_are_the_same(tmp_path):
         (["--poses", "short.txt"], "1 poses for 20 frames"),
         (["--poses", "bad.txt"], r"bad.txt:1: 3 numbers"),
         (["--period", "0"], "no time between frames"),
+        (["--sure", "nan"], "out of range"),
     ],
 )
 def test_misuse_is_named(tmp_path, monkeypatch, options, cause):

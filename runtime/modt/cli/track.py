@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument(
         "--period", type=float, default=PERIOD_S, metavar="S", help="between frames (default: %(default)g)"
     )
+    p.add_argument(
+        "--sure",
+        type=float,
+        metavar="CONFIDENCE",
+        help="least of a track that is written (default: by type, for PointRCNN)",
+    )
     p.add_argument("--quiet", action="store_true", help="no summary")
     p.set_defaults(run=run)
 
@@ -44,6 +51,8 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import LineFile, writing
     from modt.sources.detections import files, read
 
+    if arguments.sure is not None and not -1000 <= arguments.sure <= 1000:
+        raise MisuseError("--sure", f"{arguments.sure:g} is out of range", "give -1000, for all tracks, to 1000")
     if not 0.001 <= arguments.period <= 10:
         raise MisuseError("--period", f"{arguments.period:g} s is no time between frames", "give 0.001 to 10")
     paths = files(arguments.detections)
@@ -54,26 +63,33 @@ def run(arguments: argparse.Namespace) -> int:
     frames, ids, spent_s = 0, 0, 0.0
     for sequence, poses in zip(sequences, motions, strict=True):
         began = time.process_time()
-        text, n = follow(sequence, poses, arguments.period)
+        text, n = follow(sequence, poses, arguments.period, arguments.sure)
         spent_s += time.process_time() - began
         frames, ids = frames + sequence.n_frames, ids + n
         lines = LineFile(arguments.out / f"{sequence.name}.txt")
         lines.write(text)
         lines.close()
+    if not ids and any(map(len, sequences)):
+        logging.getLogger("modt").warning("no track is sure enough; lower --sure to write more")
     if not arguments.quiet:
         rate = f"{frames / spent_s:.0f} frames a second of CPU time" if spent_s else "no time"
         print(f"{len(sequences)} sequences, {frames} frames, {ids} tracks, {rate}: {arguments.out}")
     return 0
 
 
-def follow(detections: Detections, poses: Float64 | None, period_s: float) -> tuple[str, int]:
+def follow(
+    detections: Detections, poses: Float64 | None, period_s: float, sure: float | None = None
+) -> tuple[str, int]:
     """KITTI tracking results of a sequence, and how many tracks they hold.
 
     Args:
         detections: of the sequence.
         poses: (n, 4, 4) T_world_camera of its frames, None where no ego-motion is known.
         period_s: between frames.
+        sure: confidence of a track that is written, None for that of its type.
     """
+    from dataclasses import replace
+
     import numpy as np
 
     from modt.geometry import inverse, transform_boxes
@@ -86,13 +102,15 @@ def follow(detections: Detections, poses: Float64 | None, period_s: float) -> tu
     tracks = 0
     for type_, name in enumerate(TYPES):
         own = detections.take(detections.type_ == type_)
-        tracker = BoxTracker(box_config(name))
+        config = box_config(name)
+        tracker = BoxTracker(config if sure is None else replace(config, sure=sure))
         last = np.zeros((0, 4))
         reports: list[tuple[Int, Int, Float64, Float64, Float64]] = []
         for frame, rows in own.frames():
             T = None if poses is None else T_LEVEL_CAMERA @ poses[frame] @ inverse(T_LEVEL_CAMERA)
-            boxes = own.box[rows] if T is None else transform_boxes(T, own.box[rows])
-            found = tracker.follow(frame * period_s, boxes, own.score[rows])
+            seen = own.box[rows]
+            boxes = seen if T is None else transform_boxes(T, seen)
+            found = tracker.follow(frame * period_s, boxes, own.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
             if not len(found.id):
                 continue
             if found.id.max() >= len(last):
@@ -100,7 +118,7 @@ def follow(detections: Detections, poses: Float64 | None, period_s: float) -> tu
             now = found.source >= 0
             last[found.id[now]] = own.image_box[rows][found.source[now]]
             placed = found.box if T is None else transform_boxes(inverse(T), found.box)
-            reports.append((np.full(len(found.id), frame), found.id, last[found.id], placed, found.score))
+            reports.append((np.full(len(found.id), frame), found.id, last[found.id], placed, found.confidence))
         if reports:
             frames, ids, image_box, box, score = (np.concatenate(column) for column in zip(*reports, strict=True))
             lines += result_lines(frames, name, ids * len(TYPES) + type_, image_box, kitti(box), score)

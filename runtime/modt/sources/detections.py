@@ -2,7 +2,7 @@
 
 Two formats are recognised: AB3DMOT's 15 comma-separated columns (frame; type 1 Pedestrian, 2 Car, 3 Cyclist; left,
 top, right, bottom [pixel]; score; h, w, l, x, y, z [m], ry [rad]; alpha) and KITTI's tracking labels (frame, id,
-type, truncated, occluded, alpha, box, h, w, l, x, y, z, ry and a score, 1 where there is none). Both are in the
+type, truncated, occluded, alpha, box, h, w, l, x, y, z, ry and a score; what has none is sure). Both are in the
 coordinates of the camera: x right, y down, z forward, the place being the middle of the foot.
 """
 
@@ -21,6 +21,8 @@ from modt.types import Bool, Float64, Int
 TYPES = ("Pedestrian", "Car", "Cyclist")
 """In AB3DMOT's order, which counts from 1."""
 COLUMNS = 15
+UNSCORED = 10.0
+"""Score of what has none: somebody is sure of it."""
 T_LEVEL_CAMERA = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """Camera coordinates to x forward, y left, z up."""
 
@@ -132,5 +134,5 @@ def _label(words: list[str]) -> list[float] | None:
     alpha, *box = (float(v) for v in words[5:17])
     if len(box) != 11:
         raise ValueError(words)
-    score = float(words[17]) if len(words) > 17 else 1.0
+    score = float(words[17]) if len(words) > 17 else UNSCORED
     return [float(words[0]), TYPES.index(words[2]) + 1.0, *box[:4], score, *box[4:], alpha]

@@ -1,8 +1,9 @@
 """The tracker for whole boxes: detections that somebody else has made and classified.
 
-The filter is that of the proposals (Equation 1). What differs is what is known of a detection: its box is a guess at
-the whole object, so its centre is the place, and it comes with a score, so that a weak one may continue a track but
-not begin it.
+What differs from proposals is what is known of a detection: its box is a guess at the whole object, so its centre is
+the place, and it comes with a score. The score says how exact the centre is, and whether to believe in it at all: a
+weak detection may continue a track but not begin it. Where nothing is known of the sensor's own motion, all objects
+seem to share it, and their courses turn as it does; so the filter is a linear one, without a course.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from modt.config import BoxTrackingConfig
 from modt.geometry import wrap
-from modt.tracking import kalman
+from modt.tracking import constant_velocity
 from modt.tracking.association import assign_all
 from modt.types import NONE, Bool, Float64, Int
 
@@ -23,12 +24,10 @@ LIMIT = 1.0
 
 CONFIGS = {
     "Car": BoxTrackingConfig(),
-    "Pedestrian": BoxTrackingConfig(
-        acceleration_sigma_mps2=3.0, initial_speed_sigma_mps=3.0, turn_sigma_radps=1.0, min_hits=3, turn_gain=0.5
-    ),
-    "Cyclist": BoxTrackingConfig(acceleration_sigma_mps2=5.0, initial_speed_sigma_mps=8.0, min_hits=3),
+    "Pedestrian": BoxTrackingConfig(sure=4.0, turn_gain=0.5),
+    "Cyclist": BoxTrackingConfig(sure=1.0, range_bonus_per_m=0.0),
 }
-"""How objects of each type move, and how far their detections can be trusted."""
+"""How far detections of each type can be trusted."""
 
 
 def box_config(name: str) -> BoxTrackingConfig:
@@ -43,13 +42,13 @@ class Reported:
     Attributes:
         id: (K,) of the tracks.
         box: (K, 7) smoothed, world frame.
-        score: (K,) of the track so far.
+        confidence: (K,) in the track so far, the higher the surer.
         source: (K,) detection that each was seen as, NONE where it is predicted.
     """
 
     id: Int
     box: Float64
-    score: Float64
+    confidence: Float64
     source: Int
 
 
@@ -62,9 +61,6 @@ class BoxTracker:
 
     def __init__(self, config: BoxTrackingConfig) -> None:
         self.config = config
-        position, speed = config.position_sigma_m, config.initial_speed_sigma_mps
-        self._R = np.square(position) * np.eye(2)[None]
-        self._P_born = np.diag(np.square([position, position, np.pi, speed]))[None]
         self._next_id = 0
         self._stamp_s: float | None = None
         self._start(0)
@@ -72,44 +68,46 @@ class BoxTracker:
     def _start(self, n: int) -> None:
         self._id, self._hits, self._missed = (np.zeros(n, np.int64) for _ in range(3))
         self._source = np.zeros(n, np.int64)
-        self._x, self._P = np.zeros((n, 4)), np.zeros((n, 4, 4))
-        self._box, self._score = np.zeros((n, 7)), np.zeros(n)
+        self._x, self._P = np.zeros((n, 4)), np.zeros((n, 3))
+        self._box, self._trust = np.zeros((n, 7)), np.zeros(n)
 
-    def follow(self, stamp_s: float, boxes: Float64, score: Float64) -> Reported:
+    def follow(self, stamp_s: float, boxes: Float64, score: Float64, range_m: Float64) -> Reported:
         """Take a frame's detections to the tracks.
 
         Args:
             stamp_s: time of the frame [s].
             boxes: (D, 7) detections in the world frame.
             score: (D,) how sure the detector is of each, the higher the surer.
+            range_m: (D,) of each from the sensor [m].
         """
+        variance = np.square(self.config.position_sigma_m * np.exp(-np.maximum(score, 0.0) / self.config.score_scale))
+        trust = (
+            score + self.config.range_bonus_per_m * range_m
+        )  # what is far has few points, and a low score by right
         self._predict(stamp_s)
         strong = score >= self.config.strong_score
-        rows, columns = self._match(boxes, strong)
+        rows, columns = self._match(boxes, variance, strong)
         self._source[:] = NONE
         self._missed += 1
         if len(rows):
-            self._update(rows, columns, boxes, score)
+            self._update(rows, columns, boxes, variance, trust)
         free = strong.copy()
         free[columns] = False
         keep = self._missed <= self.config.max_missed
         if not keep.all() or free.any():
-            self._renew(keep, np.flatnonzero(free), boxes, score)
+            self._renew(keep, np.flatnonzero(free), boxes, variance, trust)
         return self._report()
 
     def _predict(self, stamp_s: float) -> None:
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
-        if not len(self._id):
-            return
-        Q = kalman.process_noise(self._x, dt_s, self.config.acceleration_sigma_mps2, self.config.turn_sigma_radps)
-        self._x, self._P = kalman.predict(self._x, self._P, Q, dt_s)
+        self._x, self._P = constant_velocity.predict(self._x, self._P, self.config.acceleration_sigma_mps2, dt_s)
 
-    def _match(self, boxes: Float64, strong: Bool) -> tuple[Int, Int]:
+    def _match(self, boxes: Float64, variance: Float64, strong: Bool) -> tuple[Int, Int]:
         """Rows and detections that belong together: the strong ones first, the weak ones among what is left."""
         if not len(self._id) or not len(boxes):
             return np.zeros(0, np.int64), np.zeros(0, np.int64)
-        cost = self._cost(boxes)
+        cost = self._cost(boxes, variance)
         if strong.all():
             return assign_all(cost, LIMIT)
         rows, columns = assign_all(np.where(strong, cost, LIMIT), LIMIT)
@@ -117,25 +115,19 @@ class BoxTracker:
         more, weak = assign_all(cost, LIMIT)
         return np.concatenate([rows, more]), np.concatenate([columns, weak])
 
-    def _cost(self, boxes: Float64) -> Float64:
+    def _cost(self, boxes: Float64, variance: Float64) -> Float64:
         """(T, D) of each pair, LIMIT and more beyond the gate."""
         dx, dy = boxes[:, 0] - self._x[:, 0, None], boxes[:, 1] - self._x[:, 1, None]
-        sigma = self.config.position_sigma_m**2 + (self._P[:, 0, 0] + self._P[:, 1, 1]) / 2
-        reach = self.config.gate * sigma + (self.config.overlap * self._box[:, 3]) ** 2
+        reach = self.config.gate * (self._P[:, :1] + variance) + np.square(self.config.overlap * self._box[:, 3:4])
         rise = np.abs(boxes[:, 2] - self._box[:, 2, None])
         turn = np.abs(np.sin(boxes[:, 6] - self._box[:, 6, None]))
-        cost: Float64 = (dx * dx + dy * dy) / reach[:, None] + 0.2 * rise + 0.1 * turn
+        cost: Float64 = (dx * dx + dy * dy) / reach + 0.2 * rise + 0.1 * turn
         return cost
 
-    def _update(self, rows: Int, columns: Int, boxes: Float64, score: Float64) -> None:
+    def _update(self, rows: Int, columns: Int, boxes: Float64, variance: Float64, trust: Float64) -> None:
         seen = boxes.take(columns, axis=0)
         x, P = self._x.take(rows, axis=0), self._P.take(rows, axis=0)
-        slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
-        if slow.any():
-            step = seen[:, :2] - x[:, :2]
-            course = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
-            x, P = kalman.face(x, P, course)
-        self._x[rows], self._P[rows] = kalman.turn_about(*kalman.update(x, P, seen[:, :2], self._R))
+        self._x[rows], self._P[rows] = constant_velocity.update(x, P, seen[:, :2], variance[columns])
         self._missed[rows] = 0
         self._source[rows] = columns
         hits = self._hits[rows] + 1
@@ -148,12 +140,15 @@ class BoxTracker:
         turn = np.where(about, wrap(turn + np.pi), turn)  # headings that do not flip
         box[:, 6] = wrap(box[:, 6] + self.config.turn_gain * turn)
         self._hits[rows], self._box[rows] = hits, box
-        self._score[rows] += (score[columns] - self._score[rows]) / hits
+        gain = np.maximum(1.0 / hits, self.config.score_gain)
+        self._trust[rows] += gain * (trust[columns] - self._trust[rows])
 
-    def _renew(self, keep: Bool, born: Int, boxes: Float64, score: Float64) -> None:
+    def _renew(self, keep: Bool, born: Int, boxes: Float64, variance: Float64, trust: Float64) -> None:
         n = len(born)
         x = np.zeros((n, 4))
         x[:, :2] = boxes[born, :2]
+        P = np.zeros((n, 3))
+        P[:, 0], P[:, 2] = variance[born], np.square(self.config.initial_speed_sigma_mps)
         join = np.concatenate
         self._id = join([self._id[keep], self._next_id + np.arange(n)])
         self._next_id += n
@@ -161,14 +156,13 @@ class BoxTracker:
         self._missed = join([self._missed[keep], np.zeros(n, np.int64)])
         self._source = join([self._source[keep], born])
         self._x = join([self._x[keep], x])
-        self._P = join([self._P[keep], self._P_born.repeat(n, axis=0)])
+        self._P = join([self._P[keep], P])
         self._box = join([self._box[keep], boxes[born]])
-        self._score = join([self._score[keep], score[born]])
+        self._trust = join([self._trust[keep], trust[born]])
 
     def _report(self) -> Reported:
-        sure = (self._hits >= self.config.min_hits) | (self._score > self.config.sure_score)
-        rows = np.flatnonzero(sure & (self._missed <= self.config.report_missed))
+        confidence = self._trust + self.config.age_bonus * np.log(self._hits)
+        rows = np.flatnonzero((confidence >= self.config.sure) & (self._missed <= self.config.report_missed))
         box = self._box[rows]
         box[:, :2] = self._x[rows, :2]
-        score = self._score[rows] + self.config.age_bonus * np.log(self._hits[rows])
-        return Reported(self._id[rows], box, score, self._source[rows])
+        return Reported(self._id[rows], box, confidence[rows], self._source[rows])
