@@ -142,7 +142,7 @@ class BoxTrackingConfig(StageConfig):
     score_gain: float = _number(0.5, 0.0, 1.0, "", "least weight of a new detection in the confidence")
     max_missed: int = _number(8, 0, 100, "frames", "without a detection before a track is deleted")
     report_missed: int = _number(0, 0, 100, "frames", "for which a track is reported where it is predicted")
-    gate: float = _number(9.0, 0.1, 1000.0, "", "squared Mahalanobis distance of an association at most")
+    gate: float = _number(13.8, 0.1, 1000.0, "", "squared Mahalanobis distance of an association at most")
     overlap: float = _number(0.7, 0.0, 2.0, "", "part of the length by which a centre may be off besides")
     position_sigma_m: float = _number(0.2, 0.01, 5.0, "m", "of a detected centre of score zero")
     score_scale: float = _number(10.0, 0.1, 1e6, "", "rise of the score that makes a centre e times as exact")
