@@ -26,6 +26,7 @@ PAPER = FusionConfig(
     range_ratio=0.2,
     extent_ratio=0.3,
     box_weight=0.0,
+    slip=0.0,
 )
 ALL = (EveryFrame(), FirstView(FusionConfig()), KeyViews(FusionConfig()), KeyViews(PAPER))
 
@@ -285,7 +286,7 @@ def test_what_by_its_box_is_no_object_is_not_doubted() -> None:
 def test_a_class_goes_with_what_the_box_says_since_the_view() -> None:
     proposals, tracks = scene((50,))
     prior = Told(DOUBTFUL)
-    fusion, view = KeyViews(FusionConfig(box_weight=1.0), prior), np.array([[0.5, 0.3, 0.1, 0.1]])
+    fusion, view = KeyViews(FusionConfig(box_weight=1.0, slip=0.0), prior), np.array([[0.5, 0.3, 0.1, 0.1]])
     asking = np.array([True])
     fusion.asks(tracks, proposals, asking)
     fusion.fuse(tracks, proposals, np.array([0]), view)
@@ -296,6 +297,18 @@ def test_a_class_goes_with_what_the_box_says_since_the_view() -> None:
     prior.rows = np.array([DOUBTFUL])
     fusion.asks(tracks, proposals, asking)
     np.testing.assert_allclose(tracks.posterior[0], view[0], rtol=1e-6)
+
+
+def test_a_proposal_may_be_something_else_than_its_track() -> None:
+    proposals, tracks = scene((50, 50))
+    prior = Told(CAR, CAR)
+    fusion = KeyViews(FusionConfig(slip=0.2), prior)
+    fusion.asks(tracks, proposals, np.ones(2, np.bool_))
+    view = np.array([[0.001, 0.997, 0.001, 0.001]] * 2)
+    assert fusion.fuse(tracks, proposals, np.arange(2), view).all()
+    np.testing.assert_allclose(tracks.posterior, view, rtol=1e-6)  # who was looked at is what was seen
+    fusion.asks(tracks, proposals, np.zeros(2, np.bool_))
+    np.testing.assert_allclose(tracks.posterior, 0.8 * view + 0.2 * np.array(CAR), rtol=1e-6)
 
 
 @pytest.mark.parametrize("make", [FirstView, KeyViews])

@@ -48,7 +48,7 @@ class FirstView:
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """The tracks that have no class."""
-        expect(tracks, proposals, self.prior, self.config.box_weight)
+        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
         asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
         return asks & self.prior.likely(tracks.prior, self.config.likely_once)
 
@@ -89,7 +89,7 @@ class KeyViews:
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """Those asking that were never classified or show an independent view, and the settled that came close."""
-        expect(tracks, proposals, self.prior, self.config.box_weight)
+        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
         seen = tracks.proposal != NONE
         asks: Bool = (asking | tracks.classified) & ~tracks.fixed & seen
         rows = np.flatnonzero(asks)
