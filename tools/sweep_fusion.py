@@ -170,7 +170,7 @@ def real(path: Path, config: ProfileConfig, network: PointNet, *, ideal: bool, c
 
 
 def _prior(config: ProfileConfig, network: PointNet) -> Prior:
-    return prior_of(network.metadata, config.fusion.prior, config.sensor, network.evidence)
+    return prior_of(network.boxes, config.fusion.prior, config.sensor, network.evidence)
 
 
 def tried(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording], *when: int) -> Tried:

@@ -196,7 +196,7 @@ class FusionConfig(StageConfig):
         1.5, 1.0, 1000.0, "", "times the points, and five more, that raise doubt; none: never"
     )
     reopen_points: int = _number(400, 0, 10000, "", "a class settled from so many is never doubted")
-    start_frame: int = _number(3, 1, 1000, "frames", "age of a track from which views are fused")
+    start_frame: int = _number(5, 1, 1000, "frames", "age of a track from which views are fused")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -243,8 +243,9 @@ def test_no_tracks_are_no_trouble(fusion: Fusion) -> None:
 class Told:
     """A prior that says what a test tells it."""
 
-    def __init__(self, *rows: list[float]) -> None:
+    def __init__(self, *rows: list[float], share: float = 0.0) -> None:
         self.rows = np.array(rows)
+        self.share = share
 
     def of(self, proposals: Proposals) -> Float64:
         return self.rows
@@ -339,6 +340,20 @@ def test_a_further_view_takes_the_place_of_what_the_box_said_since_the_last() ->
             fusion.fuse(tracks, proposals, np.array([0]), view[None])
         fused.append(tracks.posterior[0].copy())
     np.testing.assert_allclose(fused[0], fused[1])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4])
+def test_a_further_view_that_says_what_is_known_without_it_adds_nothing(share: float) -> None:
+    proposals, tracks = scene((50,))
+    config = dataclasses.replace(PAPER, prior=(0.08, 0.02, 0.02))
+    fusion, row = KeyViews(config, Told(DOUBTFUL, share=share)), np.array([0])
+    fusion.asks(tracks, proposals, np.array([True]))
+    first = np.array([[0.5, 0.3, 0.1, 0.1]])
+    fusion.fuse(tracks, proposals, row, first)
+    known = np.array([0.88, 0.08, 0.02, 0.02]) ** (1 - share) * np.array(DOUBTFUL) ** share
+    fusion.fuse(tracks, proposals, row, known[None] / known.sum())
+    np.testing.assert_allclose(tracks.posterior, first, rtol=1e-6)
+    assert tracks.views.tolist() == [2]
 
 
 def test_what_took_its_class_over_is_looked_at_where_its_box_may_be_an_objects() -> None:
