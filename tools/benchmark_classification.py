@@ -50,6 +50,14 @@ def textbook(net: PointNet, points: Float32, proposals: Proposals, batch: int, s
     return np.concatenate(parts).astype(np.float64)
 
 
+def bare(net: PointNet, sensor: SensorConfig, *, pool_first: bool) -> PointNet:
+    """The network by itself, in the textbook's order or in ours."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bare.onnx"
+        path.write_bytes(graph(layers_of(net.path), pool_first=pool_first).SerializeToString())
+        return PointNet(ClassificationConfig(model=str(path)), sensor)
+
+
 def cpu_ms(work: Callable[[], object]) -> float:
     before = time.thread_time_ns()
     work()
@@ -70,10 +78,7 @@ def main() -> None:
     sweeps = sweeps[:: max(1, len(sweeps) // args.frames)]
     scenes = [(points, segmenter.segment(points)) for points in sweeps]
     ours = PointNet(config.classification, config.sensor)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "textbook.onnx"
-        path.write_bytes(graph(layers_of(ours.path), pool_first=False).SerializeToString())
-        naive = PointNet(ClassificationConfig(model=str(path)), config.sensor)
+    naive, alone = (bare(ours, config.sensor, pool_first=first) for first in (False, True))
     ways: dict[str, Callable[[Float32, Proposals], Float64]] = {
         "ours": lambda points, proposals: ours.classify(points, proposals, np.arange(len(proposals)))
     }
@@ -89,8 +94,13 @@ def main() -> None:
     cost = {name: min(values) / n for name, values in spent.items()}
     best = min(value for name, value in cost.items() if name != "ours")
     apart = max(
-        float(np.abs(ways["ours"](*s) - ways[f"textbook, batch {TEXTBOOK_BATCHES[1]}"](*s)).max(initial=0.0))
+        float(
+            np.abs(
+                alone.classify(*s, np.arange(len(s[1]))) - ways[f"textbook, batch {TEXTBOOK_BATCHES[1]}"](*s)
+            ).max()
+        )
         for s in scenes
+        if len(s[1])
     )
     counts = np.concatenate([proposals.count for _, proposals in scenes])
     print(

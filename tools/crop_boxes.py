@@ -6,8 +6,8 @@ import numpy as np
 
 from augment import Beams
 from dataset import SENSOR_HEIGHT_M, Dataset
+from modt.classification.boxes import beam_sr, features
 from modt.classification.crops import Crops
-from modt.classification.prior import beam_sr, features
 from modt.segmentation.boxes import headings, upright_boxes
 from modt.segmentation.groups import Groups
 from modt.types import Float64, Int

@@ -21,7 +21,7 @@ from typing import Any
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from modt.classification import prior, reflectance
+from modt.classification import boxes, reflectance
 from modt.types import CLASS_NAMES
 from weights import Layer, load_layers
 
@@ -93,7 +93,7 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
     if "cross_validation" in report:
         lines += ["## Out of fold (drives never split)", "", *_scores(report["cross_validation"])]
     if "reflectance" in report:
-        lines += ["## With the reflectance, out of fold", "", *_reflected(report["reflectance"])]
+        lines += ["## With box and reflectance, out of fold", "", *_reflected(report["reflectance"])]
     lines += ["## The box alone, out of fold", "", *_ruled_out(report["boxes"])]
     return "\n".join(lines)
 
@@ -135,8 +135,9 @@ def _reflected(told: dict[str, Any]) -> list[str]:
         f"What the returns' reflectance says (modt.classification.reflectance), in the metadata, on the scale of an "
         f"{told['sensor']}; not looked at elsewhere.",
         "",
-        f"- the network and {told['weight']} of it: average precision {_listed(shape['average_precision'])}, "
-        f"calibration error {shape['ece']}, log loss {shape['log_loss']} ({shape['log_loss_without']} without)",
+        f"- the network to the power of {1 - told['share']:.2f}, the box to that of {told['share']} and the "
+        f"reflectance to that of {told['weight']}: average precision {_listed(shape['average_precision'])}, "
+        f"calibration error {shape['ece']}, log loss {shape['log_loss']} ({shape['log_loss_without']} by shape)",
         f"- the box and all of it: average precision {_listed(told['box']['average_precision'])}",
         "",
         *_confused(shape["confusion"]),
@@ -148,7 +149,7 @@ def _reflected(told: dict[str, Any]) -> list[str]:
 
 def _ruled_out(boxes: dict[str, Any]) -> list[str]:
     return [
-        f"What a box says (modt.classification.prior), in the metadata; average precision "
+        f"What a box says (modt.classification.boxes), in the metadata; average precision "
         f"{_listed(boxes['average_precision'])}.",
         "By its box an object with less than the probability in the first column:",
         "",
@@ -174,12 +175,14 @@ def main() -> None:
     network = graph(load_layers(args.trained / "weights.npz"))
     report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
     report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
-    held = {prior.METADATA: prior.encode(load_layers(args.trained / "boxes.npz"))}
+    held, share = {}, 0.0
     if (args.trained / "reflectance.json").exists():
         told = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
         report["reflectance"] = told
         layers = load_layers(args.trained / "reflectance.npz")
         held[reflectance.METADATA] = reflectance.encode(layers, told["weight"], told["sensor"])
+        share = told["share"]
+    held[boxes.METADATA] = boxes.encode(load_layers(args.trained / "boxes.npz"), share)
     helper.set_model_props(network, held)
     model = network.SerializeToString(deterministic=True)
     args.out.write_bytes(model)

@@ -49,11 +49,19 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A drive: its moments, and how many tracks they show."""
+    """A drive.
+
+    Attributes:
+        name: of it.
+        moments: frame by frame.
+        n_tracks: how many tracks they show.
+        share: of the box in what the network said.
+    """
 
     name: str
     moments: tuple[Moment, ...]
     n_tracks: int
+    share: float = 0.0
 
     @property
     def n_proposals(self) -> int:
@@ -108,7 +116,7 @@ def record(
                 judged=~labels.unknown & ~(labels.partial & ideal),
             )
         )
-    return Recording(name, tuple(moments), len(rows))
+    return Recording(name, tuple(moments), len(rows), prior.share)
 
 
 def owners(scan: Scan, proposals: Proposals) -> Int:
@@ -139,6 +147,7 @@ class Player:
     def __init__(self, recording: Recording, ask_from: int) -> None:
         self._moments = iter(recording.moments)
         self._ask_from = ask_from
+        self.share = recording.share
         self._tracks = Tracks.blank(recording.n_tracks)
         self._tracks.id[:] = np.arange(recording.n_tracks)
 

@@ -3,8 +3,8 @@
     train_reflectance.py OUT_DIR CROPS.npz... --sensor NAME [--steps N] [--folds K] [--seed S]
 
 OUT_DIR holds what tools/train_pointnet.py and tools/train_boxes.py wrote for the same crops and folds. Writes
-OUT_DIR/reflectance.npz for tools/export_pointnet.py, and OUT_DIR/reflectance.json: its weight beside the network, and
-what box and reflectance, and network and reflectance, are worth together out of fold.
+OUT_DIR/reflectance.npz for tools/export_pointnet.py, and OUT_DIR/reflectance.json: the weights of box and reflectance
+beside the network, and what box and reflectance, and all three, are worth together out of fold.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize
 from scipy.special import softmax
 
 import train_boxes
@@ -67,7 +67,7 @@ def train(data: Dataset, seen: Described, rows: Int, boxes: Layers, steps: int, 
 def cross_validate(
     data: Dataset, seen: Described, network: Float64, k: int, steps: int, seed: int
 ) -> tuple[Calibration, dict[str, Any]]:
-    """Out-of-fold calibration beside the boxes; weight beside the network, and what either is worth with it."""
+    """Out-of-fold calibration beside the boxes; the weights of a pool with the network, and what all are worth."""
     boxes: dict[int, Layers] = {}
 
     def boxed(among: Bool, i: int) -> Model:
@@ -87,35 +87,43 @@ def cross_validate(
     calibration = fit(added.logits[clear], label, said[clear])
     prior = calibration.apply(added.logits, said)
     evidence = added.logits / calibration.temperature + calibration.offset
-    weight = weigh(np.log(network[clear]), evidence[clear], label)
-    both = softmax(np.log(network) + weight * evidence, axis=1)
+    share, weight = weigh(np.log(network[clear]), said[clear], evidence[clear], label)
+    word = pooled(np.log(network), said, evidence, share, weight)
     return calibration, {
+        "share": share,
         "weight": weight,
         "box": {
             "average_precision": average_precision(prior, added.label, added.truth),
             "ruled_out": train_boxes.ruled_out(prior[clear], label),
         },
         "network": {
-            "average_precision": average_precision(both, added.label, added.truth),
-            "confusion": confusion(both[clear], label),
-            "ece": expected_error(both[clear], label),
-            "log_loss": log_loss(both[clear], label),
-            "log_loss_without": log_loss(network[clear], label),
+            "average_precision": average_precision(word, added.label, added.truth),
+            "confusion": confusion(word[clear], label),
+            "ece": expected_error(word[clear], label),
+            "log_loss": round(log_loss(word[clear], label), 4),
+            "log_loss_without": round(log_loss(network[clear], label), 4),
         },
     }
 
 
-def weigh(said: Float64, evidence: Float64, label: Int) -> float:
-    """The share of the evidence (R, 4), 0 to 1, with which what is said (R, 4) fits the labels best."""
-    found = minimize_scalar(
-        lambda weight: log_loss(softmax(said + weight * evidence, axis=1), label), bounds=(0.0, 1.0), method="bounded"
+def pooled(network: Float64, box: Float64, evidence: Float64, share: float, weight: float) -> Float64:
+    """(R, 4) log-linear pool of what network and box say (R, 4), logarithms both, with the evidence (R, 4)."""
+    probability: Float64 = softmax((1.0 - share) * network + share * box + weight * evidence, axis=1)
+    return probability
+
+
+def weigh(network: Float64, box: Float64, evidence: Float64, label: Int) -> tuple[float, float]:
+    """The share of the box and the weight of the evidence, 0 to 1, whose pool fits the labels best."""
+    found = minimize(
+        lambda x: log_loss(pooled(network, box, evidence, *x), label), x0=(0.5, 0.5), bounds=((0.0, 1.0),) * 2
     )
-    return round(float(found.x), 2)
+    share, weight = found.x.tolist()
+    return round(share, 2), round(weight, 2)
 
 
 def log_loss(probability: Float64, label: Int) -> float:
     """Mean negative logarithm of what the true classes were given."""
-    return round(-float(np.log(probability[np.arange(len(label)), label]).mean()), 4)
+    return -float(np.log(probability[np.arange(len(label)), label]).mean())
 
 
 def main() -> None:

@@ -26,6 +26,7 @@ PAPER = FusionConfig(
     range_ratio=0.2,
     extent_ratio=0.3,
     box_weight=0.0,
+    slip=0.0,
 )
 ALL = (EveryFrame(), FirstView(FusionConfig()), KeyViews(FusionConfig()), KeyViews(PAPER))
 
@@ -242,8 +243,9 @@ def test_no_tracks_are_no_trouble(fusion: Fusion) -> None:
 class Told:
     """A prior that says what a test tells it."""
 
-    def __init__(self, *rows: list[float]) -> None:
+    def __init__(self, *rows: list[float], share: float = 0.0) -> None:
         self.rows = np.array(rows)
+        self.share = share
 
     def of(self, proposals: Proposals) -> Float64:
         return self.rows
@@ -285,7 +287,7 @@ def test_what_by_its_box_is_no_object_is_not_doubted() -> None:
 def test_a_class_goes_with_what_the_box_says_since_the_view() -> None:
     proposals, tracks = scene((50,))
     prior = Told(DOUBTFUL)
-    fusion, view = KeyViews(FusionConfig(box_weight=1.0), prior), np.array([[0.5, 0.3, 0.1, 0.1]])
+    fusion, view = KeyViews(FusionConfig(box_weight=1.0, slip=0.0), prior), np.array([[0.5, 0.3, 0.1, 0.1]])
     asking = np.array([True])
     fusion.asks(tracks, proposals, asking)
     fusion.fuse(tracks, proposals, np.array([0]), view)
@@ -296,6 +298,18 @@ def test_a_class_goes_with_what_the_box_says_since_the_view() -> None:
     prior.rows = np.array([DOUBTFUL])
     fusion.asks(tracks, proposals, asking)
     np.testing.assert_allclose(tracks.posterior[0], view[0], rtol=1e-6)
+
+
+def test_a_proposal_may_be_something_else_than_its_track() -> None:
+    proposals, tracks = scene((50, 50))
+    prior = Told(CAR, CAR)
+    fusion = KeyViews(FusionConfig(slip=0.2), prior)
+    fusion.asks(tracks, proposals, np.ones(2, np.bool_))
+    view = np.array([[0.001, 0.997, 0.001, 0.001]] * 2)
+    assert fusion.fuse(tracks, proposals, np.arange(2), view).all()
+    np.testing.assert_allclose(tracks.posterior, view, rtol=1e-6)  # who was looked at is what was seen
+    fusion.asks(tracks, proposals, np.zeros(2, np.bool_))
+    np.testing.assert_allclose(tracks.posterior, 0.8 * view + 0.2 * np.array(CAR), rtol=1e-6)
 
 
 @pytest.mark.parametrize("make", [FirstView, KeyViews])
@@ -326,6 +340,20 @@ def test_a_further_view_takes_the_place_of_what_the_box_said_since_the_last() ->
             fusion.fuse(tracks, proposals, np.array([0]), view[None])
         fused.append(tracks.posterior[0].copy())
     np.testing.assert_allclose(fused[0], fused[1])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.4])
+def test_a_further_view_that_says_what_is_known_without_it_adds_nothing(share: float) -> None:
+    proposals, tracks = scene((50,))
+    config = dataclasses.replace(PAPER, prior=(0.08, 0.02, 0.02))
+    fusion, row = KeyViews(config, Told(DOUBTFUL, share=share)), np.array([0])
+    fusion.asks(tracks, proposals, np.array([True]))
+    first = np.array([[0.5, 0.3, 0.1, 0.1]])
+    fusion.fuse(tracks, proposals, row, first)
+    known = np.array([0.88, 0.08, 0.02, 0.02]) ** (1 - share) * np.array(DOUBTFUL) ** share
+    fusion.fuse(tracks, proposals, row, known[None] / known.sum())
+    np.testing.assert_allclose(tracks.posterior, first, rtol=1e-6)
+    assert tracks.views.tolist() == [2]
 
 
 def test_what_took_its_class_over_is_looked_at_where_its_box_may_be_an_objects() -> None:

@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from modt.classification.boxes import METADATA as BOX_PRIOR
+from modt.classification.boxes import N_FEATURES, KnownBoxes, described
+from modt.classification.boxes import encode as encode_boxes
 from modt.classification.layers import logits
 from modt.classification.pointnet import PointNet
-from modt.classification.prior import METADATA as BOX_PRIOR
-from modt.classification.prior import N_FEATURES, BoxPrior, described, prior_of
-from modt.classification.prior import encode as encode_boxes
+from modt.classification.prior import BoxPrior, prior_of
 from modt.classification.reflectance import METADATA, NoEvidence, Reflectance, encode, evidence_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
@@ -22,7 +23,8 @@ from modt.types import N_REFLECTANCE, ObjectClass, Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)
-BOXES = [(RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4))]
+BOX_LAYERS = [(RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4))]
+BOXES = KnownBoxes(BOX_LAYERS, 0.0)
 LAYERS = [(RNG.normal(size=(N_FEATURES + N_REFLECTANCE, 4)), RNG.normal(size=4))]
 BRIGHTNESS = RNG.uniform(0, 1, (3, N_REFLECTANCE))
 SENSOR = SensorConfig(reflectance="hdl-64e")
@@ -38,10 +40,10 @@ def lit() -> Proposals:
 def test_the_prior_takes_all_of_it() -> None:
     proposals = lit()
     boxes = described(proposals, slice(None), SENSOR)
-    score = logits(BOXES, boxes) + logits(LAYERS, np.c_[boxes, BRIGHTNESS])
+    score = logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, BRIGHTNESS])
     expected = np.exp(score) / np.exp(score).sum(axis=1, keepdims=True)
     evidence = evidence_of(HELD, N_FEATURES, SENSOR)
-    prior = prior_of({BOX_PRIOR: encode_boxes(BOXES)}, (0.1, 0.1, 0.1), SENSOR, evidence)
+    prior = prior_of(BOXES, (0.1, 0.1, 0.1), SENSOR, evidence)
     np.testing.assert_allclose(prior.of(proposals), expected)
 
 
@@ -117,9 +119,25 @@ def test_the_network_takes_its_share_by_bayes_rule(tmp_path: Path) -> None:
     np.testing.assert_allclose(seen.classify(points, bare, which), shape, rtol=1e-5)
 
 
-def test_a_model_whose_evidence_is_none_is_misuse(tmp_path: Path) -> None:
-    with pytest.raises(MisuseError, match="evidence"):
-        PointNet(_with_metadata(tmp_path / "model.onnx", {METADATA: "{}"}), SENSOR)
+def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
+    points, _ = blobs([10, 30, 60], np.random.default_rng(0))
+    proposals, which = lit(), np.array([2, 0])
+    held = HELD | {BOX_PRIOR: encode_boxes(BOX_LAYERS, 0.3)}
+    alone, network = (PointNet(_with_metadata(tmp_path / f"{i}.onnx", m), SENSOR) for i, m in enumerate(({}, held)))
+    shape, feature = alone.classify(points, proposals, which), described(proposals, which, SENSOR)
+    box = np.exp(logits(BOX_LAYERS, feature))
+    expected = shape**0.7 * box**0.3 * np.exp(0.5 * logits(LAYERS, np.c_[feature, BRIGHTNESS[which]]))
+    word = network.classify(points, proposals, which)
+    np.testing.assert_allclose(word, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
+    expected = shape**0.7 * box**0.3
+    word = network.classify(points, dataclasses.replace(proposals, reflectance=None), which)
+    np.testing.assert_allclose(word, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
+
+
+@pytest.mark.parametrize("key", [METADATA, BOX_PRIOR])
+def test_a_model_that_holds_nonsense_is_misuse(tmp_path: Path, key: str) -> None:
+    with pytest.raises(MisuseError, match="boxes and reflectance"):
+        PointNet(_with_metadata(tmp_path / "model.onnx", {key: "{}"}), SENSOR)
 
 
 def test_the_model_that_ships_knows_number_plates_from_leaves() -> None:
@@ -130,7 +148,7 @@ def test_the_model_that_ships_knows_number_plates_from_leaves() -> None:
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
     seen = dataclasses.replace(proposals, box=box)
     plates, leaves = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]]), np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
-    prior = prior_of(model.metadata, (0.08, 0.02, 0.02), SENSOR, evidence)
+    prior = prior_of(model.boxes, (0.08, 0.02, 0.02), SENSOR, evidence)
     car, bush = (prior.of(dataclasses.replace(seen, reflectance=told))[0] for told in (plates, leaves))
     assert car[ObjectClass.CAR] > 0.9
     assert bush[ObjectClass.CAR] < 0.3

@@ -277,17 +277,14 @@ def test_no_model_judges_a_drive_that_it_learnt_from() -> None:
     assert held.truth.tolist() == np.bincount(label).tolist()
 
 
-def test_the_textbook_graph_says_what_ours_does(tmp_path: Path) -> None:
+def test_the_textbook_graph_says_what_ours_does() -> None:
     pytest.importorskip("onnx", reason="extra [train] is not installed")
-    from benchmark_classification import layers_of, textbook
-    from export_pointnet import graph
+    from benchmark_classification import bare, textbook
     from modt.classification.pointnet import PointNet
     from modt.config import ClassificationConfig, SensorConfig
 
-    ours = PointNet(ClassificationConfig(), SensorConfig())
-    path = tmp_path / "textbook.onnx"
-    path.write_bytes(graph(layers_of(ours.path), pool_first=False).SerializeToString())
-    naive = PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+    shipped = PointNet(ClassificationConfig(), SensorConfig())
+    naive, ours = (bare(shipped, SensorConfig(), pool_first=first) for first in (False, True))
     points, proposals = blobs([6, 40, 128], np.random.default_rng(1))
     expected = ours.classify(points, proposals, np.arange(3))
     np.testing.assert_allclose(textbook(naive, points, proposals, 2, SensorConfig()), expected, atol=1e-5)

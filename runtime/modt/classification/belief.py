@@ -2,7 +2,8 @@
 
 Before its first view a track is what its box makes it; afterwards what the views said, moved by what its box says now
 and did not say then. What grows to the size of a car as it comes near is more of one; a piece of a car is less. A
-class that is settled stays, but how sure it is goes with the box.
+class that is settled stays, but how sure it is goes with the box. Now and then what a track shows is a piece of its
+object, or something that it slid to: of that the box alone tells.
 """
 
 from __future__ import annotations
@@ -16,8 +17,16 @@ FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
 
 
-def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float) -> None:
-    """Takes in what the boxes of this frame say: all that is known before a view, and what is new since the last."""
+def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float, slip: float) -> None:
+    """Takes in what the boxes of this frame say: all that is known before a view, and what is new since the last.
+
+    Args:
+        tracks: whose posteriors are written.
+        proposals: of the frame.
+        prior: what it thinks of each.
+        weight: of what the box says now and did not say at the last view.
+        slip: probability that a proposal is not what its track is; of such a one its box alone tells.
+    """
     rows = np.flatnonzero(tracks.proposal != NONE)
     tracks.prior[rows] = prior.of(proposals)[tracks.proposal[rows]]
     classified = tracks.classified[rows]
@@ -25,7 +34,8 @@ def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float) ->
     tracks.posterior[unknown] = tracks.prior[unknown]
     known = rows[classified]
     now, then = (np.maximum(said.take(known, axis=0), FLOOR) for said in (tracks.prior, tracks.key_prior))
-    tracks.posterior[known] = normal(np.log(tracks.key_posterior.take(known, axis=0)) + weight * np.log(now / then))
+    same = normal(np.log(tracks.key_posterior.take(known, axis=0)) + weight * np.log(now / then))
+    tracks.posterior[known] = (1.0 - slip) * same + slip * tracks.prior.take(known, axis=0)
 
 
 def sane(probability: Float64) -> Float64:

@@ -48,7 +48,7 @@ class FirstView:
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """The tracks that have no class."""
-        expect(tracks, proposals, self.prior, self.config.box_weight)
+        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
         asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
         return asks & self.prior.likely(tracks.prior, self.config.likely_once)
 
@@ -68,8 +68,9 @@ class KeyViews:
     by its extent. A new track is classified at first sight; what that says settles its class if it is distinct, and
     is else forgotten at the starting frame, since far and partial first views mislead (Fig. 11).
 
-    The network's word is a posterior under the frequency of the classes among proposals, the prior; Equation 6
-    multiplies likelihoods, so each further view is divided by the prior, lest that be counted once a view. Views of
+    The network's word is a posterior under the frequency of the classes among proposals and, by its share, under
+    what the box says; Equation 6 multiplies likelihoods, so each further view is divided by these, lest they be
+    counted once a view. Views of
     one object are never wholly independent: a further one may be given less than its full weight. And a class that
     was settled from afar is looked at again when the object shows clearly more points, and what was known counts only
     by its share of these; so is what took its class over from its place. What by its box is no object is neither
@@ -89,7 +90,7 @@ class KeyViews:
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """Those asking that were never classified or show an independent view, and the settled that came close."""
-        expect(tracks, proposals, self.prior, self.config.box_weight)
+        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
         seen = tracks.proposal != NONE
         asks: Bool = (asking | tracks.classified) & ~tracks.fixed & seen
         rows = np.flatnonzero(asks)
@@ -129,19 +130,25 @@ class KeyViews:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiplies the view into the posterior, in logarithms (Equation 6), and fixes what is certain."""
-        view = np.log(sane(likelihood))
-        evidence = self.config.view_weight * (view - self._log_prior)
+        view, before = np.log(sane(likelihood)), self._unseen(tracks.prior[rows])
+        evidence = self.config.view_weight * (view - before)
         fused = (tracks.views[rows] > 0)[:, None]
-        past = np.log(sane(tracks.key_posterior[rows])) - self._log_prior
+        past = np.log(sane(tracks.key_posterior[rows])) - self._unseen(tracks.key_prior[rows])
         share = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
         past *= np.where(tracks.fixed[rows], np.minimum(share, 1.0), 1.0)[:, None]
-        posterior = normal(np.where(fused, self._log_prior + past + evidence, view))
+        posterior = normal(np.where(fused, before + past + evidence, view))
         certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
         tracks.fixed[rows] = certain
         tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
         _remember(tracks, proposals, rows)
         return certain
+
+    def _unseen(self, boxes: Float64) -> Float64:
+        """(R, 4) logarithm of what a view's word holds without the view, given (R, 4) what the boxes say."""
+        share = self.prior.share
+        unseen: Float64 = (1.0 - share) * self._log_prior + share * np.log(np.maximum(boxes, FLOOR))
+        return unseen
 
     def _certain(self, posterior: Float64) -> Bool:
         """(R,) whether an object's posterior, or the evidence for background, reaches its threshold.

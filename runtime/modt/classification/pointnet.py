@@ -12,8 +12,8 @@ from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 from scipy.special import softmax
 
 from modt import assets
+from modt.classification.boxes import N_FEATURES, Boxes, boxes_of, described
 from modt.classification.crops import canonical, gather, height_of
-from modt.classification.prior import N_FEATURES, described
 from modt.classification.reflectance import Evidence, evidence_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
@@ -34,7 +34,7 @@ _LEAST_PROBABILITY = 1e-12
 
 
 class PointNet:
-    """P(class | points, reflectance) of proposals: the network knows the shape, the evidence with it the reflectance.
+    """P(class | points, box, reflectance) of proposals: a pool of the network and of what the model knows besides.
 
     A proposal costs what its own points cost: crops of like size share a call, so that little is padded, and a
     call is small enough for its features to stay in the cache.
@@ -46,12 +46,12 @@ class PointNet:
     Attributes:
         path: the model file.
         sha256: its hash, which its card (the file beside it that ends in .md) must name.
-        metadata: what else the model brings along.
+        boxes: what the model knows of boxes.
         evidence: what it makes of the returns' reflectance.
 
     Raises:
         MisuseError: no such model, not the one that its card describes, no ONNX, not (batch, points, 3) to
-            (batch, 4), or with evidence that cannot be used.
+            (batch, 4), or with knowledge of boxes or reflectance that cannot be used.
     """
 
     def __init__(self, config: ClassificationConfig, sensor: SensorConfig) -> None:
@@ -61,8 +61,7 @@ class PointNet:
         self.sha256 = _checked_hash(self.path)
         self._session = _session(self.path)
         self._input = self._session.get_inputs()[0].name
-        self.metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
-        self.evidence = self._brought_along()
+        self.boxes, self.evidence = self._brought_along()
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) probability of each class for each of the proposals given, in their order.
@@ -79,23 +78,26 @@ class PointNet:
         for first in range(0, len(crops), self.config.batch):
             rows = by_size[first : first + self.config.batch]
             out[rows] = self.infer(crops.padded(rows))
-        return self._with_evidence(out, proposals, which)
+        return self._pooled(out, proposals, which)
 
-    def _with_evidence(self, said: Float64, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) the network's word on the shape and what the reflectance adds (Bayes' rule)."""
-        if not self.evidence.weight:
+    def _pooled(self, said: Float64, proposals: Proposals, which: Int) -> Float64:
+        """(R, 4) log-linear pool of what the network says of the shape, the box says, and the reflectance adds."""
+        share, weight = self.boxes.share, self.evidence.weight
+        if not share and not weight:
             return said
+        feature = described(proposals, which, self._sensor)
         told = None if proposals.reflectance is None else proposals.reflectance[which]
-        added = self.evidence.of(described(proposals, which, self._sensor), told)
-        score = np.log(np.maximum(said, _LEAST_PROBABILITY)) + self.evidence.weight * added
+        score = (1.0 - share) * np.log(np.maximum(said, _LEAST_PROBABILITY))
+        score += share * self.boxes.of(feature) + weight * self.evidence.of(feature, told)
         probability: Float64 = softmax(score, axis=1)
         return probability
 
-    def _brought_along(self) -> Evidence:
+    def _brought_along(self) -> tuple[Boxes, Evidence]:
+        metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
-            return evidence_of(self.metadata, N_FEATURES, self._sensor)
+            return boxes_of(metadata), evidence_of(metadata, N_FEATURES, self._sensor)
         except (KeyError, TypeError, ValueError) as error:
-            cause = f"its evidence of reflectance cannot be used ({error})"
+            cause = f"what it knows of boxes and reflectance cannot be used ({error})"
             raise MisuseError(self.path, cause, "export the model again") from None
 
     def facts(self) -> dict[str, str]:

@@ -132,20 +132,13 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     cost = LinearCost(profile.classification.max_points)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
+    prior = prior_of(network.boxes, profile.fusion.prior, profile.sensor, network.evidence)
     classifier = CostedClassifier(network, cost, time.thread_time_ns)
     return Pipeline(
         segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
         tracker=Tracker(profile.tracking, mode.machine),
-        fusion=mode.fusion(profile.fusion, _prior(network, profile)),
+        fusion=mode.fusion(profile.fusion, prior),
         scheduler=Scheduler(cost),
         classifier=CountedClassifier(classifier, ledger, limits.max_points, limits.batch),
         ledger=ledger,
     )
-
-
-def _prior(network: PointNet, profile: ProfileConfig) -> Prior:
-    """What the model thinks of proposals unseen."""
-    try:
-        return prior_of(network.metadata, profile.fusion.prior, profile.sensor, network.evidence)
-    except (TypeError, ValueError) as error:
-        raise MisuseError(network.path, f"its box prior cannot be used ({error})", "export the model again") from None
