@@ -67,12 +67,20 @@ def test_two_runs_are_the_same(tmp_path):
 
 
 def test_what_is_not_sure_is_left_out_unless_it_is_asked_for(tmp_path, caplog):
-    write(tmp_path / "a.txt", score=0.5)
+    write(tmp_path / "a.txt", score=1.5)
     run(tmp_path / "a.txt", "--out", tmp_path / "none", "--quiet")
     assert (tmp_path / "none/a.txt").read_text() == ""
     assert "lower --sure" in caplog.text
     run(tmp_path / "a.txt", "--out", tmp_path / "all", "--quiet", "--sure", "-1000")
     assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
+
+
+def test_a_detector_that_gives_probabilities_is_followed(tmp_path):
+    for name, score in (("likely", 0.9), ("unlikely", 0.01)):
+        write(tmp_path / f"{name}.txt", score=score)
+    run(tmp_path, "--out", tmp_path / "out", "--quiet")
+    assert len((tmp_path / "out/likely.txt").read_text().splitlines()) == 2 * 20
+    assert (tmp_path / "out/unlikely.txt").read_text() == ""
 
 
 def test_boxes_without_a_score_are_followed(tmp_path):

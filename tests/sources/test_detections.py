@@ -55,3 +55,15 @@ def test_what_is_not_there_is_said(tmp_path):
 @given(arrays(np.float64, (3, 7), elements=st.floats(-3, 3)))
 def test_coordinates_return(boxes):
     np.testing.assert_allclose(level(kitti(boxes)), boxes, atol=1e-9)
+
+
+def test_probabilities_are_taken_to_log_odds(tmp_path):
+    def scores(*given):
+        path = tmp_path / "a.txt"
+        path.write_text("".join(f"{i},2,0,0,9,9,{score},1.5,1.6,4,0,1.5,9,0,0\n" for i, score in enumerate(given)))
+        return read(path).score.tolist()
+
+    even = scores(0.5)[0]
+    assert scores(0.1, 0.9) == pytest.approx([even - np.log(9), even + np.log(9)])
+    assert np.isfinite(scores(0.0, 1.0)).all()
+    assert scores(0.5, 1.5) == [0.5, 1.5]  # no probabilities: as they are

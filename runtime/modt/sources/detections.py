@@ -3,7 +3,8 @@
 Two formats are recognised: AB3DMOT's 15 comma-separated columns (frame; type 1 Pedestrian, 2 Car, 3 Cyclist; left,
 top, right, bottom [pixel]; score; h, w, l, x, y, z [m], ry [rad]; alpha) and KITTI's tracking labels (frame, id,
 type, truncated, occluded, alpha, box, h, w, l, x, y, z, ry and a score; what has none is sure). Both are in the
-coordinates of the camera: x right, y down, z forward, the place being the middle of the foot.
+coordinates of the camera: x right, y down, z forward, the place being the middle of the foot. Scores are on the scale
+of PointRCNN's; where all of a file lie between 0 and 1 they are probabilities, and taken there.
 """
 
 from __future__ import annotations
@@ -23,6 +24,10 @@ TYPES = ("Pedestrian", "Car", "Cyclist")
 COLUMNS = 15
 UNSCORED = 10.0
 """Score of what has none: somebody is sure of it."""
+EVEN = 5.0
+"""PointRCNN's score of cars at 20 m of which every other is one."""
+LEAST_DOUBT = 1e-3
+"""No probability is nearer to 0 or 1."""
 T_LEVEL_CAMERA = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """Camera coordinates to x forward, y left, z up."""
 
@@ -97,9 +102,18 @@ def read(path: Path) -> Detections:
         frame=table[:, 0].astype(np.int64),
         type_=table[:, 1].astype(np.int64) - 1,
         image_box=table[:, 2:6],
-        score=table[:, 6],
+        score=_on_scale(table[:, 6]),
         box=level(table[:, 7:14]),
     )
+
+
+def _on_scale(score: Float64) -> Float64:
+    """(n,) scores as log odds about EVEN; given as they are, unless all are probabilities."""
+    if not ((score >= 0) & (score <= 1)).all():
+        return score
+    p = np.clip(score, LEAST_DOUBT, 1 - LEAST_DOUBT)
+    log_odds: Float64 = EVEN + np.log(p / (1 - p))
+    return log_odds
 
 
 def level(hwlxyzry: Float64) -> Float64:

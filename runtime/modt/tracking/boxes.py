@@ -81,9 +81,7 @@ class BoxTracker:
             range_m: (D,) of each from the sensor [m].
         """
         variance = np.square(self.config.position_sigma_m * np.exp(-np.maximum(score, 0.0) / self.config.score_scale))
-        trust = (
-            score + self.config.range_bonus_per_m * range_m
-        )  # what is far has few points, and a low score by right
+        trust = score + self.config.range_bonus_per_m * range_m  # few points on what is far: a low score by right
         self._predict(stamp_s)
         strong = score >= self.config.strong_score
         rows, columns = self._match(boxes, variance, strong)
