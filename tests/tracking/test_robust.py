@@ -20,8 +20,8 @@ EYE = np.eye(4)
 BACKGROUND, CAR = np.eye(4)[ObjectClass.BACKGROUND], np.eye(4)[ObjectClass.CAR]
 
 
-def tracker(**options):
-    return Tracker(TrackingConfig(ask_from=1, **options), EFFICIENT)
+def tracker(regroupings=None, **options):
+    return Tracker(TrackingConfig(ask_from=1, **options), EFFICIENT, regroupings=regroupings)
 
 
 def classify(tracker, posterior):
@@ -121,7 +121,7 @@ def test_parts_fit_where_their_corners_do(seed):
 
 def test_a_car_behind_a_pole_stays_one_object():
     whole, halves = [box(12, 4)], [box(11.0, 4, l=1.9), box(13.3, 4, l=1.3)]
-    t = tracker()
+    t = tracker(regroupings=())
     run(t, [whole] * 4, CAR)
     run(t, [halves, halves[::-1], halves], CAR, first=4, points=(80, 40))
     for_the_larger = t.tracks.id[t.tracks.proposal == 0]

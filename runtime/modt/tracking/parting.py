@@ -14,9 +14,6 @@ nothing is taken more than AT_MOST times since the track last had a proposal of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
-
 import numpy as np
 
 from modt.geometry import transform, yaw_of
@@ -26,10 +23,11 @@ from modt.tracking.followed import Followed
 from modt.tracking.kalman import SPEED, X, Y
 from modt.tracking.kinship import PERSON_M, ROOM_M, SETTLED
 from modt.tracking.outlines import WAYS, covered, lengths, touching
+from modt.tracking.regrouping import Found
 from modt.tracking.robust import carried
 from modt.tracking.sightings import Sightings, sight
 from modt.tracking.turning import Placing
-from modt.types import NONE, Bool, Float64, Int, ObjectClass, Proposals
+from modt.types import NONE, Bool, Float64, Int, ObjectClass
 
 AT_MOST = 5
 """Times that a track takes before it must have something of its own again."""
@@ -48,47 +46,10 @@ FALL_M = 0.4
 """... and does not end lower than expected by more."""
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """What a frame shows, and whose it is.
-
-    Attributes:
-        proposals: of the frame.
-        sightings: the proposals in the world.
-        matches: those that belong to tracks.
-    """
-
-    proposals: Proposals
-    sightings: Sightings
-    matches: Matches
-
-
-class Parting(Protocol):
-    """Takes objects out of what they touch."""
-
-    def part(self, tracks: Followed, found: Found, placing: Placing) -> Found:
-        """What was found, with more proposals where there was something to take.
-
-        Args:
-            tracks: as predicted; their column of takes is kept up.
-            found: of the frame.
-            placing: by which it was put into the world.
-        """
-        ...
-
-
-class NoParting:
-    """Takes proposals as they are."""
-
-    def part(self, tracks: Followed, found: Found, placing: Placing) -> Found:
-        """What was found."""
-        return found
-
-
 class ExpectedParting:
     """Takes what lies where a track is expected."""
 
-    def part(self, tracks: Followed, found: Found, placing: Placing) -> Found:
+    def regroup(self, tracks: Followed, found: Found, placing: Placing) -> Found:
         """What was found, with one more proposal for each track that takes its own out of a larger one."""
         tracks.takes[found.matches.rows] = 0
         rows = _seeking(tracks, found.matches)

@@ -10,10 +10,12 @@ from modt.tracking import kalman
 from modt.tracking.association import Association, Matches, PaperAssociation
 from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
+from modt.tracking.joining import KnownJoining
 from modt.tracking.kinship import reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.outlines import WAYS
-from modt.tracking.parting import ExpectedParting, Found, NoParting, Parting
+from modt.tracking.parting import ExpectedParting
+from modt.tracking.regrouping import Found, Regrouping
 from modt.tracking.robust import RobustAssociation
 from modt.tracking.shifts import AGREE_M
 from modt.tracking.sightings import Sightings, sight
@@ -57,9 +59,9 @@ def memory_of(config: TrackingConfig) -> NoMemory | BackgroundMemory:
     return NoMemory() if config.association == "paper" else BackgroundMemory()
 
 
-def parting_of(config: TrackingConfig) -> Parting:
+def regroupings_of(config: TrackingConfig) -> tuple[Regrouping, ...]:
     """The paper takes proposals as they are."""
-    return NoParting() if config.association == "paper" else ExpectedParting()
+    return () if config.association == "paper" else (ExpectedParting(), KnownJoining())
 
 
 def rigid(T: Float64) -> Float64:
@@ -76,7 +78,7 @@ class Tracker:
         machine: the table that drives the states, EFFICIENT or ACCURATE.
         association: how proposals find their tracks; by default as the configuration says.
         memory: what is kept of background that is gone; by default nothing with the paper's association.
-        parting: what becomes of objects that touch others; by default nothing with the paper's association.
+        regroupings: how proposals are put right; by default not at all with the paper's association.
     """
 
     def __init__(
@@ -85,12 +87,12 @@ class Tracker:
         machine: StateMachine,
         association: Association | None = None,
         memory: NoMemory | BackgroundMemory | None = None,
-        parting: Parting | None = None,
+        regroupings: tuple[Regrouping, ...] | None = None,
     ) -> None:
         self.config, self.machine = config, machine
         self.association = association_of(config) if association is None else association
         self.memory = memory_of(config) if memory is None else memory
-        self.parting = parting_of(config) if parting is None else parting
+        self.regroupings = regroupings_of(config) if regroupings is None else regroupings
         self._registration = Registration()
         place, speed = config.position_sigma_m, config.initial_speed_sigma_mps
         self._P_born = np.diag(np.square([place, place, UNKNOWN_HEADING_RAD, speed]))
@@ -121,11 +123,11 @@ class Tracker:
 
     @property
     def proposals(self) -> Proposals:
-        """Those that the tracks were taken to last: the frame's, more of them where one was parted."""
+        """Those that the tracks were taken to last: the frame's, parted and joined where need be."""
         return self._proposals
 
     def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
-        """Take a frame's proposals to the tracks, parted where need be; afterwards each belongs to exactly one.
+        """Take a frame's proposals, put right by what is known, to the tracks; afterwards each belongs to one.
 
         Returns:
             The live table: stages that come after write their columns into it.
@@ -133,7 +135,9 @@ class Tracker:
         sightings = self._sight(frame, proposals)
         self._predict(frame.stamp_s)
         matches = reunite(self._tracks, sightings, self.association.match(self._tracks, sightings))
-        found = self.parting.part(self._tracks, Found(proposals, sightings, matches), self._placing)
+        found = Found(proposals, sightings, matches)
+        for regrouping in self.regroupings:
+            found = regrouping.regroup(self._tracks, found, self._placing)
         self._proposals, sightings, matches = found.proposals, found.sightings, found.matches
         self._update(matches, sightings)
         self._rest(matches.rows)

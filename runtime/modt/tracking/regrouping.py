@@ -1,0 +1,41 @@
+"""Proposals put right by what is known of the tracks: what a frame shows, and what changes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from modt.tracking.association import Matches
+from modt.tracking.followed import Followed
+from modt.tracking.sightings import Sightings
+from modt.tracking.turning import Placing
+from modt.types import Proposals
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a frame shows, and whose it is.
+
+    Attributes:
+        proposals: of the frame.
+        sightings: the proposals in the world.
+        matches: those that belong to tracks.
+    """
+
+    proposals: Proposals
+    sightings: Sightings
+    matches: Matches
+
+
+class Regrouping(Protocol):
+    """Groups the points of a frame's proposals anew."""
+
+    def regroup(self, tracks: Followed, found: Found, placing: Placing) -> Found:
+        """What was found, put right where something is known better; no point gets lost.
+
+        Args:
+            tracks: as predicted.
+            found: of the frame.
+            placing: by which it was put into the world.
+        """
+        ...
