@@ -143,7 +143,6 @@ class Player:
     """
 
     state_names = ("followed",)
-    tells = True
 
     def __init__(self, recording: Recording, ask_from: int) -> None:
         self._moments = iter(recording.moments)

@@ -66,8 +66,9 @@ SWEEPS: dict[str, tuple[float | None, ...]] = {
     "reopen_points": (30, 50, 100, 200, 400, 800),
     "likely": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
     ONCE: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
-    "likely_again": (0.0, 0.02, 0.05, 0.07, 0.1, 0.2),
+    "likely_again": (0.0, 0.02, 0.05, 0.1, 0.2),
     "box_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
+    "slip": (0.0, 0.03, 0.1, 0.2, 0.3),
 }
 NO_BETTER = "No setting is better on both sets at no more calls."
 DOUBTS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
@@ -146,7 +147,7 @@ def _text(value: float | None) -> str:
 def papers(config: ProfileConfig) -> ProfileConfig:
     """Alpha alone makes a view independent, from the first frame on; nothing is doubted, boxes say nothing."""
     off = {"bearing_deg": 180.0, "range_ratio": 10.0, "extent_ratio": 10.0, "reopen_ratio": None}
-    off |= {"likely": 0.0, "likely_once": 0.0, "box_weight": 0.0}
+    off |= {"likely": 0.0, "likely_once": 0.0, "box_weight": 0.0, "slip": 0.0}
     return dataclasses.replace(
         config,
         fusion=dataclasses.replace(config.fusion, **off),

@@ -185,17 +185,18 @@ class FusionConfig(StageConfig):
     prior: tuple[float, float, float] = _per_class(
         0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
     )
-    likely: float = _number(0.02, 0.0, 1.0, "", "probability of an object, by its box, from which it is classified")
+    likely: float = _number(0.01, 0.0, 1.0, "", "probability of an object, by its box, from which it is classified")
     likely_once: float = _number(0.1, 0.0, 1.0, "", "the same where the first view is the only one (efficient)")
-    likely_again: float = _number(0.07, 0.0, 1.0, "", "the same of what was classified, or took its class over")
-    box_weight: float = _number(0.5, 0.0, 1.0, "", "say of a box that has changed since the view fused last")
+    likely_again: float = _number(0.1, 0.0, 1.0, "", "the same of what is settled, or took its class over")
+    box_weight: float = _number(0.75, 0.0, 1.0, "", "say of a box that has changed since the view fused last")
+    slip: float = _number(0.1, 0.0, 1.0, "", "probability that a track's proposal is something else for the moment")
     bearing_deg: float = _number(40.0, 0.0, 180.0, "deg", "change of view that makes it independent")
     range_ratio: float = _number(0.4, 0.0, 10.0, "", "change of distance that makes it independent")
     extent_ratio: float = _number(0.6, 0.0, 10.0, "", "change of size that makes it independent")
     reopen_ratio: float | None = _number(
-        1.5, 1.0, 1000.0, "", "times the points, and five more, that raise doubt of an object; none: nothing does"
+        1.5, 1.0, 1000.0, "", "times the points, and five more, that raise doubt; none: never"
     )
-    reopen_points: int = _number(400, 0, 10000, "", "an object's class settled from so many is never doubted")
+    reopen_points: int = _number(400, 0, 10000, "", "a class settled from so many is never doubted")
     start_frame: int = _number(5, 1, 1000, "frames", "age of a track from which views are fused")
 
 

@@ -2,8 +2,8 @@
 
 Before its first view a track is what its box makes it; afterwards what the views said, moved by what its box says now
 and did not say then. What grows to the size of a car as it comes near is more of one; a piece of a car is less. A
-class that is settled stays, but how sure it is goes with the box. What a track shows may be a piece of its object or
-something that it slid to: the less it is like what was viewed, the less the views say of it, and the more its box.
+class that is settled stays, but how sure it is goes with the box. Now and then what a track shows is a piece of its
+object, or something that it slid to: of that the box alone tells.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classification.prior import Prior
-from modt.types import NONE, Float64, Int, Proposals, Tracks
+from modt.types import NONE, Float64, Proposals, Tracks
 
 FLOOR = 1e-4
 """Least likelihood that a view gives a class, and least posterior: no class is ever ruled out for good."""
 
 
-def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float) -> None:
+def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float, slip: float) -> None:
     """Takes in what the boxes of this frame say: all that is known before a view, and what is new since the last.
 
     Args:
@@ -25,6 +25,7 @@ def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float) ->
         proposals: of the frame.
         prior: what it thinks of each.
         weight: of what the box says now and did not say at the last view.
+        slip: probability that a proposal is not what its track is; of such a one its box alone tells.
     """
     rows = np.flatnonzero(tracks.proposal != NONE)
     tracks.prior[rows] = prior.of(proposals)[tracks.proposal[rows]]
@@ -32,17 +33,9 @@ def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float) ->
     unknown = rows[~classified & ~tracks.fixed[rows]]
     tracks.posterior[unknown] = tracks.prior[unknown]
     known = rows[classified]
-    now, then = (np.log(np.maximum(said.take(known, axis=0), FLOOR)) for said in (tracks.prior, tracks.key_prior))
-    viewed = np.log(tracks.key_posterior.take(known, axis=0)) + weight * (now - then)
-    share = _alike(tracks, proposals, known)[:, None] if prior.tells else 1.0
-    tracks.posterior[known] = normal(share * viewed + (1.0 - share) * now)
-
-
-def _alike(tracks: Tracks, proposals: Proposals, rows: Int) -> Float64:
-    """(R,) how like its last key observation a track looks, by the number of points: 1 as many, 0.5 four times."""
-    count, key = proposals.count[tracks.proposal[rows]], tracks.key_points[rows]
-    alike: Float64 = np.sqrt(np.minimum(count, key) / np.maximum(count, key))
-    return alike
+    now, then = (np.maximum(said.take(known, axis=0), FLOOR) for said in (tracks.prior, tracks.key_prior))
+    same = normal(np.log(tracks.key_posterior.take(known, axis=0)) + weight * np.log(now / then))
+    tracks.posterior[known] = (1.0 - slip) * same + slip * tracks.prior.take(known, axis=0)
 
 
 def sane(probability: Float64) -> Float64:

@@ -12,7 +12,7 @@ from modt.classification.belief import FLOOR, expect, normal, sane
 from modt.classification.prior import Frequency, Prior, shares
 from modt.config import FusionConfig
 from modt.geometry import wrap
-from modt.types import NONE, Bool, Float64, Int, ObjectClass, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
 CHANCE = 5
 """Points that come and go by chance: so many more are no closer look."""
@@ -48,7 +48,7 @@ class FirstView:
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """The tracks that have no class."""
-        expect(tracks, proposals, self.prior, self.config.box_weight)
+        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
         asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
         return asks & self.prior.likely(tracks.prior, self.config.likely_once)
 
@@ -70,14 +70,11 @@ class KeyViews:
 
     The network's word is a posterior under the frequency of the classes among proposals and, by its share, under
     what the box says; Equation 6 multiplies likelihoods, so each further view is divided by these, lest they be
-    counted once a view. Views of one object are never wholly independent: a further one may be given less than its
-    full weight.
-
-    What by its box is no object is neither classified nor looked at again. What is settled as background and may be
-    an object by its box is looked at again at key views all the same, and so is what took its class over from its
-    place: an object held for background would be lost for good. An object settled from afar is looked at again when
-    it shows clearly more points, unless views and box still agree on it. What was known then counts only by its share
-    of these.
+    counted once a view. Views of
+    one object are never wholly independent: a further one may be given less than its full weight. And a class that
+    was settled from afar is looked at again when the object shows clearly more points, and what was known counts only
+    by its share of these; so is what took its class over from its place. What by its box is no object is neither
+    classified nor looked at again.
 
     Args:
         config: thresholds of independence and certainty.
@@ -92,36 +89,26 @@ class KeyViews:
         self._log_prior = np.log(share / share.sum())
 
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
-        """Those asking that were never classified, and those with a class of whom another look may change it."""
-        expect(tracks, proposals, self.prior, self.config.box_weight)
+        """Those asking that were never classified or show an independent view, and the settled that came close."""
+        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
         seen = tracks.proposal != NONE
-        known = tracks.classified | tracks.fixed
-        asks: Bool = asking & ~known & seen & self.prior.likely(tracks.prior, self.config.likely)
-        again = np.flatnonzero(known & seen & self.prior.likely(tracks.prior, self.config.likely_again))
-        started = tracks.age[again] >= self.config.start_frame
-        fresh = (tracks.views[again] == 0) | self.independent(tracks, proposals, again)
-        settled = tracks.fixed[again]
-        asks[again] = np.where(settled, self._doubted(tracks, proposals, again, fresh), started & fresh)
-        return asks
+        asks: Bool = (asking | tracks.classified) & ~tracks.fixed & seen
+        rows = np.flatnonzero(asks)
+        started = tracks.age[rows] >= self.config.start_frame
+        fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
+        first = ~tracks.classified[rows]
+        asks[rows] = np.where(first, self.prior.likely(tracks.prior[rows], self.config.likely), started & fresh)
+        return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.fixed))
 
-    def _doubted(self, tracks: Tracks, proposals: Proposals, rows: Int, fresh: Bool) -> Bool:
-        """(R,) of which of these rows the class, were it settled, is looked at again.
-
-        Args:
-            tracks: alive.
-            proposals: of the frame.
-            rows: (R,) tracks with a class and a proposal.
-            fresh: (R,) which show an independent view.
-        """
-        if self.config.reopen_ratio is None:
-            return np.zeros(len(rows), np.bool_)
-        kind, key = tracks.object_class[rows], tracks.key_points[rows]
-        background = kind == ObjectClass.BACKGROUND.value
-        sure = tracks.posterior[rows, kind] >= self.config.threshold
-        many = self.config.reopen_ratio * key + CHANCE
-        grown = (proposals.count[tracks.proposal[rows]] > many) & (key < self.config.reopen_points)
-        doubted: Bool = np.where(background & self.prior.tells, fresh, grown & (background | ~sure))
-        return doubted
+    def _reopened(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
+        """(M,) which of these rows, settled as they are, show so much more that they are worth another look."""
+        again = np.zeros(len(tracks), np.bool_)
+        if self.config.reopen_ratio is not None:
+            many = self.config.reopen_ratio * tracks.key_points[rows] + CHANCE
+            again[rows] = proposals.count[tracks.proposal[rows]] > many
+            again &= tracks.key_points < self.config.reopen_points
+            again &= self.prior.likely(tracks.prior, self.config.likely_again)
+        return again
 
     def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(R,) whether the view of each track differs enough from its last key observation (Equation 4)."""

@@ -21,11 +21,6 @@ class Prior(Protocol):
     """P(class) of proposals that nobody has looked at."""
 
     @property
-    def tells(self) -> bool:
-        """Whether it tells one proposal from another."""
-        ...
-
-    @property
     def share(self) -> float:
         """What part of it the word of the network holds already (0 to 1)."""
         ...
@@ -47,7 +42,6 @@ class Frequency:
     """
 
     share = 0.0
-    tells = False
 
     def __init__(self, objects: Sequence[float]) -> None:
         self._share = shares(objects)
@@ -74,8 +68,6 @@ class BoxPrior:
         sensor: its resolution, and how high it stands, for proposals that do not say.
         evidence: what the reflectance adds.
     """
-
-    tells = True
 
     def __init__(self, boxes: Boxes, sensor: SensorConfig, evidence: Evidence) -> None:
         self.share = boxes.share
