@@ -138,6 +138,8 @@ def _reflected(told: dict[str, Any]) -> list[str]:
         f"- the network to the power of {1 - told['share']:.2f}, the box to that of {told['share']} and the "
         f"reflectance to that of {told['weight']}: average precision {_listed(shape['average_precision'])}, "
         f"calibration error {shape['ece']}, log loss {shape['log_loss']} ({shape['log_loss_without']} by shape)",
+        f"- without reflectance the network to the power of {1 - told['share_without']:.2f} and the box to that of "
+        f"{told['share_without']}",
         f"- the box and all of it: average precision {_listed(told['box']['average_precision'])}",
         "",
         *_confused(shape["confusion"]),
@@ -180,8 +182,8 @@ def main() -> None:
         told = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
         report["reflectance"] = told
         layers = load_layers(args.trained / "reflectance.npz")
-        held[reflectance.METADATA] = reflectance.encode(layers, told["weight"], told["sensor"])
-        share = told["share"]
+        held[reflectance.METADATA] = reflectance.encode(layers, told["share"], told["weight"], told["sensor"])
+        share = told["share_without"]
     held[boxes.METADATA] = boxes.encode(load_layers(args.trained / "boxes.npz"), share)
     helper.set_model_props(network, held)
     model = network.SerializeToString(deterministic=True)

@@ -88,10 +88,12 @@ def cross_validate(
     prior = calibration.apply(added.logits, said)
     evidence = added.logits / calibration.temperature + calibration.offset
     share, weight = weigh(np.log(network[clear]), said[clear], evidence[clear], label)
+    alone, _ = weigh(np.log(network[clear]), said[clear], np.zeros_like(evidence[clear]), label)
     word = pooled(np.log(network), said, evidence, share, weight)
     return calibration, {
         "share": share,
         "weight": weight,
+        "share_without": alone,
         "box": {
             "average_precision": average_precision(prior, added.label, added.truth),
             "ruled_out": train_boxes.ruled_out(prior[clear], label),

@@ -28,7 +28,7 @@ BOXES = KnownBoxes(BOX_LAYERS, 0.0)
 LAYERS = [(RNG.normal(size=(N_FEATURES + N_REFLECTANCE, 4)), RNG.normal(size=4))]
 BRIGHTNESS = RNG.uniform(0, 1, (3, N_REFLECTANCE))
 SENSOR = SensorConfig(reflectance="hdl-64e")
-HELD = {METADATA: encode(LAYERS, 0.5, "hdl-64e")}
+HELD = {METADATA: encode(LAYERS, 0.0, 0.5, "hdl-64e")}
 
 
 def lit() -> Proposals:
@@ -89,8 +89,9 @@ def test_an_empty_frame_is_no_lack_of_reflectance(caplog: pytest.LogCaptureFixtu
         "{}",
         "[]",
         "no json",
-        json.dumps({"sensor": "hdl-64e", "weight": 2.0, "layers": []}),
-        json.dumps({"sensor": "hdl-64e", "weight": 0.5, "layers": []}),
+        json.dumps({"sensor": "hdl-64e", "share": 0.5, "weight": 2.0, "layers": []}),
+        json.dumps({"sensor": "hdl-64e", "share": -0.5, "weight": 0.5, "layers": []}),
+        json.dumps({"sensor": "hdl-64e", "share": 0.5, "weight": 0.5, "layers": []}),
     ],
 )
 def test_evidence_that_cannot_be_used_is_refused(text: str) -> None:
@@ -122,16 +123,17 @@ def test_the_network_takes_its_share_by_bayes_rule(tmp_path: Path) -> None:
 def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     points, _ = blobs([10, 30, 60], np.random.default_rng(0))
     proposals, which = lit(), np.array([2, 0])
-    held = HELD | {BOX_PRIOR: encode_boxes(BOX_LAYERS, 0.3)}
-    alone, network = (PointNet(_with_metadata(tmp_path / f"{i}.onnx", m), SENSOR) for i, m in enumerate(({}, held)))
+    held = {BOX_PRIOR: encode_boxes(BOX_LAYERS, 0.2), METADATA: encode(LAYERS, 0.3, 0.5, "hdl-64e")}
+    alone = PointNet(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
+    model = _with_metadata(tmp_path / "held.onnx", held)
     shape, feature = alone.classify(points, proposals, which), described(proposals, which, SENSOR)
-    box = np.exp(logits(BOX_LAYERS, feature))
-    expected = shape**0.7 * box**0.3 * np.exp(0.5 * logits(LAYERS, np.c_[feature, BRIGHTNESS[which]]))
-    word = network.classify(points, proposals, which)
-    np.testing.assert_allclose(word, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
-    expected = shape**0.7 * box**0.3
-    word = network.classify(points, dataclasses.replace(proposals, reflectance=None), which)
-    np.testing.assert_allclose(word, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
+    box, told = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, BRIGHTNESS[which]]))
+    for sensor, expected in ((SENSOR, shape**0.7 * box**0.3 * told**0.5), (SensorConfig(), shape**0.8 * box**0.2)):
+        network = PointNet(model, sensor)
+        word = network.classify(points, proposals, which)
+        np.testing.assert_allclose(word, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
+        prior = prior_of(network.boxes, (0.1, 0.1, 0.1), sensor, network.evidence)
+        assert prior.share == (0.3 if sensor is SENSOR else 0.2)
 
 
 @pytest.mark.parametrize("key", [METADATA, BOX_PRIOR])

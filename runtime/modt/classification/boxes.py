@@ -30,7 +30,7 @@ class Boxes(Protocol):
 
     @property
     def share(self) -> float:
-        """Of the box in the word of the network, which sees the points (0 to 1)."""
+        """Of the box in the word of the network, which sees the points, where no evidence helps (0 to 1)."""
         ...
 
     def of(self, feature: Float64) -> Float64:

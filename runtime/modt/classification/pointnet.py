@@ -14,6 +14,7 @@ from scipy.special import softmax
 from modt import assets
 from modt.classification.boxes import N_FEATURES, Boxes, boxes_of, described
 from modt.classification.crops import canonical, gather, height_of
+from modt.classification.prior import share_of
 from modt.classification.reflectance import Evidence, evidence_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
@@ -82,7 +83,7 @@ class PointNet:
 
     def _pooled(self, said: Float64, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) log-linear pool of what the network says of the shape, the box says, and the reflectance adds."""
-        share, weight = self.boxes.share, self.evidence.weight
+        share, weight = share_of(self.boxes, self.evidence), self.evidence.weight
         if not share and not weight:
             return said
         feature = described(proposals, which, self._sensor)

@@ -70,7 +70,7 @@ class BoxPrior:
     """
 
     def __init__(self, boxes: Boxes, sensor: SensorConfig, evidence: Evidence) -> None:
-        self.share = boxes.share
+        self.share = share_of(boxes, evidence)
         self._boxes = boxes
         self._sensor = sensor
         self._evidence = evidence
@@ -85,6 +85,11 @@ class BoxPrior:
     def likely(self, said: Float64, least: float) -> Bool:
         """(M,) which are objects with this probability at least, said (M, 4) being what it says of them."""
         return at_least(said, least)
+
+
+def share_of(boxes: Boxes, evidence: Evidence) -> float:
+    """Part of what boxes say in the word of a network, given the evidence besides."""
+    return boxes.share if evidence.share is None else evidence.share
 
 
 def at_least(said: Float64, least: float) -> Bool:

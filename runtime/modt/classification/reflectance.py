@@ -28,6 +28,11 @@ class Evidence(Protocol):
     """What its returns say of a proposal beyond its box."""
 
     @property
+    def share(self) -> float | None:
+        """Of the box in the word of the network where there is evidence; None: as without."""
+        ...
+
+    @property
     def weight(self) -> float:
         """Share of it that the network, which knows the shape, does not know yet."""
         ...
@@ -45,6 +50,7 @@ class Evidence(Protocol):
 class NoEvidence:
     """Reflectance is not looked at."""
 
+    share = None
     weight = 0.0
 
     def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
@@ -57,11 +63,12 @@ class Reflectance:
 
     Args:
         layers: of features of boxes and of reflectance, side by side.
-        weight: see Evidence.
+        share, weight: see Evidence.
     """
 
-    def __init__(self, layers: Layers, weight: float) -> None:
+    def __init__(self, layers: Layers, share: float, weight: float) -> None:
         self._layers = layers
+        self.share = share
         self.weight = weight
         self._missed = False
 
@@ -80,9 +87,9 @@ class Reflectance:
         return np.zeros((len(box_features), N_CLASSES))
 
 
-def encode(layers: Layers, weight: float, sensor: str) -> str:
+def encode(layers: Layers, share: float, weight: float, sensor: str) -> str:
     """The evidence as a model's metadata holds it."""
-    return json.dumps({"sensor": sensor, "weight": weight, "layers": as_lists(layers)})
+    return json.dumps({"sensor": sensor, "share": share, "weight": weight, "layers": as_lists(layers)})
 
 
 def evidence_of(metadata: Mapping[str, str], n_box: int, sensor: SensorConfig) -> Evidence:
@@ -102,7 +109,7 @@ def evidence_of(metadata: Mapping[str, str], n_box: int, sensor: SensorConfig) -
     held = json.loads(text)
     if held["sensor"] != sensor.reflectance:
         return NoEvidence()
-    weight = float(held["weight"])
-    if not 0.0 <= weight <= 1.0:
-        raise ValueError(f"a weight of {weight}, wanted 0 to 1")
-    return Reflectance(of_lists(held["layers"], n_box + N_REFLECTANCE), weight)
+    share, weight = float(held["share"]), float(held["weight"])
+    if not (0.0 <= share <= 1.0 and 0.0 <= weight <= 1.0):
+        raise ValueError(f"a share of {share} and a weight of {weight}, wanted 0 to 1")
+    return Reflectance(of_lists(held["layers"], n_box + N_REFLECTANCE), share, weight)
