@@ -66,10 +66,12 @@ def _pieces(tracks: Followed, found: Found) -> tuple[Int, Int, Int]:
     owner[matches.proposals] = matches.rows
     fits = (covered(piece, whole) > WITHIN) & (lengths(both) < lengths(whole) + LONGER_M).all(axis=0)
     fits &= _free(tracks, rows[k], owner[parts])
-    parts, eldest = np.unique(parts[fits], return_index=True)
-    k = k[fits][eldest]
-    left = np.flatnonzero(~np.isin(parts, hosts[k]))  # who takes something gives nothing away
-    return rows[k[left]], hosts[k[left]], parts[left]
+    taker = np.full(len(owner), NONE)
+    taker[parts[fits][::-1]] = k[fits][::-1]  # the eldest is written last
+    taker[hosts[taker[taker != NONE]]] = NONE  # who takes something gives nothing away
+    parts = np.flatnonzero(taker != NONE)
+    k = taker[parts]
+    return rows[k], hosts[k], parts
 
 
 def _settled_cars(tracks: Followed, rows: Int) -> Bool:
