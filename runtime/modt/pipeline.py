@@ -37,7 +37,7 @@ class Tracker(Protocol):
 
     @property
     def proposals(self) -> Proposals:
-        """Those followed last: the frame's, parted where need be."""
+        """Those followed last: the frame's, parted and joined where need be."""
         ...
 
     def follow(self, frame: Frame, proposals: Proposals) -> Tracks:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from modt.config import TrackingConfig
 from modt.geometry import boxes_about, corners, inverse, rotation_zyx, se3, transform_boxes, upright_box
 from modt.segmentation.brightness import brightness
+from modt.tracking.outlines import WAYS
 from modt.tracking.sightings import sight
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
@@ -89,15 +90,21 @@ def test_only_cars_that_are_known_are_made_whole(change, why):
 
 
 @pytest.mark.parametrize(
-    ("piece", "why"),
+    ("own", "piece", "why"),
     [
-        (box(13.0, 3, 1.5, 1.8, 1.5), "it lies ahead of the car"),
-        (box(11.1, 4.2, 2.0, 1.8, 1.5), "it reaches beyond its side"),
+        (REAR, box(13.0, 3, 1.5, 1.8, 1.5), "it lies ahead of the car"),
+        (REAR, box(11.1, 4.2, 2.0, 1.8, 1.5), "it reaches beyond its side"),
+        (
+            FRONT,
+            box(13.0, 3, 2.0, 1.8, 1.5),
+            "most of it lies ahead, though both are no longer than the car",
+        ),
+        (REAR, box(11.65, 3, 2.1, 1.8, 1.5), "both are longer than the car, though most of it lies within"),
     ],
 )
-def test_what_the_car_never_was_is_no_part_of_it(piece, why):
+def test_what_the_car_never_was_is_no_part_of_it(own, piece, why):
     tracker = known([CAR], [ObjectClass.CAR])
-    seen(tracker, [REAR, piece], KNOWN)
+    seen(tracker, [own, piece], KNOWN)
     assert len(tracker.proposals) == 2, why
 
 
@@ -112,13 +119,40 @@ def test_who_is_known_as_a_person_stays_one(kind, alone):
     assert (owners == [0, 1]) == alone
 
 
-def test_a_car_that_takes_something_gives_nothing_away():
-    """The hulls of two cars that were seen as one for a while overlap."""
+def test_a_car_takes_all_its_pieces():
     lorry = box(10, 3, 9.0, 1.8, 1.5)
     tracker = known([lorry], [ObjectClass.CAR])
     pieces = [box(7.0, 3, 2.0, 1.8, 1.5), box(9.4, 3, 2.0, 1.8, 1.5), box(12.5, 3, 3.0, 1.8, 1.5)]
     assert seen(tracker, pieces, KNOWN) == [0, 0, 0]
     assert len(tracker.proposals) == 1
+
+
+YOUNGER = box(15, 3, 4.2, 1.8, 1.5)
+
+
+def two_cars(ahead_m=0.0, behind_m=0.0):
+    """A tracker that knows CAR, who was once taken for longer ahead, and YOUNGER, once taken for longer behind."""
+    tracker = known([CAR, YOUNGER], [ObjectClass.CAR, ObjectClass.CAR])
+    tracker.tracks.hull[0] += np.maximum(WAYS[0], 0) * ahead_m
+    tracker.tracks.hull[1] += np.maximum(-WAYS[0], 0) * behind_m
+    return tracker
+
+
+def test_an_elder_car_keeps_its_own():
+    tracker = two_cars(behind_m=3.5)
+    assert seen(tracker, [FRONT, YOUNGER], KNOWN) == [0, 1]
+
+
+def test_what_may_be_a_piece_of_two_cars_is_the_elders():
+    tracker = two_cars(ahead_m=3.5, behind_m=3.5)
+    assert seen(tracker, [CAR, YOUNGER, box(12.5, 3, 0.5, 1.8, 1.5)], KNOWN) == [0, 1, 0]
+
+
+def test_a_car_that_takes_something_gives_nothing_away():
+    tracker = two_cars(ahead_m=3.5)
+    near, far = box(14.2, 3, 2.6, 1.8, 1.5), box(16.4, 3, 1.3, 1.8, 1.5)
+    assert seen(tracker, [CAR, near, far], KNOWN) == [0, 1, 1]
+    assert len(tracker.proposals) == 2
 
 
 def groups(draw, n):

@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from modt.classification.crops import height_of
-from modt.classification.layers import Layers, as_lists, logits, of_lists
+from modt.classification.layers import Layers, as_lists, logits, of_lists, part_of
 from modt.config import SensorConfig
 from modt.types import N_CLASSES, Float64, Int, Proposals
 
@@ -119,7 +119,4 @@ def boxes_of(metadata: Mapping[str, str]) -> Boxes:
     if text is None:
         return NoBoxes()
     held = json.loads(text)
-    share = float(held["share"])
-    if not 0.0 <= share <= 1.0:
-        raise ValueError(f"a share of {share}, wanted 0 to 1")
-    return KnownBoxes(of_lists(held["layers"], N_FEATURES), share)
+    return KnownBoxes(of_lists(held["layers"], N_FEATURES), part_of(held, "share"))

@@ -70,11 +70,10 @@ class KeyViews:
 
     The network's word is a posterior under the frequency of the classes among proposals and, by its share, under
     what the box says; Equation 6 multiplies likelihoods, so each further view is divided by these, lest they be
-    counted once a view. Views of
-    one object are never wholly independent: a further one may be given less than its full weight. And a class that
-    was settled from afar is looked at again when the object shows clearly more points, and what was known counts only
-    by its share of these; so is what took its class over from its place. What by its box is no object is neither
-    classified nor looked at again.
+    counted once a view. Views of one object are never wholly independent: a further one may be given less than its
+    full weight. And a class that was settled from afar is looked at again when the object shows clearly more points,
+    and what was known counts only by its share of these; so is what took its class over from its place. What by its
+    box is no object is neither classified nor looked at again.
 
     Args:
         config: thresholds of independence and certainty.

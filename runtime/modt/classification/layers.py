@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -42,3 +42,15 @@ def of_lists(lists: Any, n_features: int) -> Layers:
     if widths[-1] != N_CLASSES or [weight.shape for weight, _ in layers] != [*pairwise(widths)]:
         raise ValueError(f"layers of {' x '.join(map(str, widths))}, wanted {n_features} to {N_CLASSES}")
     return layers
+
+
+def part_of(held: Mapping[str, Any], name: str) -> float:
+    """A number from 0 to 1 that stands beside layers.
+
+    Raises:
+        KeyError, TypeError, ValueError: there is none of the name, or it is none.
+    """
+    part = float(held[name])
+    if not 0.0 <= part <= 1.0:
+        raise ValueError(f"a {name} of {part}, wanted 0 to 1")
+    return part

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.classification.layers import Layers, as_lists, logits, of_lists
+from modt.classification.layers import Layers, as_lists, logits, of_lists, part_of
 from modt.config import SensorConfig
 from modt.types import N_CLASSES, N_REFLECTANCE, Float64
 
@@ -109,7 +109,5 @@ def evidence_of(metadata: Mapping[str, str], n_box: int, sensor: SensorConfig) -
     held = json.loads(text)
     if held["sensor"] != sensor.reflectance:
         return NoEvidence()
-    share, weight = float(held["share"]), float(held["weight"])
-    if not (0.0 <= share <= 1.0 and 0.0 <= weight <= 1.0):
-        raise ValueError(f"a share of {share} and a weight of {weight}, wanted 0 to 1")
-    return Reflectance(of_lists(held["layers"], n_box + N_REFLECTANCE), share, weight)
+    layers = of_lists(held["layers"], n_box + N_REFLECTANCE)
+    return Reflectance(layers, part_of(held, "share"), part_of(held, "weight"))
