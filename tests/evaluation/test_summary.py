@@ -101,3 +101,10 @@ def test_the_table_names_what_it_prints():
     for word in ("proposals", "N_go", "beta", "42.9 %", "segmentation", "classification"):
         assert word in text
     assert max(map(len, text.splitlines())) <= 100
+
+
+@pytest.mark.parametrize("missed", [0, 22])
+def test_missed_deadlines_are_told_where_there_were_any(missed):
+    paced = {"rate_hz": 10.0, "missed_deadlines": missed, "max_lateness_ms": 1965.7}
+    text = summary_table(whole() | {"run": paced})
+    assert ("missed 22 deadlines at 10 frames/s, the latest frame began 1966 ms late" in text) is (missed > 0)

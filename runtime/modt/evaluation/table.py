@@ -41,6 +41,11 @@ def summary_table(summary: dict[str, Any]) -> str:
             f"  {run['frames_per_s']:.1f} frames/s, {run['real_time_factor']:.1f} x real time; "
             f"{own_ms:.1f} ms a frame without the source"
         )
+    if run.get("missed_deadlines"):
+        lines.append(
+            f"  missed {run['missed_deadlines']} deadlines at {run['rate_hz']:g} frames/s, the latest frame began "
+            f"{run['max_lateness_ms']:.0f} ms late"
+        )
     if "host" in summary:
         lines.append(_host_line(summary["host"]))
     faults = summary.get("faults", {})
