@@ -29,6 +29,16 @@ def test_sparse_assignment_is_the_dense_one(cost):
     np.testing.assert_allclose(cost[rows, columns][keep].sum(), dense[i, j][real].sum(), atol=1e-9)
 
 
+@given(st.integers(1, 12), st.integers(1, 12), st.floats(0.5, 8), st.integers(0, 2**16))
+def test_what_is_kept_for_certain_is_in_the_dense_assignment(n, k, limit, seed):
+    cost = np.random.default_rng(seed).uniform(0, 8, (n, k))
+    rows, columns = np.nonzero(cost < limit)
+    keep = assign(rows, columns, cost[rows, columns], limit)
+    i, j = assign_all(cost, limit)
+    np.testing.assert_array_equal(rows[keep], i)
+    np.testing.assert_array_equal(columns[keep], j)
+
+
 def greatest_gain(cost, limit):
     """What the best of all ways to pair rows and columns saves below the limit, one pair after the other tried."""
     if not len(cost):

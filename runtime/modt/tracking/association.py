@@ -73,8 +73,9 @@ class Association(Protocol):
 def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     """Indices of the candidate pairs that a least-cost assignment keeps.
 
-    Pairs that nobody contests are kept as they are; the Hungarian algorithm decides the rest, on the rows and
-    columns that they concern.
+    A pair is kept for certain if whoever parted it would lose: the next best of its row and that of its column
+    together cost more than it does, and what they are left without if they are denied. The Hungarian algorithm
+    decides the rest, on the rows and columns that it concerns.
 
     Args:
         rows: (K,) first index of each candidate pair.
@@ -84,19 +85,34 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     """
     if not len(rows):
         return np.zeros(0, np.int64)
-    kept = (np.bincount(rows)[rows] == 1) & (np.bincount(columns)[columns] == 1)
-    contested = np.flatnonzero(~kept)
-    if not len(contested):
-        return np.arange(len(rows))
-    i, n = _compact(rows[contested])
-    j, k = _compact(columns[contested])
-    matrix = np.full((n, k), limit)
-    matrix[i, j] = np.minimum(cost[contested], limit)
-    row, column = linear_sum_assignment(matrix)
-    partner = np.full(n, NONE, np.int64)
-    partner[row] = column
-    kept[contested] = partner[i] == j
-    return np.flatnonzero(kept)
+    order = (-cost).argsort()
+    rows, columns, cost = rows[order], columns[order], cost[order]
+    of_row, other_row = _two_best(rows, cost, limit)
+    of_column, other_column = _two_best(columns, cost, limit)
+    kept = cost + limit < other_row + other_column
+    contested = np.flatnonzero(~(kept[of_row] | kept[of_column]))
+    if len(contested):
+        i, n = _compact(rows[contested])
+        j, k = _compact(columns[contested])
+        matrix, chosen = np.full((n, k), limit), np.zeros((n, k), np.bool_)
+        matrix[i, j] = cost[contested]
+        chosen[linear_sum_assignment(matrix)] = True
+        kept[contested] = chosen[i, j]
+    pairs: Int = order[kept]
+    pairs.sort()
+    return pairs
+
+
+def _two_best(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
+    """The best pair of the same index, (K,), and the cost of the next best, limit where there is none; dearest first."""
+    k = np.arange(len(index))
+    best = np.empty(index.max() + 1, np.int64)
+    best[index] = k  # the last one written is the cheapest
+    of_index = best[index]
+    others = np.flatnonzero(of_index != k)
+    next_best = np.full(len(best), limit)
+    next_best[index[others]] = cost[others]
+    return of_index, next_best[index]
 
 
 def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
