@@ -99,7 +99,7 @@ class Proposals:
     @property
     def count(self) -> Int:
         """(P,) points of each proposal."""
-        return np.diff(self.offsets)
+        return self.offsets[1:] - self.offsets[:-1]
 
     def label(self, n_points: int) -> Int:
         """(n_points,) proposal of each point of the frame, NONE where it belongs to none."""

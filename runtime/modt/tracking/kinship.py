@@ -70,7 +70,7 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
     """Rows and proposals: an elder track, and a larger part of its object that it does not have."""
     if not len(elders):
         return elders, elders
-    hull = (tracks.hull.take(elders, axis=0) + tracks.x.take(elders, axis=0)[:, :2] @ WAYS).T
+    hull = (tracks.hull.take(elders, axis=0) + tracks.x.take(elders, axis=0)[:, :2] @ WAYS).T.copy()
     i, part = touching(hull, sightings.outline)
     elder, rival = elders[i], owner[part]
     size = np.where(proposal == NONE, 0, sightings.count[proposal])
