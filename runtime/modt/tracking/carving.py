@@ -45,7 +45,7 @@ def carved(proposals: Proposals, hosts: Int, pieces: list[Int], yaw: Float64) ->
     occluded[n:] = True
     reflectance = proposals.reflectance
     if reflectance is not None:
-        reflectance = np.pad(reflectance, ((0, len(hosts)), (0, 0)), constant_values=np.nan)
+        reflectance = np.concatenate([reflectance, np.full((len(hosts), reflectance.shape[1]), np.nan)])
     return replace(
         proposals,
         members=np.concatenate([proposals.members[rows] for rows in order]),

@@ -128,6 +128,6 @@ def _fits(a: Float64, b: Float64, room: Float64) -> Bool:
 
 def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
     """(2, k) how far each box (k, 7) reaches from its middle along its heading yaw and across it [m]."""
-    turn = np.array((yaw, yaw + np.pi / 2)) - boxes[:, 6]
-    half: Float64 = (boxes[:, 3] * np.abs(np.cos(turn)) + boxes[:, 4] * np.abs(np.sin(turn))) / 2
-    return half
+    (length, width), turn = boxes[:, 3:5].T / 2, yaw - boxes[:, 6]
+    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    return np.array((length * c + width * s, length * s + width * c))

@@ -52,7 +52,7 @@ class Motion:
         place = place_m[:, 0] + 1j * place_m[:, 1]
         half = np.exp(0.5j * self.turn_radps * late_s)
         step = place * (half * half - 1.0) + self.velocity_mps * late_s * half
-        return np.stack([step.real, step.imag], axis=1)
+        return step.view(np.float64).reshape(-1, 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,13 +115,10 @@ def lateness(proposals: Proposals, turn_s: float) -> Float64:
     It is the mean over the bearings that its box takes up: what lies across the seam is seen at both ends of the
     sweep, and does not leap by a whole one as its centroid crosses.
     """
-    x, y = proposals.centroid[:, 0], proposals.centroid[:, 1]
+    (x, y), (length, width) = proposals.centroid[:, :2].T, proposals.box[:, 3:5].T
     bearing = np.arctan2(y, x)
-    length, width = proposals.box[:, 3], proposals.box[:, 4]
-    behind = np.flatnonzero((x < 0.0) & (2 * np.abs(y) < length + width))  # no others can lie across the seam
-    if len(behind):
-        wide = np.arctan2(np.hypot(length[behind], width[behind]) / 2, np.hypot(x[behind], y[behind]))
-        across = np.maximum(np.abs(bearing[behind]) + wide - np.pi, 0.0)
-        bearing[behind] -= np.copysign(np.pi * across / np.maximum(wide, 1e-9), bearing[behind])
+    wide = np.arctan2(np.hypot(length, width) / 2, np.hypot(x, y))
+    across = np.maximum(np.abs(bearing) + wide - np.pi, 0.0)
+    bearing -= np.copysign(np.pi * across / np.maximum(wide, 1e-9), bearing)
     late: Float64 = bearing * (-turn_s / (2 * np.pi))
     return late
