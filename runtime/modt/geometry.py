@@ -82,18 +82,18 @@ def boxes_about(boxes: Float64, group: Int, yaw: Float64) -> Float64:
         group: (F,) which of the U each is in.
         yaw: (U,) heading of each, or across it [rad].
     """
-    begins, own = np.searchsorted(group, np.arange(len(yaw))), yaw[group]
+    begins, own = group.searchsorted(np.arange(len(yaw))), yaw[group]
     x, y, z, length, width, height, heading = boxes.T
     c, s, along, across = np.cos(own), np.sin(own), np.abs(np.cos(heading - own)), np.abs(np.sin(heading - own))
-    middle = np.stack([x * c + y * s, y * c - x * s, z])
-    half = np.stack([length * along + width * across, length * across + width * along, height]) / 2
+    middle = np.array((x * c + y * s, y * c - x * s, z))
+    half = np.array((length * along + width * across, length * across + width * along, height)) / 2
     low = np.minimum.reduceat(middle - half, begins, axis=1)
     high = np.maximum.reduceat(middle + half, begins, axis=1)
     (u, v, w), (length, width, height) = (low + high) / 2, high - low
     c, s = np.cos(yaw), np.sin(yaw)
     turn = np.where(length < width, np.pi / 2, 0.0)
     sides = np.maximum(length, width), np.minimum(length, width)
-    return np.stack([u * c - v * s, u * s + v * c, w, *sides, height, yaw - turn], axis=1)
+    return np.array((u * c - v * s, u * s + v * c, w, *sides, height, yaw - turn)).T
 
 
 def corners(boxes: Float64) -> Float64:

@@ -56,13 +56,20 @@ class Unions:
             new=new,
             few=order[few],
             begins=begins,
-            union=np.cumsum(first) - 1,
+            union=first.cumsum() - 1,
         )
 
     @property
     def hosts(self) -> Int:
         """(U,) the proposals that take in others."""
         return self.kept[self.new]
+
+    def stretches(self, offsets: Int) -> list[slice]:
+        """Where the members of the proposals are, P of such offsets, in that order: few long ones are copied fast."""
+        begin = _first(self.order - np.arange(len(self.order)))
+        end = np.concatenate([begin[1:], begin[:1]])
+        firsts, afters = offsets[self.order[begin]].tolist(), offsets[self.order[end] + 1].tolist()
+        return [slice(*ends) for ends in zip(firsts, afters, strict=True)]
 
     def share(self, count: Int) -> Float64:
         """(F,) part of its union that each of the few is, of P proposals that have so many points."""
@@ -96,10 +103,9 @@ def united_proposals(proposals: Proposals, unions: Unions, yaw: Float64) -> Prop
         unions: of them.
         yaw: (U,) headings of their boxes [rad].
     """
-    breaks = np.flatnonzero(np.diff(unions.order) != 1) + 1  # long stretches are copied faster than proposals
-    firsts, lasts = unions.order[np.append(0, breaks)], unions.order[np.append(breaks, len(unions.order)) - 1]
-    runs = [slice(*ends) for ends in zip(proposals.offsets[firsts], proposals.offsets[lasts + 1], strict=True)]
-    counts = np.add.reduceat(proposals.count[unions.order], unions.starts)
+    runs = unions.stretches(proposals.offsets)
+    offsets = np.zeros(len(unions.kept) + 1, np.int64)
+    np.add.reduceat(proposals.count[unions.order], unions.starts).cumsum(out=offsets[1:])
     box, centroid = proposals.box.take(unions.kept, axis=0), proposals.centroid.take(unions.kept, axis=0)
     box[unions.new] = boxes_about(proposals.box.take(unions.few, axis=0), unions.union, yaw)
     share = unions.share(proposals.count)
@@ -109,7 +115,7 @@ def united_proposals(proposals: Proposals, unions: Unions, yaw: Float64) -> Prop
     return replace(
         proposals,
         members=np.concatenate([proposals.members[run] for run in runs]),
-        offsets=np.append(0, np.cumsum(counts)),
+        offsets=offsets,
         coordinates=np.concatenate([proposals.coordinates[:, run] for run in runs], axis=1),
         centroid=centroid,
         box=box,
@@ -123,13 +129,12 @@ def _brightness(reflectance: Float64 | None, unions: Unions, share: Float64) -> 
     """(Q, 5) that of all: the moments of unions follow from those of their parts; unknown where one's is."""
     if reflectance is None:
         return None
-    mean, deviation, most, *_ = reflectance.T
-    square = np.square(mean) + np.square(deviation)
-    told = unions.mean(np.column_stack([reflectance, square]), share)
-    told[:, 1] = np.sqrt(np.maximum(told[:, 5] - np.square(told[:, 0]), 0.0))
-    told[:, 2] = np.maximum.reduceat(most[unions.few], unions.begins)
+    told, squared = unions.mean(reflectance, share), np.square(reflectance)
+    square = unions.mean(squared[:, :1] + squared[:, 1:2], share)[:, 0]
+    told[:, 1] = np.sqrt(np.maximum(square - np.square(told[:, 0]), 0.0))
+    told[:, 2] = np.maximum.reduceat(reflectance[unions.few, 2], unions.begins)
     every = reflectance.take(unions.kept, axis=0)
-    every[unions.new] = told[:, :5]
+    every[unions.new] = told
     return every
 
 
