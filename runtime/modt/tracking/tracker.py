@@ -176,8 +176,7 @@ class Tracker:
         self._stamp_s = stamp_s
         t = self._tracks
         t.kind = t.object_class
-        at_home = np.square(t.x[:, :2] - t.home).sum(axis=1) < STILL_M**2
-        settled = t.fixed & ((t.kind != ObjectClass.BACKGROUND.value) | at_home)
+        settled = t.fixed & ((t.kind != ObjectClass.BACKGROUND.value) | (apart(t.x, t.home) < STILL_M))
         agility = np.where(settled, AGILITY[t.kind], 1.0)  # background that went away was none
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
@@ -273,13 +272,13 @@ class Tracker:
     def _rest(self, rows: Int) -> None:
         """What stays where it was has no speed; what has stopped is at home where it is."""
         t = self._tracks
-        x = t.x.take(rows, axis=0)
-        stopped = (x[:, kalman.SPEED] < SLOW_MPS) & ~t.still[rows] & (t.hits[rows] > 3)
-        t.home[rows[stopped]] = x[stopped, :2]
-        stays = self._away(rows) < STILL_M
-        t.still[rows] = stays & (t.hits[rows] > 2)
-        near, x = rows[stays], x[stays]
-        t.home[near] += HOME_GAIN * (x[:, :2] - t.home[near])
+        x, home, hits = t.x.take(rows, axis=0), t.home.take(rows, axis=0), t.hits[rows]
+        stopped = np.flatnonzero((x[:, kalman.SPEED] < SLOW_MPS) & ~t.still[rows] & (hits > 3))
+        home[stopped] = x[stopped, :2]
+        stays = apart(x, home) < STILL_M
+        t.still[rows] = stays & (hits > 2)
+        t.home[rows] = home + HOME_GAIN * stays[:, None] * (x[:, :2] - home)
+        near, x = rows[stays], x.compress(stays, axis=0)
         t.x[near], t.P[near] = kalman.observe_speed(x, t.P.take(near, axis=0), 0.0, STILL_SIGMA_MPS)
 
     def _stand(self, rows: Int) -> None:
@@ -295,8 +294,9 @@ class Tracker:
         """Tracks without a proposal coast."""
         t = self._tracks
         t.age += 1
-        missing = np.ones(len(t), np.bool_)
-        missing[matched] = False
+        seen = np.zeros(len(t), np.bool_)
+        seen[matched] = True
+        missing = np.flatnonzero(~seen)
         t.proposal[missing] = NONE
         t.missed[missing] += 1
         t.state[missing] = self.machine.meet(t.state[missing], Happening.UNASSOCIATED)
@@ -306,7 +306,7 @@ class Tracker:
         t = self._tracks
         t.inherited &= ~t.classified  # what a view said holds anywhere
         rows = np.flatnonzero(t.inherited & (t.proposal != NONE))
-        rows = rows[self._away(rows) > STILL_M]
+        rows = rows[apart(t.x.take(rows, axis=0), t.home.take(rows, axis=0)) > STILL_M]
         if not len(rows):
             return
         t.state[rows] = self.machine.meet(t.state[rows], Happening.DOUBTED)
@@ -325,7 +325,7 @@ class Tracker:
         new = np.arange(len(alive), len(t))
         t.id[new] = self._next_id + np.arange(len(born))
         self._next_id += len(born)
-        happening = np.where(known, Happening.ASSOCIATED, Happening.UNASSOCIATED)
+        happening = np.where(known, Happening.ASSOCIATED.value, Happening.UNASSOCIATED.value)
         t.state[new] = self.machine.meet(np.full(len(born), self.machine.proposal), happening)
         heir = new[known]
         t.state[heir] = self.machine.meet(t.state[heir], Happening.INHERITS_CLASS)
@@ -357,13 +357,11 @@ class Tracker:
         """Rows that are background, for certain, and never moved."""
         t = self._tracks
         plain = t.kind == ObjectClass.BACKGROUND.value  # arrays are slow to compare with an enumeration itself
-        background = np.flatnonzero(t.fixed & plain)
-        scenery: Int = background[self._away(background) < STILL_M]
-        return scenery
+        return np.flatnonzero(t.fixed & plain & (apart(t.x, t.home) < STILL_M))
 
-    def _away(self, rows: Int) -> Float64:
-        """(R,) how far each of the rows is from its home [m]."""
-        t = self._tracks
-        step = t.x.take(rows, axis=0)[:, :2] - t.home.take(rows, axis=0)
-        away: Float64 = np.hypot(step[:, 0], step[:, 1])
-        return away
+
+def apart(x: Float64, home: Float64) -> Float64:
+    """(R,) how far states (R, 4) are from their homes (R, 2) [m]."""
+    step = x[:, :2] - home
+    away: Float64 = np.hypot(step[:, 0], step[:, 1])
+    return away
