@@ -83,8 +83,8 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
         cost: (K,) of each, below limit.
         limit: cost of leaving a row or a column without a partner.
     """
-    if not len(rows):
-        return np.zeros(0, np.int64)
+    if len(rows) < 2:
+        return np.arange(len(rows))
     order = (-cost).argsort()
     rows, columns, cost = rows[order], columns[order], cost[order]
     of_row, other_row = _two_best(rows, cost, limit)
@@ -124,7 +124,7 @@ def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
 
 def _compact(index: Int) -> tuple[Int, int]:
     """Indices renumbered without gaps, and how many there are."""
-    number = np.cumsum(np.bincount(index) > 0)
+    number = (np.bincount(index) > 0).cumsum()
     return number[index] - 1, int(number[-1])
 
 

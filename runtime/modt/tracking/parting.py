@@ -177,9 +177,12 @@ def _hosts(tracks: Followed, sightings: Sightings, rows: Int) -> tuple[Int, Int]
     """Those of the rows that are expected within a proposal, and which covers each best."""
     expected = carried(tracks, rows)
     i, j = touching(expected, sightings.outline)
-    cover = covered(expected.take(i, axis=1), sightings.outline.take(j, axis=1))
-    room = np.where(tracks.kind == ObjectClass.BACKGROUND.value, PERSON_M, ROOM_M[tracks.kind, 0])[rows[i]]
-    large = lengths(sightings.outline.take(j, axis=1)).max(axis=0) > room
+    if not len(i):
+        return rows[i], j
+    outline, kind = sightings.outline.take(j, axis=1), tracks.kind[rows[i]]
+    cover = covered(expected.take(i, axis=1), outline)
+    room = np.where(kind == ObjectClass.BACKGROUND.value, PERSON_M, ROOM_M[kind, 0])
+    large = lengths(outline).max(axis=0) > room
     least_first = cover.argsort(kind="stable")
     least_first = least_first[(large & (cover > WITHIN))[least_first]]
     host = np.full(len(rows), NONE)
