@@ -256,13 +256,12 @@ class Tracks:
 
     def renewed(self, kept: Int, n: int) -> Self:
         """The rows kept, by index, then n blank ones."""
-        m = len(kept)
-        columns = []
-        for (_, old), blank in zip(self.columns(), self._blank_row(), strict=True):
-            new = np.empty((m + n, *old.shape[1:]), old.dtype)
-            old.take(kept, axis=0, out=new[:m], mode="clip")  # unlike "raise" straight into its place
-            new[m:] = blank
-            columns.append(new)
+        if not len(self):
+            return self.blank(n)
+        rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
+        columns = [column.take(rows, axis=0) for _, column in self.columns()]
+        for column, blank in zip(columns, self._blank_row(), strict=True):
+            column[len(kept) :] = blank
         return type(self)(*columns)
 
     @classmethod
