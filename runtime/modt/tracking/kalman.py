@@ -11,6 +11,8 @@ from modt.geometry import wrap
 from modt.types import Float64
 
 X, Y, HEADING, SPEED = range(4)
+UNCHANGED = np.eye(4)[None]
+"""(1, 4, 4) the change that is none."""
 
 
 def motion(x: Float64, dt_s: float) -> Float64:
@@ -23,7 +25,7 @@ def motion(x: Float64, dt_s: float) -> Float64:
 
 def motion_jacobian(x: Float64, dt_s: float) -> Float64:
     """(M, 4, 4) derivative of F at x."""
-    F = np.eye(4)[None].repeat(len(x), axis=0)
+    F = UNCHANGED.repeat(len(x), axis=0)
     c, s = np.cos(x[:, HEADING]), np.sin(x[:, HEADING])
     F[:, X, HEADING], F[:, X, SPEED] = -dt_s * s * x[:, SPEED], dt_s * c
     F[:, Y, HEADING], F[:, Y, SPEED] = dt_s * c * x[:, SPEED], dt_s * s
@@ -92,7 +94,7 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
     """
     turn = heading_rad - x[:, HEADING]
     c, s = np.cos(turn), np.sin(turn)
-    T = np.eye(4)[None].repeat(len(x), axis=0)
+    T = UNCHANGED.repeat(len(x), axis=0)
     T[:, X, X], T[:, X, Y], T[:, Y, X], T[:, Y, Y] = c, -s, s, c
     out = x.copy()
     out[:, HEADING] = wrap(heading_rad)
