@@ -53,7 +53,9 @@ def predict(x: Float64, P: Float64, Q: Float64, dt_s: float) -> tuple[Float64, F
     F = motion_jacobian(x, dt_s)
     moved = x.copy()
     moved[:, :2] += F[:, :2, SPEED] * x[:, SPEED, None]  # motion(), which is linear in the speed
-    return moved, congruent(F, P) + Q
+    changed = congruent(F, P)
+    changed += Q
+    return moved, changed
 
 
 def congruent(A: Float64, P: Float64) -> Float64:

@@ -58,12 +58,9 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
 
 def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
     """Rows, eldest first, of what was seen more than once and is now not seen, or less of it than before."""
-    rows = np.flatnonzero(tracks.hits > 1)
-    own = proposal[rows]
-    now = girth(sightings.outline)[own]
-    known = girth(tracks.hull.T)[rows]
-    less: Int = rows[(own == NONE) | (known > LESS * now)]
-    return less  # tracks are in the order of their birth
+    now, known = girth(sightings.outline)[proposal], girth(tracks.hull.T.copy())
+    less = (proposal == NONE) | (known > LESS * now)
+    return np.flatnonzero((tracks.hits > 1) & less)  # tracks are in the order of their birth
 
 
 def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
@@ -96,7 +93,8 @@ def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
     kind, other = tracks.kind[elder], tracks.kind[rival]
     alike = ~tracks.fixed[rival] | (kind == other) | (BULKY[kind] & BULKY[other])
     (vx, vy), (wx, wy) = (_velocity(tracks.x.take(rows, axis=0)) for rows in (elder, rival))
-    doubt = SIGMAS * np.sqrt(tracks.P[elder, SPEED, SPEED] + tracks.P[rival, SPEED, SPEED])
+    variance = tracks.P[:, SPEED, SPEED]
+    doubt = SIGMAS * np.sqrt(variance[elder] + variance[rival])
     together = np.hypot(wx - vx, wy - vy) <= APART_MPS + doubt
     free: Bool = (rival == NONE) | alike & (together | (tracks.hits[rival] < SETTLED))
     return free

@@ -52,8 +52,9 @@ class RobustAssociation:
         a, b = expected.take(rows, axis=1), sightings.outline.take(columns, axis=1)
         size, overlap, cover = likeness(a, b)
         S = tracks.P[:, :2, :2].copy().take(rows, axis=0)
+        noise = variance[columns]
         for k in (0, 1):
-            S[:, k, k] += variance[columns]
+            S[:, k, k] += noise
             S[:, k, k] += JUMP_M**2
         distance = kalman.mahalanobis_squared((AXES @ least(a, b) / 2).T, S)  # what changed its shape may be far off
         height = np.abs(tracks.top[rows] - sightings.top[columns])
