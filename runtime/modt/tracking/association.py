@@ -104,7 +104,7 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
 
 
 def _two_best(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
-    """The best pair of the same index, (K,), and the cost of the next best, limit where there is none; dearest first."""
+    """(K,) the best pair of the same index, (K,) cost of the next best, limit where there is none; dearest first."""
     k = np.arange(len(index))
     best = np.empty(index.max() + 1, np.int64)
     best[index] = k  # the last one written is the cheapest

@@ -41,19 +41,18 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
     owner = np.full(len(sightings), NONE, np.int64)
     proposal[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
     elders = _incomplete(tracks, sightings, proposal)
-    swapped = np.zeros(len(tracks), np.bool_)
-    taken = np.zeros(len(sightings), np.bool_)
-    for elder, part in zip(*_parts(tracks, sightings, elders, proposal, owner), strict=True):
-        younger, left = owner[part], proposal[elder]
-        if taken[part] or swapped[elder] or (younger != NONE and swapped[younger]):
+    has: dict[int, int] = {}  # the proposal of each track that took or gave one
+    settled: set[int] = set()
+    elders, parts = _parts(tracks, sightings, elders, proposal, owner)
+    for elder, part in zip(elders.tolist(), parts.tolist(), strict=True):
+        younger, left = int(owner[part]), int(proposal[elder])
+        if part in settled or elder in has or younger in has:
             continue
-        proposal[elder], owner[part], taken[part], swapped[elder] = part, elder, True, True
+        has[elder] = part
         if younger != NONE:
-            proposal[younger], swapped[younger] = left, True
-        if left != NONE:
-            owner[left], taken[left] = younger, True
-    changed = np.flatnonzero(swapped)
-    return matches.instead(tracks, changed, proposal[changed]) if len(changed) else matches
+            has[younger] = left
+        settled |= {part, left}
+    return matches.instead(tracks, *np.array(sorted(has.items()), np.int64).T) if has else matches
 
 
 def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
@@ -73,7 +72,6 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
     size = np.where(proposal == NONE, 0, sightings.count[proposal])
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
     larger = np.flatnonzero(junior & (rival != elder) & (sightings.count[part] > size[elder]))
-    larger = larger[_free(tracks, elder[larger], rival[larger])]
     stout = (sightings.box[part[larger], 3] > PERSON_M) & (tracks.box[elder[larger], 3] > PERSON_M)
     larger = larger[stout | _gives_way(tracks, elder[larger], rival[larger])]
     i, elder, part = i[larger], elder[larger], part[larger]
@@ -85,7 +83,9 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
     within = covered(outline, hull.take(i, axis=1)) > WITHIN
     whole = covered((tracks.outline.take(elder, axis=0) + moved @ WAYS).T, outline) > WITHIN
     related = fits & (within | whole)
-    return elder[related], part[related]
+    elder, part = elder[related], part[related]
+    free = _free(tracks, elder, owner[part])
+    return elder[free], part[free]
 
 
 def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:

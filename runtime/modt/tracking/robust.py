@@ -104,7 +104,8 @@ class RobustAssociation:
 
 def carried(tracks: Followed, rows: Int | slice = slice(None)) -> Float64:
     """(8, R) the outlines last seen of the rows, of all by default, where the filter expects them now."""
-    return (tracks.outline[rows] + (tracks.x[rows, :2] - tracks.shown[rows]) @ WAYS).T.copy()
+    outline: Float64 = (tracks.outline[rows] + (tracks.x[rows, :2] - tracks.shown[rows]) @ WAYS).T.copy()
+    return outline
 
 
 def compare(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64, Float64]:

@@ -52,7 +52,8 @@ class Motion:
         place = place_m[:, 0] + 1j * place_m[:, 1]
         half = np.exp(0.5j * self.turn_radps * late_s)
         step = place * (half * half - 1.0) + self.velocity_mps * late_s * half
-        return step.view(np.float64).reshape(-1, 2)
+        xy: Float64 = step.view(np.float64).reshape(-1, 2)
+        return xy
 
 
 @dataclass(frozen=True, slots=True)
