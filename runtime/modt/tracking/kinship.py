@@ -13,7 +13,7 @@ import numpy as np
 from modt.tracking.association import Matches
 from modt.tracking.followed import Followed
 from modt.tracking.kalman import HEADING, SPEED
-from modt.tracking.outlines import WAYS, covered, girth, touching
+from modt.tracking.outlines import WAYS, covered, girth, lengths, touching
 from modt.tracking.sightings import Sightings
 from modt.types import NONE, Bool, Float64, Int, ObjectClass
 
@@ -53,6 +53,13 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
             has[younger] = left
         settled |= {part, left}
     return matches.instead(tracks, *np.array(sorted(has.items()), np.int64).T) if has else matches
+
+
+def outgrown(kind: Int, outline: Float64) -> Int:
+    """Which of the objects, of a kind (n,), are longer (n, 8) than any of theirs: one with something else."""
+    things = np.flatnonzero(kind != ObjectClass.BACKGROUND.value)
+    longer: Bool = lengths(outline.take(things, axis=0).T).max(axis=0, initial=0.0) > ROOM_M[kind[things], 0]
+    return things[longer]
 
 
 def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:

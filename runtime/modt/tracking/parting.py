@@ -21,7 +21,7 @@ from modt.tracking.association import Matches
 from modt.tracking.carving import carved
 from modt.tracking.followed import Followed
 from modt.tracking.kalman import SPEED, X, Y
-from modt.tracking.kinship import PERSON_M, ROOM_M, SETTLED
+from modt.tracking.kinship import SETTLED
 from modt.tracking.outlines import WAYS, covered, lengths, touching
 from modt.tracking.regrouping import Found
 from modt.tracking.robust import carried
@@ -36,6 +36,8 @@ SLIM_M, TALL_M, WAY_M, SIGMAS = 1.5, 0.5, 1.5, 2.5
 deviations, walks. (On synthetic drives 28 of a hundred such were people; of what is slim and moves at all, 8.)"""
 WITHIN = 0.6
 """Part of the expected outline that the larger proposal must cover."""
+LONGER_M = 0.6
+"""A proposal that is longer than what is expected by so much holds something else besides."""
 PAD_M = 0.2
 """Points may lie this far beyond the outline and the top expected."""
 POINTS = 8
@@ -179,10 +181,9 @@ def _hosts(tracks: Followed, sightings: Sightings, rows: Int) -> tuple[Int, Int]
     i, j = touching(expected, sightings.outline)
     if not len(i):
         return rows[i], j
-    outline, kind = sightings.outline.take(j, axis=1), tracks.kind[rows[i]]
-    cover = covered(expected.take(i, axis=1), outline)
-    room = np.where(kind == ObjectClass.BACKGROUND.value, PERSON_M, ROOM_M[kind, 0])
-    large = lengths(outline).max(axis=0) > room
+    outline, expected = sightings.outline.take(j, axis=1), expected.take(i, axis=1)
+    cover = covered(expected, outline)
+    large = lengths(outline).max(axis=0) > lengths(expected).max(axis=0) + LONGER_M
     least_first = cover.argsort(kind="stable")
     least_first = least_first[(large & (cover > WITHIN))[least_first]]
     host = np.full(len(rows), NONE)

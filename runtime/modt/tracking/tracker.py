@@ -11,7 +11,7 @@ from modt.tracking.association import Association, Matches, PaperAssociation
 from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
 from modt.tracking.joining import KnownJoining
-from modt.tracking.kinship import reunite
+from modt.tracking.kinship import outgrown, reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.outlines import WAYS
 from modt.tracking.parting import ExpectedParting
@@ -260,7 +260,11 @@ class Tracker:
         outline = sightings.outline.T.take(proposals, axis=0)
         tracks.outline[rows] = outline
         about = outline - place @ WAYS
-        tracks.hull[rows] = np.maximum(about, FORGET * tracks.hull.take(rows, axis=0) + (1 - FORGET) * about)
+        known = tracks.hull.take(rows, axis=0)
+        hull = np.maximum(about, FORGET * known + (1 - FORGET) * about)
+        merged = outgrown(tracks.kind[rows], about)
+        hull[merged] = known[merged]
+        tracks.hull[rows] = hull
         off = tracks.shape.take(rows, axis=0) - about
         kept = np.minimum(1.0 - 1.0 / tracks.hits[rows], SHAPE_KEPT)[:, None]
         tracks.shape[rows] = about + (np.abs(off) < AGREE_M) * kept * off
