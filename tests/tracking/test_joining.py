@@ -61,6 +61,21 @@ def known(bodies, kinds, pose=still, frames=KNOWN, association="robust", fixed=T
     return tracker
 
 
+@pytest.mark.parametrize(
+    ("kind", "length_m", "known_m"),
+    [
+        (ObjectClass.CAR, 5.8, 5.8),
+        (ObjectClass.CAR, 6.4, 5.0),  # no car is as long
+        (ObjectClass.BACKGROUND, 6.4, 6.4),
+    ],
+)
+def test_what_a_car_is_one_with_is_not_what_was_seen_of_it(kind, length_m, known_m):
+    tracker = known([box(10, 3, 5.0, 1.8, 1.5)], [kind])
+    assert seen(tracker, [box(10, 3, length_m, 1.8, 1.5)], KNOWN) == [0]
+    hull = tracker.tracks.hull[0]
+    assert hull[0] + hull[4] == pytest.approx(known_m, abs=0.25)
+
+
 @pytest.mark.parametrize("pose", [still, driving])
 def test_a_car_in_two_pieces_is_one(pose):
     tracker = known([CAR], [ObjectClass.CAR], pose)

@@ -152,6 +152,20 @@ def test_who_stands_takes_only_what_a_known_object_does(kind, frames, parts):
     assert len(tracker.proposals) == parts
 
 
+def test_a_car_is_sought_in_what_is_longer_than_was_seen_of_it():
+    """Two of which half is seen are no longer than one may be."""
+    tracker, halves, ids = Tracker(TrackingConfig(), EFFICIENT), [box(10, 3, 2.0, 1.6), box(12.4, 3, 2.0, 1.6)], []
+    for i in range(8):
+        tracker.tracks.posterior[:] = np.eye(N_CLASSES)[ObjectClass.CAR]
+        found = frame_of([*halves, [*WALL[:1], 9, *WALL[2:]]], i, EYE, points=[*[PERSON_POINTS] * 2, WALL_POINTS])
+        tracker.follow(*(merged(*found, [(0, 1), (2,)]) if i == 7 else found))
+        found, shares = held(tracker, 2)
+        ids.append(found)
+        assert min(shares) > 0.95
+    assert len(set(ids[0])) == 3
+    assert all(found == ids[0] for found in ids)
+
+
 def test_what_was_away_takes_nothing():
     tracker = Tracker(TrackingConfig(), EFFICIENT)
     for i in range(MEET):

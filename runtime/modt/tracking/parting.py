@@ -36,7 +36,7 @@ SLIM_M, TALL_M, WAY_M, SIGMAS = 1.5, 0.5, 1.5, 2.5
 deviations, walks. (On synthetic drives 28 of a hundred such were people; of what is slim and moves at all, 8.)"""
 WITHIN = 0.6
 """Part of the expected outline that the larger proposal must cover."""
-LONGER_M = 0.6
+LONGER_M = 0.3
 """A proposal that is longer than what is expected by so much holds something else besides."""
 PAD_M = 0.2
 """Points may lie this far beyond the outline and the top expected."""
