@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.errors import MisuseError
-from modt.sources.detections import files, kitti, level, read
+from modt.sources.detections import files, kitti, level, read, read_all
 
 AB3DMOT = "0,2,298.3,165.2,458.2,293.4,8.3,1.96,1.81,4.75,-4.57,1.84,13.53,-2.11,-1.79\n"
 LABEL = "0 7 Car 0 0 -1.79 298.3 165.2 458.2 293.4 1.96 1.81 4.75 -4.57 1.84 13.53 -2.11 8.3\n"
@@ -57,13 +57,24 @@ def test_coordinates_return(boxes):
     np.testing.assert_allclose(level(kitti(boxes)), boxes, atol=1e-9)
 
 
+def scored(path, *scores):
+    """A file with a detection a frame, of these scores."""
+    path.write_text("".join(f"{i},2,0,0,9,9,{score},1.5,1.6,4,0,1.5,9,0,0\n" for i, score in enumerate(scores)))
+    return path
+
+
 def test_probabilities_are_taken_to_log_odds(tmp_path):
     def scores(*given):
-        path = tmp_path / "a.txt"
-        path.write_text("".join(f"{i},2,0,0,9,9,{score},1.5,1.6,4,0,1.5,9,0,0\n" for i, score in enumerate(given)))
-        return read(path).score.tolist()
+        return read(scored(tmp_path / "a.txt", *given)).score.tolist()
 
     even = scores(0.5)[0]
     assert scores(0.1, 0.9) == pytest.approx([even - np.log(9), even + np.log(9)])
     assert np.isfinite(scores(0.0, 1.0)).all()
     assert scores(0.5, 1.5) == [0.5, 1.5]  # no probabilities: as they are
+
+
+def test_a_quiet_sequence_of_a_detector_is_on_the_scale_of_the_others(tmp_path):
+    quiet, busy = scored(tmp_path / "0.txt", 0.25), scored(tmp_path / "1.txt", 0.5, 7.0)
+    assert read(quiet).score.tolist() != [0.25]
+    assert [d.score.tolist() for d in read_all([quiet, busy])] == [[0.25], [0.5, 7.0]]
+    assert [d.name for d in read_all([quiet, busy])] == ["0", "1"]

@@ -4,12 +4,12 @@ Two formats are recognised: AB3DMOT's 15 comma-separated columns (frame; type 1 
 top, right, bottom [pixel]; score; h, w, l, x, y, z [m], ry [rad]; alpha) and KITTI's tracking labels (frame, id,
 type, truncated, occluded, alpha, box, h, w, l, x, y, z, ry and a score; what has none is sure). Both are in the
 coordinates of the camera: x right, y down, z forward, the place being the middle of the foot. Scores are on the scale
-of PointRCNN's; where all of a file lie between 0 and 1 they are probabilities, and taken there.
+of PointRCNN's; where all of a detector's lie between 0 and 1 they are probabilities, and taken there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,28 +90,45 @@ def read(path: Path) -> Detections:
     Raises:
         MisuseError: it cannot be read, or a line is of neither format; it names the line.
     """
+    return read_all([path])[0]
+
+
+def read_all(paths: Sequence[Path]) -> list[Detections]:
+    """The detections of files that are one detector's: whether its scores are probabilities, all of them tell.
+
+    Raises:
+        MisuseError: one cannot be read, or a line is of neither format; it names the line.
+    """
+    tables = [_table(path) for path in paths]
+    score = np.concatenate([table[:, 6] for table in tables])
+    probable = bool(((score >= 0) & (score <= 1)).all())
+    return [
+        Detections(
+            name=path.stem,
+            frame=table[:, 0].astype(np.int64),
+            type_=table[:, 1].astype(np.int64) - 1,
+            image_box=table[:, 2:6],
+            score=_log_odds(table[:, 6]) if probable else table[:, 6],
+            box=level(table[:, 7:14]),
+        )
+        for path, table in zip(paths, tables, strict=True)
+    ]
+
+
+def _table(path: Path) -> Float64:
+    """(n, 15) AB3DMOT's columns of a file, in the order of their frames."""
     try:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(path, f"cannot be read ({error})", "give a text file of detections") from None
     rows = [_row(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
     table = np.array([r for r in rows if r is not None]).reshape(-1, COLUMNS)
-    table = table[np.argsort(table[:, 0], kind="stable")]
-    return Detections(
-        name=path.stem,
-        frame=table[:, 0].astype(np.int64),
-        type_=table[:, 1].astype(np.int64) - 1,
-        image_box=table[:, 2:6],
-        score=_on_scale(table[:, 6]),
-        box=level(table[:, 7:14]),
-    )
+    return table[np.argsort(table[:, 0], kind="stable")]
 
 
-def _on_scale(score: Float64) -> Float64:
-    """(n,) scores as log odds about EVEN; given as they are, unless all are probabilities."""
-    if not ((score >= 0) & (score <= 1)).all():
-        return score
-    p = np.clip(score, LEAST_DOUBT, 1 - LEAST_DOUBT)
+def _log_odds(probability: Float64) -> Float64:
+    """(n,) probabilities as log odds about EVEN."""
+    p = np.clip(probability, LEAST_DOUBT, 1 - LEAST_DOUBT)
     log_odds: Float64 = EVEN + np.log(p / (1 - p))
     return log_odds
 
