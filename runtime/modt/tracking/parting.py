@@ -4,7 +4,7 @@ Somebody who walks along a wall touches it now and then, and for a frame or two 
 wall would have the walker, whose track would find nothing.
 
 The rule. A track of an object, or of what walks whatever it is held for, that finds no proposal although it had one
-a frame ago, and is expected within one too large to be it, takes of that the points that lie where it is expected, if
+a frame ago, and is expected within one that is longer, takes of that the points that lie where it is expected, if
 there are about as many as it had and they reach as high as it did. What changed hands measures nothing: the track
 goes on as it went.
 
