@@ -56,7 +56,7 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
 
 
 def outgrown(kind: Int, outline: Float64) -> Int:
-    """Which of the objects, of a kind (n,), are longer (n, 8) than any of theirs: one with something else."""
+    """Which of the things, given their kinds (n,) and outlines (n, 8), are longer than any of their class: merged."""
     things = np.flatnonzero(kind != ObjectClass.BACKGROUND.value)
     longer: Bool = lengths(outline.take(things, axis=0).T).max(axis=0, initial=0.0) > ROOM_M[kind[things], 0]
     return things[longer]

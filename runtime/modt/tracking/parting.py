@@ -37,7 +37,7 @@ deviations, walks. (On synthetic drives 28 of a hundred such were people; of wha
 WITHIN = 0.6
 """Part of the expected outline that the larger proposal must cover."""
 LONGER_M = 0.3
-"""A proposal that is longer than what is expected by so much holds something else besides."""
+"""What is longer than what is expected by so much holds something else besides."""
 PAD_M = 0.2
 """Points may lie this far beyond the outline and the top expected."""
 POINTS = 8
