@@ -97,12 +97,14 @@ def test_every_frame_asks_for_whatever_is_seen() -> None:
 
 def test_first_view_is_final() -> None:
     proposals, tracks = scene()
-    fusion = FirstView(FusionConfig())
-    asking = np.array([True, True])
+    fusion = FirstView(FusionConfig(once_from=3))
+    asking, tracks.hits[:] = np.array([True, True]), 3
     assert fusion.asks(tracks, proposals, asking).all()
     certain = fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
     assert certain.all()
     assert fusion.asks(tracks, proposals, asking).tolist() == [False, True]
+    tracks.hits[1] = 2  # it may be a flicker
+    assert not fusion.asks(tracks, proposals, asking).any()
 
 
 def test_a_distinct_first_view_settles_the_class_at_once() -> None:
@@ -268,6 +270,7 @@ def test_before_it_is_classified_a_track_is_what_its_box_makes_it(
     fusion: KeyViews | FirstView, asked: list[bool]
 ) -> None:
     proposals, tracks = scene((50, 50, 50))
+    tracks.hits[:] = 2
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
     np.testing.assert_allclose(tracks.posterior, [WALL, DOUBTFUL, CAR])
     assert not tracks.classified.any()

@@ -37,6 +37,8 @@ class EveryFrame:
 class FirstView:
     """Efficient: the first classification is final (Table I), so it waits for a box that may well be an object's.
 
+    And for what was seen before: first views are often far and partial (Fig. 11), and what flickers has no second.
+
     Args:
         config: from when on it may, and what a box has to say.
         prior: what is thought of a proposal unseen; by default as common as the classes are.
@@ -49,7 +51,7 @@ class FirstView:
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """The tracks that have no class."""
         expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
-        asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE)
+        asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE) & (tracks.hits >= self.config.once_from)
         return asks & self.prior.likely(tracks.prior, self.config.likely_once)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
