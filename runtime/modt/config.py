@@ -186,8 +186,8 @@ class FusionConfig(StageConfig):
         0.08, 0.02, 0.02, 0.0, 0.33, "share of car, pedestrian, cyclist among proposals"
     )
     likely: float = _number(0.01, 0.0, 1.0, "", "probability of an object, by its box, from which it is classified")
-    likely_once: float = _number(0.2, 0.0, 1.0, "", "the same where the first view is the only one (efficient)")
-    once_from: int = _number(2, 1, 1000, "frames", "with a proposal, before that only view is taken")
+    likely_once: float = _number(0.1, 0.0, 1.0, "", "the same where the first view is the only one (efficient)")
+    once_from: int = _number(1, 1, 1000, "frames", "with a proposal, before that only view is taken")
     likely_again: float = _number(0.1, 0.0, 1.0, "", "the same of what is settled, or took its class over")
     box_weight: float = _number(0.75, 0.0, 1.0, "", "say of a box that has changed since the view fused last")
     slip: float = _number(0.1, 0.0, 1.0, "", "probability that a track's proposal is something else for the moment")
