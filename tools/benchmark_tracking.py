@@ -155,7 +155,7 @@ def main() -> None:
         }
         print(json.dumps({k: round(v, 3) for k, v in line.items()}), flush=True)
     given = arguments.detections
-    rate = box_frames_per_s([read(path) for path in files(given)] if given else [traffic(8, 500)])
+    rate = box_frames_per_s(read(files(given)) if given else [traffic(8, 500)])
     print(json.dumps({"box_frames_per_s": round(rate), "sort_cpu_ms": round(sort_ms(), 3)}))
 
 

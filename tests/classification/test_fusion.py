@@ -270,7 +270,7 @@ def test_before_it_is_classified_a_track_is_what_its_box_makes_it(
     fusion: KeyViews | FirstView, asked: list[bool]
 ) -> None:
     proposals, tracks = scene((50, 50, 50))
-    tracks.hits[:] = 2
+    tracks.hits[:] = 1
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
     np.testing.assert_allclose(tracks.posterior, [WALL, DOUBTFUL, CAR])
     assert not tracks.classified.any()

@@ -40,7 +40,7 @@ def test_results_read_back_as_they_were_seen(tmp_path, capsys):
     source = tmp_path / "0003.txt"
     write(source)
     assert run(source, "--out", tmp_path / "out") == 0
-    found = read(tmp_path / "out" / "0003.txt")
+    (found,) = read([tmp_path / "out" / "0003.txt"])
     assert found.n_frames == 20
     np.testing.assert_allclose(found.box[found.frame == 19][:, :2], [[20, 3], [29, -3]], atol=0.2)
     ids = {line.split()[1] for line in (tmp_path / "out" / "0003.txt").read_text().splitlines()}
@@ -54,7 +54,7 @@ def test_poses_place_what_is_seen_in_the_world(tmp_path):
     T_camera = [inverse(T_LEVEL_CAMERA) @ turning(i) @ T_LEVEL_CAMERA for i in range(20)]
     np.savetxt(poses, [T[:3].ravel() for T in T_camera])
     run(source, "--out", tmp_path / "out", "--poses", poses, "--quiet")
-    found = read(tmp_path / "out" / "a.txt")
+    (found,) = read([tmp_path / "out" / "a.txt"])
     world = transform_boxes(turning(19), found.box[found.frame == 19])
     np.testing.assert_allclose(world[:, :2], [[20, 3], [29, -3]], atol=0.2)
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.errors import MisuseError
-from modt.sources.detections import files, kitti, level, read, read_all
+from modt.sources.detections import files, kitti, level, read
 
 AB3DMOT = "0,2,298.3,165.2,458.2,293.4,8.3,1.96,1.81,4.75,-4.57,1.84,13.53,-2.11,-1.79\n"
 LABEL = "0 7 Car 0 0 -1.79 298.3 165.2 458.2 293.4 1.96 1.81 4.75 -4.57 1.84 13.53 -2.11 8.3\n"
@@ -17,8 +17,14 @@ def write(tmp_path, text):
     return path
 
 
+def one(path):
+    """The detections of a file alone."""
+    (found,) = read([path])
+    return found
+
+
 def test_both_formats_say_the_same(tmp_path):
-    a, b = read(write(tmp_path, AB3DMOT)), read(write(tmp_path, LABEL))
+    a, b = one(write(tmp_path, AB3DMOT)), one(write(tmp_path, LABEL))
     np.testing.assert_allclose(a.box, b.box)
     np.testing.assert_allclose(a.score, b.score)
     np.testing.assert_allclose(a.image_box, b.image_box)
@@ -28,13 +34,13 @@ def test_both_formats_say_the_same(tmp_path):
 
 def test_frames_without_detections_are_frames(tmp_path):
     later = AB3DMOT.replace("0,2,", "3,2,", 1)
-    found = read(write(tmp_path, later + AB3DMOT + AB3DMOT))
+    found = one(write(tmp_path, later + AB3DMOT + AB3DMOT))
     assert [rows.stop - rows.start for _, rows in found.frames()] == [2, 0, 0, 1]
 
 
 def test_types_that_are_not_followed_are_left_out(tmp_path):
-    assert len(read(write(tmp_path, LABEL.replace("Car", "DontCare")))) == 0
-    assert read(write(tmp_path, "")).n_frames == 0
+    assert len(one(write(tmp_path, LABEL.replace("Car", "DontCare")))) == 0
+    assert one(write(tmp_path, "")).n_frames == 0
 
 
 @pytest.mark.parametrize(
@@ -42,14 +48,14 @@ def test_types_that_are_not_followed_are_left_out(tmp_path):
 )
 def test_a_bad_line_is_named(tmp_path, text):
     with pytest.raises(MisuseError, match=r"0000\.txt:2"):
-        read(write(tmp_path, AB3DMOT + text))
+        one(write(tmp_path, AB3DMOT + text))
 
 
 def test_what_is_not_there_is_said(tmp_path):
     with pytest.raises(MisuseError, match=r"no \.txt"):
         files(tmp_path)
     with pytest.raises(MisuseError, match="cannot be read"):
-        read(tmp_path / "none.txt")
+        one(tmp_path / "none.txt")
 
 
 @given(arrays(np.float64, (3, 7), elements=st.floats(-3, 3)))
@@ -65,7 +71,7 @@ def scored(path, *scores):
 
 def test_probabilities_are_taken_to_log_odds(tmp_path):
     def scores(*given):
-        return read(scored(tmp_path / "a.txt", *given)).score.tolist()
+        return one(scored(tmp_path / "a.txt", *given)).score.tolist()
 
     even = scores(0.5)[0]
     assert scores(0.1, 0.9) == pytest.approx([even - np.log(9), even + np.log(9)])
@@ -75,6 +81,6 @@ def test_probabilities_are_taken_to_log_odds(tmp_path):
 
 def test_a_quiet_sequence_of_a_detector_is_on_the_scale_of_the_others(tmp_path):
     quiet, busy = scored(tmp_path / "0.txt", 0.25), scored(tmp_path / "1.txt", 0.5, 7.0)
-    assert read(quiet).score.tolist() != [0.25]
-    assert [d.score.tolist() for d in read_all([quiet, busy])] == [[0.25], [0.5, 7.0]]
-    assert [d.name for d in read_all([quiet, busy])] == ["0", "1"]
+    assert one(quiet).score.tolist() != [0.25]
+    assert [d.score.tolist() for d in read([quiet, busy])] == [[0.25], [0.5, 7.0]]
+    assert [d.name for d in read([quiet, busy])] == ["0", "1"]

@@ -49,14 +49,14 @@ def run(arguments: argparse.Namespace) -> int:
     import time
 
     from modt.sinks.output import LineFile, writing
-    from modt.sources.detections import files, read_all
+    from modt.sources.detections import files, read
 
     if arguments.sure is not None and not -1000 <= arguments.sure <= 1000:
         raise MisuseError("--sure", f"{arguments.sure:g} is out of range", "give -1000, for all tracks, to 1000")
     if not 0.001 <= arguments.period <= 10:
         raise MisuseError("--period", f"{arguments.period:g} s is no time between frames", "give 0.001 to 10")
     paths = files(arguments.detections)
-    sequences = read_all(paths)
+    sequences = read(paths)
     motions = [_poses(arguments, sequence, len(paths)) for sequence in sequences]
     with writing(arguments.out):
         arguments.out.mkdir(parents=True, exist_ok=True)

@@ -84,16 +84,7 @@ def files(path: Path) -> list[Path]:
     return found
 
 
-def read(path: Path) -> Detections:
-    """The detections of one file.
-
-    Raises:
-        MisuseError: it cannot be read, or a line is of neither format; it names the line.
-    """
-    return read_all([path])[0]
-
-
-def read_all(paths: Sequence[Path]) -> list[Detections]:
+def read(paths: Sequence[Path]) -> list[Detections]:
     """The detections of files that are one detector's: whether its scores are probabilities, all of them tell.
 
     Raises:

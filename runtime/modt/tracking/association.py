@@ -73,8 +73,8 @@ class Association(Protocol):
 def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     """Indices of the candidate pairs that a least-cost assignment keeps.
 
-    A pair is kept for certain if whoever parted it would lose: the next best of its row and that of its column
-    together cost more than it does, and what they are left without if they are denied. The Hungarian algorithm
+    A pair is kept for certain if to part it cannot pay: if the next best of its row and the next best of its column
+    together cost more than the pair and limit, which is the most that their partners then lose. The Hungarian algorithm
     decides the rest, on the rows and columns that it concerns.
 
     Args:
