@@ -175,6 +175,16 @@ def test_what_was_away_takes_nothing():
     assert len(tracker.proposals) == 1
 
 
+def test_who_is_gone_takes_nothing_of_whom_he_walked_beside():
+    """The other is seen where he is himself expected in part, and as large as before."""
+    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    for i in range(MEET):
+        tracker.follow(*scene(i, walker(i, 2.15), walker(i)))
+    tracker.follow(*scene(MEET, walker(MEET, 2.15)))
+    assert len(tracker.proposals) == 2
+    assert sorted(tracker.proposals.count) == [PERSON_POINTS, WALL_POINTS]
+
+
 def test_what_hangs_above_is_left():
     tracker, roof = Tracker(TrackingConfig(), EFFICIENT), box(10, 2.5, l=8.0, w=3.0, h=0.5, z=1.2)
     for i in range(MEET + 1):

@@ -41,18 +41,35 @@ def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches
     owner = np.full(len(sightings), NONE, np.int64)
     proposal[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
     elders = _incomplete(tracks, sightings, proposal)
-    has: dict[int, int] = {}  # the proposal of each track that took or gave one
-    settled: set[int] = set()
     elders, parts = _parts(tracks, sightings, elders, proposal, owner)
+    rows, proposals = swapped(elders, parts, proposal, owner)
+    return matches.instead(tracks, rows, proposals) if len(rows) else matches
+
+
+def swapped(elders: Int, parts: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
+    """Who has another proposal once elders took parts and left their own to whoever had these; each changes once.
+
+    Args:
+        elders: (K,) rows that may take something, those that come first being served first.
+        parts: (K,) what each may take.
+        proposal: (M,) that each track has, NONE for none.
+        owner: (P,) track that has each proposal, NONE for nobody.
+
+    Returns:
+        (R,) rows, ascending, and the proposal that each has now, NONE for none.
+    """
+    has: dict[int, int] = {}
+    taken: set[int] = set()
     for elder, part in zip(elders.tolist(), parts.tolist(), strict=True):
-        younger, left = int(owner[part]), int(proposal[elder])
-        if part in settled or elder in has or younger in has:
+        younger = int(owner[part])
+        if part in taken or elder in has or younger in has:
             continue
         has[elder] = part
         if younger != NONE:
-            has[younger] = left
-        settled |= {part, left}
-    return matches.instead(tracks, *np.array(sorted(has.items()), np.int64).T) if has else matches
+            has[younger] = int(proposal[elder])
+        taken.add(part)
+    rows, proposals = np.array(sorted(has.items()), np.int64).reshape(-1, 2).T
+    return rows, proposals
 
 
 def outgrown(kind: Int, outline: Float64) -> Int:
