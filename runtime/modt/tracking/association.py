@@ -74,8 +74,8 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     """Indices of the candidate pairs that a least-cost assignment keeps.
 
     A pair is kept for certain if to part it cannot pay: if the next best of its row and the next best of its column
-    together cost more than the pair and limit, which is the most that their partners then lose. The Hungarian algorithm
-    decides the rest, on the rows and columns that it concerns.
+    together cost more than the pair and limit, which is the most that their partners then lose. The Hungarian
+    algorithm decides the rest, on the rows and columns that it concerns.
 
     Args:
         rows: (K,) first index of each candidate pair.
