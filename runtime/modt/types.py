@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 from functools import cache
+from operator import attrgetter
 from typing import Any, Self
 
 import numpy as np
@@ -73,7 +74,8 @@ class Proposals:
     Attributes:
         members: (K,) indices of points in the frame, grouped by proposal.
         offsets: (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]].
-        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once for all.
+        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once for all; (3, 0) once
+            nobody needs them any more: unions are made last.
         centroid: (P, 3) mean of each proposal's points [m, sensor frame].
         box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
         truncated: (P,) cut by the edge of the field of view.
@@ -243,23 +245,32 @@ class Tracks:
 
     def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
         """Every column with its name."""
-        return ((name, getattr(self, name)) for name in self._names())
+        return zip(self._names(), self._columns(), strict=True)
+
+    def _columns(self) -> tuple[NDArray[Any], ...]:
+        columns: tuple[NDArray[Any], ...] = self._getter()(self)
+        return columns
 
     @classmethod
     @cache
     def _names(cls) -> tuple[str, ...]:
         return tuple(f.name for f in fields(cls))
 
+    @classmethod
+    @cache
+    def _getter(cls) -> attrgetter[tuple[NDArray[Any], ...]]:
+        return attrgetter(*cls._names())
+
     def copy(self) -> Self:
         """The same rows, independent of these."""
-        return type(self)(**{name: column.copy() for name, column in self.columns()})
+        return type(self)(*[column.copy() for column in self._columns()])
 
     def renewed(self, kept: Int, n: int) -> Self:
         """The rows kept, by index, then n blank ones."""
         if not len(self):
             return self.blank(n)
         rows = np.concatenate([kept, np.zeros(n, np.int64)])  # room for the blank ones, whatever was there
-        columns = [column.take(rows, axis=0) for _, column in self.columns()]
+        columns = [column.take(rows, axis=0) for column in self._columns()]
         for column, blank in zip(columns, self._blank_row(), strict=True):
             column[len(kept) :] = blank
         return type(self)(*columns)
@@ -267,7 +278,7 @@ class Tracks:
     @classmethod
     @cache
     def _blank_row(cls) -> tuple[NDArray[Any], ...]:
-        return tuple(column for _, column in cls.blank(1).columns())
+        return cls.blank(1)._columns()
 
     def row_of_proposal(self, n_proposals: int) -> Int:
         """(n_proposals,) row of the track that owns each proposal, NONE where there is none."""

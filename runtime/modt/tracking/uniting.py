@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -46,13 +46,13 @@ class Unions:
         kept[parts] = False
         of_union = np.zeros(n, np.bool_)
         of_union[hosts] = True
-        few = np.flatnonzero(of_union[group])
+        few = of_union[group].nonzero()[0]
         first = _first(group[few])
-        new, begins = np.flatnonzero(of_union[kept]), np.flatnonzero(first)
+        new, begins = of_union[kept].nonzero()[0], first.nonzero()[0]
         return cls(
             order=order,
-            starts=np.flatnonzero(_first(group)),
-            kept=np.flatnonzero(kept),
+            starts=_first(group).nonzero()[0],
+            kept=kept.nonzero()[0],
             new=new,
             few=order[few],
             begins=begins,
@@ -90,7 +90,8 @@ class Unions:
 
 def _first(group: Int) -> Bool:
     """Whether each is the first of its group, given the groups side by side."""
-    first = np.ones(len(group), np.bool_)
+    first = np.empty(len(group), np.bool_)
+    first[:1] = True
     np.not_equal(group[1:], group[:-1], out=first[1:])
     return first
 
@@ -98,12 +99,13 @@ def _first(group: Int) -> Bool:
 def united_proposals(proposals: Proposals, unions: Unions, yaw: Float64) -> Proposals:
     """The proposals with unions as if hidden in part; their boxes are about those of what they consist of.
 
+    Their coordinates are not copied, since what comes after the tracker has no use for them.
+
     Args:
         proposals: (P,) as they were.
         unions: of them.
         yaw: (U,) headings of their boxes [rad].
     """
-    runs = unions.stretches(proposals.offsets)
     offsets = np.zeros(len(unions.kept) + 1, np.int64)
     np.add.reduceat(proposals.count[unions.order], unions.starts).cumsum(out=offsets[1:])
     box, centroid = proposals.box.take(unions.kept, axis=0), proposals.centroid.take(unions.kept, axis=0)
@@ -112,15 +114,15 @@ def united_proposals(proposals: Proposals, unions: Unions, yaw: Float64) -> Prop
     centroid[unions.new] = unions.mean(proposals.centroid, share)
     truncated, occluded = proposals.truncated[unions.kept], proposals.occluded[unions.kept]
     truncated[unions.new], occluded[unions.new] = unions.any(proposals.truncated), True
-    return replace(
-        proposals,
-        members=np.concatenate([proposals.members[run] for run in runs]),
+    return Proposals(
+        members=np.concatenate([proposals.members[run] for run in unions.stretches(proposals.offsets)]),
         offsets=offsets,
-        coordinates=np.concatenate([proposals.coordinates[:, run] for run in runs], axis=1),
+        coordinates=proposals.coordinates[:, :0],
         centroid=centroid,
         box=box,
         truncated=truncated,
         occluded=occluded,
+        sensor_height_m=proposals.sensor_height_m,
         reflectance=_brightness(proposals.reflectance, unions, share),
     )
 
@@ -168,7 +170,7 @@ def united_matches(matches: Matches, unions: Unions) -> Matches:
     number = np.full(len(unions.order), NONE)
     number[unions.kept] = np.arange(len(unions.kept))
     own = number[matches.proposals]
-    kept = np.flatnonzero(own != NONE)
+    kept = (own != NONE).nonzero()[0]
     return Matches(
         matches.rows[kept],
         own[kept],
