@@ -6,14 +6,24 @@ from hypothesis.extra.numpy import arrays
 from modt.geometry import wrap
 from modt.tracking import kalman
 
-STATES = arrays(
-    np.float64,
-    (3, 4),
-    elements=st.floats(-3, 3, allow_subnormal=False),
-)
+STATES = arrays(np.float64, (4, 3), elements=st.floats(-3, 3, allow_subnormal=False))
 POSITIVE = arrays(np.float64, (3, 4, 4), elements=st.floats(-1, 1, allow_subnormal=False)).map(
-    lambda A: A @ A.transpose(0, 2, 1) + 0.1 * np.eye(4)
+    lambda A: (A @ A.transpose(0, 2, 1) + 0.1 * np.eye(4)).transpose(1, 2, 0)
 )
+
+
+def eigenvalues(P):
+    return np.linalg.eigvalsh(P.transpose(2, 0, 1))
+
+
+def slow_predict(x, P, dt_s, acceleration, turn):
+    """Textbook form, one track at a time."""
+    c, s = np.cos(x[2]), np.sin(x[2])
+    F = np.eye(4)
+    F[:2, 2:] = [[-dt_s * s * x[3], dt_s * c], [dt_s * c * x[3], dt_s * s]]
+    Q = np.diag([(dt_s**2 / 2 * acceleration) ** 2] * 2 + [(dt_s * turn) ** 2, (dt_s * acceleration) ** 2])
+    Q[:2, 3] = Q[3, :2] = dt_s**3 / 2 * acceleration**2 * np.array([c, s])
+    return x + dt_s * x[3] * np.array([c, s, 0, 0]), F @ P @ F.T + Q
 
 
 def slow_update(x, P, z, R):
@@ -28,52 +38,70 @@ def slow_update(x, P, z, R):
 
 @given(STATES, st.floats(0, 1))
 def test_jacobian_is_the_numerical_one(x, dt_s):
-    step = 1e-6
+    step, F = 1e-6, np.eye(4)[:, :, None].repeat(3, axis=2)
+    F[:2, 2:] = kalman.motion_jacobian(x, dt_s)
     for k in range(4):
         ahead, behind = x.copy(), x.copy()
-        ahead[:, k] += step
-        behind[:, k] -= step
+        ahead[k] += step
+        behind[k] -= step
         numerical = (kalman.motion(ahead, dt_s) - kalman.motion(behind, dt_s)) / (2 * step)
-        np.testing.assert_allclose(kalman.motion_jacobian(x, dt_s)[:, :, k], numerical, atol=1e-6)
+        np.testing.assert_allclose(F[:, k], numerical, atol=1e-6)
 
 
-@given(STATES, POSITIVE, arrays(np.float64, (3, 2), elements=st.floats(-5, 5)))
+@given(STATES, POSITIVE, st.floats(0, 1))
+def test_prediction_is_the_textbooks(x, P, dt_s):
+    acceleration, turn = np.array([0.5, 1.0, 2.0]), np.array([0.1, 0.2, 0.3])
+    after, covariance = kalman.predict(x, P, dt_s, acceleration, turn)
+    for i in range(3):
+        slow_x, slow_P = slow_predict(x[:, i], P[:, :, i], dt_s, acceleration[i], turn[i])
+        np.testing.assert_allclose(after[:, i], slow_x, atol=1e-9)
+        np.testing.assert_allclose(covariance[:, :, i], slow_P, atol=1e-9)
+
+
+@given(STATES, POSITIVE, arrays(np.float64, (2, 3), elements=st.floats(-5, 5)))
 def test_update_is_the_textbooks(x, P, z):
-    R = np.broadcast_to(np.diag([0.2, 0.3]), (3, 2, 2))
+    R = np.diag([0.2, 0.3])[:, :, None].repeat(3, axis=2)
     after, covariance = kalman.update(x, P, z, R)
     for i in range(3):
-        slow_x, slow_P = slow_update(x[i], P[i], z[i], R[i])
-        np.testing.assert_allclose(np.delete(after[i], 2), np.delete(slow_x, 2), atol=1e-8)
-        assert abs(wrap(after[i, 2] - slow_x[2])) < 1e-8
-        np.testing.assert_allclose(covariance[i], slow_P, atol=1e-8)
+        slow_x, slow_P = slow_update(x[:, i], P[:, :, i], z[:, i], R[:, :, i])
+        np.testing.assert_allclose(np.delete(after[:, i], 2), np.delete(slow_x, 2), atol=1e-8)
+        assert abs(wrap(after[2, i] - slow_x[2])) < 1e-8
+        np.testing.assert_allclose(covariance[:, :, i], slow_P, atol=1e-8)
 
 
 @given(STATES, POSITIVE, st.floats(0, 0.5))
 def test_covariances_stay_covariances(x, P, dt_s):
-    ones = np.ones(3)
-    Q = kalman.process_noise(x, dt_s, 2 * ones, 0.3 * ones)
-    x, P = kalman.predict(x, P, Q, dt_s)
-    x, P = kalman.update(x, P, x[:, :2] + 0.1, np.broadcast_to(np.eye(2), (3, 2, 2)))
+    x, P = kalman.predict(x, P, dt_s, 2.0, 0.3)
+    x, P = kalman.update(x, P, x[:2] + 0.1, np.eye(2)[:, :, None].repeat(3, axis=2))
     x, P = kalman.observe_speed(x, P, 0.0, 0.1)
-    np.testing.assert_allclose(P, P.transpose(0, 2, 1), atol=1e-9)
-    assert np.linalg.eigvalsh(P).min() > -1e-9
+    np.testing.assert_allclose(P, P.transpose(1, 0, 2), atol=1e-9)
+    assert eigenvalues(P).min() > -1e-9
+
+
+@given(STATES, POSITIVE)
+def test_a_table_is_turned_into_rows_and_back(x, P):
+    there = kalman.by_track(x, P)
+    assert there[0].shape == (3, 4)
+    np.testing.assert_array_equal(there[1][1], P[:, :, 1])
+    for before, after in zip((x, P), kalman.by_number(*there), strict=True):
+        np.testing.assert_array_equal(before, after)
 
 
 @given(STATES, POSITIVE, arrays(np.float64, 3, elements=st.floats(-3, 3)))
 def test_turning_a_standing_track_moves_nothing(x, P, heading):
-    x[:, 3] = 0
+    x[3] = 0
     turned, Q = kalman.face(x, P, heading)
     np.testing.assert_allclose(kalman.motion(turned, 0.1), kalman.motion(x, 0.1) + (turned - x), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.eigvalsh(Q), np.linalg.eigvalsh(P), atol=1e-9)
-    np.testing.assert_allclose(np.hypot(Q[:, 0, 3], Q[:, 1, 3]), np.hypot(P[:, 0, 3], P[:, 1, 3]))
+    np.testing.assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
+    np.testing.assert_allclose(np.hypot(Q[0, 3], Q[1, 3]), np.hypot(P[0, 3], P[1, 3]))
 
 
 @given(STATES, POSITIVE)
 def test_turning_about_keeps_the_motion(x, P):
     turned, Q = kalman.turn_about(x, P)
-    np.testing.assert_allclose(np.linalg.eigvalsh(Q), np.linalg.eigvalsh(P), atol=1e-9)
-    assert (turned[:, 3] >= 0).all()
-    np.testing.assert_allclose(kalman.motion(turned, 1.0)[:, :2], kalman.motion(x, 1.0)[:, :2], atol=1e-12)
+    np.testing.assert_allclose(eigenvalues(Q), eigenvalues(P), atol=1e-9)
+    assert (turned[3] >= 0).all()
+    np.testing.assert_allclose(kalman.motion(turned, 1.0)[:2], kalman.motion(x, 1.0)[:2], atol=1e-12)
 
 
 def test_mahalanobis():
@@ -81,5 +109,5 @@ def test_mahalanobis():
     nu, A = rng.normal(size=(5, 2)), rng.normal(size=(5, 2, 2))
     S = A @ A.transpose(0, 2, 1) + np.eye(2)
     slow = [n @ np.linalg.inv(s) @ n for n, s in zip(nu, S, strict=True)]
-    np.testing.assert_allclose(kalman.mahalanobis_squared(nu, S), slow)
-    np.testing.assert_allclose(kalman.inverse_2x2(S), np.linalg.inv(S))
+    np.testing.assert_allclose(kalman.mahalanobis_squared(nu.T, S.transpose(1, 2, 0)), slow)
+    np.testing.assert_allclose(kalman.inverse_2x2(S.transpose(1, 2, 0)), np.linalg.inv(S).transpose(1, 2, 0))

@@ -51,21 +51,20 @@ class RobustAssociation:
         rows, columns = self._near(tracks, expected, sightings)
         a, b = expected.take(rows, axis=1), sightings.outline.take(columns, axis=1)
         size, overlap, cover = likeness(a, b)
-        S = tracks.P[:, :2, :2].copy().take(rows, axis=0)
-        noise = variance[columns]
+        S = tracks.P[:, :2, :2].transpose(1, 2, 0).copy().take(rows, axis=2)
+        noise = variance[columns] + JUMP_M**2
         for k in (0, 1):
-            S[:, k, k] += noise
-            S[:, k, k] += JUMP_M**2
-        distance = kalman.mahalanobis_squared((AXES @ least(a, b) / 2).T, S)  # what changed its shape may be far off
+            S[k, k] += noise
+        distance = kalman.mahalanobis_squared(AXES @ least(a, b) / 2, S)  # what changed its shape may be far off
         height = np.abs(tracks.top[rows] - sightings.top[columns])
         foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
         count = np.abs(np.log(tracks.points[rows] / sightings.count[columns]))
         shape = W_SIZE * size + W_OVERLAP * (1 - overlap) + W_HEIGHT * (height + foot) / 2 + W_COUNT * count
         cost = distance / 2 + shape
-        first = np.flatnonzero((distance < GATE) & (cost < LIMIT))
+        first = ((distance < GATE) & (cost < LIMIT)).nonzero()[0]
         first = first[assign(rows[first], columns[first], cost[first], LIMIT)]
         left = _left(rows, rows[first], len(tracks)) & _left(columns, columns[first], len(sightings))
-        second = np.flatnonzero(left & (cover > COVER))
+        second = (left & (cover > COVER)).nonzero()[0]
         second = second[~self._swallowed(tracks, sightings, rows[second], columns[second])]
         second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
         kept = np.concatenate([first, second])
@@ -126,7 +125,7 @@ def likeness(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
     size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).sum(axis=0) / 4
     pad = SOFT_M / 3
     common = np.maximum(lengths(np.minimum(a, b)) + pad, 0.0)
-    squares = [(length + pad)[:2] * (length + pad)[2:] for length in (length_a, length_b)]
+    squares = [side[:2] * side[2:] for side in (length_a + pad, length_b + pad)]
     shared = common[:2] * common[2:]  # in the upright square, and in the one on its corner
     overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)))
     cover = np.minimum(*(shared / np.minimum(*squares)))
@@ -135,6 +134,7 @@ def likeness(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
 
 def _left(all_: Int, taken: Int, n: int) -> Bool:
     """(K,) which of the indices were not taken."""
-    free = np.ones(n, np.bool_)
-    free[taken] = False
-    return free[all_]
+    gone = np.zeros(n, np.bool_)
+    gone[taken] = True
+    left: Bool = ~gone[all_]
+    return left

@@ -11,6 +11,7 @@ from modt.tracking.association import Association, Matches, PaperAssociation
 from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
 from modt.tracking.joining import KnownJoining
+from modt.tracking.kalman import HEADING, SPEED, by_number, by_track
 from modt.tracking.kinship import outgrown, reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.outlines import WAYS
@@ -180,7 +181,7 @@ class Tracker:
         agility = np.where(settled, AGILITY[t.kind], 1.0)  # background that went away was none
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
-        t.x, t.P = kalman.predict(t.x, t.P, kalman.process_noise(t.x, dt_s, acceleration, turn), dt_s)
+        t.x, t.P = by_track(*kalman.predict(*by_number(t.x, t.P), dt_s, acceleration, turn))
 
     def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
         """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
@@ -242,48 +243,50 @@ class Tracker:
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""
         t, rows = self._tracks, matches.rows
-        x, P = t.x.take(rows, axis=0), t.P.take(rows, axis=0)
-        slow = np.abs(x[:, kalman.SPEED]) < np.sqrt(P[:, kalman.SPEED, kalman.SPEED])
-        step = matches.place - x[:, :2]
-        heading = np.where(slow, np.arctan2(step[:, 1], step[:, 0]), x[:, kalman.HEADING])
-        x, P = kalman.update(*kalman.face(x, P, heading), matches.place, matches.covariance)
-        t.x[rows], t.P[rows] = kalman.turn_about(x, P)
+        x, P = by_number(t.x.take(rows, axis=0), t.P.take(rows, axis=0))
+        z, R = by_number(matches.place, matches.covariance)
+        slow = np.abs(x[SPEED]) < np.sqrt(P[SPEED, SPEED])
+        step_x, step_y = z - x[:2]
+        heading = np.where(slow, np.arctan2(step_y, step_x), x[HEADING])
+        x, P = kalman.update(*kalman.face(x, P, heading), z, R)
+        t.x[rows], t.P[rows] = by_track(*kalman.turn_about(x, P))
         t.state[rows] = self.machine.meet(t.state[rows], Happening.ASSOCIATED)
         t.missed[rows] = 0
         t.hits[rows] += 1
         t.doubt[rows] = matches.doubt
-        self._show(t, rows, matches.proposals, sightings, matches.place)
-
-    def _show(self, tracks: Followed, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> None:
-        """Note what was seen of the tracks."""
-        tracks.shown[rows] = place
-        outline = sightings.outline.T.take(proposals, axis=0)
-        tracks.outline[rows] = outline
-        about = outline - place @ WAYS
-        known = tracks.hull.take(rows, axis=0)
+        about = self._show(rows, matches.proposals, sightings, matches.place)
+        known = t.hull.take(rows, axis=0)
         hull = np.maximum(about, FORGET * known + (1 - FORGET) * about)
-        merged = outgrown(tracks.kind[rows], about)
+        merged = outgrown(t.kind[rows], about)
         hull[merged] = known[merged]
-        tracks.hull[rows] = hull
-        off = tracks.shape.take(rows, axis=0) - about
-        kept = np.minimum(1.0 - 1.0 / tracks.hits[rows], SHAPE_KEPT)[:, None]
-        tracks.shape[rows] = about + (np.abs(off) < AGREE_M) * kept * off
-        tracks.proposal[rows] = proposals
-        tracks.box[rows] = sightings.box.take(proposals, axis=0)
-        tracks.points[rows] = sightings.count[proposals]
-        tracks.foot[rows], tracks.top[rows] = sightings.foot[proposals], sightings.top[proposals]
+        t.hull[rows] = hull
+        off = t.shape.take(rows, axis=0) - about
+        kept = np.minimum(1.0 - 1.0 / t.hits[rows], SHAPE_KEPT)[:, None]
+        t.shape[rows] = about + (np.abs(off) < AGREE_M) * kept * off
+
+    def _show(self, rows: Int, proposals: Int, sightings: Sightings, place: Float64) -> Float64:
+        """Note what is seen of tracks (R,) at their places (R, 2); returns (R, 8) their outlines about these [m]."""
+        t = self._tracks
+        outline = sightings.outline.T.take(proposals, axis=0)
+        t.shown[rows], t.outline[rows], t.proposal[rows] = place, outline, proposals
+        t.box[rows] = sightings.box.take(proposals, axis=0)
+        t.points[rows] = sightings.count[proposals]
+        t.foot[rows], t.top[rows] = sightings.foot[proposals], sightings.top[proposals]
+        about: Float64 = outline - place @ WAYS
+        return about
 
     def _rest(self, rows: Int) -> None:
         """What stays where it was has no speed; what has stopped is at home where it is."""
         t = self._tracks
         x, home, hits = t.x.take(rows, axis=0), t.home.take(rows, axis=0), t.hits[rows]
-        stopped = np.flatnonzero((x[:, kalman.SPEED] < SLOW_MPS) & ~t.still[rows] & (hits > 3))
+        stopped = ((x[:, SPEED] < SLOW_MPS) & ~t.still[rows] & (hits > 3)).nonzero()[0]
         home[stopped] = x[stopped, :2]
         stays = apart(x, home) < STILL_M
         t.still[rows] = stays & (hits > 2)
         t.home[rows] = home + HOME_GAIN * stays[:, None] * (x[:, :2] - home)
-        near, x = rows[stays], x.compress(stays, axis=0)
-        t.x[near], t.P[near] = kalman.observe_speed(x, t.P.take(near, axis=0), 0.0, STILL_SIGMA_MPS)
+        near = rows[stays]
+        x, P = by_number(x.compress(stays, axis=0), t.P.take(near, axis=0))
+        t.x[near], t.P[near] = by_track(*kalman.observe_speed(x, P, 0.0, STILL_SIGMA_MPS))
 
     def _stand(self, rows: Int) -> None:
         """The mean outline of what stands: a landmark that does not creep with what is registered to it."""
@@ -300,7 +303,7 @@ class Tracker:
         t.age += 1
         seen = np.zeros(len(t), np.bool_)
         seen[matched] = True
-        missing = np.flatnonzero(~seen)
+        missing = (~seen).nonzero()[0]
         t.proposal[missing] = NONE
         t.missed[missing] += 1
         t.state[missing] = self.machine.meet(t.state[missing], Happening.UNASSOCIATED)
@@ -309,7 +312,7 @@ class Tracker:
         """A class inherited from a place does not hold away from it."""
         t = self._tracks
         t.inherited &= ~t.classified  # what a view said holds anywhere
-        rows = np.flatnonzero(t.inherited & (t.proposal != NONE))
+        rows = (t.inherited & (t.proposal != NONE)).nonzero()[0]
         rows = rows[apart(t.x.take(rows, axis=0), t.home.take(rows, axis=0)) > STILL_M]
         if not len(rows):
             return
@@ -319,9 +322,9 @@ class Tracker:
 
     def _renew(self, matches: Matches, sightings: Sightings) -> None:
         """Deaths, and a track for every proposal that found none; a2, or a1 and a5 where its place is remembered."""
-        free = np.ones(len(sightings), np.bool_)
-        free[matches.proposals] = False
-        born = np.flatnonzero(free)
+        claimed = np.zeros(len(sightings), np.bool_)
+        claimed[matches.proposals] = True
+        born = (~claimed).nonzero()[0]
         scenery = self._scenery()
         known = self.memory.recall(self._tracks, scenery, sightings, born)
         alive = self._bury(scenery)
@@ -339,7 +342,7 @@ class Tracker:
         t.x[new, :2] = t.home[new] = place  # speed and heading begin at zero
         t.P[new] = self._P_born
         t.age[new] = t.hits[new] = 1
-        self._show(t, new, born, sightings, place)
+        t.hull[new] = t.shape[new] = self._show(new, born, sightings, place)
 
     def _bury(self, scenery: Int) -> Int:
         """After N frames without a proposal a track is deleted; a9, a14. Of background its place is remembered.
@@ -352,16 +355,17 @@ class Tracker:
         t = self._tracks
         patience = np.where(t.hits < FLICKER, self.config.max_missed // 2, self.config.max_missed)
         expired = t.missed > patience
-        rows = np.flatnonzero(expired)
+        rows = expired.nonzero()[0]
         t.state[rows] = self.machine.meet(t.state[rows], Happening.EXPIRED)
         self.memory.keep(t, scenery[expired[scenery]])
-        return np.flatnonzero(~expired)
+        return (~expired).nonzero()[0]
 
     def _scenery(self) -> Int:
         """Rows that are background, for certain, and never moved."""
         t = self._tracks
         plain = t.kind == ObjectClass.BACKGROUND.value  # arrays are slow to compare with an enumeration itself
-        return np.flatnonzero(t.fixed & plain & (apart(t.x, t.home) < STILL_M))
+        rows: Int = (t.fixed & plain & (apart(t.x, t.home) < STILL_M)).nonzero()[0]
+        return rows
 
 
 def apart(x: Float64, home: Float64) -> Float64:
