@@ -45,7 +45,7 @@ class Matches:
         """
         changed = np.zeros(len(tracks), np.bool_)
         changed[rows] = True
-        kept = np.flatnonzero(~changed[self.rows])
+        kept = (~changed[self.rows]).nonzero()[0]
         some = proposals != NONE
         rows, proposals = rows[some], proposals[some]
         unmeasured = UNMEASURED_M2[None].repeat(len(rows), axis=0)
@@ -90,7 +90,7 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
     of_row, other_row = _two_best(rows, cost, limit)
     of_column, other_column = _two_best(columns, cost, limit)
     kept = cost + limit < other_row + other_column
-    contested = np.flatnonzero(~(kept[of_row] | kept[of_column]))
+    contested = (~(kept[of_row] | kept[of_column])).nonzero()[0]
     if len(contested):
         i, n = _compact(rows[contested])
         j, k = _compact(columns[contested])
@@ -109,7 +109,7 @@ def _two_best(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
     best = np.empty(index.max() + 1, np.int64)
     best[index] = k  # the last one written is the cheapest
     of_index = best[index]
-    others = np.flatnonzero(of_index != k)
+    others = (of_index != k).nonzero()[0]
     next_best = np.full(len(best), limit)
     next_best[index[others]] = cost[others]
     return of_index, next_best[index]

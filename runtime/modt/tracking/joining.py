@@ -51,14 +51,14 @@ class KnownJoining:
 def _pieces(tracks: Followed, found: Found) -> tuple[Int, Int, Int]:
     """Rows of cars, the proposal of each, and a further piece of it; every piece once."""
     matches, outlines = found.matches, found.sightings.outline
-    cars = np.flatnonzero(_settled_cars(tracks, matches.rows) & (tracks.hits[matches.rows] >= SETTLED))
+    cars = (_settled_cars(tracks, matches.rows) & (tracks.hits[matches.rows] >= SETTLED)).nonzero()[0]
     cars = cars[matches.rows[cars].argsort()]  # the eldest first: tracks are in the order of their birth
     rows, hosts = matches.rows[cars], matches.proposals[cars]
     if not len(rows):
         return rows, hosts, hosts
     known = tracks.hull.take(rows, axis=0).T + WAYS.T @ matches.place.take(cars, axis=0).T
     k, parts = touching(known, outlines)
-    other = np.flatnonzero(parts != hosts[k])
+    other = (parts != hosts[k]).nonzero()[0]
     k, parts = k[other], parts[other]
     piece, whole = outlines.take(parts, axis=1), known.take(k, axis=1)
     both = np.maximum(piece, outlines.take(hosts[k], axis=1))
@@ -69,7 +69,7 @@ def _pieces(tracks: Followed, found: Found) -> tuple[Int, Int, Int]:
     taker = np.full(len(owner), NONE)
     taker[parts[fits][::-1]] = k[fits][::-1]  # the eldest is written last
     taker[hosts[taker[taker != NONE]]] = NONE  # who takes something gives nothing away
-    parts = np.flatnonzero(taker != NONE)
+    parts = (taker != NONE).nonzero()[0]
     k = taker[parts]
     return rows[k], hosts[k], parts
 

@@ -68,13 +68,13 @@ def swapped(elders: Int, parts: Int, proposal: Int, owner: Int) -> tuple[Int, In
         if younger != NONE:
             has[younger] = int(proposal[elder])
         taken.add(part)
-    rows, proposals = np.array(sorted(has.items()), np.int64).reshape(-1, 2).T
-    return rows, proposals
+    rows = sorted(has)
+    return np.array(rows, np.int64), np.array([has[row] for row in rows], np.int64)
 
 
 def outgrown(kind: Int, outline: Float64) -> Int:
     """Which of the things, given their kinds (n,) and outlines (n, 8), are longer than any of their class: merged."""
-    things = np.flatnonzero(kind != ObjectClass.BACKGROUND.value)
+    things: Int = (kind != ObjectClass.BACKGROUND.value).nonzero()[0]
     longer: Bool = lengths(outline.take(things, axis=0).T).max(axis=0, initial=0.0) > ROOM_M[kind[things], 0]
     return things[longer]
 
@@ -83,7 +83,8 @@ def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
     """Rows, eldest first, of what was seen more than once and is now not seen, or less of it than before."""
     now, known = girth(sightings.outline)[proposal], girth(tracks.hull.T.copy())
     less = (proposal == NONE) | (known > LESS * now)
-    return np.flatnonzero((tracks.hits > 1) & less)  # tracks are in the order of their birth
+    rows: Int = ((tracks.hits > 1) & less).nonzero()[0]  # tracks are in the order of their birth
+    return rows
 
 
 def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
@@ -95,7 +96,7 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
     elder, rival = elders[i], owner[part]
     size = np.where(proposal == NONE, 0, sightings.count[proposal])
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
-    larger = np.flatnonzero(junior & (rival != elder) & (sightings.count[part] > size[elder]))
+    larger = (junior & (rival != elder) & (sightings.count[part] > size[elder])).nonzero()[0]
     stout = (sightings.box[part[larger], 3] > PERSON_M) & (tracks.box[elder[larger], 3] > PERSON_M)
     larger = larger[stout | _gives_way(tracks, elder[larger], rival[larger])]
     i, elder, part = i[larger], elder[larger], part[larger]

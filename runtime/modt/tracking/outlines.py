@@ -72,11 +72,11 @@ def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
     """
     n, k = a.shape[1], b.shape[1]
     if n * k <= HANDFUL:
-        rows, columns = np.nonzero((a[::2, :, None] >= -b[[4, 6, 0, 2], None]).all(axis=0))
-        return rows, columns
-    origin = (b[:4:2, 0] @ WAYS[:, ::2])[:, None]
-    ends, facing = _cells(a[::2] - origin), _cells(-b[::2] + origin)
-    pair = (compare_all if n * k < FEW_PAIRS else sweep)(ends, facing)
+        pair = compare_all(a[::2], -b[::2])
+    else:
+        origin = (b[:4:2, 0] @ WAYS[:, ::2])[:, None]
+        ends, facing = _cells(a[::2] - origin), _cells(-b[::2] + origin)
+        pair = (compare_all if n * k < FEW_PAIRS else sweep)(ends, facing)
     i = pair // k
     return i, pair - i * k
 
@@ -86,7 +86,7 @@ def _cells(coordinate: Float64) -> Int16:
     return np.minimum(np.maximum(coordinate / CELL_M, -FAR), FAR).astype(np.int16)
 
 
-def compare_all(ends: Int16, facing: Int16) -> Int:
+def compare_all(ends: Int16 | Float64, facing: Int16 | Float64) -> Int:
     """Pairs i * k + j, in order, of which ends (4, n) reach what faces them (4, k) on every side, all looked at.
 
     What faces an end is the other's opposite one, two further on and with its sign reversed.
@@ -94,7 +94,7 @@ def compare_all(ends: Int16, facing: Int16) -> Int:
     near: Bool = ends[0][:, None] >= facing[2]
     for side in (1, 2, 3):
         near &= ends[side][:, None] >= facing[side - 2]
-    return np.flatnonzero(near)
+    return near.ravel().nonzero()[0]
 
 
 def sweep(ends: Int16, facing: Int16) -> Int:

@@ -109,7 +109,7 @@ class _Scene:
             return np.zeros(0, np.int64)
         if z[own].max() < self.tracks.top[row] - FALL_M:
             return np.zeros(0, np.int64)
-        piece: Int = first + np.flatnonzero(own)
+        piece: Int = first + own.nonzero()[0]
         self.free[piece] = False
         return piece
 
@@ -130,7 +130,7 @@ class _Scene:
         """(n,) which places lie where a track is expected."""
         reach = self.expected[:, row] + PAD_M
         within: Bool = (x <= reach[0]) & (x >= -reach[4]) & (y <= reach[2]) & (y >= -reach[6])
-        near = np.flatnonzero(within)
+        near = within.nonzero()[0]
         within[near] = (np.stack([x[near], y[near]], axis=1) @ WAYS <= reach).all(axis=1)
         return within
 
@@ -157,7 +157,7 @@ def _seeking(tracks: Followed, matches: Matches) -> Int:
     """Rows of objects, and of what walks whatever it is held for, that found nothing and did a frame ago."""
     lost = tracks.missed == 0
     lost[matches.rows] = False
-    rows = np.flatnonzero(lost)
+    rows = lost.nonzero()[0]
     rows = rows[(tracks.hits[rows] >= SETTLED) & (tracks.takes[rows] < AT_MOST)]
     thing = tracks.kind[rows] != ObjectClass.BACKGROUND.value
     seeking: Int = rows[thing | _walks(tracks, rows)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,7 +48,8 @@ class Sightings:
         """Each of them where it is after a step (P, 2) [m, world]."""
         box = self.box.copy()
         box[:, :2] += step
-        return replace(self, box=box, centroid=self.centroid + step, outline=self.outline + WAYS.T @ step.T)
+        centroid, outline = self.centroid + step, self.outline + WAYS.T @ step.T
+        return Sightings(box, centroid, outline, self.foot, self.top, self.count, self.range_m, self.cut, self.eye)
 
     def take(self, rows: Int) -> Sightings:
         """A copy of the rows given."""

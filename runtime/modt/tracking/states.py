@@ -143,7 +143,7 @@ class StateMachine:
             UndefinedTransitionError: one of them has no such transition.
         """
         after: Int = self.table[states, events]
-        bad = np.flatnonzero((after == NONE) | (np.broadcast_to(events, np.shape(after)) == NONE))
+        bad = ((after == NONE) | (np.broadcast_to(events, np.shape(after)) == NONE)).nonzero()[0]
         if len(bad):
             state, event = states[bad[0]], np.broadcast_to(events, after.shape)[bad[0]]
             what = self.events[event] if event != NONE else "no event of the table"
@@ -157,7 +157,7 @@ class StateMachine:
             UndefinedTransitionError: one of them has no answer to it.
         """
         after: Int = self.after[states, happening]
-        if after.min(initial=0) == NONE:
+        if NONE in after:
             self.fire(states, self.answer[states, happening])  # says which of them
         return after
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.geometry import inverse, yaw_of
+from modt.geometry import yaw_of
 from modt.types import Float64, Proposals
 
 LEVER_M, ALIKE_M = 20.0, 0.05
@@ -36,10 +36,11 @@ class Motion:
         """The one that led from pose to pose; none where no time passed."""
         if dt_s <= 0.0:
             return cls()
-        T = inverse(T_world_before) @ T_world_after
+        T = T_world_before[:3, :3].T @ T_world_after[:3]
+        x, y, _ = T[:, 3] - T_world_before[:3, 3] @ T_world_before[:3, :3]
         turn = yaw_of(T)
         # The way is an arc: its chord points half the turn away from where it began.
-        velocity = complex(T[0, 3], T[1, 3]) * np.exp(-0.5j * turn) / dt_s
+        velocity = complex(x, y) * np.exp(-0.5j * turn) / dt_s
         return cls(velocity, turn / dt_s)
 
     def skews_like(self, other: Motion, turn_s: float) -> bool:
