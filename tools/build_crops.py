@@ -76,7 +76,7 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
         tall[whole] = of_class == ObjectClass.CAR and box[5] > TALL_M
         partial |= (shared > 0.2 * size) & ~whole
         partial[whole] = False
-        unknown[whole] |= not to_find
+        unknown[whole] = not to_find
     return Labels(kind, partial, unknown, tall)
 
 

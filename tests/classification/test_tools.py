@@ -77,6 +77,18 @@ def test_what_nobody_labelled_is_unknown() -> None:
     assert label(scan_of(points, [], [], unlabelled), proposals).unknown.tolist() == [False, True, True, True]
 
 
+def test_an_object_that_is_to_be_found_is_judged_where_labels_end_as_well() -> None:
+    points = np.zeros((40, 4), np.float32)
+    box, none = np.zeros((2, 7)), np.zeros(2, np.bool_)
+    proposals = Proposals(
+        np.arange(40), np.array([0, 20, 40]), points[:, :3].T, np.zeros((2, 3)), box, none[:2], none[:2]
+    )
+    unlabelled = np.tile(np.arange(20) >= 5, 2)  # of both, most lies there
+    labels = label(scan_of(points, [np.arange(20)], [ObjectClass.CAR], unlabelled), proposals)
+    assert labels.kind.tolist() == [ObjectClass.CAR, 0]
+    assert labels.unknown.tolist() == [False, True]
+
+
 def test_argoverse_sweeps_are_moved_to_the_sensor(tmp_path: Path) -> None:
     car = np.array([11.35, 0.0, 0.5, 0.2], np.float32) + np.linspace(0, 1, 30)[:, None] * np.float32([0, 1, 0, 0])
     carrier = np.array([[1.4, 0.1, 1.0, 0.2]], np.float32)
