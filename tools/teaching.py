@@ -14,10 +14,12 @@ import torch
 from numpy.random import Generator
 from torch import Tensor, nn
 
-from modt.types import N_CLASSES, Int
+from modt.types import N_CLASSES, Float64, Int
 
 SMOOTHING = 0.02
 """Of a label, spread evenly over the classes."""
+TRUST = 0.8
+"""In the evidence of returns, which is not calibrated."""
 
 
 class Teaching(Protocol):
@@ -27,13 +29,14 @@ class Teaching(Protocol):
         """(F,) rows to be shown besides those drawn for their labels."""
         ...
 
-    def targets(self, xyz: Tensor, count: Tensor, label: Int) -> Tensor:
+    def targets(self, xyz: Tensor, count: Tensor, label: Int, further: Int) -> Tensor:
         """(R, 4) what the network should say of R crops, given as it sees them, the labelled ones first.
 
         Args:
             xyz: (K, 3) points, one crop after another.
             count: (R,) points of each.
             label: of the labelled ones.
+            further: (F,) rows of the others.
         """
         ...
 
@@ -45,23 +48,26 @@ class Labels:
         """(0,) rows."""
         return np.zeros(0, np.int64)
 
-    def targets(self, xyz: Tensor, count: Tensor, label: Int) -> Tensor:
+    def targets(self, xyz: Tensor, count: Tensor, label: Int, further: Int) -> Tensor:
         """(R, 4) the labels, softened a little."""
         hard = nn.functional.one_hot(torch.from_numpy(label), N_CLASSES)
         return hard * (1 - SMOOTHING) + SMOOTHING / N_CLASSES
 
 
 class Ensemble:
-    """Goes by the mean of some networks, also of crops without a label.
+    """Goes by the mean of some networks, also of crops without a label, and of these by their returns besides.
+
+    The network sees the shape alone; what brightness tells its teachers of a crop it learns to see in the shape.
 
     Args:
         teachers: networks that never saw what the taught one will be judged by.
         unlabelled: (U,) rows without a label.
         number: of those shown with each batch.
+        evidence: (N, 4) what its returns add to the logarithms of the probabilities of each crop.
     """
 
-    def __init__(self, teachers: Sequence[nn.Module], unlabelled: Int, number: int) -> None:
-        self.teachers, self.unlabelled = teachers, unlabelled
+    def __init__(self, teachers: Sequence[nn.Module], unlabelled: Int, number: int, evidence: Float64) -> None:
+        self.teachers, self.unlabelled, self.evidence = teachers, unlabelled, TRUST * evidence
         self.number = number if len(unlabelled) else 0
 
     def further(self, rng: Generator) -> Int:
@@ -69,6 +75,8 @@ class Ensemble:
         return rng.choice(self.unlabelled, self.number) if self.number else np.zeros(0, np.int64)
 
     @torch.no_grad()
-    def targets(self, xyz: Tensor, count: Tensor, label: Int) -> Tensor:
-        """(R, 4) mean probabilities."""
-        return torch.stack([torch.softmax(net(xyz, count), dim=1) for net in self.teachers]).mean(dim=0)
+    def targets(self, xyz: Tensor, count: Tensor, label: Int, further: Int) -> Tensor:
+        """(R, 4) mean probabilities, with the evidence of the further ones."""
+        said = torch.stack([torch.softmax(net(xyz, count), dim=1) for net in self.teachers]).mean(dim=0)
+        said[len(label) :] *= torch.from_numpy(np.exp(self.evidence[further]).astype(np.float32))
+        return said / said.sum(dim=1, keepdim=True)

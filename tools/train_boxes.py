@@ -18,6 +18,7 @@ import numpy as np
 import torch
 
 from augment import Beams, augment, limit
+from batches import draw, odds
 from calibration import Calibration
 from crop_boxes import all_described, described
 from dataset import Dataset, load
@@ -26,7 +27,6 @@ from modt.classification.layers import Layers, logits
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 from scores import average_precision
 from small_network import Batch, trained
-from train_pointnet import draw, odds
 from weights import save_layers
 
 STEPS = 1000

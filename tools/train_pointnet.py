@@ -6,7 +6,8 @@ Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json:
 out-of-fold average precision, confusion and calibration (drives are never split between folds), and the probabilities
 themselves, OUT_DIR/held_out.npz, for tools/train_reflectance.py. The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
-With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written.
+With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written,
+and so does what the returns of its crops say.
 An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
 40 epochs (weak) and 100 (converged).
 """
@@ -21,28 +22,24 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.random import Generator
 
+import train_boxes
+import train_reflectance
 from augment import Beams, augment, limit
+from batches import BATCH, draw, odds
 from calibration import Calibration, expected_error
 from dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
 from held_out import HeldOut, Model, cross_validated
 from modt.classification.crops import Crops, canonical
+from modt.classification.layers import logits as layer_logits
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 from network import PointNet
 from scores import average_precision, confusion
 from teaching import Ensemble, Labels, Teaching
 from weights import save_layers
 
-SHARE = np.array([0.46, 0.24, 0.16, 0.14])
-"""Of each class in a batch: objects are rare, and background has many faces."""
-MIX = np.array([[0.4, 0.35, 0.0, 0.25], [0.3, 0.25, 0.3, 0.15], [0.2, 0.15, 0.3, 0.35], [0.2, 0.15, 0.3, 0.35]])
-"""Of each variant (shipped, clustered, pasted, synthetic) among the crops of each class, where there are such: the
-rarer a class is in real scans, the more of it is made."""
-TALL = 0.3
-"""Of vans among the cars."""
-BATCH, POINTS, MOST_POINTS = 128, 128, 400
-"""Labelled crops of a step, points of each, and points that are augmented at most."""
+POINTS, MOST_POINTS = 128, 400
+"""Points of each crop, and points that are augmented at most."""
 FURTHER = 102
 """Crops of a step besides that nobody labelled, where there are teachers."""
 
@@ -51,24 +48,6 @@ def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
     """Canonical crops for the network."""
     seen = canonical(crops, SENSOR_HEIGHT_M)
     return torch.from_numpy(seen.xyz), torch.from_numpy(seen.count)
-
-
-def odds(data: Dataset, rows: Int) -> list[tuple[Int, Float64]]:
-    """Rows of each class and how likely each is drawn: crops of one class, variant and height alike."""
-    pools = []
-    for c in range(N_CLASSES):
-        own = rows[data.label[rows] == c]
-        group = 2 * data.variant[own] + data.tall[own]
-        share = np.outer(MIX[c], [1 - TALL, TALL]).ravel()
-        weight = (share / np.bincount(group, minlength=len(share)).clip(1))[group]
-        pools.append((own, weight / weight.sum()))
-    return pools
-
-
-def draw(pools: list[tuple[Int, Float64]], rng: Generator) -> Int:
-    """Rows of one batch, classes by their share."""
-    number = rng.multinomial(BATCH, SHARE / SHARE.sum())
-    return np.concatenate([rng.choice(own, k, p=p) for (own, p), k in zip(pools, number, strict=True)])
 
 
 def train(
@@ -95,9 +74,10 @@ def train(
     running = 0.0
     for step in range(first, steps):
         chosen = draw(pools, rng)
-        shown = data.take(np.append(chosen, teaching.further(rng)))
+        further = teaching.further(rng)
+        shown = data.take(np.append(chosen, further))
         seen = tensors(limit(augment(limit(shown, MOST_POINTS, rng), Beams(), rng), POINTS, rng))
-        loss = criterion(net(*seen), teaching.targets(*seen, data.label[chosen]))
+        loss = criterion(net(*seen), teaching.targets(*seen, data.label[chosen], further))
         optimiser.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(net.parameters(), 5.0)
@@ -117,7 +97,7 @@ def train(
 def educate(
     data: Dataset, among: Bool, steps: tuple[int, int], teachers: int, seed: int, folder: Path | None
 ) -> tuple[PointNet, list[float]]:
-    """A network trained on what is labelled among these, by as many teachers trained on the same.
+    """A network trained on what is labelled among these, by as many teachers, and returns, that learnt from the same.
 
     Args:
         data: all crops.
@@ -131,8 +111,19 @@ def educate(
     states = [folder / f"teacher{t}.pt" if folder else None for t in range(teachers)]
     taught = [train(data, rows, steps[1], seed + 100 * t, s, Labels())[0] for t, s in enumerate(states, start=1)]
     unlabelled = np.flatnonzero(among & (data.variant == UNLABELLED))
-    teaching = Ensemble(taught, unlabelled, FURTHER) if taught else Labels()
+    teaching = Ensemble(taught, unlabelled, FURTHER, added(data, rows, seed)) if taught else Labels()
     return train(data, rows, steps[0], seed, folder / "state.pt" if folder else None, teaching)
+
+
+def added(data: Dataset, rows: Int, seed: int) -> Float64:
+    """(R, 4) what the returns of each crop add to the logarithms of its classes; 0 if unknown."""
+    evidence, known = np.zeros((len(data), N_CLASSES)), np.isfinite(data.reflectance).all(axis=1)
+    if known.any():
+        seen = train_reflectance.Described(data)
+        boxes = train_boxes.train(data, rows, train_boxes.STEPS, seed)
+        layers = train_reflectance.train(data, seen, rows, boxes, train_reflectance.STEPS, seed)
+        evidence[known] = layer_logits(layers, seen.whole[known])
+    return evidence
 
 
 @torch.no_grad()

@@ -20,6 +20,7 @@ from scipy.optimize import minimize
 from scipy.special import softmax
 
 import train_boxes
+from batches import draw, odds
 from calibration import Calibration, expected_error, fit
 from crop_boxes import all_described
 from dataset import Dataset, load
@@ -28,9 +29,9 @@ from modt.classification.layers import Layers, logits
 from modt.types import Bool, Float64, Int
 from scores import average_precision, confusion
 from small_network import Batch, trained
-from train_pointnet import draw, odds
 from weights import load_layers, save_layers
 
+STEPS = 1500
 JITTER = 0.1
 """Of each feature in a batch, of how it is spread: few crops, seen often."""
 
@@ -133,7 +134,7 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("crops", type=Path, nargs="+")
     parser.add_argument("--sensor", required=True, help="on whose scale the reflectances are, as profiles name it")
-    parser.add_argument("--steps", type=int, default=1500)
+    parser.add_argument("--steps", type=int, default=STEPS)
     parser.add_argument("--folds", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()

@@ -222,21 +222,24 @@ def test_the_exported_network_is_the_trained_one(tmp_path_factory: pytest.TempPa
         np.testing.assert_allclose(exported.infer(xyz.reshape(2, n, 3).numpy()), expected, atol=1e-4)
 
 
-def test_an_ensemble_teaches_its_mean_and_shows_what_nobody_labelled() -> None:
+def test_an_ensemble_teaches_its_mean_and_what_returns_say_of_crops_without_a_label() -> None:
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
-    from teaching import Ensemble, Labels
+    from teaching import TRUST, Ensemble, Labels
 
     rng = np.random.default_rng(0)
     xyz, count, label = torch.randn(9, 3), torch.tensor([4, 3, 2]), np.array([1, 3])
     said = torch.tensor([[[9.0, 0, 0, 0], [0, 9, 0, 0], [0, 0, 0, 9]], [[9, 0, 0, 0], [0, 0, 9, 0], [0, 0, 0, 9]]])
-    ensemble = Ensemble([lambda xyz, count, own=own: own for own in said], np.arange(70, 90), 5)
+    evidence = rng.normal(size=(90, 4))
+    ensemble = Ensemble([lambda xyz, count, own=own: own for own in said], np.arange(70, 90), 5, evidence)
     assert (np.isin(ensemble.further(rng), np.arange(70, 90))).all()
     assert len(ensemble.further(rng)) == 5
     expected = torch.softmax(said, dim=2).mean(dim=0)
-    assert torch.allclose(ensemble.targets(xyz, count, label), expected)
-    assert len(Ensemble([], np.zeros(0, np.int64), 5).further(rng)) == 0
+    expected[2] *= torch.from_numpy(np.exp(TRUST * evidence[77]))
+    expected[2] /= expected[2].sum()
+    assert torch.allclose(ensemble.targets(xyz, count, label, np.array([77])), expected)
+    assert len(Ensemble([], np.zeros(0, np.int64), 5, evidence).further(rng)) == 0
     assert len(Labels().further(rng)) == 0
-    told = Labels().targets(xyz[:7], count[:2], label)
+    told = Labels().targets(xyz[:7], count[:2], label, np.zeros(0, np.int64))
     assert told.argmax(dim=1).tolist() == label.tolist()
     assert torch.allclose(told.sum(dim=1), torch.ones(2))
 
