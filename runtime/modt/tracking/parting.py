@@ -131,7 +131,7 @@ class _Scene:
         reach = self.expected[:, row] + PAD_M
         within: Bool = (x <= reach[0]) & (x >= -reach[4]) & (y <= reach[2]) & (y >= -reach[6])
         near = within.nonzero()[0]
-        within[near] = (np.stack([x[near], y[near]], axis=1) @ WAYS <= reach).all(axis=1)
+        within[near] = (WAYS.T @ np.array((x[near], y[near])) <= reach[:, None]).all(axis=0)
         return within
 
     def parted(self, takers: Int, pieces: list[Int]) -> Found:
@@ -166,12 +166,12 @@ def _seeking(tracks: Followed, matches: Matches) -> Int:
 
 def _walks(tracks: Followed, rows: Int) -> Bool:
     """(R,) what is as slim as a person, not flat, has come some way, and surely goes on."""
-    slim = lengths(tracks.hull.take(rows, axis=0).T).max(axis=0) < SLIM_M
-    tall = tracks.top[rows] - tracks.foot[rows] > TALL_M
     x, home = tracks.x.take(rows, axis=0), tracks.home.take(rows, axis=0)
-    far = np.square(x[:, X] - home[:, 0]) + np.square(x[:, Y] - home[:, 1]) > WAY_M**2
-    sure = x[:, SPEED] > SIGMAS * np.sqrt(tracks.P[rows, SPEED, SPEED])
-    walks: Bool = slim & tall & far & sure
+    walks: Bool = x[:, SPEED] > SIGMAS * np.sqrt(tracks.P[rows, SPEED, SPEED])
+    if walks.any():  # seldom
+        walks &= lengths(tracks.hull.take(rows, axis=0).T).max(axis=0) < SLIM_M
+        walks &= tracks.top[rows] - tracks.foot[rows] > TALL_M
+        walks &= np.square(x[:, X] - home[:, 0]) + np.square(x[:, Y] - home[:, 1]) > WAY_M**2
     return walks
 
 
