@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
+from modt.tracking import landmarks
 from modt.tracking.egomotion import GATE_M, REACH_M, SCALES, Fit, Registration, _fit, _mutual
 from modt.tracking.followed import Followed
 from modt.tracking.outlines import WAYS
@@ -246,6 +247,7 @@ def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
     for i in range(12):
         tracker.follow(*frame_of(street(n=3), i, np.eye(4), points=40))
         t = tracker.tracks
+        landmarks.keep(t)
         seen.append(t.outline[:, 4:].copy())
         since = int(t.stood[0])
         if since:
@@ -255,5 +257,6 @@ def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
         moved = street(n=3)
         moved[:, 0] += 0.4 * (i - 11)
         tracker.follow(*frame_of(moved, i, np.eye(4), points=40))
+        landmarks.keep(tracker.tracks)
     assert not tracker.tracks.still.any()
     np.testing.assert_allclose(tracker.tracks.landmark, tracker.tracks.outline, atol=1e-9)

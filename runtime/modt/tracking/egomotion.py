@@ -12,11 +12,12 @@ import numpy as np
 
 from modt.geometry import rotation_zyx, se3
 from modt.tracking.followed import Followed
+from modt.tracking.landmarks import landmarks, stands
 from modt.tracking.outlines import WAYS, middles, touching
-from modt.tracking.robust import carried, compare, likeness
+from modt.tracking.robust import compare, likeness
 from modt.tracking.shifts import shift_between
 from modt.tracking.sightings import Sightings
-from modt.types import Bool, Float64, Int
+from modt.types import Float64, Int
 
 REACH_M = 2.5
 """How far the prediction may be off at its first frame."""
@@ -41,8 +42,6 @@ AGREEMENT = 0.3
 CONSENT, AS_BEFORE = 0.75, 0.5
 """Part that must agree, and so many of those that agreed last time, lest the prediction is mistrusted and pairs are
 sought farther away."""
-STOOD = 3
-"""Frames from which the mean of what stands is its place."""
 TURN_RAD = 0.2
 """Greatest turn of a correction."""
 OUTSET_RAD = (0.0, 0.05, -0.05, 0.1, -0.1, 0.15, -0.15)
@@ -142,7 +141,7 @@ class Registration:
             shift, size, _, _ = compare(known[:, i], near[:, j])
             motion = motion + np.append(-_vote(shift[size < ALIKE]), 0.0)
         a, b, ways = known.take(i, axis=1), sightings.outline.take(j, axis=1), ways.take(j, axis=2)
-        gain, young = b - a, np.where(_stands(tracks), 0.0, YOUNG_M).take(rows)
+        gain, young = b - a, np.where(stands(tracks), 0.0, YOUNG_M).take(rows)
         variance = young[i] ** 2 + (END_M + END_SPREAD * sightings.range_m[j]) ** 2
         for _ in range(choices):
             gone = b + np.tensordot(motion, ways, 1)
@@ -153,25 +152,6 @@ class Registration:
         a, b, ways = a.take(best, axis=1), b.take(best, axis=1), ways.take(best, axis=2)
         shift = shift_between(a, b + np.tensordot(motion, ways, 1))
         return Fit(motion, int((np.hypot(shift[:, 0], shift[:, 1]) < INLIER_M).sum()), len(best))
-
-
-def landmarks(tracks: Followed) -> tuple[Int, Float64]:
-    """Rows of what stands or may, and their (8, n) outlines.
-
-    What has stood for a while lies where it was seen on average, not where it was seen last: then an error of one
-    frame is not handed on to all that follow.
-    """
-    rows = np.flatnonzero((tracks.still | (tracks.hits < 3)) & (tracks.missed <= 2))
-    outline = carried(tracks).take(rows, axis=1)
-    known = _stands(tracks)[rows]
-    outline[:, known] = tracks.landmark[rows[known]].T
-    return rows, outline
-
-
-def _stands(tracks: Followed) -> Bool:
-    """(M,) what has stood for a while."""
-    stands: Bool = tracks.still & (tracks.stood >= STOOD)
-    return stands
 
 
 def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, se3
-from modt.tracking import kalman
+from modt.tracking import kalman, landmarks
 from modt.tracking.association import Association, Matches, PaperAssociation
 from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
@@ -38,10 +38,6 @@ FLICKER = 3
 """What is seen less often than in so many frames comes and goes."""
 SHAPE_KEPT = 0.8
 """What is kept at most, a frame, of the mean outline of a track about its place."""
-LANDMARK_GAIN = 0.03
-"""Least say of a new view in the mean outline of a landmark."""
-LANDMARK_M = 0.2
-"""An end of an outline that is off by more is another end."""
 FORGET = 0.98
 """What is kept, a frame, of an extent that is not seen again."""
 BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
@@ -142,7 +138,6 @@ class Tracker:
         self._proposals, sightings, matches = found.proposals, found.sightings, found.matches
         self._update(matches, sightings)
         self._rest(matches.rows)
-        self._stand(matches.rows)
         self._miss(matches.rows)
         self._doubt()
         self._renew(matches, sightings)
@@ -215,6 +210,7 @@ class Tracker:
             placing = placed(self._T_world_odometry @ given)
             self._mend_first(placing.motion)
         else:
+            landmarks.keep(self._tracks)
             predicted = placed(before @ (inverse(self._T_world_before) @ before))  # as it moved last
             placing = corrected(predicted)
             self._mend_first(placing.motion)
@@ -287,15 +283,6 @@ class Tracker:
         near = rows[stays]
         x, P = by_number(x.compress(stays, axis=0), t.P.take(near, axis=0))
         t.x[near], t.P[near] = by_track(*kalman.observe_speed(x, P, 0.0, STILL_SIGMA_MPS))
-
-    def _stand(self, rows: Int) -> None:
-        """The mean outline of what stands: a landmark that does not creep with what is registered to it."""
-        t = self._tracks
-        t.stood[rows] = np.where(t.still[rows], t.stood[rows] + 1, 0)
-        gain = np.maximum(1.0 / np.maximum(t.stood[rows], 1), LANDMARK_GAIN)[:, None]
-        mean = t.landmark.take(rows, axis=0)
-        off = t.outline.take(rows, axis=0) - mean
-        t.landmark[rows] = mean + np.where(np.abs(off) < LANDMARK_M, gain, 1.0) * off
 
     def _miss(self, matched: Int) -> None:
         """Tracks without a proposal coast."""
