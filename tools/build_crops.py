@@ -48,7 +48,7 @@ class Labels:
     Attributes:
         kind: (R,) class.
         partial: (R,) neither clearly one object nor clearly none.
-        unknown: (R,) not to be judged by: beyond the labels, or of an object with too few points.
+        unknown: (R,) not to be judged by: background beyond the labels, or an object with too few points.
         tall: (R,) vehicles the height of a van: rare, and unlike other cars.
     """
 

@@ -19,7 +19,7 @@ from modt.types import N_CLASSES, Float64, Int
 SMOOTHING = 0.02
 """Of a label, spread evenly over the classes."""
 TRUST = 0.8
-"""In the evidence of returns, which is not calibrated."""
+"""In the evidence of returns, which is not calibrated; what the pool takes of it, about."""
 
 
 class Teaching(Protocol):

@@ -6,8 +6,8 @@ Writes OUT_DIR/weights.npz for tools/export_pointnet.py and OUT_DIR/report.json:
 out-of-fold average precision, confusion and calibration (drives are never split between folds), and the probabilities
 themselves, OUT_DIR/held_out.npz, for tools/train_reflectance.py. The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
-With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written,
-and so does what the returns of its crops say.
+With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written;
+of crops without a label, what their returns add (tools/train_reflectance.py) does so as well.
 An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
 40 epochs (weak) and 100 (converged).
 """
@@ -97,7 +97,10 @@ def train(
 def educate(
     data: Dataset, among: Bool, steps: tuple[int, int], teachers: int, seed: int, folder: Path | None
 ) -> tuple[PointNet, list[float]]:
-    """A network trained on what is labelled among these, by as many teachers, and returns, that learnt from the same.
+    """A network trained on what is labelled among these.
+
+    It is taught by as many networks and, of crops without a label, by what their returns add; these learnt from the
+    same.
 
     Args:
         data: all crops.
@@ -111,14 +114,17 @@ def educate(
     states = [folder / f"teacher{t}.pt" if folder else None for t in range(teachers)]
     taught = [train(data, rows, steps[1], seed + 100 * t, s, Labels())[0] for t, s in enumerate(states, start=1)]
     unlabelled = np.flatnonzero(among & (data.variant == UNLABELLED))
-    teaching = Ensemble(taught, unlabelled, FURTHER, added(data, rows, seed)) if taught else Labels()
+    teaching = Ensemble(taught, unlabelled, FURTHER, evidence_of_returns(data, rows, seed)) if taught else Labels()
     return train(data, rows, steps[0], seed, folder / "state.pt" if folder else None, teaching)
 
 
-def added(data: Dataset, rows: Int, seed: int) -> Float64:
-    """(R, 4) what the returns of each crop add to the logarithms of its classes; 0 if unknown."""
+def evidence_of_returns(data: Dataset, rows: Int, seed: int) -> Float64:
+    """(R, 4) what the returns of each crop add to the logarithms of its classes; 0 if unknown.
+
+    Nor is it known where these rows show a class without returns.
+    """
     evidence, known = np.zeros((len(data), N_CLASSES)), np.isfinite(data.reflectance).all(axis=1)
-    if known.any():
+    if np.isin(np.arange(N_CLASSES), data.label[rows[known[rows]]]).all():
         seen = train_reflectance.Described(data)
         boxes = train_boxes.train(data, rows, train_boxes.STEPS, seed)
         layers = train_reflectance.train(data, seen, rows, boxes, train_reflectance.STEPS, seed)

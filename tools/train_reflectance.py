@@ -32,6 +32,7 @@ from small_network import Batch, trained
 from weights import load_layers, save_layers
 
 STEPS = 1500
+"""Batches."""
 JITTER = 0.1
 """Of each feature in a batch, of how it is spread: few crops, seen often."""
 
