@@ -74,8 +74,8 @@ class Proposals:
     Attributes:
         members: (K,) indices of points in the frame, grouped by proposal.
         offsets: (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]].
-        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once for all; (3, 0) once
-            nobody needs them any more: unions are made last.
+        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once for all; (3, 0) after
+            tracking has joined some, the last step that could need them.
         centroid: (P, 3) mean of each proposal's points [m, sensor frame].
         box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
         truncated: (P,) cut by the edge of the field of view.

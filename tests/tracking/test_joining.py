@@ -191,6 +191,7 @@ def test_unions_hold_what_their_parts_did(counts, yaw, data):
     unions = Unions.of(n, hosts, parts)
     after = united_proposals(proposals, unions, np.full(len(np.unique(hosts)), yaw))
     assert sorted(after.members) == sorted(proposals.members)
+    assert after.coordinates.shape == (3, 0)
     into = np.arange(n)
     into[parts] = hosts
     kept = np.unique(into)

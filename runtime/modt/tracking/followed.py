@@ -25,8 +25,8 @@ class Followed(Tracks):
         shown: (M, 2) place that the outline was taken to show [m, world].
         home: (M, 2) place at which the track was last known to stand [m, world].
         still: the track stands.
-        stood: frames with a proposal since it began to, as far as landmarks were kept (landmarks.py).
-        landmark: (M, 8) mean outline since then, an end that jumped beginning anew [m, world].
+        stood: frames in a row without a pose in which it stood and was seen; 0 where poses are given (landmarks.py).
+        landmark: (M, 8) mean outline in these, an end that jumped beginning anew [m, world].
         takes: times that its proposal was taken out of another since it last had one of its own.
         inherited: its class was taken over from a remembered place, and it was not classified itself since.
     """

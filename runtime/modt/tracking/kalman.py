@@ -2,8 +2,8 @@
 
 State x = [x, y, heading, speed] in the world: m, m, rad, m/s. Only the place is observed.
 
-M states are a (4, M) array and their covariances a (4, 4, M) one, a contiguous row a number: what the textbook does
-to a matrix is done to all of them at once, and arithmetic along axes of four is slow.
+M states are a (4, M) array and their covariances a (4, 4, M) one: each number of the state is a contiguous row over
+all tracks, and arithmetic runs along it. Along axes of four it would be slow.
 """
 
 from __future__ import annotations

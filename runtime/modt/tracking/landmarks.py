@@ -21,13 +21,18 @@ SAME_M = 0.2
 
 
 def keep(tracks: Followed) -> None:
-    """Take what the last frame showed into the mean outlines of what stands; once a frame."""
+    """Take what the last frame showed into the mean outlines of what stands; once in each frame without a pose."""
     t, rows = tracks, (tracks.proposal != NONE).nonzero()[0]
     t.stood[rows] = stood = np.where(t.still[rows], t.stood[rows] + 1, 0)
     gain = np.maximum(1.0 / np.maximum(stood, 1), GAIN)[:, None]
     mean = t.landmark.take(rows, axis=0)
     off = t.outline.take(rows, axis=0) - mean
     t.landmark[rows] = mean + np.where(np.abs(off) < SAME_M, gain, 1.0) * off
+
+
+def forget(tracks: Followed) -> None:
+    """Where poses are given nobody keeps landmarks: should they fail, what stands then is noted from then on."""
+    tracks.stood[:] = 0
 
 
 def landmarks(tracks: Followed) -> tuple[Int, Float64]:

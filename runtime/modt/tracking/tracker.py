@@ -75,7 +75,8 @@ class Tracker:
         machine: the table that drives the states, EFFICIENT or ACCURATE.
         association: how proposals find their tracks; by default as the configuration says.
         memory: what is kept of background that is gone; by default nothing with the paper's association.
-        regroupings: how proposals are put right; by default not at all with the paper's association.
+        regroupings: how proposals are put right, joining last, since it leaves no coordinates; by default not at all
+            with the paper's association.
     """
 
     def __init__(
@@ -207,6 +208,7 @@ class Tracker:
             return placed(rigid(correction @ placing.T_world_sensor))
 
         if given is not None and self._T_world_odometry is not None:
+            landmarks.forget(self._tracks)
             placing = placed(self._T_world_odometry @ given)
             self._mend_first(placing.motion)
         else:
