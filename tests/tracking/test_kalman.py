@@ -80,10 +80,10 @@ def test_covariances_stay_covariances(x, P, dt_s):
 
 @given(STATES, POSITIVE)
 def test_a_table_is_turned_into_rows_and_back(x, P):
-    there = kalman.by_track(x, P)
+    there = kalman.tracks_first(x, P)
     assert there[0].shape == (3, 4)
     np.testing.assert_array_equal(there[1][1], P[:, :, 1])
-    for before, after in zip((x, P), kalman.by_number(*there), strict=True):
+    for before, after in zip((x, P), kalman.components_first(*there), strict=True):
         np.testing.assert_array_equal(before, after)
 
 

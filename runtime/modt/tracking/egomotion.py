@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import rotation_zyx, se3
+from modt.tracking import landmarks
 from modt.tracking.followed import Followed
-from modt.tracking.landmarks import landmarks, stands
 from modt.tracking.outlines import WAYS, middles, touching
 from modt.tracking.robust import compare, likeness
 from modt.tracking.shifts import shift_between
@@ -132,7 +132,7 @@ class Registration:
         choices: int,
     ) -> Fit | None:
         """The motion that most landmarks within reach of one say, pairs chosen so many times; ways as of _ways."""
-        rows, known = landmarks(tracks)
+        rows, known = landmarks.places(tracks)
         near = sightings.outline + np.tensordot(motion, ways, 1)
         i, j = _pairs(known, near, reach_m)
         if len(i) < MINIMUM:
@@ -141,7 +141,7 @@ class Registration:
             shift, size, _, _ = compare(known[:, i], near[:, j])
             motion = motion + np.append(-_vote(shift[size < ALIKE]), 0.0)
         a, b, ways = known.take(i, axis=1), sightings.outline.take(j, axis=1), ways.take(j, axis=2)
-        gain, young = b - a, np.where(stands(tracks), 0.0, YOUNG_M).take(rows)
+        gain, young = b - a, np.where(landmarks.stands(tracks), 0.0, YOUNG_M).take(rows)
         variance = young[i] ** 2 + (END_M + END_SPREAD * sightings.range_m[j]) ** 2
         for _ in range(choices):
             gone = b + np.tensordot(motion, ways, 1)

@@ -16,12 +16,12 @@ from modt.types import Float64
 X, Y, HEADING, SPEED = range(4)
 
 
-def by_number(x: Float64, P: Float64) -> tuple[Float64, Float64]:
+def components_first(x: Float64, P: Float64) -> tuple[Float64, Float64]:
     """(n, M) and (n, n, M), as the filter takes them, of a table's (M, n) and (M, n, n)."""
     return x.T.copy(), P.transpose(1, 2, 0).copy()
 
 
-def by_track(x: Float64, P: Float64) -> tuple[Float64, Float64]:
+def tracks_first(x: Float64, P: Float64) -> tuple[Float64, Float64]:
     """(M, n) and (M, n, n), as a table holds them, of the filter's (n, M) and (n, n, M)."""
     return x.T.copy(), P.transpose(2, 0, 1).copy()
 

@@ -35,8 +35,8 @@ def forget(tracks: Followed) -> None:
     tracks.stood[:] = 0
 
 
-def landmarks(tracks: Followed) -> tuple[Int, Float64]:
-    """Rows of what stands or may, and their (8, n) outlines."""
+def places(tracks: Followed) -> tuple[Int, Float64]:
+    """Rows of what stands or may, and the (8, n) outlines that it should show [m, world]."""
     rows: Int = ((tracks.still | (tracks.hits < 3)) & (tracks.missed <= 2)).nonzero()[0]
     outline = carried(tracks).take(rows, axis=1)
     known = stands(tracks)[rows]

@@ -48,8 +48,17 @@ class Sightings:
         """Each of them where it is after a step (P, 2) [m, world]."""
         box = self.box.copy()
         box[:, :2] += step
-        centroid, outline = self.centroid + step, self.outline + WAYS.T @ step.T
-        return Sightings(box, centroid, outline, self.foot, self.top, self.count, self.range_m, self.cut, self.eye)
+        return Sightings(
+            box=box,
+            centroid=self.centroid + step,
+            outline=self.outline + WAYS.T @ step.T,
+            foot=self.foot,
+            top=self.top,
+            count=self.count,
+            range_m=self.range_m,
+            cut=self.cut,
+            eye=self.eye,
+        )
 
     def take(self, rows: Int) -> Sightings:
         """A copy of the rows given."""

@@ -11,7 +11,7 @@ from modt.tracking.association import Association, Matches, PaperAssociation
 from modt.tracking.egomotion import Registration
 from modt.tracking.followed import Followed
 from modt.tracking.joining import KnownJoining
-from modt.tracking.kalman import HEADING, SPEED, by_number, by_track
+from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
 from modt.tracking.kinship import outgrown, reunite
 from modt.tracking.memory import BackgroundMemory, NoMemory
 from modt.tracking.outlines import WAYS
@@ -177,7 +177,7 @@ class Tracker:
         agility = np.where(settled, AGILITY[t.kind], 1.0)  # background that went away was none
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
-        t.x, t.P = by_track(*kalman.predict(*by_number(t.x, t.P), dt_s, acceleration, turn))
+        t.x, t.P = tracks_first(*kalman.predict(*components_first(t.x, t.P), dt_s, acceleration, turn))
 
     def _sight(self, frame: Frame, proposals: Proposals) -> Sightings:
         """The proposals in the world; where no odometry says how the sensor moved, they do themselves."""
@@ -241,13 +241,13 @@ class Tracker:
     def _update(self, matches: Matches, sightings: Sightings) -> None:
         """Equation 1's filter on the places found; a4 and a7, or a7, a9, a11 and a13."""
         t, rows = self._tracks, matches.rows
-        x, P = by_number(t.x.take(rows, axis=0), t.P.take(rows, axis=0))
-        z, R = by_number(matches.place, matches.covariance)
+        x, P = components_first(t.x.take(rows, axis=0), t.P.take(rows, axis=0))
+        z, R = components_first(matches.place, matches.covariance)
         slow = np.abs(x[SPEED]) < np.sqrt(P[SPEED, SPEED])
         step_x, step_y = z - x[:2]
         heading = np.where(slow, np.arctan2(step_y, step_x), x[HEADING])
         x, P = kalman.update(*kalman.face(x, P, heading), z, R)
-        t.x[rows], t.P[rows] = by_track(*kalman.turn_about(x, P))
+        t.x[rows], t.P[rows] = tracks_first(*kalman.turn_about(x, P))
         t.state[rows] = self.machine.meet(t.state[rows], Happening.ASSOCIATED)
         t.missed[rows] = 0
         t.hits[rows] += 1
@@ -283,8 +283,8 @@ class Tracker:
         t.still[rows] = stays & (hits > 2)
         t.home[rows] = home + HOME_GAIN * stays[:, None] * (x[:, :2] - home)
         near = rows[stays]
-        x, P = by_number(x.compress(stays, axis=0), t.P.take(near, axis=0))
-        t.x[near], t.P[near] = by_track(*kalman.observe_speed(x, P, 0.0, STILL_SIGMA_MPS))
+        x, P = components_first(x.compress(stays, axis=0), t.P.take(near, axis=0))
+        t.x[near], t.P[near] = tracks_first(*kalman.observe_speed(x, P, 0.0, STILL_SIGMA_MPS))
 
     def _miss(self, matched: Int) -> None:
         """Tracks without a proposal coast."""
