@@ -18,7 +18,7 @@ from held_out import cross_validated
 from labelled import Scan, argoverse_scans, inside
 from modt.classification.crops import Crops, gather
 from modt.geometry import FieldOfView
-from modt.types import NONE, ObjectClass, Proposals
+from modt.types import N_REFLECTANCE, NONE, ObjectClass, Proposals
 from paste import Item, pasted
 from scores import average_precision, confusion
 from tests.classification.datasets import data_of
@@ -242,6 +242,16 @@ def test_an_ensemble_teaches_its_mean_and_what_returns_say_of_crops_without_a_la
     told = Labels().targets(xyz[:7], count[:2], label, np.zeros(0, np.int64))
     assert told.argmax(dim=1).tolist() == label.tolist()
     assert torch.allclose(told.sum(dim=1), torch.ones(2))
+
+
+def test_returns_teach_nothing_where_a_class_shows_none() -> None:
+    pytest.importorskip("torch", reason="extra [train] is not installed")
+    from train_pointnet import evidence_of_returns
+
+    told = np.full((4, N_REFLECTANCE), 0.3)
+    told[1:] = np.nan  # background alone
+    data = data_of(Crops(np.zeros((4, 3), np.float32), np.arange(5)), np.arange(4), reflectance=told)
+    assert not evidence_of_returns(data, np.arange(4), 0).any()
 
 
 def test_the_maximum_of_a_linear_layer_has_the_gradients_of_its_definition() -> None:

@@ -268,6 +268,11 @@ def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
         np.testing.assert_allclose(tracks.landmark[:2], np.mean(seen, axis=0)[:2], atol=1e-9)
     assert tracks.stood.tolist() == [9, 9, 0]
     assert not tracks.landmark[2].any()
+    tracks.outline[0, 2] += 0.5  # another end comes into view
+    before = tracks.landmark.copy()
+    landmarks.keep(tracks)
+    assert tracks.landmark[0, 2] == tracks.outline[0, 2]
+    np.testing.assert_allclose(np.delete(tracks.landmark[0], 2), np.delete(before[0], 2), atol=0.01)
     tracks.still[:] = False
     for _ in range(8):  # it drives off: what it was seen as before is no landmark
         tracks.outline[:] += 0.4

@@ -184,7 +184,7 @@ def test_unions_hold_what_their_parts_did(counts, yaw, data):
     frame, proposals = frame_of([box(6 * k + 5, k, yaw=0.3 * k) for k in range(n)], points=counts)
     light = np.random.default_rng(n).uniform(0, 1, len(frame.points)).astype(np.float32)
     told = brightness(light[proposals.members], proposals.offsets)
-    proposals = dataclasses.replace(proposals, reflectance=told, truncated=np.arange(n) % 3 == 0)
+    proposals = dataclasses.replace(proposals, reflectance=told, truncated=np.arange(n) % 3 == 0, sensor_height_m=1.6)
     hosts, parts = groups(data.draw, n)
     if not len(parts):
         return
@@ -192,6 +192,7 @@ def test_unions_hold_what_their_parts_did(counts, yaw, data):
     after = united_proposals(proposals, unions, np.full(len(np.unique(hosts)), yaw))
     assert sorted(after.members) == sorted(proposals.members)
     assert after.coordinates.shape == (3, 0)
+    assert after.sensor_height_m == 1.6
     into = np.arange(n)
     into[parts] = hosts
     kept = np.unique(into)

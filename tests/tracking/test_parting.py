@@ -1,6 +1,7 @@
 """Somebody touches a wall, and is taken out of it again."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt.tracking.carving import carved
 from modt.tracking.followed import Followed
-from modt.tracking.parting import AT_MOST, _walks
+from modt.tracking.parting import AT_MOST, _Scene, _walks
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import N_CLASSES, NONE, ObjectClass
@@ -282,3 +283,10 @@ def test_every_point_stays_in_one_proposal(counts, data):
     np.testing.assert_array_equal(after.box[untouched], proposals.box[untouched])
     np.testing.assert_array_equal(after.reflectance[: len(proposals)], proposals.reflectance)
     assert np.isnan(after.reflectance[len(proposals) :]).all()
+
+
+def test_within_is_within_the_slanting_sides_as_well():
+    diamond = np.array([1.0, np.sqrt(0.5)] * 4)[:, None]
+    scene = SimpleNamespace(expected=diamond)
+    x, y = np.array([0.0, 0.9, 0.9, -0.6, 1.3]), np.array([0.0, 0.0, 0.9, 0.6, 0.0])
+    assert _Scene._within(scene, x, y, 0).tolist() == [True, True, False, True, False]
