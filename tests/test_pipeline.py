@@ -6,8 +6,7 @@ import pytest
 from modt.energy.ledger import Ledger
 from modt.pipeline import STAGES, Pipeline
 from modt.types import NONE, Budget, Frame, Tracks
-
-from .results import STATES, proposals
+from tests.results import STATES, proposals
 
 
 class Selected:

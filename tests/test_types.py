@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.types import N_CLASSES, NONE, Proposals, Tracks
-
-from .results import proposals
+from tests.results import proposals
 
 
 @given(st.lists(st.integers(1, 9), max_size=6))

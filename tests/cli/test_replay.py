@@ -12,13 +12,13 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.evaluation.summary import summarise
+from modt.reporting.summary import summarise
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
-from modt.sources.synthetic.stream import SyntheticStream
+from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import CLASS_NAMES
+from tests.sources import layouts
 
-from ..sources import layouts
 from .commands import begin, environment, modt
 
 MODES = ("conventional", "efficient", "accurate")

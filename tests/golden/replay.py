@@ -15,7 +15,7 @@ from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.sinks.tracks import frame_record
-from modt.sources.synthetic.stream import SyntheticStream
+from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import CLASS_NAMES
 
 FOLDER = Path(__file__).parent

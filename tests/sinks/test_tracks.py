@@ -6,11 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.sinks.numerals import beside, probabilities, text, thousandths
+from modt.sinks.fast_json import beside, probabilities, text, thousandths
 from modt.sinks.records import line, read_records
 from modt.sinks.tracks import SCHEMA, TrackLines, frame_line, frame_record
-
-from ..results import CAR, result
+from tests.results import CAR, result
 
 
 def test_a_record_holds_what_the_format_says():

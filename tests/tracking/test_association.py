@@ -6,13 +6,12 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import linear_sum_assignment
 
 from modt.config import TrackingConfig
+from modt.geometry.kdop import WAYS
+from modt.observations import sight
 from modt.tracking.association import FORBIDDEN, PaperAssociation, assign, assign_all
-from modt.tracking.outlines import WAYS
-from modt.tracking.sightings import sight
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
-
-from .tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import box, frame_of
 
 EYE = np.eye(4)
 

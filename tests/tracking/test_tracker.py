@@ -7,8 +7,7 @@ from modt.config import TrackingConfig
 from modt.tracking.states import ACCURATE, EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, Proposals
-
-from .tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import box, frame_of
 
 ASSOCIATIONS = ["robust", "paper"]
 EYE = np.eye(4)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classification.belief import FLOOR, expect, normal, sane
+from modt.classification.posterior import FLOOR, expect, normal, sane
 from modt.classification.prior import Frequency, Prior, shares
 from modt.config import FusionConfig
 from modt.geometry import wrap

@@ -7,24 +7,24 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from modt.classification.costed import CostedClassifier
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.instrumentation import CostedClassifier
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, prior_of
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, OdometryConfig, ProfileConfig
-from modt.energy.counted import CountedClassifier
+from modt.energy.instrumentation import CountedClassifier
 from modt.energy.ledger import StageLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.pipeline import Fusion, Pipeline
 from modt.profile import DEFAULT
 from modt.segmentation.segmenter import Segmenter
-from modt.sources.odometry import ListedPoses, NoOdometry, Odometry, OwnOdometry
 from modt.sources.pose_socket import PoseSocket, open_socket
+from modt.sources.pose_source import ListedPoses, NoOdometry, Odometry, OwnOdometry
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
-from modt.sources.synthetic.stream import SyntheticStream
+from modt.sources.synthetic_stream import SyntheticStream
 from modt.tracking.states import ACCURATE, EFFICIENT, StateMachine
 from modt.tracking.tracker import Tracker
 from modt.types import UNLIMITED, Budget

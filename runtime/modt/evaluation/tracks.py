@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.tracking.overlap import birds_eye_iou, iou_3d
+from modt.geometry.overlap import birds_eye_iou, iou_3d
 from modt.types import Float64, Int
 
 THRESHOLD = 0.25

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.sinks.numerals import LIMIT, Words, beside, probabilities, table, text, thousandths, whole, words
+from modt.sinks.fast_json import LIMIT, Words, beside, probabilities, table, text, thousandths, whole, words
 from modt.sinks.output import LineFile
 from modt.sinks.records import line
 from modt.types import CLASS_NAMES, NONE, FrameResult

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from modt.config import TrackingConfig
-from modt.tracking.followed import Followed
-from modt.tracking.overlap import iou_3d
-from modt.tracking.sightings import Sightings
+from modt.geometry.overlap import iou_3d
+from modt.observations import Sightings
+from modt.tracking.track_table import Followed
 from modt.types import NONE, Float64, Int
 
 FORBIDDEN = 1e6

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from modt.observations import Sightings
+from modt.odometry.deskew import Placing
 from modt.tracking.association import Matches
-from modt.tracking.followed import Followed
-from modt.tracking.sightings import Sightings
-from modt.tracking.turning import Placing
+from modt.tracking.track_table import Followed
 from modt.types import Proposals
 
 

@@ -6,22 +6,23 @@ import numpy as np
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, se3
-from modt.tracking import kalman, landmarks
+from modt.geometry.kdop import WAYS
+from modt.observations import Sightings, sight
+from modt.odometry import landmarks
+from modt.odometry.deskew import Motion, Placing, Skew
+from modt.odometry.registration import Registration
+from modt.tracking import kalman
 from modt.tracking.association import Association, Matches, PaperAssociation
-from modt.tracking.egomotion import Registration
-from modt.tracking.followed import Followed
-from modt.tracking.joining import KnownJoining
+from modt.tracking.background_map import BackgroundMemory, NoMemory
+from modt.tracking.displacement import AGREE_M
+from modt.tracking.fragments import outgrown, reunite
 from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
-from modt.tracking.kinship import outgrown, reunite
-from modt.tracking.memory import BackgroundMemory, NoMemory
-from modt.tracking.outlines import WAYS
-from modt.tracking.parting import ExpectedParting
+from modt.tracking.kdop_association import RobustAssociation
+from modt.tracking.merging import KnownJoining
 from modt.tracking.regrouping import Found, Regrouping
-from modt.tracking.robust import RobustAssociation
-from modt.tracking.shifts import AGREE_M
-from modt.tracking.sightings import Sightings, sight
+from modt.tracking.splitting import ExpectedParting
 from modt.tracking.states import Happening, StateMachine
-from modt.tracking.turning import Motion, Placing, Skew
+from modt.tracking.track_table import Followed
 from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
 
 UNKNOWN_HEADING_RAD = np.pi
