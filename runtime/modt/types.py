@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
-from enum import IntEnum
 from functools import cache
 from operator import attrgetter
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from modt.classes import N_CLASSES
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -26,19 +27,6 @@ NONE = -1
 """Index of nothing: a track without a proposal, a proposal without a track."""
 UNRECORDED = -1.0
 """Reflectance of a return of which none was recorded; any below 0 is none."""
-
-
-class ObjectClass(IntEnum):
-    """What a proposal can be; the value is its index in every posterior."""
-
-    BACKGROUND = 0
-    CAR = 1
-    PEDESTRIAN = 2
-    CYCLIST = 3
-
-
-CLASS_NAMES = tuple(c.name.lower() for c in ObjectClass)
-N_CLASSES = len(ObjectClass)
 N_REFLECTANCE = 5
 """Numbers that tell of the reflectance of a proposal."""
 
@@ -158,7 +146,7 @@ class Tracks:
     Columns of the fusion:
         prior: (M, 4) P(class | box) of the last box seen, uniform before any.
         posterior: (M, 4) P(class | views, box), the prior before any view.
-        fixed: the class is settled and not asked for again.
+        final: the class is final: it is not asked for again unless the view improves.
         views: key observations fused.
         key_prior, key_posterior: (M, 4) prior and posterior at the last key observation.
         key_points: points of it, 0 before any.
@@ -180,7 +168,7 @@ class Tracks:
     missed: Int
     prior: Float64
     posterior: Float64
-    fixed: Bool
+    final: Bool
     views: Int
     key_prior: Float64
     key_posterior: Float64
@@ -194,15 +182,15 @@ class Tracks:
         return len(self.id)
 
     @property
-    def classified(self) -> Bool:
-        """(M,) whether it was ever classified."""
-        classified: Bool = self.key_points > 0
-        return classified
+    def viewed(self) -> Bool:
+        """(M,) whether the network ever saw it."""
+        viewed: Bool = self.key_points > 0
+        return viewed
 
     @property
     def object_class(self) -> Int:
         """(M,) class: the one settled, whatever the box of the moment says; else the likeliest."""
-        settled = (self.fixed & self.classified)[:, None]
+        settled = (self.final & self.viewed)[:, None]
         object_class: Int = np.where(settled, self.key_posterior, self.posterior).argmax(axis=1)
         return object_class
 
@@ -232,7 +220,7 @@ class Tracks:
             missed=count(),
             prior=uniform(),
             posterior=uniform(),
-            fixed=np.zeros(m, np.bool_),
+            final=np.zeros(m, np.bool_),
             views=count(),
             key_prior=uniform(),
             key_posterior=uniform(),
@@ -313,13 +301,13 @@ class FrameResult:
         proposals: its segments.
         tracks: a copy of the tracks alive after the frame.
         state_names: name of each value of tracks.state.
-        classified: proposals classified in this frame.
-        deferred: proposals that asked for a class and must wait for the next frame's budget.
+        n_classified: proposals classified in this frame.
+        n_deferred: tracks whose request for a class waits for the next frame's budget.
     """
 
     frame: Frame
     proposals: Proposals
     tracks: Tracks
     state_names: tuple[str, ...]
-    classified: int
-    deferred: int
+    n_classified: int
+    n_deferred: int

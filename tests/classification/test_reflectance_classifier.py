@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from modt.classes import ObjectClass
 from modt.classification.box_classifier import METADATA as BOX_PRIOR
 from modt.classification.box_classifier import N_FEATURES, KnownBoxes, described
 from modt.classification.box_classifier import encode as encode_boxes
@@ -19,7 +20,7 @@ from modt.classification.prior import BoxPrior, prior_of
 from modt.classification.reflectance_classifier import METADATA, NoEvidence, Reflectance, encode, evidence_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
-from modt.types import N_REFLECTANCE, ObjectClass, Proposals
+from modt.types import N_REFLECTANCE, Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)

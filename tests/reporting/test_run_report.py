@@ -50,8 +50,8 @@ def track(id_, proposal, named):
         "state": "tracked",
         "class": "car" if named else "background",
         "posterior": [0.1, 0.7, 0.1, 0.1] if named else [0.25] * 4,
-        "classified": named,
-        "fixed": named,
+        "viewed": named,
+        "final": named,
         "proposal": proposal,
         "points": 40,
         "age": 1,
@@ -104,8 +104,8 @@ def write_run(path, *, windows=True, mode="efficient", frames=20, energy=None):
     with (path / "tracks.jsonl").open("w") as out:
         for k in range(frames):
             tracks = [track(id_, id_, named=id_ < 15) for id_ in range(20)]
-            record = {"frame": k, "proposals": 20, "classified": (k * 7) % 5, "deferred": 0, "tracks": tracks}
-            out.write(json.dumps({"schema": "modt.frame/2", **record}) + "\n")
+            record = {"frame": k, "proposals": 20, "classifications": (k * 7) % 5, "deferred": 0, "tracks": tracks}
+            out.write(json.dumps({"schema": "modt.frame/3", **record}) + "\n")
     (path / "summary.json").write_text("{}")
     return path
 

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, transform, transform_boxes
 from modt.simulation.scenes import SCENES
 from modt.simulation.sensors import SENSORS
 from modt.simulation.simulator import SLICES, late_of
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.types import NONE, ObjectClass
+from modt.types import NONE
 
 
 @pytest.fixture(scope="module")

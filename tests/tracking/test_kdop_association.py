@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import corners
 from modt.geometry.kdop import AXES, WAYS
@@ -12,7 +13,7 @@ from modt.tracking.fragments import _fits
 from modt.tracking.kdop_association import SOFT_M, compare
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
-from modt.types import NONE, ObjectClass
+from modt.types import NONE
 from tests.tracking.tracking_scenes import box, frame_of
 
 EYE = np.eye(4)
@@ -26,7 +27,7 @@ def tracker(regroupings=None, **options):
 def classify(tracker, posterior):
     """Settle whatever asks."""
     rows = np.flatnonzero(tracker.asking())
-    tracker.tracks.posterior[rows], tracker.tracks.fixed[rows] = posterior, True
+    tracker.tracks.posterior[rows], tracker.tracks.final[rows] = posterior, True
     tracker.settle(rows, np.ones(len(rows), np.bool_))
     return len(rows)
 
@@ -208,7 +209,7 @@ def test_what_a_view_said_since_holds_away_from_the_place_too():
     t.tracks.key_points[parted] = 40  # as fusion notes it, where mode accurate looks again
     assert run(t, steps[2:], first=6) == 0
     assert not t.tracks.inherited[t.tracks.id.argmax()]
-    assert t.tracks.fixed[t.tracks.id.argmax()]
+    assert t.tracks.final[t.tracks.id.argmax()]
 
 
 def test_memory_forgets_the_oldest():

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.classes import N_CLASSES, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import boxes_about, corners, inverse, rotation_zyx, se3, transform_boxes, upright_box
 from modt.geometry.kdop import WAYS
@@ -15,7 +16,7 @@ from modt.segmentation.reflectance_statistics import brightness
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.tracking.unions import Unions, united_proposals, united_sightings
-from modt.types import N_CLASSES, NONE, ObjectClass
+from modt.types import NONE
 from tests.tracking.tracking_scenes import box, frame_of
 
 CAR = box(10, 3, 4.2, 1.8, 1.5)
@@ -36,7 +37,7 @@ def driving(i):
 def settle(tracker, *kinds, fixed=True):
     """Tell the tracks, in the order of their birth, what they are."""
     t = tracker.tracks
-    t.fixed[:], t.key_points[:] = fixed, 50
+    t.final[:], t.key_points[:] = fixed, 50
     t.posterior[:] = t.key_posterior[:] = np.eye(N_CLASSES)[list(kinds)]
 
 

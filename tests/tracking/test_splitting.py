@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.classes import N_CLASSES, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt.tracking.carving import carved
@@ -15,7 +16,7 @@ from modt.tracking.splitting import AT_MOST, _Scene, _walks
 from modt.tracking.states import EFFICIENT
 from modt.tracking.track_table import Followed
 from modt.tracking.tracker import Tracker
-from modt.types import N_CLASSES, NONE, ObjectClass
+from modt.types import NONE
 from tests.odometry.test_deskew import skewed
 from tests.tracking.tracking_scenes import box, frame_of
 

@@ -181,7 +181,7 @@ def test_background_that_went_away_is_as_agile_as_anything():
         tracker = Tracker(TrackingConfig(), EFFICIENT)
         for i in range(12):
             tracks = tracker.follow(*frame_of([box(12 + step_m * i, 3, 0.6, 0.6, 1.7)], i, EYE))
-            tracks.posterior[:], tracks.fixed[:] = np.eye(4)[0], True
+            tracks.posterior[:], tracks.final[:] = np.eye(4)[0], True
         before = tracks.P[0, 3, 3]
         grown.append(tracker.follow(*frame_of([], 12, EYE)).P[0, 3, 3] - before)
     assert grown[1] == pytest.approx(np.square(0.1 * TrackingConfig().acceleration_sigma_mps2))

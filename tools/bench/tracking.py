@@ -99,7 +99,7 @@ def registration_ms(scene: list[tuple[Frame, Proposals]]) -> float:
 def classify(tracker: Tracker) -> None:
     """Settle whatever asks: it is background."""
     rows = np.flatnonzero(tracker.asking())
-    tracker.tracks.posterior[rows], tracker.tracks.fixed[rows] = [1, 0, 0, 0], True
+    tracker.tracks.posterior[rows], tracker.tracks.final[rows] = [1, 0, 0, 0], True
     tracker.settle(rows, np.ones(len(rows), np.bool_))
 
 

@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from modt import profile
+from modt.classes import CLASS_NAMES
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.types import CLASS_NAMES
 from tools.train.labelled_scans import FOOT_M, Scan, object_scans
 from tools.train.synthetic_scans import driven
 

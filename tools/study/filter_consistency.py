@@ -20,10 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from modt.classes import CLASS_NAMES
 from modt.geometry import wrap
 from modt.simulation.world import MOVING_MPS
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.types import CLASS_NAMES, Float64
+from modt.types import Float64
 from tools.study.truth_replay import Seen, add_drives, replay
 
 SETTLED = 6

@@ -18,11 +18,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES, ObjectClass
 from modt.cli.assemble import MODES
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.tracking.background_map import NoMemory
 from modt.tracking.track_table import Followed
-from modt.types import CLASS_NAMES, NONE, Int, ObjectClass
+from modt.types import NONE, Int
 from tools.study.truth_replay import Seen, add_drives, replay
 
 PURE = 0.5
@@ -64,7 +65,7 @@ class Tally:
             object_ = class_ != ObjectClass.BACKGROUND
             new, inherits = table.age[rows] == 1, table.inherited[rows]
             self.proposals += len(s.result.proposals)
-            self.calls += s.result.classified
+            self.calls += s.result.n_classified
             self.born += int(new.sum())
             self.objects_born += int((new & object_).sum())
             self.inherited += int((new & inherits).sum())

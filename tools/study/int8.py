@@ -17,10 +17,11 @@ from pathlib import Path
 import numpy as np
 from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
 
+from modt.classes import N_CLASSES
 from modt.classification.crops import Crops, canonical
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
-from modt.types import N_CLASSES, Float32, Float64, Int
+from modt.types import Float32, Float64, Int
 from tools.train.dataset import SHIPPED, Dataset, load
 from tools.train.scores import average_precision
 

@@ -175,7 +175,7 @@ class Player:
     def asking(self) -> Bool:
         """(M,) tracks seen often enough, whose class is not settled."""
         t = self._tracks
-        asks: Bool = (t.proposal != NONE) & ~t.fixed & (t.hits >= self._ask_from)
+        asks: Bool = (t.proposal != NONE) & ~t.final & (t.hits >= self._ask_from)
         return asks
 
     def settle(self, rows: Int, certain: Bool) -> None:

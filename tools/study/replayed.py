@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.prior import Prior
 from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import NullLedger
 from modt.pipeline import Fusion, Pipeline
-from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Frame, Int, Proposals, Tracks
+from modt.types import Bool, Float64, Frame, Int, Proposals, Tracks
 from tools.study.recording import Player, Recording
 from tools.train.scores import average_precision
 
@@ -38,8 +39,8 @@ class Counting:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """As the fusion does."""
-        new, unfused = ~tracks.classified[rows], tracks.views[rows] == 0
-        reason = np.select([new, tracks.fixed[rows], unfused], [0, 3, 1], 2)
+        new, unfused = ~tracks.viewed[rows], tracks.views[rows] == 0
+        reason = np.select([new, tracks.final[rows], unfused], [0, 3, 1], 2)
         for name, n in zip(CALLS, np.bincount(reason, minlength=len(CALLS)).tolist(), strict=True):
             self.calls[name] += n
         return self.fusion.fuse(tracks, proposals, rows, likelihood)

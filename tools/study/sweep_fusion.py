@@ -34,6 +34,7 @@ from typing import Any
 import numpy as np
 
 from modt import profile
+from modt.classes import CLASS_NAMES
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, prior_of
@@ -42,7 +43,7 @@ from modt.pipeline import Fusion
 from modt.reporting import page, svg
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.types import CLASS_NAMES, Frame
+from modt.types import Frame
 from tools.study.recording import Recording, record
 from tools.study.replayed import Outcome, replay
 from tools.train.labelled_scans import TEST_DRIVE, Scan, raw_scans

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.random import Generator
 
-from modt.types import N_CLASSES, Float64, Int
+from modt.classes import N_CLASSES
+from modt.types import Float64, Int
 from tools.train.dataset import Dataset
 
 SHARE = np.array([0.46, 0.24, 0.16, 0.14])

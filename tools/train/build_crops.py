@@ -23,11 +23,12 @@ import numpy as np
 
 import modt
 from modt import profile
+from modt.classes import ObjectClass
 from modt.classification.crops import gather
 from modt.config import ProfileConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.types import N_REFLECTANCE, Bool, Float64, Int, ObjectClass, Proposals
+from modt.types import N_REFLECTANCE, Bool, Float64, Int, Proposals
 from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, UNLABELLED
 from tools.train.labelled_scans import Scan, argoverse_scans, object_scans, raw_scans, semantic_scans
 from tools.train.paste import library, pasted

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from modt.classes import N_CLASSES
 from modt.classification.crops import Crops
-from modt.types import N_CLASSES, NONE, Bool, Float64, Int
+from modt.types import NONE, Bool, Float64, Int
 
 SHIPPED, CLUSTERED, PASTED, SYNTHETIC, UNLABELLED = range(5)
 """Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are

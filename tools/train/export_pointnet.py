@@ -21,8 +21,8 @@ from typing import Any
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
+from modt.classes import CLASS_NAMES
 from modt.classification import box_classifier, reflectance_classifier
-from modt.types import CLASS_NAMES
 from tools.train.weights import Layer, load_layers
 
 N_SHARED = 3

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.types import N_CLASSES, Bool, Float64, Int
+from modt.classes import N_CLASSES
+from modt.types import Bool, Float64, Int
 from tools.train.dataset import Dataset, folds
 from tools.train.temperature import Calibration, fit
 

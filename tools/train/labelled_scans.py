@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.geometry import Camera, FieldOfView, inverse, se3, transform
-from modt.types import Bool, Float32, Float64, Int, ObjectClass
+from modt.types import Bool, Float32, Float64, Int
 
 CLASS_OF = {
     "Car": ObjectClass.CAR,

@@ -10,8 +10,9 @@ import numpy as np
 import torch
 from torch import nn
 
+from modt.classes import N_CLASSES
 from modt.classification.mlp import Layers
-from modt.types import N_CLASSES, Float64, Int
+from modt.types import Float64, Int
 
 HIDDEN = (32, 32)
 

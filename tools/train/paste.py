@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 
+from modt.classes import ObjectClass
 from modt.geometry import FieldOfView
-from modt.types import Float32, Float64, Int, ObjectClass
+from modt.types import Float32, Float64, Int
 from tools.train.augment import Beams
 from tools.train.labelled_scans import PAD_M, Scan
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.types import CLASS_NAMES, N_CLASSES, Float64, Int
+from modt.classes import CLASS_NAMES, N_CLASSES
+from modt.types import Float64, Int
 
 
 def average_precision(probability: Float64, label: Int, truth: Int) -> dict[str, float]:

@@ -14,7 +14,8 @@ import torch
 from numpy.random import Generator
 from torch import Tensor, nn
 
-from modt.types import N_CLASSES, Float64, Int
+from modt.classes import N_CLASSES
+from modt.types import Float64, Int
 
 SMOOTHING = 0.02
 """Of a label, spread evenly over the classes."""

@@ -9,7 +9,8 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
-from modt.types import N_CLASSES, Float32, Float64, Int
+from modt.classes import N_CLASSES
+from modt.types import Float32, Float64, Int
 
 
 @dataclass(frozen=True)

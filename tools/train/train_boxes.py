@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.mlp import Layers, logits
-from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
+from modt.types import Bool, Float64, Int
 from tools.train.augment import Beams, augment, limit
 from tools.train.batches import draw, odds
 from tools.train.box_features import all_described, described

@@ -23,9 +23,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.crops import Crops, canonical
 from modt.classification.mlp import logits as layer_logits
-from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
+from modt.types import Bool, Float64, Int
 from tools.train import train_boxes, train_reflectance
 from tools.train.augment import Beams, augment, limit
 from tools.train.batches import BATCH, draw, odds

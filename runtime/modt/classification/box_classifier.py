@@ -11,10 +11,11 @@ from typing import Protocol
 
 import numpy as np
 
+from modt.classes import N_CLASSES
 from modt.classification.crops import height_of
 from modt.classification.mlp import Layers, as_lists, logits, of_lists, part_of
 from modt.config import SensorConfig
-from modt.types import N_CLASSES, Float64, Int, Proposals
+from modt.types import Float64, Int, Proposals
 
 METADATA = "box_prior"
 """Key of an ONNX model's metadata under which what it knows of boxes is found."""

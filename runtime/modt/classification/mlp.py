@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from modt.types import N_CLASSES, Float64
+from modt.classes import N_CLASSES
+from modt.types import Float64
 
 Layers = Sequence[tuple[Float64, Float64]]
 """(in, out) weight and (out,) bias of each."""

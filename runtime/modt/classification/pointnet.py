@@ -12,13 +12,14 @@ from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 from scipy.special import softmax
 
 from modt import assets
+from modt.classes import N_CLASSES
 from modt.classification.box_classifier import N_FEATURES, Boxes, boxes_of, described
 from modt.classification.crops import canonical, gather, height_of
 from modt.classification.prior import share_of
 from modt.classification.reflectance_classifier import Evidence, evidence_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
-from modt.types import N_CLASSES, Float32, Float64, Int, Proposals
+from modt.types import Float32, Float64, Int, Proposals
 
 _UNUSABLE = (
     ort_errors.Fail,

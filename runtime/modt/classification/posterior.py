@@ -29,8 +29,8 @@ def expect(tracks: Tracks, proposals: Proposals, prior: Prior, weight: float, sl
     """
     rows = np.flatnonzero(tracks.proposal != NONE)
     tracks.prior[rows] = prior.of(proposals)[tracks.proposal[rows]]
-    classified = tracks.classified[rows]
-    unknown = rows[~classified & ~tracks.fixed[rows]]
+    classified = tracks.viewed[rows]
+    unknown = rows[~classified & ~tracks.final[rows]]
     tracks.posterior[unknown] = tracks.prior[unknown]
     known = rows[classified]
     now, then = (np.maximum(said.take(known, axis=0), FLOOR) for said in (tracks.prior, tracks.key_prior))

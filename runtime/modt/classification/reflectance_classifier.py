@@ -14,9 +14,10 @@ from typing import Protocol
 
 import numpy as np
 
+from modt.classes import N_CLASSES
 from modt.classification.mlp import Layers, as_lists, logits, of_lists, part_of
 from modt.config import SensorConfig
-from modt.types import N_CLASSES, N_REFLECTANCE, Float64
+from modt.types import N_REFLECTANCE, Float64
 
 log = logging.getLogger(__name__)
 

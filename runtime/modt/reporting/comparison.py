@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.energy.ledger import Ledger
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
-from modt.types import NONE, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, ObjectClass, Proposals
+from modt.types import NONE, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
 
 COUNTS = ("proposals", "foreground", "tracks", "classified_tracks", "classified", "refound", "points", "calls")
 """Columns of a run's counts, as in energy.savings.Counts."""
@@ -127,7 +128,7 @@ class Contender:
                 int(foreground.sum()),
                 new,
                 first,
-                result.classified,
+                result.n_classified,
                 refound,
                 row.get("points", 0),
                 row.get("calls", 0),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from modt import profile
+from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
 from modt.energy.attribution import ByCoefficients, ByCpuTime, usable
 from modt.energy.instrumentation import padded_points
@@ -25,7 +26,6 @@ from modt.reporting.quantity import figure
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
-from modt.types import CLASS_NAMES, ObjectClass
 
 SCHEMA = "modt.report/1"
 BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
@@ -50,13 +50,13 @@ class Tally:
         """A line of tracks.jsonl."""
         seen = [track for track in record["tracks"] if track["proposal"] is not None]
         self.proposals.append(record["proposals"])
-        self.classified.append(record["classified"])
+        self.classified.append(record["classifications"])
         self.deferred.append(record["deferred"])
         counts = np.array([track["points"] for track in seen], np.int64)
         self.points_of_all.append(padded_points(counts, self.max_points, self.batch))
         self.foreground += sum(track["class"] != BACKGROUND for track in seen)
         self.lives.update(track["id"] for track in seen)
-        self.classified_ids.update(track["id"] for track in record["tracks"] if track["classified"])
+        self.classified_ids.update(track["id"] for track in record["tracks"] if track["viewed"])
 
 
 def run_tree(run: Path) -> dict[str, Any]:

@@ -7,13 +7,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from modt.classes import CLASS_NAMES, ObjectClass
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.pipeline import CLASSIFICATION, SEGMENTATION
 from modt.reporting.histogram import Spread
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
-from modt.types import CLASS_NAMES, NONE, FrameResult, ObjectClass
+from modt.types import NONE, FrameResult
 
 SCHEMA = "modt.summary/1"
 LEDGER_SCHEMA = "modt.ledger/1"
@@ -60,13 +61,13 @@ class Summary:
 
     def add_frame(self, record: dict[str, Any]) -> None:
         """A line of tracks.jsonl."""
-        self._add_counts(record["proposals"], record["classified"], record["deferred"])
+        self._add_counts(record["proposals"], record["classifications"], record["deferred"])
         self.lives.add((t["id"], t["proposal"] is not None, t["class"] != BACKGROUND) for t in record["tracks"])
 
     def add_result(self, result: FrameResult) -> None:
         """What add_frame reads in the line of this result."""
         tracks = result.tracks
-        self._add_counts(len(result.proposals), result.classified, result.deferred)
+        self._add_counts(len(result.proposals), result.n_classified, result.n_deferred)
         seen, foreground = tracks.proposal != NONE, tracks.object_class != ObjectClass.BACKGROUND
         self.lives.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.types import ObjectClass
+from modt.classes import ObjectClass
 
 
 @dataclass(frozen=True, slots=True)

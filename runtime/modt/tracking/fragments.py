@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.geometry.kdop import WAYS, covered, girth, lengths, touching
 from modt.observations import Sightings
 from modt.tracking.association import Matches
 from modt.tracking.kalman import HEADING, SPEED
 from modt.tracking.track_table import Followed
-from modt.types import NONE, Bool, Float64, Int, ObjectClass
+from modt.types import NONE, Bool, Float64, Int
 
 ROOM_M = np.array([[6.0, 2.7], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
 """Greatest length and width of one object of each class; what counts as background may be a car not known as one."""
@@ -116,7 +117,7 @@ def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, o
 def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
     """(k,) whether the elder may take the part that the rival (NONE: nobody) has: they may be one object."""
     kind, other = tracks.kind[elder], tracks.kind[rival]
-    alike = ~tracks.fixed[rival] | (kind == other) | (BULKY[kind] & BULKY[other])
+    alike = ~tracks.final[rival] | (kind == other) | (BULKY[kind] & BULKY[other])
     (vx, vy), (wx, wy) = (_velocity(tracks.x.take(rows, axis=0)) for rows in (elder, rival))
     variance = tracks.P[:, SPEED, SPEED]
     doubt = SIGMAS * np.sqrt(variance[elder] + variance[rival])
@@ -132,7 +133,7 @@ def _velocity(x: Float64) -> tuple[Float64, Float64]:
 
 def _gives_way(tracks: Followed, elder: Int, rival: Int) -> Bool:
     """(k,) whether a part that may be a person goes to the elder: nobody settled has it, or the elder is a car."""
-    car = tracks.fixed[elder] & (tracks.kind[elder] == ObjectClass.CAR.value)
+    car = tracks.final[elder] & (tracks.kind[elder] == ObjectClass.CAR.value)
     way: Bool = (rival == NONE) | (tracks.hits[rival] < SETTLED) | car
     return way
 

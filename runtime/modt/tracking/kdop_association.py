@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kdop import AXES, WAYS, girth, lengths, touching
 from modt.observations import Sightings
@@ -11,7 +12,7 @@ from modt.tracking import kalman
 from modt.tracking.association import Matches, assign
 from modt.tracking.displacement import least, measured, shift_between
 from modt.tracking.track_table import Followed
-from modt.types import Bool, Float64, Int, ObjectClass
+from modt.types import Bool, Float64, Int
 
 SOFT_M = 0.3
 """Lengths are compared with this added: a difference of a few returns says nothing."""
@@ -79,7 +80,7 @@ class RobustAssociation:
         """(K,) pairs in which an object would become a part of something larger: it waits until they part again."""
         grown = lengths(sightings.outline.take(columns, axis=1)).max(axis=0)
         known = lengths(tracks.hull.take(rows, axis=0).T).max(axis=0)
-        scenery = tracks.fixed[rows] & (tracks.kind[rows] == ObjectClass.BACKGROUND.value)
+        scenery = tracks.final[rows] & (tracks.kind[rows] == ObjectClass.BACKGROUND.value)
         swallowed: Bool = ~scenery & (grown > GROWTH * known + 1.0)
         return swallowed
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.geometry import yaw_of
 from modt.geometry.kdop import WAYS, covered, lengths, touching
 from modt.odometry.deskew import Placing
@@ -22,7 +23,7 @@ from modt.tracking.fragments import SETTLED
 from modt.tracking.regrouping import Found
 from modt.tracking.track_table import Followed
 from modt.tracking.unions import Unions, united_matches, united_proposals, united_sightings
-from modt.types import NONE, Bool, Int, ObjectClass
+from modt.types import NONE, Bool, Int
 
 CAR = ObjectClass.CAR.value
 WITHIN = 0.7
@@ -76,13 +77,13 @@ def _pieces(tracks: Followed, found: Found) -> tuple[Int, Int, Int]:
 
 def _settled_cars(tracks: Followed, rows: Int) -> Bool:
     """(k,) which rows are."""
-    cars: Bool = tracks.fixed[rows] & (tracks.kind[rows] == CAR)
+    cars: Bool = tracks.final[rows] & (tracks.kind[rows] == CAR)
     return cars
 
 
 def _free(tracks: Followed, rows: Int, rival: Int) -> Bool:
     """(k,) whether cars may take what the rivals (NONE: nobody) have."""
-    person = tracks.fixed[rival] & (tracks.kind[rival] > CAR)
+    person = tracks.final[rival] & (tracks.kind[rival] > CAR)
     elder = _settled_cars(tracks, rival) & (rival < rows)
     free: Bool = (rival == NONE) | ~(person | elder)
     return free

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.geometry import transform, yaw_of
 from modt.geometry.kdop import WAYS, covered, lengths, touching
 from modt.observations import Sightings, sight
@@ -27,7 +28,7 @@ from modt.tracking.kalman import SPEED, X, Y
 from modt.tracking.kdop_association import carried
 from modt.tracking.regrouping import Found
 from modt.tracking.track_table import Followed
-from modt.types import NONE, Bool, Float64, Int, ObjectClass
+from modt.types import NONE, Bool, Float64, Int
 
 AT_MOST = 5
 """Times that a track takes before it must have something of its own again."""

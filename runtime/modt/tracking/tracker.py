@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import N_CLASSES, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import inverse, se3
 from modt.geometry.kdop import WAYS
@@ -23,7 +24,7 @@ from modt.tracking.regrouping import Found, Regrouping
 from modt.tracking.splitting import ExpectedParting
 from modt.tracking.states import Happening, StateMachine
 from modt.tracking.track_table import Followed
-from modt.types import N_CLASSES, NONE, Bool, Float64, Frame, Int, ObjectClass, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, Frame, Int, Proposals, Tracks
 
 UNKNOWN_HEADING_RAD = np.pi
 """Deviation of the heading of a new track: it says nothing."""
@@ -174,7 +175,7 @@ class Tracker:
         self._stamp_s = stamp_s
         t = self._tracks
         t.kind = t.object_class
-        settled = t.fixed & ((t.kind != ObjectClass.BACKGROUND.value) | (apart(t.x, t.home) < STILL_M))
+        settled = t.final & ((t.kind != ObjectClass.BACKGROUND.value) | (apart(t.x, t.home) < STILL_M))
         agility = np.where(settled, AGILITY[t.kind], 1.0)  # background that went away was none
         acceleration = agility * self.config.acceleration_sigma_mps2
         turn = agility * self.config.turn_sigma_radps
@@ -301,13 +302,13 @@ class Tracker:
     def _doubt(self) -> None:
         """A class inherited from a place does not hold away from it."""
         t = self._tracks
-        t.inherited &= ~t.classified  # what a view said holds anywhere
+        t.inherited &= ~t.viewed  # what a view said holds anywhere
         rows = (t.inherited & (t.proposal != NONE)).nonzero()[0]
         rows = rows[apart(t.x.take(rows, axis=0), t.home.take(rows, axis=0)) > STILL_M]
         if not len(rows):
             return
         t.state[rows] = self.machine.meet(t.state[rows], Happening.DOUBTED)
-        t.inherited[rows] = t.fixed[rows] = False
+        t.inherited[rows] = t.final[rows] = False
         t.posterior[rows] = 1.0 / N_CLASSES
 
     def _renew(self, matches: Matches, sightings: Sightings) -> None:
@@ -326,7 +327,7 @@ class Tracker:
         t.state[new] = self.machine.meet(np.full(len(born), self.machine.proposal), happening)
         heir = new[known]
         t.state[heir] = self.machine.meet(t.state[heir], Happening.INHERITS_CLASS)
-        t.inherited[heir] = t.fixed[heir] = True
+        t.inherited[heir] = t.final[heir] = True
         t.posterior[heir] = BACKGROUND
         place = self.association.birthplace(sightings)[born]
         t.x[new, :2] = t.home[new] = place  # speed and heading begin at zero
@@ -354,7 +355,7 @@ class Tracker:
         """Rows that are background, for certain, and never moved."""
         t = self._tracks
         plain = t.kind == ObjectClass.BACKGROUND.value  # arrays are slow to compare with an enumeration itself
-        rows: Int = (t.fixed & plain & (apart(t.x, t.home) < STILL_M)).nonzero()[0]
+        rows: Int = (t.final & plain & (apart(t.x, t.home) < STILL_M)).nonzero()[0]
         return rows
 
 

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 from modt import profile
+from modt.classes import ObjectClass
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.prior import Frequency, Prior
 from modt.config import FusionConfig
 from modt.geometry import FieldOfView
 from modt.pipeline import Fusion
-from modt.types import NONE, ObjectClass, Proposals
+from modt.types import NONE, Proposals
 from tests.classification.scenes import blobs
 from tools.study import sweep_fusion
 from tools.study.recording import Moment, Recording, owners, record

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.classes import ObjectClass
 from modt.classification.crops import Crops, gather
 from modt.geometry import FieldOfView
-from modt.types import N_REFLECTANCE, NONE, ObjectClass, Proposals
+from modt.types import N_REFLECTANCE, NONE, Proposals
 from tests.classification.scenes import blobs
 from tests.tools.train.datasets import data_of
 from tools.train.augment import Beams, augment, limit
