@@ -69,7 +69,7 @@ class Bounds:
         turn_m = np.square(np.abs(x) + np.abs(y)) / range_m
         least = groups.least(np.stack([direction, range_m, low, (low + ground) / range_m]))
         most = groups.most(np.stack([direction, range_m, high, (high + ground) / range_m]))
-        return cls(least, most, turn_m[groups.offsets[:-1]])
+        return cls(least, most, turn_m[groups.offsets[:-1]].astype(np.float32, copy=False))
 
     def take(self, rows: Int) -> Self:
         """The groups given."""

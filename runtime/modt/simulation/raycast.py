@@ -256,7 +256,7 @@ class RayCaster:
         """The window of each piece that lies within the sensor's reach and field of view."""
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], np.float32)
         arm = (signs * pieces.half[:, None]) @ pieces.rotation.transpose(0, 2, 1)
-        corner = pieces.centre[:, None] + arm
+        corner = (pieces.centre[:, None] + arm).astype(np.float32, copy=False)
         far = np.hypot(corner[..., 0], corner[..., 1]).max(axis=1)
         near = self._nearest(pieces)
         azimuth = np.arctan2(pieces.centre[:, 1], pieces.centre[:, 0]).astype(np.float64)

@@ -27,7 +27,7 @@ def yard(rng: np.random.Generator, seconds: float, height_m: float) -> World:
         line = _stroll(rng, (half[0] - 2, half[1] - 2))
         builder.cyclist(Path.steady(line, 0.0, 2.5, seconds), 2.5)
     for _ in range(int(rng.integers(2, 6))):
-        x, y = rng.uniform(-half[0] + 3, half[0] - 3), rng.choice([-1, 1]) * (half[1] - 3)
+        x, y = rng.uniform(-half[0] + 3, half[0] - 3), float(rng.choice([-1, 1])) * (half[1] - 3)
         kind = kinds.CAR if rng.random() < 0.7 else kinds.VAN
         builder.vehicle(kind, Path.standing(x, y, np.pi / 2 + rng.normal(0, 0.05)))
     for _ in range(30):
@@ -70,7 +70,7 @@ def pallets(rng: np.random.Generator) -> Pieces:
     layers, z = int(rng.integers(1, 5)), 0.0
     parts = []
     for _ in range(layers):
-        height = rng.choice([0.15, 0.4, 0.7])
+        height = float(rng.choice([0.15, 0.4, 0.7]))
         shift = rng.normal(0, 0.04, 2)
         parts.append(
             box((shift[0], shift[1], z + height / 2), (1.2, 0.8, height), Material.WOOD, rng.normal(0, 0.05))
