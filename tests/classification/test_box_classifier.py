@@ -15,7 +15,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import N_REFLECTANCE, Float64, Int
 from tests.tools.train.datasets import data_of
-from tools.train.box_features import all_described, described
+from tools.train.box_features import dataset_features, crop_features
 from tools.train.dataset import SENSOR_HEIGHT_M, Dataset
 
 
@@ -27,7 +27,7 @@ def test_crops_say_of_their_boxes_what_proposals_do() -> None:
     step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
     expected = features(proposals.count, proposals.box, SENSOR_HEIGHT_M, step_sr)
     assert len(crops) > 50
-    off = np.abs(described(crops) - expected)
+    off = np.abs(crop_features(crops) - expected)
     assert off[:, 4:].max() < 1e-3  # height, foot and top
     assert np.quantile(off[:, :4], 0.9, axis=0).max() < 0.15  # at run time headings are fitted to fewer points
 
@@ -44,14 +44,14 @@ def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
 def test_training_finds_what_sizes_tell() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.mlp import logits
-    from tools.train.train_boxes import cross_validate, train
+    from tools.train.train_box_classifier import cross_validate, train
 
     rng = np.random.default_rng(0)
     label = np.arange(80) // 2 % 4
     data = cubes(0.1 * 4.0**label, label, rng)
     layers = train(data, np.arange(80), 150, seed=1)
     again = train(data, np.arange(80), 150, seed=1)
-    feature = all_described(data, np.arange(80))
+    feature = dataset_features(data, np.arange(80))
     assert feature.shape == (80, N_FEATURES)
     assert np.mean(logits(layers, feature).argmax(axis=1) == label) > 0.9
     assert all(
@@ -66,7 +66,7 @@ def test_training_finds_what_sizes_tell() -> None:
 def test_training_finds_what_reflectance_tells_beyond_the_box() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.mlp import logits
-    from tools.train.train_reflectance import Described, cross_validate, train, weigh
+    from tools.train.train_reflectance_classifier import Described, cross_validate, train, weigh
 
     rng = np.random.default_rng(0)
     label = np.arange(160) // 2 % 4

@@ -23,7 +23,7 @@ WITHIN_DEG = 15.0
 LEAST_RANGE_M = 3.0
 EDGE = 0.02
 """Difference of 1 / range from which there is an edge [1/m]."""
-FEWEST = 20
+MIN_POINTS = 20
 """Edges."""
 
 
@@ -40,7 +40,7 @@ def displacement_m(points: Float32, bearing_deg: float) -> tuple[float, int]:
     chosen &= np.minimum(range_m[:-1], range_m[1:]) > LEAST_RANGE_M
     nearer, farther = chosen & (edge > 0), chosen & (edge < 0)
     n = int(min(nearer.sum(), farther.sum()))
-    if n < FEWEST / 2:
+    if n < MIN_POINTS / 2:
         return np.nan, 2 * n
     slope = np.deg2rad(np.median(step[nearer]) - np.median(step[farther]))
     aside = slope / (np.median(edge[nearer]) - np.median(edge[farther]))

@@ -16,7 +16,7 @@ from modt.types import Bool, Float64, Int
 from tools.train.dataset import SENSOR_HEIGHT_M
 
 MAX_RANGE_M = 75.0
-FEWEST = 6
+MIN_POINTS = 6
 """Points that an augmented crop must keep; it is left whole otherwise."""
 
 
@@ -34,11 +34,11 @@ def augment(crops: Crops, beams: Beams, rng: Generator) -> Crops:
     owner = np.repeat(np.arange(n), count)
     xyz = crops.xyz.astype(np.float64)
     centre = np.stack([np.add.reduceat(xyz[:, k], crops.offsets[:-1]) / count for k in range(3)], axis=1)
-    xyz = _reshape(xyz, centre, owner, rng)
-    xyz = _move(xyz, centre, owner, rng)
-    keep = _at_resolution(xyz, owner, beams, rng)
-    keep = _unless_lost(keep, _shadow(xyz, owner, keep, n, rng), owner, n)
-    keep = _unless_lost(keep, rng.random(len(owner)) < 1 - rng.uniform(0, 0.35, n)[owner] ** 1.5, owner, n)
+    xyz = _deform(xyz, centre, owner, rng)
+    xyz = _change_range(xyz, centre, owner, rng)
+    keep = _one_return_per_beam(xyz, owner, beams, rng)
+    keep = _keep_enough(keep, _occlude(xyz, owner, keep, n, rng), owner, n)
+    keep = _keep_enough(keep, rng.random(len(owner)) < 1 - rng.uniform(0, 0.35, n)[owner] ** 1.5, owner, n)
     xyz += rng.normal(0, 0.012, xyz.shape)
     rho = np.hypot(*centre[:, :2].T)
     xyz[:, 2] += (rng.normal(0, 1, n) * (0.05 + 0.004 * rho))[owner]
@@ -55,27 +55,27 @@ def limit(crops: Crops, most: int, rng: Generator) -> Crops:
     return Crops(crops.xyz[kept], np.append(0, np.cumsum(np.minimum(crops.count, most))))
 
 
-def _reshape(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
+def _deform(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
     """Mirrored about the line of sight, turned a little, of another size."""
     n = len(centre)
     bearing = np.arctan2(centre[:, 1], centre[:, 0])
-    local = _turn(xyz - np.c_[centre[:, :2], np.zeros(n)][owner], -bearing[owner])
+    local = _rotate(xyz - np.c_[centre[:, :2], np.zeros(n)][owner], -bearing[owner])
     local[:, 1] *= rng.choice([-1.0, 1.0], n)[owner]
-    local = _turn(local, rng.normal(0, np.deg2rad(6), n)[owner])
+    local = _rotate(local, rng.normal(0, np.deg2rad(6), n)[owner])
     size = rng.uniform(0.9, 1.1, n)
     local[:, :2] *= size[owner, None]
     ground = -SENSOR_HEIGHT_M
     local[:, 2] = ground + (local[:, 2] - ground) * (size * rng.uniform(0.96, 1.04, n))[owner]
-    out: Float64 = _turn(local, bearing[owner]) + np.c_[centre[:, :2], np.zeros(n)][owner]
+    out: Float64 = _rotate(local, bearing[owner]) + np.c_[centre[:, :2], np.zeros(n)][owner]
     return out
 
 
-def _turn(xyz: Float64, angle: Float64) -> Float64:
+def _rotate(xyz: Float64, angle: Float64) -> Float64:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * xyz[:, 0] - s * xyz[:, 1], s * xyz[:, 0] + c * xyz[:, 1], xyz[:, 2]], axis=1)
 
 
-def _move(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
+def _change_range(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
     """To another range along the line of sight; mostly farther, since no point can be added."""
     rho = np.hypot(*centre[:, :2].T)
     farthest = np.clip(MAX_RANGE_M / rho, 1.0, 4.0)
@@ -85,7 +85,7 @@ def _move(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
     return moved
 
 
-def _at_resolution(xyz: Float64, owner: Int, beams: Beams, rng: Generator) -> Bool:
+def _one_return_per_beam(xyz: Float64, owner: Int, beams: Beams, rng: Generator) -> Bool:
     """One return a beam: of the points that a beam of the sensor would hit, one is kept."""
     azimuth = np.rad2deg(np.arctan2(xyz[:, 1], xyz[:, 0])) / beams.azimuth_deg
     elevation = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))) / beams.elevation_deg
@@ -97,17 +97,17 @@ def _at_resolution(xyz: Float64, owner: Int, beams: Beams, rng: Generator) -> Bo
     _, first = np.unique(key[order], return_index=True)
     keep = np.zeros(len(key), np.bool_)
     keep[order[first]] = True
-    return _unless_lost(np.ones(len(key), np.bool_), keep, owner, int(owner.max(initial=-1)) + 1)
+    return _keep_enough(np.ones(len(key), np.bool_), keep, owner, int(owner.max(initial=-1)) + 1)
 
 
-def _shadow(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Bool:
+def _occlude(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Bool:
     """What an occluder leaves: a part cut off at one side, at the foot or at the top, or a post in between."""
     across = np.arctan2(xyz[:, 1], xyz[:, 0])
     kind = rng.choice(5, n, p=[0.5, 0.28, 0.1, 0.05, 0.07])
     cut = rng.uniform(0.1, 0.65, n)
     left = rng.random(n) < 0.5
-    a = _rank(across, owner, keep, n)
-    z = _rank(xyz[:, 2], owner, keep, n)
+    a = _relative_position(across, owner, keep, n)
+    z = _relative_position(xyz[:, 2], owner, keep, n)
     side = np.where(left[owner], a, 1 - a) > cut[owner]
     foot, top = z > cut[owner], z < 1 - 0.5 * cut[owner]
     post = np.abs(a - (0.2 + 0.6 * cut)[owner]) > 0.08
@@ -115,7 +115,7 @@ def _shadow(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Boo
     return chosen
 
 
-def _rank(value: Float64, owner: Int, keep: Bool, n: int) -> Float64:
+def _relative_position(value: Float64, owner: Int, keep: Bool, n: int) -> Float64:
     """Where each value stands between its crop's least (0) and greatest (1)."""
     low, high = np.full(n, np.inf), np.full(n, -np.inf)
     np.minimum.at(low, owner[keep], value[keep])
@@ -124,8 +124,8 @@ def _rank(value: Float64, owner: Int, keep: Bool, n: int) -> Float64:
     return rank
 
 
-def _unless_lost(keep: Bool, further: Bool, owner: Int, n: int) -> Bool:
+def _keep_enough(keep: Bool, further: Bool, owner: Int, n: int) -> Bool:
     """Keep further what still leaves enough of its crop."""
     both = keep & further
-    enough = np.bincount(owner[both], minlength=n) >= FEWEST
+    enough = np.bincount(owner[both], minlength=n) >= MIN_POINTS
     return np.where(enough[owner], both, keep)

@@ -13,10 +13,10 @@ from tools.train.augment import Beams
 from tools.train.dataset import SENSOR_HEIGHT_M, Dataset
 
 CHUNK = 2000
-"""Crops described at a time."""
+"""Crops crop_features at a time."""
 
 
-def described(crops: Crops) -> Float64:
+def crop_features(crops: Crops) -> Float64:
     """(R, 7) features of the boxes about crops."""
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
@@ -25,6 +25,6 @@ def described(crops: Crops) -> Float64:
     return features(crops.count, box, SENSOR_HEIGHT_M, beam_sr(beams.azimuth_deg, beams.elevation_deg))
 
 
-def all_described(data: Dataset, rows: Int) -> Float64:
+def dataset_features(data: Dataset, rows: Int) -> Float64:
     """(R, 7) features of these rows as they are."""
-    return np.concatenate([described(data.take(rows[i : i + CHUNK])) for i in range(0, len(rows), CHUNK)])
+    return np.concatenate([crop_features(data.take(rows[i : i + CHUNK])) for i in range(0, len(rows), CHUNK)])

@@ -5,7 +5,7 @@
 A proposal is an object if more than half of its points lie in the object's box and it holds more than half of those
 that do. What is neither clearly that nor clearly something else (fragments, merged objects) is kept but marked
 partial; what the annotators left out is marked unknown. Neither is trained on, and what is unknown is not judged.
-What the camera of KITTI's scans does not see is kept apart, without labels, for teachers (tools/train/teaching.py).
+What the camera of KITTI's scans does not see is kept apart, without labels, for teachers (tools/train/distillation.py).
 The file carries its own provenance. tools/train/build_synthetic_crops.py writes the same of synthetic scans.
 """
 
@@ -36,7 +36,7 @@ from tools.train.paste import library, pasted
 CELL_SCALES = (0.75, 1.4)
 """Finer and coarser clusters than those of the segmentation that ships, for training alone."""
 MAX_POINTS = 1200
-MIN_BOX_POINTS, COUNTED_BOX_POINTS = 5, 10
+MIN_BOX_POINTS, MIN_DETECTABLE_POINTS = 5, 10
 """An object must show so many points to be trained on, and to be counted as one that should be found."""
 TALL_M = 1.85
 """Cars taller than this are vans and their like."""
@@ -67,7 +67,7 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
     left_out = np.bincount(number[scan.unlabelled & (number >= 0)], minlength=len(proposals))
     partial, tall = np.zeros(len(proposals), np.bool_), np.zeros(len(proposals), np.bool_)
     unknown = left_out > 0.5 * size
-    for members, of_class, box, to_find in zip(scan.objects, scan.kinds, scan.boxes, countable(scan), strict=True):
+    for members, of_class, box, to_find in zip(scan.objects, scan.kinds, scan.boxes, detectable(scan), strict=True):
         if len(members) < MIN_BOX_POINTS:
             continue
         own = number[members]
@@ -88,10 +88,10 @@ def told(proposals: Proposals) -> Float64:
     return proposals.reflectance
 
 
-def countable(scan: Scan) -> Bool:
+def detectable(scan: Scan) -> Bool:
     """(B,) objects that a detector should find in a scan."""
     points = [int(scan.fov.contains(scan.points[own]).sum()) for own in scan.objects]
-    return np.array([n >= COUNTED_BOX_POINTS for n in points], np.bool_)
+    return np.array([n >= MIN_DETECTABLE_POINTS for n in points], np.bool_)
 
 
 class Writer:
@@ -116,7 +116,7 @@ class Writer:
         row |= {"variant": np.full(n, variant, np.int8), "reflectance": told(proposals)[kept]}
         row |= {"scan": np.array([scan.name] * n, np.str_), "drive": np.array([scan.drive] * n, np.str_)}
         if judged:
-            truth = np.array(scan.kinds, np.int64)[countable(scan)]
+            truth = np.array(scan.kinds, np.int64)[detectable(scan)]
             truth = truth[truth > ObjectClass.BACKGROUND]
             row |= {"truth_label": truth.astype(np.int8), "truth_drive": np.array([scan.drive] * len(truth), np.str_)}
         for key, value in row.items():

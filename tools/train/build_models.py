@@ -44,8 +44,8 @@ def main() -> None:
     free, placed, real = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti"))
     tool("build_synthetic_crops", free, "--worlds", WORLDS)
     tool("train_pointnet", args.work / "synthetic", free, "--epochs", "6", "--fold-epochs", "3", "--folds", "2")
-    tool("train_boxes", args.work / "synthetic", free)
-    tool("train_reflectance", args.work / "synthetic", free, "--sensor", SENSOR, "--folds", "2")
+    tool("train_box_classifier", args.work / "synthetic", free)
+    tool("train_reflectance_classifier", args.work / "synthetic", free, "--sensor", SENSOR, "--folds", "2")
     tool("export_pointnet", args.work / "synthetic", MODELS / "pointnet-synthetic.onnx",
          "--data", SYNTHETIC_DATA, "--licence", "Apache-2.0: free for any use")  # fmt: skip
     if args.kitti:
@@ -54,8 +54,8 @@ def main() -> None:
              "--labels", args.kitti / "object" / "training_all_labels")  # fmt: skip
         tool("train_pointnet", args.work / "kitti", real, placed,
              "--epochs", "100", "--fold-epochs", "40", "--folds", "3", "--teachers", TEACHERS)  # fmt: skip
-        tool("train_boxes", args.work / "kitti", real, placed)
-        tool("train_reflectance", args.work / "kitti", real, placed, "--sensor", SENSOR)
+        tool("train_box_classifier", args.work / "kitti", real, placed)
+        tool("train_reflectance_classifier", args.work / "kitti", real, placed, "--sensor", SENSOR)
         tool("export_pointnet", args.work / "kitti", MODELS / "pointnet-kitti.onnx",
              "--data", KITTI_DATA, "--licence", "CC BY-NC-SA 3.0, as its data: not for commercial use")  # fmt: skip
 

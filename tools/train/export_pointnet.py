@@ -2,7 +2,7 @@
 
     python -m tools.train.export_pointnet TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
 
-TRAINED_DIR is what train_pointnet, train_boxes and, where there is any, train_reflectance wrote. What boxes and
+TRAINED_DIR is what train_pointnet, train_box_classifier and, where there is any, train_reflectance_classifier wrote. What boxes and
  reflectance say goes into the metadata.
 
 Two identities make the exported graph cheap without changing a digit that matters: the maximum commutes with adding a

@@ -10,7 +10,7 @@ import numpy as np
 from modt.classes import N_CLASSES
 from modt.types import Bool, Float64, Int
 from tools.train.dataset import Dataset, folds
-from tools.train.temperature import Calibration, fit
+from tools.train.temperature_scaling import Calibration, fit
 
 Model = Callable[[Int], Float64]
 """(R, 4) logits of rows."""
@@ -40,7 +40,7 @@ class HeldOut:
         return self.calibration.apply(self.logits)
 
 
-def cross_validated(data: Dataset, k: int, trained: Callable[[Bool, int], Model]) -> HeldOut:
+def out_of_fold(data: Dataset, k: int, trained: Callable[[Bool, int], Model]) -> HeldOut:
     """Every judged crop by the model that never saw its drive.
 
     Args:

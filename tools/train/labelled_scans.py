@@ -37,9 +37,9 @@ SEMANTIC_CLASS = {
 SEMANTIC_UNKNOWN = (0, 1, 13, 15, 16, 20, 32, 99, 255, 256, 257, 259)
 """Labels that say nothing about the classes: unlabelled, and vehicles that KITTI's object labels name otherwise."""
 ARGOVERSE_CLASS = {"REGULAR_VEHICLE": "Car", "PEDESTRIAN": "Pedestrian", "BICYCLIST": "Cyclist"}
-ARGOVERSE_SENSOR = np.array([1.35, 0.0, 1.4], np.float32)
+ARGOVERSE_SENSOR_M = np.array([1.35, 0.0, 1.4], np.float32)
 """Where its sweeps get their origin: at the heads, at the height above the ground that KITTI's have."""
-ARGOVERSE_CARRIER_M = 2.5
+ARGOVERSE_EGO_VEHICLE_M = 2.5
 """Its own car is seen within this."""
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
@@ -84,7 +84,7 @@ def inside(points: Float32, box: Float64) -> Bool:
     return within
 
 
-def boxed(
+def scan_from_boxes(
     name: str,
     drive: str,
     points: Float32,
@@ -129,7 +129,7 @@ def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
         kinds.append(kind)
     fov = FieldOfView.of_camera(camera)
     unlabelled = _in_regions(points, camera, np.array(regions).reshape(-1, 4))
-    return boxed(path.stem, drive, points, boxes, kinds, fov, unlabelled)
+    return scan_from_boxes(path.stem, drive, points, boxes, kinds, fov, unlabelled)
 
 
 def object_camera(calib: Path) -> Camera:
@@ -164,7 +164,7 @@ def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
         boxes = [[*pose[:3], hwl[2], hwl[1], hwl[0], pose[3]] for _, hwl, pose in here]
         name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
         kinds = [kind for kind, _, _ in here]
-        scan = boxed(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
+        scan = scan_from_boxes(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
         yield replace(scan, numbers=tuple(seen))
 
 
@@ -196,19 +196,19 @@ def argoverse_scans(folder: Path) -> Iterator[Scan]:
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as file:
             points = file["points"].astype(np.float32)
-        points[:, :3] -= ARGOVERSE_SENSOR
+        points[:, :3] -= ARGOVERSE_SENSOR_M
         points[:, 3] = 0.0  # on another scale
-        points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_CARRIER_M]
+        points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_EGO_VEHICLE_M]
         with path.with_suffix(".csv").open(encoding="utf-8") as rows:
             objects = [row for row in csv.DictReader(rows) if int(row["points"]) > 0]
         columns = ("x_m", "y_m", "z_centre_m", "length_m", "width_m", "height_m", "yaw_rad")
         boxes = np.array([[float(row[c]) for c in columns] for row in objects])
-        boxes[:, :3] -= ARGOVERSE_SENSOR
+        boxes[:, :3] -= ARGOVERSE_SENSOR_M
         boxes[:, 2] -= boxes[:, 5] / 2
         kinds = [ARGOVERSE_CLASS.get(row["category"], "") for row in objects]
         drive = f"argoverse2/{path.stem.split('_')[0]}"
         none = np.zeros(len(points), np.bool_)
-        yield boxed(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
+        yield scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
 
 
 def _raw_camera(date: Path) -> Camera:

@@ -20,7 +20,7 @@ SHARED = (3, 32, 64, 512)
 HEAD = (512, 256, 128, 4)
 
 
-class MaxOfLinear(torch.autograd.Function):
+class MaxPooledLinear(torch.autograd.Function):
     """Maximum over each crop of a linear layer, which is most of the network.
 
     A channel's gradient goes to the point that is its maximum alone: sparse products carry it back in a fraction of
@@ -46,7 +46,7 @@ class MaxOfLinear(torch.autograd.Function):
         return torch.from_numpy(d_y @ weight), torch.from_numpy(d_y.T @ x), None
 
 
-class PositiveNorm(nn.Module):
+class PositiveScaleNorm(nn.Module):
     """Batch normalisation whose scale is positive."""
 
     def __init__(self, width: int) -> None:
@@ -76,7 +76,7 @@ class PointNet(nn.Module):
         super().__init__()
         self.shared = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(SHARED))
         self.head = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(HEAD[:-1]))
-        self.norms = nn.ModuleList(PositiveNorm(width) for width in (*SHARED[1:], *HEAD[1:-1]))
+        self.norms = nn.ModuleList(PositiveScaleNorm(width) for width in (*SHARED[1:], *HEAD[1:-1]))
         self.last = nn.Linear(*HEAD[-2:])
         self.dropout = nn.Dropout(dropout)
 
@@ -85,7 +85,7 @@ class PointNet(nn.Module):
         h = xyz
         for layer, norm in zip(self.shared[:-1], self.norms, strict=False):
             h = torch.relu(norm(layer(h)))
-        h = MaxOfLinear.apply(h, self.shared[-1].weight, count)
+        h = MaxPooledLinear.apply(h, self.shared[-1].weight, count)
         h = torch.relu(self.norms[len(self.shared) - 1](h))
         for layer, norm in zip(self.head, self.norms[len(self.shared) :], strict=True):
             h = torch.relu(norm(layer(h)))

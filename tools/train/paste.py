@@ -19,9 +19,9 @@ from modt.types import Float32, Float64, Int
 from tools.train.augment import Beams
 from tools.train.labelled_scans import PAD_M, Scan
 
-FEWEST, CLEARANCE_M, HIDDEN_M = 8, 0.4, 0.4
+MIN_POINTS, CLEARANCE_M, OCCLUSION_MARGIN_M = 8, 0.4, 0.4
 SHARE = {ObjectClass.CAR: 0.36, ObjectClass.PEDESTRIAN: 0.36, ObjectClass.CYCLIST: 0.28}
-BACK = 0.5
+SAME_RANGE_SHARE = 0.5
 """Share of objects that keep their range."""
 
 
@@ -47,7 +47,7 @@ def library(scans: Iterable[Scan]) -> list[Item]:
         Item(scan.points[own], box, kind, scan.drive)
         for scan in scans
         for own, kind, box in zip(scan.objects, scan.kinds, scan.boxes, strict=True)
-        if kind != ObjectClass.BACKGROUND and len(own) >= 2 * FEWEST and np.isfinite(box).all()
+        if kind != ObjectClass.BACKGROUND and len(own) >= 2 * MIN_POINTS and np.isfinite(box).all()
     ]
 
 
@@ -93,7 +93,7 @@ def _place(item: Item, scene: Float32, beams: Beams, rng: Generator) -> tuple[Fl
     """The object's points and box somewhere else, and which of the scene's points it hides; None if it cannot be."""
     angle = rng.uniform(-np.pi, np.pi)
     rho = float(np.hypot(*item.box[:2]))
-    factor = 1.0 if rng.random() < BACK else float(min(rng.uniform(1.0, 2.2), max(60.0 / rho, 1.0)))
+    factor = 1.0 if rng.random() < SAME_RANGE_SHARE else float(min(rng.uniform(1.0, 2.2), max(60.0 / rho, 1.0)))
     c, s = np.cos(angle), np.sin(angle)
     xy = item.points[:, :2] + (factor - 1) * item.box[:2]
     foot = item.box[:2] * factor
@@ -113,12 +113,12 @@ def _place(item: Item, scene: Float32, beams: Beams, rng: Generator) -> tuple[Fl
         points, cells = points[first], cells[first]
     scene_cells = _cells(scene, beams)
     distance, scene_distance = np.linalg.norm(points[:, :3], axis=1), np.linalg.norm(scene[:, :3], axis=1)
-    front = np.flatnonzero((scene_distance < distance.min() - HIDDEN_M) & (scene_distance > 2.0))
-    seen = ~np.isin(cells, _spread(scene_cells[front]))
+    front = np.flatnonzero((scene_distance < distance.min() - OCCLUSION_MARGIN_M) & (scene_distance > 2.0))
+    seen = ~np.isin(cells, _dilate(scene_cells[front]))
     points, cells = points[seen], cells[seen]
-    if seen.sum() < max(FEWEST, 0.2 * len(seen)):
+    if seen.sum() < max(MIN_POINTS, 0.2 * len(seen)):
         return None
-    hidden = np.isin(scene_cells, _spread(cells)) & (scene_distance > distance.mean())
+    hidden = np.isin(scene_cells, _dilate(cells)) & (scene_distance > distance.mean())
     box = np.array([*target, ground, *item.box[3:6], item.box[6] + angle])
     return points, box, hidden
 
@@ -129,6 +129,6 @@ def _cells(points: Float32, beams: Beams) -> Int:
     return (np.floor(azimuth).astype(np.int64) << 16) + np.floor(elevation).astype(np.int64) + 8192
 
 
-def _spread(cells: Int) -> Int:
+def _dilate(cells: Int) -> Int:
     """These cells and their neighbours to either side."""
     return np.unique(np.concatenate([cells - (1 << 16), cells, cells + (1 << 16)]))

@@ -13,7 +13,7 @@ from modt.sources.synthetic_stream import SyntheticStream, nominal_camera
 from modt.types import Frame
 from tools.train.labelled_scans import TEST_DRIVE, Scan
 
-RICH = ("Pedestrian", "Cyclist", "Person_sitting")
+PEOPLE = ("Pedestrian", "Cyclist", "Person_sitting")
 SECONDS = 4.0
 
 
@@ -62,5 +62,5 @@ def label_files(folder: Path) -> list[Path]:
     rows = (line.split("\t") for line in (folder / "frame_to_raw.tsv").read_text(encoding="utf-8").splitlines())
     drive = {row[0]: row[2] for row in rows}
     files = [p for p in sorted((folder / "label_2").glob("*.txt")) if drive.get(p.stem, TEST_DRIVE) != TEST_DRIVE]
-    rich = [p for p in files if any(line.startswith(RICH) for line in p.read_text(encoding="utf-8").splitlines())]
+    rich = [p for p in files if any(line.startswith(PEOPLE) for line in p.read_text(encoding="utf-8").splitlines())]
     return files + 3 * rich

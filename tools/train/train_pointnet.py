@@ -4,10 +4,10 @@
 
 Writes OUT_DIR/weights.npz for export_pointnet and OUT_DIR/report.json: loss curve, and with --folds the
 out-of-fold average precision, confusion and calibration (drives are never split between folds), and the probabilities
-themselves, OUT_DIR/held_out.npz, for train_reflectance. The temperature and
+themselves, OUT_DIR/held_out.npz, for train_reflectance_classifier. The temperature and
 class offsets that make the confidences mean what they say are fitted out of fold and folded into the last layer.
 With --teachers as many networks are trained first, as long as those of the folds, and teach the one that is written;
-of crops without a label, what their returns add (tools/train/train_reflectance.py) does so as well.
+of crops without a label, what their returns add (tools/train/train_reflectance_classifier.py) does so as well.
 An epoch is as many draws as there are clear crops of real scans (of any, without real ones); the paper's settings are
 40 epochs (weak) and 100 (converged).
 """
@@ -27,15 +27,15 @@ from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.crops import Crops, canonical
 from modt.classification.mlp import logits as layer_logits
 from modt.types import Bool, Float64, Int
-from tools.train import train_boxes, train_reflectance
+from tools.train import train_box_classifier, train_reflectance_classifier
 from tools.train.augment import Beams, augment, limit
-from tools.train.batches import BATCH, draw, odds
+from tools.train.batches import BATCH, draw, sampling_pools
 from tools.train.dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
-from tools.train.held_out import HeldOut, Model, cross_validated
+from tools.train.held_out import HeldOut, Model, out_of_fold
 from tools.train.network import PointNet
 from tools.train.scores import average_precision, confusion
-from tools.train.teaching import Ensemble, Labels, Teaching
-from tools.train.temperature import Calibration, expected_error
+from tools.train.distillation import Ensemble, Labels, TargetSource
+from tools.train.temperature_scaling import Calibration, expected_calibration_error
 from tools.train.weights import save_layers
 
 POINTS, MOST_POINTS = 128, 400
@@ -51,7 +51,7 @@ def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def train(
-    data: Dataset, rows: Int, steps: int, seed: int, state: Path | None, teaching: Teaching
+    data: Dataset, rows: Int, steps: int, seed: int, state: Path | None, teaching: TargetSource
 ) -> tuple[PointNet, list[float]]:
     """A network trained on these rows, and its loss every 50 steps; taken up again where state was left."""
     torch.manual_seed(seed)
@@ -60,7 +60,7 @@ def train(
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
     criterion = torch.nn.CrossEntropyLoss()
-    pools = odds(data, rows)
+    pools = sampling_pools(data, rows)
     losses: list[float] = []
     first = 0
     if state is not None and state.exists():
@@ -125,9 +125,9 @@ def evidence_of_returns(data: Dataset, rows: Int, seed: int) -> Float64:
     """
     evidence, known = np.zeros((len(data), N_CLASSES)), np.isfinite(data.reflectance).all(axis=1)
     if np.isin(np.arange(N_CLASSES), data.label[rows[known[rows]]]).all():
-        seen = train_reflectance.Described(data)
-        boxes = train_boxes.train(data, rows, train_boxes.STEPS, seed)
-        layers = train_reflectance.train(data, seen, rows, boxes, train_reflectance.STEPS, seed)
+        seen = train_reflectance_classifier.Described(data)
+        boxes = train_box_classifier.train(data, rows, train_box_classifier.STEPS, seed)
+        layers = train_reflectance_classifier.train(data, seen, rows, boxes, train_reflectance_classifier.STEPS, seed)
         evidence[known] = layer_logits(layers, seen.whole[known])
     return evidence
 
@@ -147,15 +147,15 @@ def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) 
         net, _ = educate(data, among, (steps, steps), teachers, seed + i, None)
         return lambda rows: logits(net, data, rows)
 
-    held = cross_validated(data, k, trained)
+    held = out_of_fold(data, k, trained)
     probability, clear = held.probability, held.clear
     label = held.label[clear]
     return held, {
         "average_precision": average_precision(probability, held.label, held.truth),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], held.truth[1:], strict=True)},
         "confusion": confusion(probability[clear], label),
-        "ece": expected_error(probability[clear], label),
-        "ece_uncalibrated": expected_error(Calibration.none().apply(held.logits[clear]), label),
+        "ece": expected_calibration_error(probability[clear], label),
+        "ece_uncalibrated": expected_calibration_error(Calibration.none().apply(held.logits[clear]), label),
     }
 
 

@@ -20,7 +20,7 @@ from modt.types import NONE, Proposals
 from tests.classification.scenes import blobs
 from tools.study import sweep_fusion
 from tools.study.recording import Moment, Recording, owners, record
-from tools.study.replayed import CALLS, Outcome, replay
+from tools.study.fusion_replay import CALLS, Outcome, replay
 from tools.study.sweep_fusion import Setting, Tried
 from tools.train.labelled_scans import TEST_DRIVE, Scan
 from tools.train.synthetic_scans import scan_of

@@ -19,11 +19,11 @@ from tests.tools.train.datasets import data_of
 from tools.train.augment import Beams, augment, limit
 from tools.train.build_crops import label
 from tools.train.dataset import SHIPPED, SYNTHETIC, UNLABELLED, folds
-from tools.train.held_out import cross_validated
+from tools.train.held_out import out_of_fold
 from tools.train.labelled_scans import Scan, argoverse_scans, inside
 from tools.train.paste import Item, pasted
 from tools.train.scores import average_precision, confusion
-from tools.train.temperature import Calibration, expected_error, fit
+from tools.train.temperature_scaling import Calibration, expected_calibration_error, fit
 
 EVERYWHERE = FieldOfView()
 
@@ -185,8 +185,8 @@ def test_calibration_finds_the_temperature_and_what_is_common() -> None:
     found = fit(distorted, label)
     assert found.temperature == pytest.approx(3.0, rel=0.1)
     assert found.offset[1:] == pytest.approx(np.full(3, -2.0), abs=0.2)
-    assert expected_error(found.apply(distorted), label) < 0.02
-    assert expected_error(Calibration.none().apply(distorted), label) > 0.1
+    assert expected_calibration_error(found.apply(distorted), label) < 0.02
+    assert expected_calibration_error(Calibration.none().apply(distorted), label) > 0.1
 
 
 def test_calibration_folds_into_the_last_layer() -> None:
@@ -225,7 +225,7 @@ def test_the_exported_network_is_the_trained_one(tmp_path_factory: pytest.TempPa
 
 def test_an_ensemble_teaches_its_mean_and_what_returns_say_of_crops_without_a_label() -> None:
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
-    from tools.train.teaching import TRUST, Ensemble, Labels
+    from tools.train.distillation import EVIDENCE_WEIGHT, Ensemble, Labels
 
     rng = np.random.default_rng(0)
     xyz, count, label = torch.randn(9, 3), torch.tensor([4, 3, 2]), np.array([1, 3])
@@ -235,7 +235,7 @@ def test_an_ensemble_teaches_its_mean_and_what_returns_say_of_crops_without_a_la
     assert (np.isin(ensemble.further(rng), np.arange(70, 90))).all()
     assert len(ensemble.further(rng)) == 5
     expected = torch.softmax(said, dim=2).mean(dim=0)
-    expected[2] *= torch.from_numpy(np.exp(TRUST * evidence[77]))
+    expected[2] *= torch.from_numpy(np.exp(EVIDENCE_WEIGHT * evidence[77]))
     expected[2] /= expected[2].sum()
     assert torch.allclose(ensemble.targets(xyz, count, label, np.array([77])), expected)
     assert len(Ensemble([], np.zeros(0, np.int64), 5, evidence).further(rng)) == 0
@@ -257,13 +257,13 @@ def test_returns_teach_nothing_where_a_class_shows_none() -> None:
 
 def test_the_maximum_of_a_linear_layer_has_the_gradients_of_its_definition() -> None:
     torch = pytest.importorskip("torch", reason="extra [train] is not installed")
-    from tools.train.network import MaxOfLinear
+    from tools.train.network import MaxPooledLinear
 
     torch.manual_seed(0)
     count = torch.tensor([1, 7, 30])
     x, weight = torch.randn(38, 5, requires_grad=True), torch.randn(11, 5, requires_grad=True)
     outward = torch.randn(3, 11)
-    found = MaxOfLinear.apply(x, weight, count)
+    found = MaxPooledLinear.apply(x, weight, count)
     expected = torch.segment_reduce(x @ weight.T, "max", lengths=count, axis=0)
     assert torch.allclose(found, expected)
     for one, other in zip(
@@ -297,7 +297,7 @@ def test_no_model_judges_a_drive_that_it_learnt_from() -> None:
 
         return model
 
-    held = cross_validated(data, 3, trained)
+    held = out_of_fold(data, 3, trained)
     assert sorted(judged) == list(range(30))
     assert (held.logits.argmax(axis=1) == held.label).all()
     assert held.truth.tolist() == np.bincount(label).tolist()

@@ -1,8 +1,8 @@
 """Train the reflectance classifier, modt.classification.reflectance_classifier (extra [train]).
 
-    python -m tools.train.train_reflectance OUT_DIR CROPS.npz... --sensor NAME [--steps N] [--folds K] [--seed S]
+    python -m tools.train.train_reflectance_classifier OUT_DIR CROPS.npz... --sensor NAME [--steps N] [--folds K] [--seed S]
 
-OUT_DIR holds what train_pointnet and train_boxes wrote for the same crops and folds. Writes
+OUT_DIR holds what train_pointnet and train_box_classifier wrote for the same crops and folds. Writes
 OUT_DIR/reflectance.npz for export_pointnet, and OUT_DIR/reflectance.json: the weights of box and reflectance
 beside the network, and what box and reflectance, and all three, are worth together out of fold.
 """
@@ -21,14 +21,14 @@ from scipy.special import softmax
 
 from modt.classification.mlp import Layers, logits
 from modt.types import Bool, Float64, Int
-from tools.train import train_boxes
-from tools.train.batches import draw, odds
-from tools.train.box_features import all_described
+from tools.train import train_box_classifier
+from tools.train.batches import draw, sampling_pools
+from tools.train.box_features import dataset_features
 from tools.train.dataset import Dataset, load
-from tools.train.held_out import Model, cross_validated
+from tools.train.held_out import Model, out_of_fold
 from tools.train.mlp_training import Batch, trained
 from tools.train.scores import average_precision, confusion
-from tools.train.temperature import Calibration, expected_error, fit
+from tools.train.temperature_scaling import Calibration, expected_calibration_error, fit
 from tools.train.weights import load_layers, save_layers
 
 STEPS = 1500
@@ -45,7 +45,7 @@ class Described:
     """
 
     def __init__(self, data: Dataset) -> None:
-        self.box = all_described(data, np.arange(len(data)))
+        self.box = dataset_features(data, np.arange(len(data)))
         self.whole = np.hstack([self.box, data.reflectance])
 
 
@@ -53,7 +53,7 @@ def train(data: Dataset, seen: Described, rows: Int, boxes: Layers, steps: int, 
     """Layers trained on these rows to add to what the layers of the boxes say, uncalibrated."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    pools = odds(data, rows[np.isfinite(data.reflectance[rows]).all(axis=1)])
+    pools = sampling_pools(data, rows[np.isfinite(data.reflectance[rows]).all(axis=1)])
     base = logits(boxes, seen.box)
     sample = seen.whole[np.concatenate([draw(pools, rng) for _ in range(16)])]
     scale = JITTER * sample.std(axis=0)
@@ -72,18 +72,18 @@ def cross_validate(
     """Out-of-fold calibration beside the boxes; the weights of a pool with the network, and what all are worth."""
     boxes: dict[int, Layers] = {}
 
-    def boxed(among: Bool, i: int) -> Model:
-        boxes[i] = train_boxes.train(data, np.flatnonzero(among & data.clear), train_boxes.STEPS, seed + i)
+    def scan_from_boxes(among: Bool, i: int) -> Model:
+        boxes[i] = train_box_classifier.train(data, np.flatnonzero(among & data.clear), train_box_classifier.STEPS, seed + i)
         return lambda rows: logits(boxes[i], seen.box[rows])
 
-    by_box = cross_validated(data, k, boxed)
+    by_box = out_of_fold(data, k, scan_from_boxes)
 
     def lit(among: Bool, i: int) -> Model:
         calibrated = [*boxes[i][:-1], by_box.calibration.folded(boxes[i][-1])]
         layers = train(data, seen, np.flatnonzero(among & data.clear), calibrated, steps, seed + i)
         return lambda rows: logits(layers, seen.whole[rows])
 
-    added = cross_validated(data, k, lit)
+    added = out_of_fold(data, k, lit)
     clear, label = added.clear, added.label[added.clear]
     said = np.log(by_box.probability)
     calibration = fit(added.logits[clear], label, said[clear])
@@ -98,12 +98,12 @@ def cross_validate(
         "share_without": alone,
         "box": {
             "average_precision": average_precision(prior, added.label, added.truth),
-            "ruled_out": train_boxes.ruled_out(prior[clear], label),
+            "ruled_out": train_box_classifier.ruled_out(prior[clear], label),
         },
         "network": {
             "average_precision": average_precision(word, added.label, added.truth),
             "confusion": confusion(word[clear], label),
-            "ece": expected_error(word[clear], label),
+            "ece": expected_calibration_error(word[clear], label),
             "log_loss": round(log_loss(word[clear], label), 4),
             "log_loss_without": round(log_loss(network[clear], label), 4),
         },

@@ -1,6 +1,6 @@
 """Train what a model thinks of a proposal by its box alone, modt.classification.prior, on its crops (extra [train]).
 
-    python -m tools.train.train_boxes OUT_DIR CROPS.npz... [--steps N] [--folds K] [--seed S]
+    python -m tools.train.train_box_classifier OUT_DIR CROPS.npz... [--steps N] [--folds K] [--seed S]
 
 Writes OUT_DIR/boxes.npz for export_pointnet, and OUT_DIR/boxes.json: out-of-fold average precision and, for
 some thresholds, the share of the background that its box rules out and the share of the objects ruled out with it.
@@ -21,13 +21,13 @@ from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.mlp import Layers, logits
 from modt.types import Bool, Float64, Int
 from tools.train.augment import Beams, augment, limit
-from tools.train.batches import draw, odds
-from tools.train.box_features import all_described, described
+from tools.train.batches import draw, sampling_pools
+from tools.train.box_features import dataset_features, crop_features
 from tools.train.dataset import Dataset, load
-from tools.train.held_out import Model, cross_validated
+from tools.train.held_out import Model, out_of_fold
 from tools.train.mlp_training import Batch, trained
 from tools.train.scores import average_precision
-from tools.train.temperature import Calibration
+from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
 
 STEPS = 1000
@@ -40,13 +40,13 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
     """Layers trained on these rows, uncalibrated; they take features as they are."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    pools = odds(data, rows)
-    sample = all_described(data, np.concatenate([draw(pools, rng) for _ in range(16)]))
+    pools = sampling_pools(data, rows)
+    sample = dataset_features(data, np.concatenate([draw(pools, rng) for _ in range(16)]))
 
     def batch() -> Batch:
         chosen = np.concatenate([draw(pools, rng), draw(pools, rng)])
         seen = augment(limit(data.take(chosen), AUGMENTED_POINTS, rng), Beams(), rng)
-        return Batch(described(seen), data.label[chosen])
+        return Batch(crop_features(seen), data.label[chosen])
 
     return trained(batch, sample, steps, rate=1e-2, decay=1e-3)
 
@@ -56,9 +56,9 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
 
     def model(among: Bool, i: int) -> Model:
         layers = train(data, np.flatnonzero(among & data.clear), steps, seed + i)
-        return lambda rows: logits(layers, all_described(data, rows))
+        return lambda rows: logits(layers, dataset_features(data, rows))
 
-    held = cross_validated(data, k, model)
+    held = out_of_fold(data, k, model)
     probability, clear = held.probability, held.clear
     return held.calibration, {
         "average_precision": average_precision(probability, held.label, held.truth),
@@ -69,12 +69,12 @@ def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibr
 def ruled_out(probability: Float64, label: Int) -> list[dict[str, Any]]:
     """Share of each class that thresholds of what is thought of them (R, 4) rule out."""
     return [
-        {"likely": threshold, "share": dict(zip(CLASS_NAMES, _below(probability, label, threshold), strict=True))}
+        {"likely": threshold, "share": dict(zip(CLASS_NAMES, _share_below(probability, label, threshold), strict=True))}
         for threshold in THRESHOLDS
     ]
 
 
-def _below(probability: Float64, label: Int, threshold: float) -> list[float]:
+def _share_below(probability: Float64, label: Int, threshold: float) -> list[float]:
     """Share of each class that is an object with less than this probability."""
     out = 1.0 - probability[:, 0] < threshold
     return [round(float(out[label == c].mean()), 4) if (label == c).any() else 0.0 for c in range(N_CLASSES)]

@@ -19,11 +19,11 @@ from modt.types import Float64, Int
 
 SMOOTHING = 0.02
 """Of a label, spread evenly over the classes."""
-TRUST = 0.8
+EVIDENCE_WEIGHT = 0.8
 """In the evidence of returns, which is not calibrated; what the pool takes of it, about."""
 
 
-class Teaching(Protocol):
+class TargetSource(Protocol):
     """Tells what the crops of a batch are."""
 
     def further(self, rng: Generator) -> Int:
@@ -68,7 +68,7 @@ class Ensemble:
     """
 
     def __init__(self, teachers: Sequence[nn.Module], unlabelled: Int, number: int, evidence: Float64) -> None:
-        self.teachers, self.unlabelled, self.evidence = teachers, unlabelled, TRUST * evidence
+        self.teachers, self.unlabelled, self.evidence = teachers, unlabelled, EVIDENCE_WEIGHT * evidence
         self.number = number if len(unlabelled) else 0
 
     def further(self, rng: Generator) -> Int:
