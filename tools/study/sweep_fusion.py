@@ -44,8 +44,8 @@ from modt.reporting import page, svg
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Frame
-from tools.study.recording import Recording, record
 from tools.study.fusion_replay import Outcome, replay
+from tools.study.recording import Recording, record
 from tools.train.labelled_scans import TEST_DRIVE, Scan, raw_scans
 from tools.train.synthetic_scans import scan_of
 

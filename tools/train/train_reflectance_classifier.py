@@ -1,17 +1,16 @@
 """Train the reflectance classifier, modt.classification.reflectance_classifier (extra [train]).
 
-    python -m tools.train.train_reflectance_classifier OUT_DIR CROPS.npz... --sensor NAME [--steps N] [--folds K] [--seed S]
+    python -m tools.train.train_reflectance_classifier OUT_DIR CROPS.npz... --sensor NAME
+                                    [--steps N] [--folds K] [--seed S]
 
-OUT_DIR holds what train_pointnet and train_box_classifier wrote for the same crops and folds. Writes
-OUT_DIR/reflectance.npz for export_pointnet, and OUT_DIR/reflectance.json: the weights of box and reflectance
-beside the network, and what box and reflectance, and all three, are worth together out of fold.
+OUT_DIR holds the output of train_pointnet and train_box_classifier for the same crops and folds. Writes
+OUT_DIR/reflectance.npz for export_pointnet and OUT_DIR/reflectance.json: the weights of box and reflectance in the
+pool with the network, and out-of-fold scores of box with reflectance and of all three.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,135 +20,144 @@ from scipy.special import softmax
 
 from modt.classification.mlp import Layers, logits
 from modt.types import Bool, Float64, Int
+from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier
-from tools.train.batches import draw, sampling_pools
+from tools.train.batches import draw_batch, sampling_pools
 from tools.train.box_features import dataset_features
 from tools.train.dataset import Dataset, load
 from tools.train.held_out import Model, out_of_fold
-from tools.train.mlp_training import Batch, trained
+from tools.train.mlp_training import Batch, train_mlp
 from tools.train.scores import average_precision, confusion
-from tools.train.temperature_scaling import Calibration, expected_calibration_error, fit
+from tools.train.temperature_scaling import Calibration, expected_calibration_error, fit_calibration
 from tools.train.weights import load_layers, save_layers
 
 STEPS = 1500
-"""Batches."""
 JITTER = 0.1
-"""Of each feature in a batch, of how it is spread: few crops, seen often."""
+"""Noise added to the features of a batch, as a fraction of their standard deviation; few crops are drawn often."""
 
 
-class Described:
-    """Features of all crops, as they are.
+class Features:
+    """Features of all crops of a data set, without augmentation.
 
-    Args:
-        data: the crops.
+    Attributes:
+        box: (R, 7) of the boxes.
+        all: (R, 12) of box and reflectance.
     """
 
     def __init__(self, data: Dataset) -> None:
         self.box = dataset_features(data, np.arange(len(data)))
-        self.whole = np.hstack([self.box, data.reflectance])
+        self.all = np.hstack([self.box, data.reflectance])
 
 
-def train(data: Dataset, seen: Described, rows: Int, boxes: Layers, steps: int, seed: int) -> Layers:
-    """Layers trained on these rows to add to what the layers of the boxes say, uncalibrated."""
+def train(data: Dataset, features: Features, rows: Int, boxes: Layers, steps: int, seed: int) -> Layers:
+    """Train on rows of the data set; uncalibrated layers whose logits are added to those of the box layers."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     pools = sampling_pools(data, rows[np.isfinite(data.reflectance[rows]).all(axis=1)])
-    base = logits(boxes, seen.box)
-    sample = seen.whole[np.concatenate([draw(pools, rng) for _ in range(16)])]
+    base = logits(boxes, features.box)
+    sample = features.all[np.concatenate([draw_batch(pools, rng) for _ in range(16)])]
     scale = JITTER * sample.std(axis=0)
 
     def batch() -> Batch:
-        chosen = np.concatenate([draw(pools, rng), draw(pools, rng)])
-        feature = seen.whole[chosen]
+        chosen = np.concatenate([draw_batch(pools, rng), draw_batch(pools, rng)])
+        feature = features.all[chosen]
         return Batch(feature + rng.normal(0.0, scale, feature.shape), data.label[chosen], base[chosen])
 
-    return trained(batch, sample, steps, rate=5e-3, decay=1e-2)
+    return train_mlp(batch, sample, steps, rate=5e-3, decay=1e-2)
 
 
 def cross_validate(
-    data: Dataset, seen: Described, network: Float64, k: int, steps: int, seed: int
+    data: Dataset, features: Features, network: Float64, k: int, steps: int, seed: int
 ) -> tuple[Calibration, dict[str, Any]]:
-    """Out-of-fold calibration beside the boxes; the weights of a pool with the network, and what all are worth."""
+    """Calibration, pool weights and scores from out-of-fold predictions.
+
+    Args:
+        data: all crops.
+        features: of them.
+        network: (R, 4) out-of-fold probabilities of the PointNet.
+        k: number of folds.
+        steps: training steps of a fold.
+        seed: of the first fold.
+    """
     boxes: dict[int, Layers] = {}
 
-    def scan_from_boxes(among: Bool, i: int) -> Model:
-        boxes[i] = train_box_classifier.train(data, np.flatnonzero(among & data.clear), train_box_classifier.STEPS, seed + i)
-        return lambda rows: logits(boxes[i], seen.box[rows])
+    def box_model(among: Bool, i: int) -> Model:
+        layers = train_box_classifier.train(
+            data, np.flatnonzero(among & data.trainable), train_box_classifier.STEPS, seed + i
+        )
+        boxes[i] = layers
+        return lambda rows: logits(layers, features.box[rows])
 
-    by_box = out_of_fold(data, k, scan_from_boxes)
+    by_box = out_of_fold(data, k, box_model)
 
-    def lit(among: Bool, i: int) -> Model:
-        calibrated = [*boxes[i][:-1], by_box.calibration.folded(boxes[i][-1])]
-        layers = train(data, seen, np.flatnonzero(among & data.clear), calibrated, steps, seed + i)
-        return lambda rows: logits(layers, seen.whole[rows])
+    def reflectance_model(among: Bool, i: int) -> Model:
+        calibrated = [*boxes[i][:-1], by_box.calibration.fold_into(boxes[i][-1])]
+        layers = train(data, features, np.flatnonzero(among & data.trainable), calibrated, steps, seed + i)
+        return lambda rows: logits(layers, features.all[rows])
 
-    added = out_of_fold(data, k, lit)
-    clear, label = added.clear, added.label[added.clear]
-    said = np.log(by_box.probability)
-    calibration = fit(added.logits[clear], label, said[clear])
-    prior = calibration.apply(added.logits, said)
-    evidence = added.logits / calibration.temperature + calibration.offset
-    share, weight = weigh(np.log(network[clear]), said[clear], evidence[clear], label)
-    alone, _ = weigh(np.log(network[clear]), said[clear], np.zeros_like(evidence[clear]), label)
-    word = pooled(np.log(network), said, evidence, share, weight)
+    held = out_of_fold(data, k, reflectance_model)
+    clear, label = held.unambiguous, held.label[held.unambiguous]
+    box = np.log(by_box.probability)
+    calibration = fit_calibration(held.logits[clear], label, box[clear])
+    both = calibration.apply(held.logits, box)
+    evidence = held.logits / calibration.temperature + calibration.offset
+    share, weight = fit_pool(np.log(network[clear]), box[clear], evidence[clear], label)
+    share_without, _ = fit_pool(np.log(network[clear]), box[clear], np.zeros_like(evidence[clear]), label)
+    pool = pooled(np.log(network), box, evidence, share, weight)
     return calibration, {
         "share": share,
         "weight": weight,
-        "share_without": alone,
+        "share_without": share_without,
         "box": {
-            "average_precision": average_precision(prior, added.label, added.truth),
-            "ruled_out": train_box_classifier.ruled_out(prior[clear], label),
+            "average_precision": average_precision(both, held.label, held.truth),
+            "ruled_out": train_box_classifier.ruled_out(both[clear], label),
         },
         "network": {
-            "average_precision": average_precision(word, added.label, added.truth),
-            "confusion": confusion(word[clear], label),
-            "ece": expected_calibration_error(word[clear], label),
-            "log_loss": round(log_loss(word[clear], label), 4),
+            "average_precision": average_precision(pool, held.label, held.truth),
+            "confusion": confusion(pool[clear], label),
+            "ece": expected_calibration_error(pool[clear], label),
+            "log_loss": round(log_loss(pool[clear], label), 4),
             "log_loss_without": round(log_loss(network[clear], label), 4),
         },
     }
 
 
 def pooled(network: Float64, box: Float64, evidence: Float64, share: float, weight: float) -> Float64:
-    """(R, 4) log-linear pool of what network and box say (R, 4), logarithms both, with the evidence (R, 4)."""
+    """(R, 4) log-linear pool of the log probabilities (R, 4) of network and box and the evidence (R, 4)."""
     probability: Float64 = softmax((1.0 - share) * network + share * box + weight * evidence, axis=1)
     return probability
 
 
-def weigh(network: Float64, box: Float64, evidence: Float64, label: Int) -> tuple[float, float]:
-    """The share of the box and the weight of the evidence, 0 to 1, whose pool fits the labels best."""
-    found = minimize(
-        lambda x: log_loss(pooled(network, box, evidence, *x), label), x0=(0.5, 0.5), bounds=((0.0, 1.0),) * 2
-    )
-    share, weight = found.x.tolist()
+def fit_pool(network: Float64, box: Float64, evidence: Float64, label: Int) -> tuple[float, float]:
+    """Share of the box and weight of the evidence, both in 0 to 1, that minimise the log loss of the pool."""
+
+    def loss(x: Float64) -> float:
+        return log_loss(pooled(network, box, evidence, float(x[0]), float(x[1])), label)
+
+    share, weight = minimize(loss, x0=(0.5, 0.5), bounds=((0.0, 1.0),) * 2).x.tolist()
     return round(share, 2), round(weight, 2)
 
 
 def log_loss(probability: Float64, label: Int) -> float:
-    """Mean negative logarithm of what the true classes were given."""
+    """Mean negative log probability of the true classes."""
     return -float(np.log(probability[np.arange(len(label)), label]).mean())
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("crops", type=Path, nargs="+")
-    parser.add_argument("--sensor", required=True, help="on whose scale the reflectances are, as profiles name it")
+    parser = training_parser(__doc__, folds=3)
+    parser.add_argument("--sensor", required=True, help="sensor that measured the reflectance, by its profile's name")
     parser.add_argument("--steps", type=int, default=STEPS)
-    parser.add_argument("--folds", type=int, default=3)
-    parser.add_argument("--seed", type=int, default=1)
     args = parser.parse_args()
-    torch.set_num_threads(1)
-    torch.use_deterministic_algorithms(True)
+    make_torch_deterministic()
     data = load(*args.crops)
-    seen = Described(data)
+    features = Features(data)
     with np.load(args.out / "held_out.npz") as file:
-        assert file["crops"].tolist() == data.sha256, "held_out.npz is of other crops"
+        assert file["crops"].tolist() == data.sha256, "held_out.npz belongs to other crops"
         network = file["probability"]
-    calibration, report = cross_validate(data, seen, network, args.folds, args.steps, args.seed)
+    calibration, report = cross_validate(data, features, network, args.folds, args.steps, args.seed)
     boxes = load_layers(args.out / "boxes.npz")
-    layers = train(data, seen, np.flatnonzero(data.clear), boxes, args.steps, args.seed)
-    save_layers(args.out / "reflectance.npz", [*layers[:-1], calibration.folded(layers[-1])])
+    layers = train(data, features, np.flatnonzero(data.trainable), boxes, args.steps, args.seed)
+    save_layers(args.out / "reflectance.npz", [*layers[:-1], calibration.fold_into(layers[-1])])
     report |= {"sensor": args.sensor, "steps": args.steps, "seed": args.seed}
     (args.out / "reflectance.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(report))

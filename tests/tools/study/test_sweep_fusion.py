@@ -19,8 +19,8 @@ from modt.pipeline import Fusion
 from modt.types import NONE, Proposals
 from tests.classification.scenes import blobs
 from tools.study import sweep_fusion
-from tools.study.recording import Moment, Recording, owners, record
 from tools.study.fusion_replay import CALLS, Outcome, replay
+from tools.study.recording import Moment, Recording, owners, record
 from tools.study.sweep_fusion import Setting, Tried
 from tools.train.labelled_scans import TEST_DRIVE, Scan
 from tools.train.synthetic_scans import scan_of
