@@ -1,17 +1,16 @@
-"""What it saves, and what it costs, that new proposals inherit background from a place that is remembered.
+"""Classifier calls saved and objects missed by new tracks that inherit background from the background map.
 
     python -m tools.study.inheritance [--scene street crossing] [--seeds 0:4] [--seconds 10]
                          [--sensor hdl-64e] [--fov full]
                          [--mode efficient]
 
-Every synthetic drive is played twice, with the memory and without. Of the proposals that are new and inherit, those
-are wrong that are truly an object: most of their points are of a car, a pedestrian or a cyclist. They stay so until
-the class is doubted (e7), the track ends or what it follows is no longer an object.
+Every simulated drive runs twice, with the background map and without. An inheriting new track is wrong if most points
+of its proposal are on a car, pedestrian or cyclist, until the class is reopened (e7), the track ends or its proposal
+is no longer on an object.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -24,10 +23,11 @@ from modt.sources.synthetic_stream import SyntheticStream
 from modt.tracking.background_map import NoMemory
 from modt.tracking.track_table import Followed
 from modt.types import NONE, Int
-from tools.study.truth_replay import Seen, add_drives, replay
+from tools.options import parser
+from tools.study.truth_replay import JudgedFrame, add_drives, replay
 
-PURE = 0.5
-"""Share of a proposal's points that make it one of their body."""
+MIN_SHARE = 0.5
+"""Minimum share of a proposal's points on one body."""
 
 
 @dataclass
@@ -35,13 +35,13 @@ class Tally:
     """Counts over drives.
 
     Attributes:
-        proposals: seen.
+        proposals: number of proposals.
         calls: proposals classified.
-        born: tracks begun.
-        objects_born: those that are truly an object.
-        inherited: those that inherited background.
-        wrong: those of them that are truly an object, by class.
-        frames_wrong: for how long each of these was background by inheritance while it showed an object.
+        born: new tracks.
+        objects_born: new tracks of objects.
+        inherited: new tracks that inherit background.
+        wrong: inheriting new tracks of objects, by class.
+        frames_wrong: number of frames for which each of these is wrong.
     """
 
     proposals: int = 0
@@ -52,15 +52,15 @@ class Tally:
     wrong: Counter[str] = field(default_factory=Counter)
     frames_wrong: list[int] = field(default_factory=list)
 
-    def add(self, seen: Iterable[Seen], kind_of: Int) -> None:
-        """One drive; kind_of (b,) is the true class of each body."""
+    def add(self, seen: Iterable[JudgedFrame], kind_of: Int) -> None:
+        """Add a drive; kind_of (b,) is the true class of each body."""
         still_wrong: dict[int, int] = {}
         for s in seen:
             table = s.tracker.tracks
             assert isinstance(table, Followed)
             rows = np.flatnonzero(table.proposal != NONE)
             proposal = table.proposal[rows]
-            sure = (s.body[proposal] != NONE) & (s.share[proposal] > PURE)
+            sure = (s.body[proposal] != NONE) & (s.share[proposal] > MIN_SHARE)
             class_ = np.where(sure, kind_of[s.body[proposal]], ObjectClass.BACKGROUND)
             object_ = class_ != ObjectClass.BACKGROUND
             new, inherits = table.age[rows] == 1, table.inherited[rows]
@@ -82,7 +82,7 @@ class Tally:
 
 
 def table_of(with_memory: Tally, without: Tally) -> str:
-    """Both sides, as rows of a Markdown table."""
+    """Rows of a Markdown table."""
     m, frames = with_memory, np.array(with_memory.frames_wrong or [0])
     wrong = sum(m.wrong.values())
 
@@ -109,10 +109,10 @@ def table_of(with_memory: Tally, without: Tally) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add_drives(parser)
-    parser.add_argument("--mode", choices=tuple(MODES), default="efficient")
-    arguments = parser.parse_args()
+    options = parser(__doc__)
+    add_drives(options)
+    options.add_argument("--mode", choices=tuple(MODES), default="efficient")
+    arguments = options.parse_args()
     for scene in arguments.scene:
         with_memory, without = Tally(), Tally()
         for seed in range(*arguments.seeds):

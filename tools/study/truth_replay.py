@@ -1,4 +1,4 @@
-"""A synthetic drive through the pipeline, frame by frame beside its truth."""
+"""Replay of a simulated drive through the pipeline, with the truth of each frame."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from modt.simulation.simulator import Truth
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.tracking.background_map import BackgroundMemory, NoMemory
 from modt.tracking.tracker import Tracker
-from modt.types import NONE, FrameResult, Int, Proposals
+from modt.types import NONE, Float64, FrameResult, Int, Proposals
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """A frame's result and what is true of it.
+class JudgedFrame:
+    """Result and truth of a frame.
 
     Attributes:
         result: of the pipeline.
-        truth: about the sweep.
-        body: (P,) the body that most points of each proposal are of, NONE for the ground.
-        share: (P,) of its points that are.
+        truth: of the sweep.
+        body: (P,) body with most points of each proposal, NONE for the ground.
+        share: (P,) of its points on that body.
         tracker: after the frame.
     """
 
     result: FrameResult
     truth: Truth
     body: Int
-    share: np.ndarray
+    share: Float64
     tracker: Tracker
 
 
 def add_drives(parser: ArgumentParser) -> None:
-    """Options that say which synthetic drives to study."""
+    """Add the options that select simulated drives."""
     parser.add_argument("--scene", nargs="+", default=["street", "crossing"])
-    parser.add_argument("--sensor", default="hdl-64e", help="there must be a profile of its name")
+    parser.add_argument("--sensor", default="hdl-64e", help="sensor with a profile of the same name")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
     parser.add_argument("--fov", choices=("camera", "full"), default="full")
@@ -55,7 +55,7 @@ def replay(
     mode_name: str = "efficient",
     camera: bool = False,
     memory: NoMemory | BackgroundMemory | None = None,
-) -> Iterator[Seen]:
+) -> Iterator[JudgedFrame]:
     """Every frame; the profile is that of the sensor, the memory the tracker's own where none is given."""
     profile, mode = load(profile_name), assemble.MODES[mode_name]
     assert stream.info.camera is not None
@@ -65,11 +65,11 @@ def replay(
     pipeline = replace(pipeline, tracker=tracker)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, mode.budget(profile))
-        yield Seen(result, truth, *majority_bodies(result.proposals, truth.instance), tracker)
+        yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance), tracker)
 
 
-def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, np.ndarray]:
-    """(P,) body that most points of each proposal are of, NONE for the ground, and (P,) their share."""
+def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, Float64]:
+    """(P,) body with most points of each proposal, NONE for the ground, and (P,) its share of the points."""
     n = len(proposals)
     if not n:
         return np.zeros(0, np.int64), np.zeros(0)
