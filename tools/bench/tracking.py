@@ -1,6 +1,6 @@
 """CPU time of the tracker by number of proposals, on a static scene and a moving sensor.
 
-Printed with odometry, without, for the registration alone, and as frames per second of `modt track`. The reference
+Printed with poses and without, where odometry estimates them, and as frames per second of `modt track`. The reference
 workload, sorting 100,000 numbers, relates figures of different machines.
 """
 
@@ -10,15 +10,13 @@ import json
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from modt.cli import track
-from modt.config import TrackingConfig
+from modt.config import OdometryConfig, TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
-from modt.observations import sight
-from modt.odometry.registration import Registration
+from modt.odometry.odometry import Odometry
 from modt.sources.detections import TYPES, Detections, files, read
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
@@ -29,8 +27,6 @@ POINTS = 80
 """Points of a proposal."""
 WARM_UP_FRAMES = 10
 """Frames left out of the figures, while the number of tracks grows."""
-POSE_ERROR_M = np.array([0.05, 0.03, 0.0])
-"""Error of the predicted pose."""
 
 
 def scenery(n: int, rng: np.random.Generator) -> Float64:
@@ -63,45 +59,22 @@ def frames(n: int, count: int, alive: float, seed: int = 0) -> list[tuple[Frame,
     return out
 
 
-def median_ms(times_ns: list[int]) -> float:
-    """Median without the warm-up [ms]."""
-    return float(np.median(times_ns[WARM_UP_FRAMES:])) / 1e6
-
-
-def tracking_ms(scene: list[tuple[Frame, Proposals]]) -> tuple[float, float]:
-    """CPU time per frame [ms], and number of tracks alive."""
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
-    times, alive = [], []
+def stages_ms(scene: list[tuple[Frame, Proposals]]) -> tuple[float, float, float]:
+    """Median CPU time per frame of odometry and of tracking [ms], and mean number of tracks."""
+    odometry, tracker = Odometry(OdometryConfig()), Tracker(TrackingConfig(), EFFICIENT)
+    times_ns, alive = [], []
     for frame, proposals in scene:
-        began = time.thread_time_ns()
-        tracker.follow(frame, proposals)
-        times.append(time.thread_time_ns() - began)
-        alive.append(len(tracker.tracks))
-        classify(tracker)
-    return median_ms(times), float(np.mean(alive[WARM_UP_FRAMES:]))
-
-
-def registration_ms(scene: list[tuple[Frame, Proposals]]) -> float:
-    """CPU time per frame of the registration alone, to tracks of known pose [ms]."""
-    tracker, registration = Tracker(TrackingConfig(), EFFICIENT), Registration()
-    times = []
-    for frame, proposals in scene:
-        assert frame.T_world_sensor is not None
-        tracks: Any = tracker.tracks  # has the columns of the registration
-        sightings = sight(proposals, se3(np.eye(3), frame.T_world_sensor[:3, 3] + POSE_ERROR_M))
-        began = time.thread_time_ns()
-        registration.correct(tracks, sightings)
-        times.append(time.thread_time_ns() - began)
-        tracker.follow(frame, proposals)
-        classify(tracker)
-    return median_ms(times)
-
-
-def classify(tracker: Tracker) -> None:
-    """Set every track that requests a class to background."""
-    rows = np.flatnonzero(tracker.asking())
-    tracker.tracks.posterior[rows], tracker.tracks.final[rows] = [1, 0, 0, 0], True
-    tracker.settle(rows, np.ones(len(rows), np.bool_))
+        began_ns = time.thread_time_ns()
+        located = odometry.locate(frame, proposals, tracker.static_tracks)
+        located_ns = time.thread_time_ns()
+        tracked = tracker.follow(frame.stamp_s, proposals, located)
+        rows = np.flatnonzero(tracked.wants_class)
+        tracked.tracks.posterior[rows] = [1, 0, 0, 0]
+        tracker.conclude(rows, np.ones(len(rows), np.bool_))
+        times_ns.append((located_ns - began_ns, time.thread_time_ns() - located_ns))
+        alive.append(len(tracked.tracks))
+    odometry_ms, tracking_ms = np.median(times_ns[WARM_UP_FRAMES:], axis=0) / 1e6
+    return float(odometry_ms), float(tracking_ms), float(np.mean(alive[WARM_UP_FRAMES:]))
 
 
 def traffic(cars: int, count: int, seed: int = 0) -> Detections:
@@ -145,13 +118,14 @@ def main() -> None:
     arguments = options.parse_args()
     for n in arguments.proposals:
         scene = frames(n, arguments.frames, arguments.alive)
-        known, alive = tracking_ms(scene)
+        _, with_poses_ms, alive = stages_ms(scene)
+        odometry_ms, tracking_ms, _ = stages_ms([(replace(f, T_world_sensor=None), p) for f, p in scene])
         line = {
             "proposals": n,
             "tracks": alive,
-            "cpu_ms": known,
-            "without_odometry_cpu_ms": tracking_ms([(replace(f, T_world_sensor=None), p) for f, p in scene])[0],
-            "registration_cpu_ms": registration_ms(scene),
+            "tracking_cpu_ms": with_poses_ms,
+            "without_poses_odometry_cpu_ms": odometry_ms,
+            "without_poses_tracking_cpu_ms": tracking_ms,
             "sort_cpu_ms": sort_ms(),
         }
         print(json.dumps({k: round(v, 3) for k, v in line.items()}), flush=True)

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -21,13 +22,14 @@ from modt.cli import assemble
 from modt.cli.replay import frames as frame_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
+from modt.observations import Located, StaticTracks
+from modt.pipeline import Odometry
 from modt.profile import load
 from modt.sources import kitti_calibration, oxts
 from modt.sources.pose_source import NoOdometry, PosedStream
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
-from modt.tracking.tracker import Tracker
-from modt.types import Float64
+from modt.types import Float64, Frame, Proposals
 from tools.options import parser
 
 VN, VE, VU = 6, 7, 10
@@ -58,18 +60,38 @@ def drift(estimate: Float64, reference: Float64) -> dict[str, float]:
     }
 
 
+class PoseRecorder:
+    """Odometry that stores the pose of each frame.
+
+    Args:
+        odometry: wrapped.
+
+    Attributes:
+        poses: (4, 4) of each frame.
+    """
+
+    def __init__(self, odometry: Odometry) -> None:
+        self.odometry = odometry
+        self.poses: list[Float64] = []
+
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+        """Delegate and store the pose."""
+        located = self.odometry.locate(frame, proposals, static_tracks)
+        self.poses.append(located.placement.T_world_sensor)
+        return located
+
+
 def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     """(n, 4, 4) poses estimated from proposals, without odometry."""
     profile, mode = load(), assemble.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
     pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
-    tracker, poses = pipeline.tracker, []
-    assert isinstance(tracker, Tracker)
+    recorder = PoseRecorder(pipeline.odometry)
+    pipeline = replace(pipeline, odometry=recorder)
     for frame in PosedStream(stream, NoOdometry()):
         pipeline.step(frame, mode.budget(profile))
-        poses.append(tracker.T_world_sensor)
-    return np.array(poses)
+    return np.array(recorder.poses)
 
 
 def by_kiss_icp(stream: Stream) -> Float64:

@@ -33,9 +33,9 @@ class CallCounter:
         self.fusion = fusion
         self.calls = dict.fromkeys(CALLS, 0)
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """Delegate."""
-        return self.fusion.asks(tracks, proposals, asking)
+        return self.fusion.asks(tracks, proposals, wants_class)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Count the calls and delegate."""
@@ -69,23 +69,23 @@ class Outcome:
 
 
 def replay(
-    recordings: Sequence[Recording], fusion: Callable[[Prior], Fusion], ask_from: int, scored_from: int | None = None
+    recordings: Sequence[Recording], fusion: Callable[[Prior], Fusion], min_hits: int, scored_from: int | None = None
 ) -> Outcome:
     """Replay drives with a fusion, without a budget.
 
     Args:
         recordings: the drives.
         fusion: makes the fusion of a drive from its prior.
-        ask_from: minimum number of frames with a proposal before a track is classified.
-        scored_from: minimum number of such frames before a proposal is scored, by default `ask_from`: earlier ones
+        min_hits: minimum number of frames with a proposal before a track is classified.
+        scored_from: minimum number of such frames before a proposal is scored, by default `min_hits`: earlier ones
             do not depend on the fusion.
     """
     calls = dict.fromkeys(CALLS, 0)
     parts: list[tuple[Float64, Int]] = []
     for recording in recordings:
-        playback = Playback(recording, ask_from)
+        playback = Playback(recording, min_hits)
         counter = CallCounter(fusion(playback))
-        parts.append(_played(recording, playback, counter, scored_from or ask_from))
+        parts.append(_played(recording, playback, counter, scored_from or min_hits))
         calls = {name: n + counter.calls[name] for name, n in calls.items()}
     probability, kind = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     total = sum(recording.n_proposals for recording in recordings)
@@ -95,7 +95,7 @@ def replay(
 
 def _played(recording: Recording, playback: Playback, fusion: Fusion, scored_from: int) -> tuple[Float64, Int]:
     """(R, 4) posteriors of the scored proposals, and (R,) their true classes."""
-    pipeline = Pipeline(playback, playback, fusion, Scheduler(), playback, NullLedger())
+    pipeline = Pipeline(playback, playback, playback, fusion, Scheduler(), playback, NullLedger())
     no_points = np.zeros((0, 4), np.float32)
     posterior, true = [np.zeros((0, N_CLASSES))], [np.zeros(0, np.int64)]
     for index, recorded in enumerate(recording.frames):

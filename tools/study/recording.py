@@ -7,7 +7,7 @@ object, and further fragments of one, are tracked by modt's own tracker; without
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,11 +15,14 @@ import numpy as np
 from modt.classification.prior import Prior, at_least
 from modt.config import ProfileConfig
 from modt.geometry import transform_boxes
+from modt.observations import Located, StaticTracks, observe
+from modt.odometry.odometry import Odometry
 from modt.pipeline import Classifier
+from modt.placement import Placement
 from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
-from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, Tracks
+from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks
 from tools.train.build_crops import label
 from tools.train.labelled_scans import Scan
 
@@ -94,12 +97,14 @@ def record(
         prior: classifies proposals by their boxes.
         ideal: objects have their true tracks.
     """
-    tracker = Tracker(config.tracking, ACCURATE)
+    odometry, tracker = Odometry(config.odometry), Tracker(config.tracking, ACCURATE)
     rows: dict[tuple[str, int], int] = {}
     frames = []
     for frame, scan in drive:
         proposals = Segmenter(config.segmentation, config.sensor, scan.fov).segment(frame.points)
-        own, proposals = tracker.follow(frame, proposals), tracker.proposals
+        located = odometry.locate(frame, proposals, tracker.static_tracks)
+        tracked = tracker.follow(frame.stamp_s, proposals, located)
+        own, proposals = tracked.tracks, tracked.proposals
         ids = own.id[own.row_of_proposal(len(proposals))]
         keys = [
             ("body", body) if ideal and body != NONE else ("track", i)
@@ -109,7 +114,7 @@ def record(
         frames.append(
             RecordedFrame(
                 proposals=proposals,
-                box=transform_boxes(tracker.T_world_sensor, proposals.box),
+                box=transform_boxes(located.placement.T_world_sensor, proposals.box),
                 track=np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64),
                 prior=prior.of(proposals),
                 likelihood=network.classify(frame.points, proposals, np.arange(len(proposals))),
@@ -134,36 +139,40 @@ def owners(scan: Scan, proposals: Proposals) -> Int:
 
 
 class Playback:
-    """Segmenter, tracker, classifier and prior of a pipeline that return the data of a recording.
+    """Segmenter, odometry, tracker, classifier and prior of a pipeline that return the data of a recording.
 
     The track table has a row for each track of the drive from the first frame on.
 
     Args:
         recording: data to return.
-        ask_from: minimum number of frames with a proposal before a track is classified.
+        min_hits: minimum number of frames with a proposal before a track is classified.
     """
 
     state_names = ("followed",)
 
-    def __init__(self, recording: Recording, ask_from: int) -> None:
+    def __init__(self, recording: Recording, min_hits: int) -> None:
         self._frames = iter(recording.frames)
-        self._ask_from = ask_from
+        self._min_hits = min_hits
         self.share = recording.share
         self._tracks = Tracks.blank(recording.n_tracks)
         self._tracks.id[:] = np.arange(recording.n_tracks)
-
-    @property
-    def proposals(self) -> Proposals:
-        """Of the current frame."""
-        return self._current.proposals
 
     def segment(self, points: Float32) -> Proposals:
         """Advance to the next frame; its proposals."""
         self._current = next(self._frames)
         return self._current.proposals
 
-    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
-        """Update the track table."""
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+        """Placement at the origin; the recorded boxes are in the world."""
+        placement = Placement(np.eye(4))
+        return Located(placement, observe(proposals, placement.T_world_sensor))
+
+    def static_tracks(self) -> StaticTracks:
+        """Never called, since `locate` registers nothing."""
+        raise NotImplementedError
+
+    def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+        """Update the track table; tracks with enough hits whose class is not final want a class."""
         t, rows = self._tracks, self._current.track
         t.proposal[:] = NONE
         t.proposal[rows] = np.arange(len(rows))
@@ -171,16 +180,12 @@ class Playback:
         t.hits[rows] += 1
         t.age += t.hits > 0
         t.missed = np.where(t.proposal == NONE, t.missed + 1, 0)
-        return t
+        return TrackedFrame(t, proposals, (t.proposal != NONE) & ~t.final & (t.hits >= self._min_hits))
 
-    def asking(self) -> Bool:
-        """(M,) tracks with enough hits whose class is not final."""
-        t = self._tracks
-        asks: Bool = (t.proposal != NONE) & ~t.final & (t.hits >= self._ask_from)
-        return asks
-
-    def settle(self, rows: Int, certain: Bool) -> None:
-        """No effect: the fusion has updated the table."""
+    def conclude(self, rows: Int, certain: Bool) -> Tracks:
+        """A certain class is final."""
+        self._tracks.final[rows] = certain
+        return self._tracks
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) recorded likelihoods."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.simulation.simulator import Truth
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.background_map import BackgroundMemory, NoMemory
-from modt.tracking.tracker import Tracker
 from modt.types import NONE, Float64, FrameResult, Int, Proposals
 
 
@@ -29,14 +27,12 @@ class JudgedFrame:
         truth: of the sweep.
         body: (P,) body with most points of each proposal, NONE for the ground.
         share: (P,) of its points on that body.
-        tracker: after the frame.
     """
 
     result: FrameResult
     truth: Truth
     body: Int
     share: Float64
-    tracker: Tracker
 
 
 def add_drives(parser: ArgumentParser) -> None:
@@ -48,24 +44,15 @@ def add_drives(parser: ArgumentParser) -> None:
     parser.add_argument("--fov", choices=("camera", "full"), default="full")
 
 
-def replay(
-    stream: SyntheticStream,
-    profile_name: str,
-    *,
-    mode_name: str = "efficient",
-    camera: bool = False,
-    memory: NoMemory | BackgroundMemory | None = None,
-) -> Iterator[JudgedFrame]:
-    """Every frame; the profile is that of the sensor, the memory the tracker's own where none is given."""
-    profile, mode = load(profile_name), assemble.MODES[mode_name]
+def replay(stream: SyntheticStream, profile_name: str, *, camera: bool = False) -> Iterator[JudgedFrame]:
+    """Run a stream in mode `efficient`, in the camera's view or over the full circle."""
+    profile, mode = load(profile_name), assemble.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
     pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
-    tracker = Tracker(profile.tracking, mode.machine, memory=memory)
-    pipeline = replace(pipeline, tracker=tracker)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, mode.budget(profile))
-        yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance), tracker)
+        yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance))
 
 
 def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, Float64]:

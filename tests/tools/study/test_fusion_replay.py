@@ -16,7 +16,7 @@ from tests.classification.scenes import blobs
 from tools.study.fusion_replay import CALLS, Outcome, replay
 from tools.study.recording import RecordedFrame, Recording
 
-ASK_FROM = 2
+MIN_HITS = 2
 ALONE = FusionConfig(bearing_deg=180.0, range_ratio=10.0, extent_ratio=10.0, reopen_ratio=None)
 """Views independent by their number of points alone; no reopening."""
 
@@ -46,14 +46,14 @@ def keyed(config: FusionConfig) -> Callable[[Prior], Fusion]:
 
 
 def test_conventional_classifies_every_proposal(played: Recording) -> None:
-    outcome = replay([played, played], lambda prior: EveryFrame(), ASK_FROM)
+    outcome = replay([played, played], lambda prior: EveryFrame(), MIN_HITS)
     assert outcome.share == 1.0
     assert calls(outcome) == 2 * played.n_proposals == 120
     assert len(outcome.each) == 2
 
 
 def test_efficient_classifies_each_track_once(played: Recording) -> None:
-    outcome = replay([played], lambda prior: FirstView(FusionConfig(), prior), ASK_FROM)
+    outcome = replay([played], lambda prior: FirstView(FusionConfig(), prior), MIN_HITS)
     assert outcome.calls == dict(zip(CALLS, (6, 0, 0, 0), strict=True))
 
 
@@ -61,10 +61,10 @@ def test_only_independent_views_are_fused_after_the_first(played: Recording) -> 
     never = dataclasses.replace(
         ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=1, threshold=1.0, background_threshold=1.0
     )
-    few = replay([played], keyed(never), ASK_FROM)
+    few = replay([played], keyed(never), MIN_HITS)
     assert few.calls == dict(zip(CALLS, (6, 0, 0, 0), strict=True))
     always = dataclasses.replace(never, alpha=(0.0,) * 3, background_alpha=0.0)
-    many = replay([played], keyed(always), ASK_FROM)
+    many = replay([played], keyed(always), MIN_HITS)
     assert many.calls == dict(zip(CALLS, (6, 0, 48, 0), strict=True))  # each of the nine frames that may ask
 
 
@@ -72,14 +72,14 @@ def test_a_late_start_replaces_the_first_view(played: Recording) -> None:
     late = dataclasses.replace(
         ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=5, threshold=1.0, background_threshold=1.0
     )
-    assert replay([played], keyed(late), ASK_FROM).calls == dict(zip(CALLS, (6, 6, 0, 0), strict=True))
+    assert replay([played], keyed(late), MIN_HITS).calls == dict(zip(CALLS, (6, 6, 0, 0), strict=True))
 
 
 def test_a_class_final_with_few_points_is_reopened(played: Recording) -> None:
     settled = dataclasses.replace(
         ALONE, threshold=0.25, background_threshold=0.25, prior=(0.25,) * 3, reopen_ratio=2.0
     )
-    outcome = replay([played], keyed(settled), ASK_FROM)
+    outcome = replay([played], keyed(settled), MIN_HITS)
     assert outcome.calls["first views"] == 6
     assert outcome.calls["reopenings"] == 6 * 2  # 18 points at first, then 42 and 86: each more than twice the last
     assert calls(outcome) == 18
@@ -87,15 +87,15 @@ def test_a_class_final_with_few_points_is_reopened(played: Recording) -> None:
 
 def test_replays_are_reproducible_and_leave_the_recording_unchanged(played: Recording) -> None:
     before = [recorded.likelihood.tobytes() for recorded in played.frames]
-    once, again = (replay([played], keyed(FusionConfig()), ASK_FROM) for _ in range(2))
+    once, again = (replay([played], keyed(FusionConfig()), MIN_HITS) for _ in range(2))
     assert once == again
     assert before == [recorded.likelihood.tobytes() for recorded in played.frames]
 
 
 def test_unclassified_proposals_count_as_missed(played: Recording) -> None:
-    late = replay([played], lambda prior: FirstView(FusionConfig(), prior), ask_from=6, scored_from=1)
+    late = replay([played], lambda prior: FirstView(FusionConfig(), prior), min_hits=6, scored_from=1)
     assert max(late.precision.values()) <= 0.5 + 0.3  # five of ten views come before the first answer
-    assert min(replay([played], lambda prior: FirstView(FusionConfig(), prior), ask_from=6).precision.values()) > max(
+    assert min(replay([played], lambda prior: FirstView(FusionConfig(), prior), min_hits=6).precision.values()) > max(
         late.precision.values()
     )
 
