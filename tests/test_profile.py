@@ -30,7 +30,9 @@ def test_an_empty_profile_is_the_default():
 
 
 def test_dump_and_parse_are_inverse():
-    config = profile.parse("fusion: {object_threshold: 0.9, point_change: [0.1, 0.2, 0.3, 0.4]}\nsensor: {height_m: null}\n")
+    config = profile.parse(
+        "fusion: {object_threshold: 0.9, point_change: [0.1, 0.2, 0.3, 0.4]}\nsensor: {height_m: null}\n"
+    )
     assert config.fusion.point_change == (0.1, 0.2, 0.3, 0.4)
     assert config.sensor.height_m is None
     assert profile.parse(profile.to_yaml(profile.dump(config))) == config

@@ -146,9 +146,14 @@ def _text(value: float | None) -> str:
 
 
 def papers(config: ProfileConfig) -> ProfileConfig:
-    """The number of points alone makes a view independent, from the first frame on; nothing is doubted, boxes say nothing."""
+    """Views independent by their points alone, from the first frame on; no review, no box prior."""
     off = {"bearing_change_deg": 180.0, "range_change": 10.0, "extent_change": 10.0, "review_point_ratio": None}
-    off |= {"min_object_probability": 0.0, "first_view_min_object_probability": 0.0, "box_update_weight": 0.0, "mismatch_probability": 0.0}
+    off |= {
+        "min_object_probability": 0.0,
+        "first_view_min_object_probability": 0.0,
+        "box_update_weight": 0.0,
+        "mismatch_probability": 0.0,
+    }
     return dataclasses.replace(
         config,
         fusion=dataclasses.replace(config.fusion, **off),

@@ -124,7 +124,7 @@ class KeyViews:
         return independent
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Multiply the view into the posterior (Equation 6); (R,) certain, which is also whether the class is final."""
+        """Multiply the view into the posterior (Equation 6); (R,) certain: the class is final, else not."""
         view, prior = np.log(normalise(likelihood)), self._log_pooled_prior(tracks.prior[rows])
         past = np.log(normalise(tracks.key_posterior[rows])) - self._log_pooled_prior(tracks.key_prior[rows])
         ratio = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
@@ -141,8 +141,9 @@ class KeyViews:
     def _log_pooled_prior(self, box_prior: Float64) -> Float64:
         """(R, 4) logarithm of the prior that a likelihood contains: pool of class frequency and box prior (R, 4)."""
         weight = self.prior.pool_weight
-        box: Float64 = np.log(np.maximum(box_prior, MIN_PROBABILITY))
-        return (1.0 - weight) * self._log_frequency + weight * box
+        box = np.log(np.maximum(box_prior, MIN_PROBABILITY))
+        pooled: Float64 = (1.0 - weight) * self._log_frequency + weight * box
+        return pooled
 
     def _certain(self, posterior: Float64) -> Bool:
         """(R,) whether the posterior of an object, or the evidence for background, reaches its threshold.

@@ -36,7 +36,7 @@ class ReflectanceClassifier(Protocol):
 
     @property
     def weight(self) -> float:
-        """Exponent of the likelihood in that pool: its part that the network does not know from the shape (0 to 1)."""
+        """Exponent of the likelihood in that pool: the part of it that the shape does not imply (0 to 1)."""
         ...
 
     def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:

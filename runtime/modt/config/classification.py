@@ -53,13 +53,13 @@ class SchedulerConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FusionConfig(StageConfig):
-    """Independent views and final classes (section V-C, Figs. 10 and 11), by tools/study/sweep_fusion.py if not stated.
+    """Independent views and final classes (section V-C, Figs. 10 and 11), found by tools/study/sweep_fusion.py.
 
     first_view_*: mode efficient; start_frame, thresholds, *_change and review_*: mode accurate.
     """
 
     prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency among proposals")
-    box_update_weight: float = number(0.75, 0.0, 1.0, "", "exponent of the change of the box prior since the last view")
+    box_update_weight: float = number(0.75, 0.0, 1.0, "", "exponent of the change of the box prior since a view")
     mismatch_probability: float = number(0.1, 0.0, 1.0, "", "that a proposal is not the object of its track")
     first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")
     first_view_min_hits: int = number(1, 1, 1000, "frames", "with a proposal, to be classified")
