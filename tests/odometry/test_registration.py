@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
-from modt.geometry.kdop import WAYS
-from modt.observations import sight
+from modt.geometry.kdop import DIRECTIONS
+from modt.observations import observe
 from modt.odometry import landmarks
 from modt.odometry.registration import GATE_M, REACH_M, SCALES, Fit, Registration, _fit, _mutual
 from modt.tracking.states import EFFICIENT
-from modt.tracking.track_table import Followed
+from modt.tracking.track_table import TrackTable
 from modt.tracking.tracker import Tracker, rigid
 from tests.tracking.tracking_scenes import frame_of
 
@@ -121,7 +121,7 @@ def outward(lever):
     out = np.zeros((3, 8, len(lever)))
     for k, (x, y) in enumerate(lever):
         for e in range(8):
-            out[:, e, k] = WAYS[0, e], WAYS[1, e], WAYS[0, e] * -y + WAYS[1, e] * x
+            out[:, e, k] = DIRECTIONS[0, e], DIRECTIONS[1, e], DIRECTIONS[0, e] * -y + DIRECTIONS[1, e] * x
     return out
 
 
@@ -224,8 +224,8 @@ def test_a_fit_of_a_few_is_doubted(near, far, taken, monkeypatch):
     registration._begun = registration._settled = True
     registration._agreed = 30
     monkeypatch.setattr(registration, "_solve", lambda *arguments, choices: fits[arguments[4]])
-    _, sightings = frame_of([], 0, np.eye(4))
-    motion = registration.correct(Followed.blank(), sight(sightings, np.eye(4)))
+    _, observations = frame_of([], 0, np.eye(4))
+    motion = registration.correct(TrackTable.blank(), observe(observations, np.eye(4)))
     np.testing.assert_allclose(motion[0, 3], {"near": 0.01, "far": 0.03}[taken])
 
 
@@ -247,34 +247,34 @@ def test_landmarks_begin_anew_where_odometry_fails_again():
     for i in range(206):
         drifted = None if i < 6 else se3(np.eye(3), np.array([0.15 * (i - 6) / 199, 0.0, 0.0]))
         tracker.follow(*frame_of(world, i, drifted, points=150))
-        assert i < 7 or not tracker.tracks.stood.any()
+        assert i < 7 or not tracker.tracks.stationary_frames.any()
     left = tracker.T_world_sensor[0, 3]
     for i in range(206, 211):
         tracker.follow(*frame_of(world, i, None, points=150))
         assert abs(tracker.T_world_sensor[0, 3] - left) < 0.01
-    assert tracker.tracks.stood.max() > 3
+    assert tracker.tracks.stationary_frames.max() > 3
 
 
 def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
     rng = np.random.default_rng(3)
-    tracks, place, seen = Followed.blank(3), rng.uniform(5, 20, (3, 8)), []
+    tracks, place, seen = TrackTable.blank(3), rng.uniform(5, 20, (3, 8)), []
     tracks.proposal[:2] = [1, 0]  # the third is not seen
-    tracks.still[:] = True
+    tracks.stationary[:] = True
     for _ in range(9):
-        tracks.outline[:] = place + rng.normal(0, 0.01, (3, 8))
-        seen.append(tracks.outline.copy())
+        tracks.kdop[:] = place + rng.normal(0, 0.01, (3, 8))
+        seen.append(tracks.kdop.copy())
         landmarks.keep(tracks)
-        np.testing.assert_allclose(tracks.landmark[:2], np.mean(seen, axis=0)[:2], atol=1e-9)
-    assert tracks.stood.tolist() == [9, 9, 0]
-    assert not tracks.landmark[2].any()
-    tracks.outline[0, 2] += 0.5  # another end comes into view
-    before = tracks.landmark.copy()
+        np.testing.assert_allclose(tracks.landmark_kdop[:2], np.mean(seen, axis=0)[:2], atol=1e-9)
+    assert tracks.stationary_frames.tolist() == [9, 9, 0]
+    assert not tracks.landmark_kdop[2].any()
+    tracks.kdop[0, 2] += 0.5  # another end comes into view
+    before = tracks.landmark_kdop.copy()
     landmarks.keep(tracks)
-    assert tracks.landmark[0, 2] == tracks.outline[0, 2]
-    np.testing.assert_allclose(np.delete(tracks.landmark[0], 2), np.delete(before[0], 2), atol=0.01)
-    tracks.still[:] = False
+    assert tracks.landmark_kdop[0, 2] == tracks.kdop[0, 2]
+    np.testing.assert_allclose(np.delete(tracks.landmark_kdop[0], 2), np.delete(before[0], 2), atol=0.01)
+    tracks.stationary[:] = False
     for _ in range(8):  # it drives off: what it was seen as before is no landmark
-        tracks.outline[:] += 0.4
+        tracks.kdop[:] += 0.4
         landmarks.keep(tracks)
-        np.testing.assert_array_equal(tracks.landmark[:2], tracks.outline[:2])
-    assert not tracks.stood.any()
+        np.testing.assert_array_equal(tracks.landmark_kdop[:2], tracks.kdop[:2])
+    assert not tracks.stationary_frames.any()

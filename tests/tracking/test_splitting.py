@@ -14,7 +14,7 @@ from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt.tracking.carving import carved
 from modt.tracking.splitting import AT_MOST, _Scene, _walks
 from modt.tracking.states import EFFICIENT
-from modt.tracking.track_table import Followed
+from modt.tracking.track_table import TrackTable
 from modt.tracking.tracker import Tracker
 from modt.types import NONE
 from tests.odometry.test_deskew import skewed
@@ -82,14 +82,14 @@ def held(tracker, n):
     return ids, shares
 
 
-def walk(frames, touching, association="robust", pose=still):
+def walk(frames, overlapping_pairs, association="robust", pose=still):
     """A tracker, and (ids of walker and wall, proposals) of every frame, in some of which they touch."""
     tracker, seen = Tracker(TrackingConfig(association=association), EFFICIENT), []
     for i in range(frames):
         T = pose(i)
         bodies = transform_boxes(pose(0), np.array([walker(i), WALL]))
         found = frame_of(transform_boxes(inverse(T), bodies), i, T, points=[PERSON_POINTS, WALL_POINTS])
-        tracker.follow(*(merged(*found, [(0, 1)]) if i in touching else found))
+        tracker.follow(*(merged(*found, [(0, 1)]) if i in overlapping_pairs else found))
         seen.append((*held(tracker, 1)[0], len(tracker.proposals)))
     return tracker, seen
 
@@ -109,14 +109,14 @@ def test_the_paper_takes_proposals_as_they_are():
 def test_neither_what_is_taken_nor_what_is_left_measures_anything():
     (together, _), (apart, _) = walk(MEET + 1, {MEET}), walk(MEET + 1, ())
     assert (together.tracks.P[:, 0, 0] > 1.5 * apart.tracks.P[:, 0, 0]).all()
-    assert together.tracks.takes.tolist() == [1, 0]
+    assert together.tracks.splits.tolist() == [1, 0]
 
 
 def test_nobody_lives_on_what_is_taken():
-    touching = range(MEET, MEET + AT_MOST + 2)
-    tracker, seen = walk(touching.stop + 2, touching)
+    overlapping_pairs = range(MEET, MEET + AT_MOST + 2)
+    tracker, seen = walk(overlapping_pairs.stop + 2, overlapping_pairs)
     assert [n for *_, n in seen[MEET:]] == [2] * AT_MOST + [1] * 2 + [2] * 2
-    assert tracker.tracks.takes.tolist() == [0, 0]
+    assert tracker.tracks.splits.tolist() == [0, 0]
 
 
 @pytest.mark.parametrize(
@@ -201,15 +201,15 @@ def test_what_hangs_above_is_left():
     ("change", "walks"),
     [
         ({}, True),
-        ({"hull": np.full(8, 0.8)}, False),  # as long as a bicycle
+        ({"envelope": np.full(8, 0.8)}, False),  # as long as a bicycle
         ({"top": 0.4}, False),  # a kerb
-        ({"home": [4.0, 0.0]}, False),  # back home
+        ({"rest_position": [4.0, 0.0]}, False),  # back home
         ({"P": np.eye(4)}, False),  # may stand
     ],
 )
 def test_walking_is_told_by_shape_and_way(change, walks):
-    tracks = Followed.blank(1)
-    tracks.x[:], tracks.P[:], tracks.hull[:], tracks.top[:] = [5, 0, 0, 1.3], 0.1 * np.eye(4), 0.3, 1.7
+    tracks = TrackTable.blank(1)
+    tracks.x[:], tracks.P[:], tracks.envelope[:], tracks.top[:] = [5, 0, 0, 1.3], 0.1 * np.eye(4), 0.3, 1.7
     for column, value in change.items():
         getattr(tracks, column)[:] = value
     assert _walks(tracks, np.array([0])).tolist() == [walks]

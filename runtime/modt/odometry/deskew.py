@@ -48,35 +48,35 @@ class Motion:
         faster = abs(self.velocity_mps - other.velocity_mps) + LEVER_M * abs(self.turn_radps - other.turn_radps)
         return bool(faster * abs(turn_s) / 2 <= ALIKE_M)
 
-    def displacement(self, place_m: Float64, late_s: Float64) -> Float64:
+    def displacement(self, place_m: Float64, delay_s: Float64) -> Float64:
         """(P, 2) steps of what was seen at a place (P, 2) so late (P,) to where it is seen from at the stamp [m]."""
-        place = place_m[:, 0] + 1j * place_m[:, 1]
-        half = np.exp(0.5j * self.turn_radps * late_s)
-        step = place * (half * half - 1.0) + self.velocity_mps * late_s * half
+        position = place_m[:, 0] + 1j * place_m[:, 1]
+        half = np.exp(0.5j * self.turn_radps * delay_s)
+        step = position * (half * half - 1.0) + self.velocity_mps * delay_s * half
         xy: Float64 = step.view(np.float64).reshape(-1, 2)
         return xy
 
 
 @dataclass(frozen=True, slots=True)
-class Skew:
+class SweepSkew:
     """Where and when the proposals of a frame were seen; P rows.
 
     Attributes:
         place: (P, 2) their centroids [m, sensor frame at that time].
-        late_s: (P,) after the stamp.
+        delay_s: (P,) after the stamp.
     """
 
-    place: Float64
-    late_s: Float64
+    position: Float64
+    delay_s: Float64
 
     @classmethod
-    def of(cls, proposals: Proposals, turn_s: float) -> Skew | None:
+    def of(cls, proposals: Proposals, turn_s: float) -> SweepSkew | None:
         """That of a head that turns so (Frame.turn_s); none if all was seen at once."""
-        return cls(proposals.centroid[:, :2], lateness(proposals, turn_s)) if turn_s else None
+        return cls(proposals.centroid[:, :2], delays(proposals, turn_s)) if turn_s else None
 
     def step(self, motion: Motion, T_world_sensor: Float64) -> Float64:
         """(P, 2) from where the pose at the stamp puts them to where they stand [m, world]."""
-        step: Float64 = motion.displacement(self.place, self.late_s) @ T_world_sensor[:2, :2].T
+        step: Float64 = motion.displacement(self.position, self.delay_s) @ T_world_sensor[:2, :2].T
         return step
 
     def share(self, dt_s: float) -> Float64:
@@ -84,12 +84,12 @@ class Skew:
 
         A sensor that went farther in that time had gone farther by the same share whenever it saw something.
         """
-        share: Float64 = 1.0 + self.late_s / dt_s
+        share: Float64 = 1.0 + self.delay_s / dt_s
         return share
 
 
 @dataclass(frozen=True, slots=True)
-class Placing:
+class Placement:
     """By what a frame was placed.
 
     Attributes:
@@ -102,16 +102,16 @@ class Placing:
     motion: Motion = Motion()
     turn_s: float = 0.0
 
-    def step(self, place: Float64) -> Float64:
+    def step(self, position: Float64) -> Float64:
         """(P, 2) from where the pose puts what is seen about a place (P, 2) to where that stands [m, world]."""
         R, t = self.T_world_sensor[:2, :2], self.T_world_sensor[:2, 3]
-        local = (place - t) @ R
-        late_s = np.arctan2(local[:, 1], local[:, 0]) * (-self.turn_s / (2 * np.pi))
-        step: Float64 = self.motion.displacement(local, late_s) @ R.T
+        local = (position - t) @ R
+        delay_s = np.arctan2(local[:, 1], local[:, 0]) * (-self.turn_s / (2 * np.pi))
+        step: Float64 = self.motion.displacement(local, delay_s) @ R.T
         return step
 
 
-def lateness(proposals: Proposals, turn_s: float) -> Float64:
+def delays(proposals: Proposals, turn_s: float) -> Float64:
     """(P,) when each proposal was seen, after the stamp of its frame [s]; turn_s as in Frame.
 
     It is the mean over the bearings that its box takes up: what lies across the seam is seen at both ends of the

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import rotation_zyx, se3
-from modt.geometry.kdop import WAYS, middles, touching
-from modt.observations import Sightings
+from modt.geometry.kdop import DIRECTIONS, centres, overlapping_pairs
+from modt.observations import Observations
 from modt.odometry import landmarks
 from modt.tracking.displacement import shift_between
-from modt.tracking.kdop_association import compare, likeness
-from modt.tracking.track_table import Followed
+from modt.tracking.kdop_association import compare, shape_similarity
+from modt.tracking.track_table import TrackTable
 from modt.types import Float64, Int
 
 REACH_M = 2.5
@@ -39,7 +39,7 @@ INLIER_M = 0.2
 """A landmark this near to where it should be agrees."""
 AGREEMENT = 0.3
 """Part of the landmarks that must agree for the prediction to be trusted next time."""
-CONSENT, AS_BEFORE = 0.75, 0.5
+INLIER_RATIO, INLIER_DROP = 0.75, 0.5
 """Part that must agree, and so many of those that agreed last time, lest the prediction is mistrusted and pairs are
 sought farther away."""
 TURN_RAD = 0.2
@@ -78,25 +78,25 @@ class Registration:
         self._begun = self._settled = False
         self._agreed = self._tried = 0
 
-    def correct(self, tracks: Followed, sightings: Sightings, share: Float64 | float = 1.0) -> Float64:
+    def correct(self, tracks: TrackTable, observations: Observations, share: Float64 | float = 1.0) -> Float64:
         """The motion in the world that brings the sightings onto the tracks.
 
         Args:
             tracks: what stands where, among others.
-            sightings: a frame's, by the pose that is expected.
-            share: of the motion, by which each of them goes (P,), as Skew.share.
+            observations: a frame's, by the pose that is expected.
+            share: of the motion, by which each of them goes (P,), as SweepSkew.share.
 
         Returns:
             (4, 4) motion of the pose; identity where nothing says so.
         """
-        ways = _ways(sightings) * share
+        ways = _ways(observations) * share
         rest = np.zeros(3)
-        fit = self._solve(tracks, sightings, ways, rest, GATE_M, SCALES, choices=1) if self._settled else None
-        sure = fit is not None and fit.shared_by(CONSENT) and fit.agree >= AS_BEFORE * self._agreed
+        fit = self._solve(tracks, observations, ways, rest, GATE_M, SCALES, choices=1) if self._settled else None
+        sure = fit is not None and fit.shared_by(INLIER_RATIO) and fit.agree >= INLIER_DROP * self._agreed
         if not sure:  # the prediction may be off: look farther
-            wide = self._look_far(tracks, sightings, ways, rest)
+            wide = self._look_far(tracks, observations, ways, rest)
             if self._begun and wide is not None and not wide.shared_by(AGREEMENT):  # it did not get there yet
-                again = self._look_far(tracks, sightings, ways, wide.motion)
+                again = self._look_far(tracks, observations, ways, wide.motion)
                 wide = again if again is not None and again.agree > wide.agree else wide
             if fit is None or (wide is not None and wide.agree > fit.agree):
                 fit = wide
@@ -108,23 +108,23 @@ class Registration:
         if np.hypot(*fit.motion[:2]) > REACH_M or abs(fit.motion[2]) > TURN_RAD:
             self._settled = False
             return np.eye(4)
-        return _about(fit.motion, sightings.eye)
+        return _about(fit.motion, observations.sensor_xy)
 
-    def _look_far(self, tracks: Followed, sightings: Sightings, ways: Float64, motion: Float64) -> Fit | None:
+    def _look_far(self, tracks: TrackTable, observations: Observations, ways: Float64, motion: Float64) -> Fit | None:
         """The motion that most landmarks say that are near after another motion, or after any turn at the outset."""
         outset = not self._begun and self._tried < OUTSET
         self._tried += outset and len(tracks) > 0
         starts = ([0.0, 0.0, turn] for turn in OUTSET_RAD) if outset else (motion,)
         fits = (
-            self._solve(tracks, sightings, ways, np.asarray(start), REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
+            self._solve(tracks, observations, ways, np.asarray(start), REACH_M, SCALES[:ROUNDS], choices=ROUNDS)
             for start in starts
         )
         return max((fit for fit in fits if fit is not None), key=lambda fit: fit.agree, default=None)
 
     def _solve(
         self,
-        tracks: Followed,
-        sightings: Sightings,
+        tracks: TrackTable,
+        observations: Observations,
         ways: Float64,
         motion: Float64,
         reach_m: float,
@@ -133,20 +133,20 @@ class Registration:
     ) -> Fit | None:
         """The motion that most landmarks within reach of one say, pairs chosen so many times; ways as of _ways."""
         rows, known = landmarks.places(tracks)
-        near = sightings.outline + np.tensordot(motion, ways, 1)
+        near = observations.kdop + np.tensordot(motion, ways, 1)
         i, j = _pairs(known, near, reach_m)
         if len(i) < MINIMUM:
             return None
         if not self._begun:
             shift, size, _, _ = compare(known[:, i], near[:, j])
             motion = motion + np.append(-_vote(shift[size < ALIKE]), 0.0)
-        a, b, ways = known.take(i, axis=1), sightings.outline.take(j, axis=1), ways.take(j, axis=2)
+        a, b, ways = known.take(i, axis=1), observations.kdop.take(j, axis=1), ways.take(j, axis=2)
         gain, young = b - a, np.where(landmarks.stands(tracks), 0.0, YOUNG_M).take(rows)
-        variance = young[i] ** 2 + (END_M + END_SPREAD * sightings.range_m[j]) ** 2
+        variance = young[i] ** 2 + (END_M + END_SPREAD * observations.range_m[j]) ** 2
         for _ in range(choices):
             gone = b + np.tensordot(motion, ways, 1)
             shift = shift_between(a, gone)
-            size, overlap, _ = likeness(a, gone)
+            size, overlap, _ = shape_similarity(a, gone)
             best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
             motion = _fit(gain.take(best, axis=1), ways.take(best, axis=2), variance[best], motion, scales)
         a, b, ways = a.take(best, axis=1), b.take(best, axis=1), ways.take(best, axis=2)
@@ -156,16 +156,16 @@ class Registration:
 
 def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
     """Indices of outlines a and b whose middles are within reach of one another, along x and along y."""
-    middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (middles(a), middles(b)))
-    return touching(middle_a + reach, middle_b)
+    middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (centres(a), centres(b)))
+    return overlapping_pairs(middle_a + reach, middle_b)
 
 
-def _ways(sightings: Sightings) -> Float64:
+def _ways(observations: Observations) -> Float64:
     """(3, 8, P) how far a motion takes each end of the outlines outward, per metre of x and y and per radian."""
-    x, y = (sightings.place - sightings.eye).T
+    x, y = (observations.position - observations.sensor_xy).T
     ways = np.empty((3, 8, len(x)))
-    ways[:2] = WAYS[:, :, None]
-    ways[2] = WAYS.T @ np.stack([-y, x])
+    ways[:2] = DIRECTIONS[:, :, None]
+    ways[2] = DIRECTIONS.T @ np.stack([-y, x])
     return ways
 
 
@@ -220,8 +220,8 @@ def _fit(gain: Float64, ways: Float64, variance: Float64, motion: Float64, scale
     return motion
 
 
-def _about(motion: Float64, eye: Float64) -> Float64:
+def _about(motion: Float64, sensor_xy: Float64) -> Float64:
     """(4, 4) turn about the sensor's place, then shift."""
     R = rotation_zyx(0.0, 0.0, motion[2])
-    place = np.array([eye[0], eye[1], 0.0])
-    return se3(R, place - R @ place + np.array([motion[0], motion[1], 0.0]))
+    position = np.array([sensor_xy[0], sensor_xy[1], 0.0])
+    return se3(R, position - R @ position + np.array([motion[0], motion[1], 0.0]))

@@ -10,8 +10,8 @@ from scipy.optimize import linear_sum_assignment
 
 from modt.config import TrackingConfig
 from modt.geometry.overlap import iou_3d
-from modt.observations import Sightings
-from modt.tracking.track_table import Followed
+from modt.observations import Observations
+from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Float64, Int
 
 FORBIDDEN = 1e6
@@ -34,11 +34,11 @@ class Matches:
 
     rows: Int
     proposals: Int
-    place: Float64
+    position: Float64
     covariance: Float64
-    doubt: Float64
+    end_variance: Float64
 
-    def instead(self, tracks: Followed, rows: Int, proposals: Int) -> Matches:
+    def instead(self, tracks: TrackTable, rows: Int, proposals: Int) -> Matches:
         """The matches with these proposals, NONE for nothing, for those that tracks (R,) had.
 
         What changed hands measures nothing: its outline is not that of the track.
@@ -52,20 +52,20 @@ class Matches:
         return Matches(
             np.concatenate([self.rows[kept], rows]),
             np.concatenate([self.proposals[kept], proposals]),
-            np.concatenate([self.place.take(kept, axis=0), tracks.x.take(rows, axis=0)[:, :2]]),
+            np.concatenate([self.position.take(kept, axis=0), tracks.x.take(rows, axis=0)[:, :2]]),
             np.concatenate([self.covariance.take(kept, axis=0), unmeasured]),
-            np.concatenate([self.doubt.take(kept, axis=0), tracks.doubt.take(rows, axis=0)]),
+            np.concatenate([self.end_variance.take(kept, axis=0), tracks.end_variance.take(rows, axis=0)]),
         )
 
 
 class Association(Protocol):
     """Finds the proposals of the tracks."""
 
-    def match(self, tracks: Followed, sightings: Sightings) -> Matches:
+    def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs of predicted tracks and this frame's sightings."""
         ...
 
-    def birthplace(self, sightings: Sightings) -> Float64:
+    def initial_position(self, observations: Observations) -> Float64:
         """(P, 2) where a track begins that a sighting is the first of [m, world]."""
         ...
 
@@ -139,41 +139,41 @@ class PaperAssociation:
     def __init__(self, config: TrackingConfig) -> None:
         self.config = config
 
-    def match(self, tracks: Followed, sightings: Sightings) -> Matches:
+    def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs whose cost is at most T_DA."""
-        rows, columns = self._near(tracks, sightings)
-        cost = self.cost(tracks, sightings, rows, columns)
+        rows, columns = self._near(tracks, observations)
+        cost = self.cost(tracks, observations, rows, columns)
         low = cost <= self.config.t_da
         rows, columns, cost = rows[low], columns[low], cost[low]
         keep = assign(rows, columns, cost, FORBIDDEN)
         covariance = np.square(self.config.position_sigma_m) * np.eye(2)[None].repeat(len(keep), axis=0)
         rows, columns = rows[keep], columns[keep]
-        return Matches(rows, columns, sightings.centroid[columns], covariance, np.zeros((len(keep), 4)))
+        return Matches(rows, columns, observations.centroid[columns], covariance, np.zeros((len(keep), 4)))
 
-    def cost(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Float64:
+    def cost(self, tracks: TrackTable, observations: Observations, rows: Int, columns: Int) -> Float64:
         """(K,) cost of the pairs."""
-        a, b = tracks.box[rows].copy(), sightings.box[columns]
-        a[:, :2] += tracks.x[rows, :2] - tracks.shown[rows]  # the last box, carried along the prediction
-        points = np.abs(tracks.points[rows] - sightings.count[columns])
+        a, b = tracks.box[rows].copy(), observations.box[columns]
+        a[:, :2] += tracks.x[rows, :2] - tracks.anchor[rows]  # the last box, carried along the prediction
+        points = np.abs(tracks.points[rows] - observations.count[columns])
         size = np.abs(a[:, 3:6] - b[:, 3:6]).sum(axis=1)
         penalty: Float64 = (
             self.config.alpha * (1 - iou_3d(a, b)) + self.config.beta * points + self.config.gamma * size
         )
         return penalty
 
-    def birthplace(self, sightings: Sightings) -> Float64:
+    def initial_position(self, observations: Observations) -> Float64:
         """Mean of the points."""
-        return sightings.centroid
+        return observations.centroid
 
-    def _near(self, tracks: Followed, sightings: Sightings) -> tuple[Int, Int]:
+    def _near(self, tracks: TrackTable, observations: Observations) -> tuple[Int, Int]:
         """Pairs whose boxes could touch: without overlap no pair can pass, unless alpha is below T_DA."""
-        centre = tracks.box[:, :2] + tracks.x[:, :2] - tracks.shown
-        offset = centre[:, None] - sightings.box[None, :, :2]
+        centre = tracks.box[:, :2] + tracks.x[:, :2] - tracks.anchor
+        offset = centre[:, None] - observations.box[None, :, :2]
         if self.config.alpha <= self.config.t_da:
             near = np.ones(offset.shape[:2], np.bool_)
         else:
             reach = np.hypot(tracks.box[:, 3], tracks.box[:, 4])[:, None]
-            reach = (reach + np.hypot(sightings.box[:, 3], sightings.box[:, 4])) / 2
+            reach = (reach + np.hypot(observations.box[:, 3], observations.box[:, 4])) / 2
             near = (offset**2).sum(axis=2) < reach**2
         rows, columns = np.nonzero(near)
         return rows, columns

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.geometry.kdop import WAYS, covered, touching
-from modt.observations import Sightings
-from modt.tracking.track_table import Followed
+from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs
+from modt.observations import Observations
+from modt.tracking.track_table import TrackTable
 from modt.types import Bool, Int
 
 CAPACITY = 2048
@@ -28,18 +28,18 @@ RISE_M = 0.5
 """How far a proposal may rise above what stood at its place."""
 
 
-class NoMemory:
+class NoBackgroundMap:
     """Nothing is remembered: every new proposal asks."""
 
-    def keep(self, tracks: Followed, rows: Int) -> None:
+    def keep(self, tracks: TrackTable, rows: Int) -> None:
         """Forget them."""
 
-    def recall(self, tracks: Followed, rows: Int, sightings: Sightings, which: Int) -> Bool:
+    def recall(self, tracks: TrackTable, rows: Int, observations: Observations, which: Int) -> Bool:
         """(n,) of the sightings named, none."""
         return np.zeros(len(which), np.bool_)
 
 
-class BackgroundMemory:
+class BackgroundMap:
     """Outlines of background that stood still, in the world frame.
 
     Args:
@@ -54,29 +54,29 @@ class BackgroundMemory:
     def __len__(self) -> int:
         return self._filled
 
-    def keep(self, tracks: Followed, rows: Int) -> None:
+    def keep(self, tracks: TrackTable, rows: Int) -> None:
         """Remember the places of tracks that end: background all of them, and at rest."""
         slots = (self._next + np.arange(len(rows))) % len(self._top)
-        self._outline[:, slots], self._top[slots] = tracks.outline.take(rows, axis=0).T, tracks.top[rows]
+        self._outline[:, slots], self._top[slots] = tracks.kdop.take(rows, axis=0).T, tracks.top[rows]
         self._next = int(self._next + len(rows)) % len(self._top)
         self._filled = min(self._filled + len(rows), len(self._top))
 
-    def recall(self, tracks: Followed, rows: Int, sightings: Sightings, which: Int) -> Bool:
+    def recall(self, tracks: TrackTable, rows: Int, observations: Observations, which: Int) -> Bool:
         """(n,) of the sightings named, which appear where background stood.
 
         Args:
             tracks: alive.
             rows: of those that are background at rest.
-            sightings: of this frame.
+            observations: of this frame.
             which: (n,) those that no track claims.
         """
         n = self._filled
-        alive = tracks.hull.take(rows, axis=0) + tracks.x.take(rows, axis=0)[:, :2] @ WAYS
-        place = np.concatenate([self._outline[:, :n], alive.T], axis=1)
+        alive = tracks.envelope.take(rows, axis=0) + tracks.x.take(rows, axis=0)[:, :2] @ DIRECTIONS
+        position = np.concatenate([self._outline[:, :n], alive.T], axis=1)
         top = np.concatenate([self._top[:n], tracks.top[rows]])
-        seen = sightings.outline.take(which, axis=1)
-        i, j = touching(seen, place)
-        within = covered(seen.take(i, axis=1), place.take(j, axis=1)) >= COVER
+        seen = observations.kdop.take(which, axis=1)
+        i, j = overlapping_pairs(seen, position)
+        within = coverage(seen.take(i, axis=1), position.take(j, axis=1)) >= COVER
         known = np.zeros(len(which), np.bool_)
-        known[i[within & (sightings.top[which[i]] < top[j] + RISE_M)]] = True
+        known[i[within & (observations.top[which[i]] < top[j] + RISE_M)]] = True
         return known

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.geometry.kdop import AXES, lengths
+from modt.geometry.kdop import AXES, widths
 from modt.types import Float64
 
 AGREE_M = 0.6
@@ -38,7 +38,7 @@ def least(a: Float64, b: Float64) -> Float64:
 
 def shift_between(a: Float64, b: Float64) -> Float64:
     """(K, 2) from outlines a to b [m], every axis as good as the other."""
-    moved, _, _ = _moved(a, b, lengths(b))
+    moved, _, _ = _moved(a, b, widths(b))
     shift: Float64 = (AXES @ moved).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     return shift
 
@@ -57,11 +57,13 @@ def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tupl
         covariance: (K, 2, 2) of it [m2].
         doubt: (4, K) variance along each axis by what its ends disagree, or did, no more than what is seen [m2].
     """
-    seen = lengths(b)
+    seen = widths(b)
     moved, unlike, apart = _moved(a, b, seen)
-    doubt = np.maximum(DOUBT**2 * unlike * np.square(apart), KEPT * before)
-    np.minimum(doubt, np.square(DOUBT * seen.max(axis=0)), out=doubt)
-    weight = 0.5 / (variance + doubt)  # were they alike, the four would say as much as one of them in each direction
+    end_variance = np.maximum(DOUBT**2 * unlike * np.square(apart), KEPT * before)
+    np.minimum(end_variance, np.square(DOUBT * seen.max(axis=0)), out=end_variance)
+    weight = 0.5 / (
+        variance + end_variance
+    )  # were they alike, the four would say as much as one of them in each direction
     (xx, yy, xy), (x, y) = PRODUCTS @ weight, AXES @ (weight * moved)
     scale = 1.0 / (xx * yy - xy * xy)
     xx, yy, xy = scale * yy, scale * xx, -scale * xy  # the inverse
@@ -69,7 +71,7 @@ def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tupl
     shift[:, 0], shift[:, 1] = xx * x + xy * y, xy * x + yy * y
     covariance[:, 0, 0], covariance[:, 1, 1] = xx, yy
     covariance[:, 0, 1] = covariance[:, 1, 0] = xy
-    return shift, covariance, doubt
+    return shift, covariance, end_variance
 
 
 def _moved(a: Float64, b: Float64, seen: Float64) -> tuple[Float64, Float64, Float64]:

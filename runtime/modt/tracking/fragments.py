@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.geometry.kdop import WAYS, covered, girth, lengths, touching
-from modt.observations import Sightings
+from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, width_sum, widths
+from modt.observations import Observations
 from modt.tracking.association import Matches
 from modt.tracking.kalman import HEADING, SPEED
-from modt.tracking.track_table import Followed
+from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int
 
 ROOM_M = np.array([[6.0, 2.7], [6.0, 2.7], [1.1, 1.1], [2.2, 1.1]])
@@ -34,20 +34,20 @@ SETTLED = 4
 """Frames after which a velocity says something."""
 
 
-def reunite(tracks: Followed, sightings: Sightings, matches: Matches) -> Matches:
+def reunite_fragments(tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
     """The matches, with the larger part of an object given to its eldest track."""
-    if not len(sightings):
+    if not len(observations):
         return matches
     proposal = np.full(len(tracks), NONE, np.int64)
-    owner = np.full(len(sightings), NONE, np.int64)
+    owner = np.full(len(observations), NONE, np.int64)
     proposal[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
-    elders = _incomplete(tracks, sightings, proposal)
-    elders, parts = _parts(tracks, sightings, elders, proposal, owner)
-    rows, proposals = swapped(elders, parts, proposal, owner)
+    elders = _incomplete(tracks, observations, proposal)
+    elders, parts = _parts(tracks, observations, elders, proposal, owner)
+    rows, proposals = swap_proposals(elders, parts, proposal, owner)
     return matches.instead(tracks, rows, proposals) if len(rows) else matches
 
 
-def swapped(elders: Int, parts: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
+def swap_proposals(elders: Int, parts: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
     """Who has another proposal once elders took parts and left their own to whoever had these; each changes once.
 
     Args:
@@ -73,55 +73,55 @@ def swapped(elders: Int, parts: Int, proposal: Int, owner: Int) -> tuple[Int, In
     return np.array(rows, np.int64), np.array([has[row] for row in rows], np.int64)
 
 
-def outgrown(kind: Int, outline: Float64) -> Int:
+def oversized(kind: Int, kdop: Float64) -> Int:
     """Which of the things, given their kinds (n,) and outlines (n, 8), are longer than any of their class: merged."""
     things: Int = (kind != ObjectClass.BACKGROUND.value).nonzero()[0]
-    longer: Bool = lengths(outline.take(things, axis=0).T).max(axis=0, initial=0.0) > ROOM_M[kind[things], 0]
+    longer: Bool = widths(kdop.take(things, axis=0).T).max(axis=0, initial=0.0) > ROOM_M[kind[things], 0]
     return things[longer]
 
 
-def _incomplete(tracks: Followed, sightings: Sightings, proposal: Int) -> Int:
+def _incomplete(tracks: TrackTable, observations: Observations, proposal: Int) -> Int:
     """Rows, eldest first, of what was seen more than once and is now not seen, or less of it than before."""
-    now, known = girth(sightings.outline)[proposal], girth(tracks.hull.T.copy())
+    now, known = width_sum(observations.kdop)[proposal], width_sum(tracks.envelope.T.copy())
     less = (proposal == NONE) | (known > LESS * now)
     rows: Int = ((tracks.hits > 1) & less).nonzero()[0]  # tracks are in the order of their birth
     return rows
 
 
-def _parts(tracks: Followed, sightings: Sightings, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
+def _parts(tracks: TrackTable, observations: Observations, elders: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
     """Rows and proposals: an elder track, and a larger part of its object that it does not have."""
     if not len(elders):
         return elders, elders
-    hull = (tracks.hull.take(elders, axis=0) + tracks.x.take(elders, axis=0)[:, :2] @ WAYS).T.copy()
-    i, part = touching(hull, sightings.outline)
+    envelope = (tracks.envelope.take(elders, axis=0) + tracks.x.take(elders, axis=0)[:, :2] @ DIRECTIONS).T.copy()
+    i, part = overlapping_pairs(envelope, observations.kdop)
     elder, rival = elders[i], owner[part]
-    size = np.where(proposal == NONE, 0, sightings.count[proposal])
+    size = np.where(proposal == NONE, 0, observations.count[proposal])
     junior = (rival == NONE) | (tracks.id[rival] > tracks.id[elder])
-    larger = (junior & (rival != elder) & (sightings.count[part] > size[elder])).nonzero()[0]
-    stout = (sightings.box[part[larger], 3] > PERSON_M) & (tracks.box[elder[larger], 3] > PERSON_M)
+    larger = (junior & (rival != elder) & (observations.count[part] > size[elder])).nonzero()[0]
+    stout = (observations.box[part[larger], 3] > PERSON_M) & (tracks.box[elder[larger], 3] > PERSON_M)
     larger = larger[stout | _gives_way(tracks, elder[larger], rival[larger])]
     i, elder, part = i[larger], elder[larger], part[larger]
-    moved = tracks.x.take(elder, axis=0)[:, :2] - tracks.shown.take(elder, axis=0)
+    moved = tracks.x.take(elder, axis=0)[:, :2] - tracks.anchor.take(elder, axis=0)
     box = tracks.box.take(elder, axis=0)
     box[:, :2] += moved
-    fits = _fits(box, sightings.box.take(part, axis=0), ROOM_M[tracks.kind[elder]])
-    outline = sightings.outline.take(part, axis=1)
-    within = covered(outline, hull.take(i, axis=1)) > WITHIN
-    whole = covered((tracks.outline.take(elder, axis=0) + moved @ WAYS).T, outline) > WITHIN
+    fits = _fits(box, observations.box.take(part, axis=0), ROOM_M[tracks.last_class[elder]])
+    kdop = observations.kdop.take(part, axis=1)
+    within = coverage(kdop, envelope.take(i, axis=1)) > WITHIN
+    whole = coverage((tracks.kdop.take(elder, axis=0) + moved @ DIRECTIONS).T, kdop) > WITHIN
     related = fits & (within | whole)
     elder, part = elder[related], part[related]
     free = _free(tracks, elder, owner[part])
     return elder[free], part[free]
 
 
-def _free(tracks: Followed, elder: Int, rival: Int) -> Bool:
+def _free(tracks: TrackTable, elder: Int, rival: Int) -> Bool:
     """(k,) whether the elder may take the part that the rival (NONE: nobody) has: they may be one object."""
-    kind, other = tracks.kind[elder], tracks.kind[rival]
+    kind, other = tracks.last_class[elder], tracks.last_class[rival]
     alike = ~tracks.final[rival] | (kind == other) | (BULKY[kind] & BULKY[other])
     (vx, vy), (wx, wy) = (_velocity(tracks.x.take(rows, axis=0)) for rows in (elder, rival))
     variance = tracks.P[:, SPEED, SPEED]
-    doubt = SIGMAS * np.sqrt(variance[elder] + variance[rival])
-    together = np.hypot(wx - vx, wy - vy) <= APART_MPS + doubt
+    end_variance = SIGMAS * np.sqrt(variance[elder] + variance[rival])
+    together = np.hypot(wx - vx, wy - vy) <= APART_MPS + end_variance
     free: Bool = (rival == NONE) | alike & (together | (tracks.hits[rival] < SETTLED))
     return free
 
@@ -131,9 +131,9 @@ def _velocity(x: Float64) -> tuple[Float64, Float64]:
     return x[:, SPEED] * np.cos(x[:, HEADING]), x[:, SPEED] * np.sin(x[:, HEADING])
 
 
-def _gives_way(tracks: Followed, elder: Int, rival: Int) -> Bool:
+def _gives_way(tracks: TrackTable, elder: Int, rival: Int) -> Bool:
     """(k,) whether a part that may be a person goes to the elder: nobody settled has it, or the elder is a car."""
-    car = tracks.final[elder] & (tracks.kind[elder] == ObjectClass.CAR.value)
+    car = tracks.final[elder] & (tracks.last_class[elder] == ObjectClass.CAR.value)
     way: Bool = (rival == NONE) | (tracks.hits[rival] < SETTLED) | car
     return way
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from modt.observations import Sightings
-from modt.odometry.deskew import Placing
+from modt.observations import Observations
+from modt.odometry.deskew import Placement
 from modt.tracking.association import Matches
-from modt.tracking.track_table import Followed
+from modt.tracking.track_table import TrackTable
 from modt.types import Proposals
 
 
@@ -18,24 +18,24 @@ class Found:
 
     Attributes:
         proposals: of the frame.
-        sightings: the proposals in the world.
+        observations: the proposals in the world.
         matches: those that belong to tracks.
     """
 
     proposals: Proposals
-    sightings: Sightings
+    observations: Observations
     matches: Matches
 
 
 class Regrouping(Protocol):
     """Groups the points of a frame's proposals anew."""
 
-    def regroup(self, tracks: Followed, found: Found, placing: Placing) -> Found:
+    def regroup(self, tracks: TrackTable, found: Found, placement: Placement) -> Found:
         """What was found, put right where something is known better; no point gets lost.
 
         Args:
             tracks: as predicted.
             found: of the frame.
-            placing: by which it was put into the world.
+            placement: by which it was put into the world.
         """
         ...

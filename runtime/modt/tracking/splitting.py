@@ -18,16 +18,16 @@ import numpy as np
 
 from modt.classes import ObjectClass
 from modt.geometry import transform, yaw_of
-from modt.geometry.kdop import WAYS, covered, lengths, touching
-from modt.observations import Sightings, sight
-from modt.odometry.deskew import Placing
+from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
+from modt.observations import Observations, observe
+from modt.odometry.deskew import Placement
 from modt.tracking.association import Matches
 from modt.tracking.carving import carved
 from modt.tracking.fragments import SETTLED
 from modt.tracking.kalman import SPEED, X, Y
-from modt.tracking.kdop_association import carried
+from modt.tracking.kdop_association import predicted_kdops
 from modt.tracking.regrouping import Found
-from modt.tracking.track_table import Followed
+from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int
 
 AT_MOST = 5
@@ -49,24 +49,24 @@ FALL_M = 0.4
 """... and does not end lower than expected by more."""
 
 
-class ExpectedParting:
+class ExpectedSplit:
     """Takes what lies where a track is expected."""
 
-    def regroup(self, tracks: Followed, found: Found, placing: Placing) -> Found:
+    def regroup(self, tracks: TrackTable, found: Found, placement: Placement) -> Found:
         """What was found, with one more proposal for each track that takes its own out of a larger one."""
-        tracks.takes[found.matches.rows] = 0
+        tracks.splits[found.matches.rows] = 0
         rows = _seeking(tracks, found.matches)
         if not len(rows):
             return found
-        rows, hosts = _hosts(tracks, found.sightings, rows)
+        rows, hosts = _hosts(tracks, found.observations, rows)
         if not len(rows):
             return found
-        scene = _Scene(tracks, found, placing, rows, hosts)
+        scene = _Scene(tracks, found, placement, rows, hosts)
         pieces = [scene.piece(k) for k in range(len(rows))]
         takers = np.array([k for k, piece in enumerate(pieces) if len(piece)], np.int64)
         if not len(takers):
             return found
-        tracks.takes[rows[takers]] += 1
+        tracks.splits[rows[takers]] += 1
         return scene.parted(takers, [pieces[k] for k in takers])
 
 
@@ -81,10 +81,10 @@ class _Scene:
         hosts: (R,) proposal that each is expected in.
     """
 
-    def __init__(self, tracks: Followed, found: Found, placing: Placing, rows: Int, hosts: Int) -> None:
-        self.tracks, self.found, self.placing, self.rows, self.hosts = tracks, found, placing, rows, hosts
-        self.expected = carried(tracks)
-        self.step = placing.step(tracks.x.take(rows, axis=0)[:, :2])
+    def __init__(self, tracks: TrackTable, found: Found, placement: Placement, rows: Int, hosts: Int) -> None:
+        self.tracks, self.found, self.placement, self.rows, self.hosts = tracks, found, placement, rows, hosts
+        self.expected = predicted_kdops(tracks)
+        self.step = placement.step(tracks.x.take(rows, axis=0)[:, :2])
         self.owner = np.full(len(found.proposals), NONE)
         self.owner[found.matches.proposals] = found.matches.rows
         self.free = np.ones(len(found.proposals.members), np.bool_)
@@ -97,7 +97,7 @@ class _Scene:
         """
         row, host = self.rows[k], self.hosts[k]
         first, end = self.found.proposals.offsets[host : host + 2]
-        R, t = self.placing.T_world_sensor[:3, :3], self.placing.T_world_sensor[:3, 3:]
+        R, t = self.placement.T_world_sensor[:3, :3], self.placement.T_world_sensor[:3, 3:]
         x, y, z = R.astype(np.float32) @ self.found.proposals.coordinates[:, first:end] + t
         x += self.step[k, 0]
         y += self.step[k, 1]
@@ -118,7 +118,7 @@ class _Scene:
         """Rows of the others who may claim a part of the host of the k-th."""
         owner = self.owner[self.hosts[k]]
         others = self.rows[(self.hosts == self.hosts[k]) & (self.rows != self.rows[k])].tolist()
-        owns = owner != NONE and self.tracks.kind[owner] != ObjectClass.BACKGROUND.value
+        owns = owner != NONE and self.tracks.last_class[owner] != ObjectClass.BACKGROUND.value
         return [*others, int(owner)] if owns else others
 
     def _nearer(self, x: Float64, y: Float64, row: int, than: int) -> Bool:
@@ -132,59 +132,59 @@ class _Scene:
         reach = self.expected[:, row] + PAD_M
         within: Bool = (x <= reach[0]) & (x >= -reach[4]) & (y <= reach[2]) & (y >= -reach[6])
         near = within.nonzero()[0]
-        within[near] = (WAYS.T @ np.array((x[near], y[near])) <= reach[:, None]).all(axis=0)
+        within[near] = (DIRECTIONS.T @ np.array((x[near], y[near])) <= reach[:, None]).all(axis=0)
         return within
 
     def parted(self, takers: Int, pieces: list[Int]) -> Found:
         """What is found once some of those who seek have taken their pieces."""
-        tracks, found, T_world_sensor = self.tracks, self.found, self.placing.T_world_sensor
+        tracks, found, T_world_sensor = self.tracks, self.found, self.placement.T_world_sensor
         rows, hosts, n = self.rows[takers], self.hosts[takers], len(found.proposals)
         proposals = carved(found.proposals, hosts, pieces, tracks.box[rows, 6] - yaw_of(T_world_sensor))
         source, cut, new = np.append(np.arange(n), hosts), np.unique(hosts), np.arange(n, n + len(hosts))
         # Where a host stands at the stamp, seen when it was: a sensor that moves sees each from elsewhere.
-        moved = found.sightings.centroid[cut] - transform(T_world_sensor, found.proposals.centroid[cut])[:, :2]
-        sightings, seen = found.sightings.take(source), np.append(cut, new)
-        few = sight(proposals.take(seen), T_world_sensor)
-        sightings.put(seen, few.moved(np.concatenate([moved, self.step[takers]])))
+        moved = found.observations.centroid[cut] - transform(T_world_sensor, found.proposals.centroid[cut])[:, :2]
+        observations, seen = found.observations.take(source), np.append(cut, new)
+        few = observe(proposals.take(seen), T_world_sensor)
+        observations.put(seen, few.moved(np.concatenate([moved, self.step[takers]])))
         # What was taken shows nothing new of the track, least of all what was taken too much.
-        sightings.outline[:, new] = self.expected[:, rows]
-        sightings.foot[new], sightings.top[new] = tracks.foot[rows], tracks.top[rows]
+        observations.kdop[:, new] = self.expected[:, rows]
+        observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
         owned = cut[self.owner[cut] != NONE]
         changed, of_changed = np.append(self.owner[owned], rows), np.append(owned, new)
-        return Found(proposals, sightings, found.matches.instead(tracks, changed, of_changed))
+        return Found(proposals, observations, found.matches.instead(tracks, changed, of_changed))
 
 
-def _seeking(tracks: Followed, matches: Matches) -> Int:
+def _seeking(tracks: TrackTable, matches: Matches) -> Int:
     """Rows of objects, and of what walks whatever it is held for, that found nothing and did a frame ago."""
     lost = tracks.missed == 0
     lost[matches.rows] = False
     rows = lost.nonzero()[0]
-    rows = rows[(tracks.hits[rows] >= SETTLED) & (tracks.takes[rows] < AT_MOST)]
-    thing = tracks.kind[rows] != ObjectClass.BACKGROUND.value
+    rows = rows[(tracks.hits[rows] >= SETTLED) & (tracks.splits[rows] < AT_MOST)]
+    thing = tracks.last_class[rows] != ObjectClass.BACKGROUND.value
     seeking: Int = rows[thing | _walks(tracks, rows)]
     return seeking
 
 
-def _walks(tracks: Followed, rows: Int) -> Bool:
+def _walks(tracks: TrackTable, rows: Int) -> Bool:
     """(R,) what is as slim as a person, not flat, has come some way, and surely goes on."""
-    x, home = tracks.x.take(rows, axis=0), tracks.home.take(rows, axis=0)
+    x, rest_position = tracks.x.take(rows, axis=0), tracks.rest_position.take(rows, axis=0)
     walks: Bool = x[:, SPEED] > SIGMAS * np.sqrt(tracks.P[rows, SPEED, SPEED])
     if walks.any():  # seldom
-        walks &= lengths(tracks.hull.take(rows, axis=0).T).max(axis=0) < SLIM_M
-        walks &= tracks.top[rows] - tracks.foot[rows] > TALL_M
-        walks &= np.square(x[:, X] - home[:, 0]) + np.square(x[:, Y] - home[:, 1]) > WAY_M**2
+        walks &= widths(tracks.envelope.take(rows, axis=0).T).max(axis=0) < SLIM_M
+        walks &= tracks.top[rows] - tracks.bottom[rows] > TALL_M
+        walks &= np.square(x[:, X] - rest_position[:, 0]) + np.square(x[:, Y] - rest_position[:, 1]) > WAY_M**2
     return walks
 
 
-def _hosts(tracks: Followed, sightings: Sightings, rows: Int) -> tuple[Int, Int]:
+def _hosts(tracks: TrackTable, observations: Observations, rows: Int) -> tuple[Int, Int]:
     """Those of the rows that are expected within a proposal, and which covers each best."""
-    expected = carried(tracks, rows)
-    i, j = touching(expected, sightings.outline)
+    expected = predicted_kdops(tracks, rows)
+    i, j = overlapping_pairs(expected, observations.kdop)
     if not len(i):
         return rows[i], j
-    outline, expected = sightings.outline.take(j, axis=1), expected.take(i, axis=1)
-    cover = covered(expected, outline)
-    large = lengths(outline).max(axis=0) > lengths(expected).max(axis=0) + LONGER_M
+    kdop, expected = observations.kdop.take(j, axis=1), expected.take(i, axis=1)
+    cover = coverage(expected, kdop)
+    large = widths(kdop).max(axis=0) > widths(expected).max(axis=0) + LONGER_M
     least_first = cover.argsort(kind="stable")
     least_first = least_first[(large & (cover > WITHIN))[least_first]]
     host = np.full(len(rows), NONE)

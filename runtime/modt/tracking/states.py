@@ -1,7 +1,7 @@
 """The finite-state machines of a proposal, as tables (Tables I and II, Figs. 3 and 6).
 
 A table says where each event leads. What befalls a track (it found a proposal, it was classified, ...) is a
-`Happening`; in each state at most one event of the table answers to it, so arrays of states are driven by one dense
+`Event`; in each state at most one event of the table answers to it, so arrays of states are driven by one dense
 look-up. Events a1 to a14 are the paper's; those named e1 and on are extensions: the paper knows no budget, so it has
 no word for an object that waits for its first class, and no way back from a class that was inherited in error.
 """
@@ -21,7 +21,7 @@ class UndefinedTransitionError(ValueError):
     """A state met an event or a happening that its machine has no transition for."""
 
 
-class Happening(IntEnum):
+class Event(IntEnum):
     """What can befall a proposal or the track that it becomes."""
 
     ASSOCIATED = 0
@@ -57,9 +57,9 @@ class Transition:
     """
 
     source: str
-    event: str
+    label: str
     target: str
-    happening: Happening
+    event: Event
     meaning: str
 
 
@@ -98,32 +98,32 @@ class StateMachine:
         return self.names.index(name)
 
     @cached_property
-    def events(self) -> tuple[str, ...]:
+    def labels(self) -> tuple[str, ...]:
         """Names of the events, in the table's order."""
-        return tuple(dict.fromkeys(t.event for t in self.transitions))
+        return tuple(dict.fromkeys(t.label for t in self.transitions))
 
     @cached_property
     def table(self) -> Int:
         """(S, E) state that each event leads to, NONE where undefined."""
-        table = np.full((len(self.names), len(self.events)), NONE, np.int64)
+        table = np.full((len(self.names), len(self.labels)), NONE, np.int64)
         for t in self.transitions:
-            table[self.index(t.source), self.events.index(t.event)] = self.index(t.target)
+            table[self.index(t.source), self.labels.index(t.label)] = self.index(t.target)
         return table
 
     @cached_property
     def answer(self) -> Int:
         """(S, H) event that answers to each happening, NONE where none does."""
-        answer = np.full((len(self.names), len(Happening)), NONE, np.int64)
+        answer = np.full((len(self.names), len(Event)), NONE, np.int64)
         for t in self.transitions:
-            answer[self.index(t.source), t.happening] = self.events.index(t.event)
+            answer[self.index(t.source), t.event] = self.labels.index(t.label)
         return answer
 
     @cached_property
     def after(self) -> Int:
         """(S, H) state that each happening leads to, NONE where none answers to it."""
         after = np.full(self.answer.shape, NONE, np.int64)
-        states, happenings = np.nonzero(self.answer != NONE)
-        after[states, happenings] = self.table[states, self.answer[states, happenings]]
+        states, events = np.nonzero(self.answer != NONE)
+        after[states, events] = self.table[states, self.answer[states, events]]
         return after
 
     @cached_property
@@ -136,29 +136,29 @@ class StateMachine:
         """(S,) whether the class is settled in a state."""
         return self._among(self.certain)
 
-    def fire(self, states: Int, events: Int) -> Int:
+    def fire(self, states: Int, labels: Int) -> Int:
         """(M,) states after events (M,), by index in the table's events.
 
         Raises:
             UndefinedTransitionError: one of them has no such transition.
         """
-        after: Int = self.table[states, events]
-        bad = ((after == NONE) | (np.broadcast_to(events, np.shape(after)) == NONE)).nonzero()[0]
+        after: Int = self.table[states, labels]
+        bad = ((after == NONE) | (np.broadcast_to(labels, np.shape(after)) == NONE)).nonzero()[0]
         if len(bad):
-            state, event = states[bad[0]], np.broadcast_to(events, after.shape)[bad[0]]
-            what = self.events[event] if event != NONE else "no event of the table"
+            state, label = states[bad[0]], np.broadcast_to(labels, after.shape)[bad[0]]
+            what = self.labels[label] if label != NONE else "no event of the table"
             raise UndefinedTransitionError(f"{self.title}: {what} in state {self.names[state]}")
         return after
 
-    def meet(self, states: Int, happening: Happening | Int) -> Int:
+    def transition(self, states: Int, event: Event | Int) -> Int:
         """(M,) states after what befell them, one happening for all or one each.
 
         Raises:
             UndefinedTransitionError: one of them has no answer to it.
         """
-        after: Int = self.after[states, happening]
+        after: Int = self.after[states, event]
         if NONE in after:
-            self.fire(states, self.answer[states, happening])  # says which of them
+            self.fire(states, self.answer[states, event])  # says which of them
         return after
 
     def inherits(self, states: Int) -> Int:
@@ -166,8 +166,8 @@ class StateMachine:
         waits = self._among(self.waiting)
         kinds = np.where(
             self.knows,
-            Happening.INHERITS_CLASS,
-            np.where(waits, Happening.INHERITS_NOTHING, Happening.INHERITS_DOUBT),
+            Event.INHERITS_CLASS,
+            np.where(waits, Event.INHERITS_NOTHING, Event.INHERITS_DOUBT),
         )
         joined: Int = kinds[states]
         return joined
@@ -176,7 +176,7 @@ class StateMachine:
         return np.array([n in names for n in self.names], np.bool_)
 
 
-_H = Happening
+_H = Event
 
 WAITING = (
     Transition("unmatched", "e1", "unmatched", _H.ASSOCIATED, "followed while it waits to be classified"),

@@ -7,19 +7,19 @@ from typing import Self
 
 import numpy as np
 
-from modt.geometry.kdop import WAYS
+from modt.geometry.kdop import DIRECTIONS
 from modt.types import Bool, Float64, Int, Tracks
 
 
 @dataclass(slots=True)
-class Followed(Tracks):
+class TrackTable(Tracks):
     """Tracks with what only the tracker needs to know of them.
 
     Columns:
         kind: class when the frame began.
         outline: (M, 8) last seen, see outlines.py [m, world].
         hull: (M, 8) outline of all that was seen of it, slowly forgotten, about its place [m].
-        shape: (M, 8) mean outline about its place, an end that jumped beginning anew [m].
+        mean_kdop: (M, 8) mean outline about its place, an end that jumped beginning anew [m].
         doubt: (M, 4) variance along each axis of where the outline puts it, by what its ends disagreed [m2].
         foot, top: lowest and highest point last seen [m, world].
         shown: (M, 2) place that the outline was taken to show [m, world].
@@ -31,19 +31,19 @@ class Followed(Tracks):
         inherited: its class was taken over from a remembered place, and it was not classified itself since.
     """
 
-    kind: Int
-    outline: Float64
-    hull: Float64
-    shape: Float64
-    doubt: Float64
-    foot: Float64
+    last_class: Int
+    kdop: Float64
+    envelope: Float64
+    mean_kdop: Float64
+    end_variance: Float64
+    bottom: Float64
     top: Float64
-    shown: Float64
-    home: Float64
-    still: Bool
-    stood: Int
-    landmark: Float64
-    takes: Int
+    anchor: Float64
+    rest_position: Float64
+    stationary: Bool
+    stationary_frames: Int
+    landmark_kdop: Float64
+    splits: Int
     inherited: Bool
 
     @classmethod
@@ -52,25 +52,25 @@ class Followed(Tracks):
         shared = dict(Tracks.blank(m).columns())
         return cls(
             **shared,
-            kind=np.zeros(m, np.int64),
-            outline=np.zeros((m, 8)),
-            hull=np.full((m, 8), -np.inf),
-            shape=np.zeros((m, 8)),
-            doubt=np.zeros((m, 4)),
-            foot=np.zeros(m),
+            last_class=np.zeros(m, np.int64),
+            kdop=np.zeros((m, 8)),
+            envelope=np.full((m, 8), -np.inf),
+            mean_kdop=np.zeros((m, 8)),
+            end_variance=np.zeros((m, 4)),
+            bottom=np.zeros(m),
             top=np.zeros(m),
-            shown=np.zeros((m, 2)),
-            home=np.zeros((m, 2)),
-            still=np.zeros(m, np.bool_),
-            stood=np.zeros(m, np.int64),
-            landmark=np.zeros((m, 8)),
-            takes=np.zeros(m, np.int64),
+            anchor=np.zeros((m, 2)),
+            rest_position=np.zeros((m, 2)),
+            stationary=np.zeros(m, np.bool_),
+            stationary_frames=np.zeros(m, np.int64),
+            landmark_kdop=np.zeros((m, 8)),
+            splits=np.zeros(m, np.int64),
             inherited=np.zeros(m, np.bool_),
         )
 
     def move(self, step: Float64) -> None:
         """Put what is somewhere elsewhere, by (M, 2) [m, world]."""
-        for column in (self.x, self.box, self.shown, self.home):
+        for column in (self.x, self.box, self.anchor, self.rest_position):
             column[:, :2] += step
-        self.outline += step @ WAYS
-        self.landmark += step @ WAYS
+        self.kdop += step @ DIRECTIONS
+        self.landmark_kdop += step @ DIRECTIONS

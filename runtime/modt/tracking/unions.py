@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from modt.geometry import boxes_about, transform, transform_boxes
-from modt.observations import Sightings
+from modt.observations import Observations
 from modt.tracking.association import Matches
 from modt.types import NONE, Bool, Float64, Int, Proposals
 
@@ -141,26 +141,26 @@ def _brightness(reflectance: Float64 | None, unions: Unions, share: Float64) -> 
 
 
 def united_sightings(
-    sightings: Sightings, unions: Unions, proposals: Proposals, T_world_sensor: Float64
-) -> Sightings:
+    observations: Observations, unions: Unions, proposals: Proposals, T_world_sensor: Float64
+) -> Observations:
     """The same in the world.
 
     Args:
-        sightings: (P,) as they were.
+        observations: (P,) as they were.
         unions: of them.
         proposals: (Q,) with unions.
         T_world_sensor: (4, 4) pose of the frame.
     """
     new, begins = unions.new, unions.begins
-    united, outline = sightings.take(unions.kept), sightings.outline.take(unions.few, axis=1)
-    centroid = unions.mean(sightings.centroid, unions.share(sightings.count))
+    united, kdop = observations.take(unions.kept), observations.kdop.take(unions.few, axis=1)
+    centroid = unions.mean(observations.centroid, unions.share(observations.count))
     moved = centroid - transform(T_world_sensor, proposals.centroid.take(new, axis=0))[:, :2]
     box = transform_boxes(T_world_sensor, proposals.box.take(new, axis=0))
     box[:, :2] += moved
     united.box[new], united.centroid[new] = box, centroid
-    united.outline[:, new] = np.maximum.reduceat(outline, begins, axis=1)
-    united.foot[new], united.top[new] = box[:, 2] - box[:, 5] / 2, box[:, 2] + box[:, 5] / 2
-    united.count[new], united.cut[new] = np.add.reduceat(sightings.count[unions.few], begins), True
+    united.kdop[:, new] = np.maximum.reduceat(kdop, begins, axis=1)
+    united.bottom[new], united.top[new] = box[:, 2] - box[:, 5] / 2, box[:, 2] + box[:, 5] / 2
+    united.count[new], united.partial[new] = np.add.reduceat(observations.count[unions.few], begins), True
     united.range_m[new] = np.hypot(*proposals.centroid[new, :2].T)
     return united
 
@@ -174,7 +174,7 @@ def united_matches(matches: Matches, unions: Unions) -> Matches:
     return Matches(
         matches.rows[kept],
         own[kept],
-        matches.place.take(kept, axis=0),
+        matches.position.take(kept, axis=0),
         matches.covariance.take(kept, axis=0),
-        matches.doubt.take(kept, axis=0),
+        matches.end_variance.take(kept, axis=0),
     )
