@@ -27,9 +27,9 @@ def test_features_of_crops_and_proposals_agree() -> None:
     beam_sr = beam_solid_angle_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
     expected = box_features(proposals.count, proposals.box, SENSOR_HEIGHT_M, beam_sr)
     assert len(crops) > 50
-    error = np.abs(described(crops) - expected)
-    assert error[:, 4:].max() < 1e-3  # height, foot and top
-    assert np.quantile(error[:, :4], 0.9, axis=0).max() < 0.15  # headings are fitted to fewer points at run time
+    off = np.abs(described(crops) - expected)
+    assert off[:, 4:].max() < 1e-3  # height, foot and top
+    assert np.quantile(off[:, :4], 0.9, axis=0).max() < 0.15  # at run time headings are fitted to fewer points
 
 
 def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
@@ -70,23 +70,23 @@ def test_training_separates_classes_by_reflectance() -> None:
 
     rng = np.random.default_rng(0)
     label = np.arange(160) // 2 % 4
-    equal_boxes = cubes(np.ones(160), label, rng)
-    reflectance = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
-    reflectance[::20] = np.nan  # of another sensor
-    data = dataclasses.replace(equal_boxes, reflectance=reflectance)
-    described_data = Described(data)
-    uniform = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
-    layers = train(data, described_data, np.arange(160), uniform, 200, seed=1)
-    known = np.isfinite(reflectance).all(axis=1)
-    assert np.mean(logits(layers, described_data.whole[known]).argmax(axis=1) == label[known]) > 0.9
+    alike = cubes(np.ones(160), label, rng)
+    told = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
+    told[::20] = np.nan  # of another sensor
+    data = dataclasses.replace(alike, reflectance=told)
+    seen = Described(data)
+    dumb = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
+    layers = train(data, seen, np.arange(160), dumb, 200, seed=1)
+    known = np.isfinite(told).all(axis=1)
+    assert np.mean(logits(layers, seen.whole[known]).argmax(axis=1) == label[known]) > 0.9
 
-    data = dataclasses.replace(equal_boxes, reflectance=np.nan_to_num(reflectance, nan=0.3))
+    data = dataclasses.replace(alike, reflectance=np.nan_to_num(told, nan=0.3))
     network = np.full((160, 4), 0.25)
     _, report = cross_validate(data, Described(data), network, 2, 200, seed=1)
-    assert report["weight"] > 0.9  # a uniform network leaves all of it
+    assert report["weight"] > 0.9  # a network that knows nothing leaves all of it
     assert min(report["network"]["average_precision"].values()) > 0.7
     assert report["network"]["log_loss"] < 0.5 * report["network"]["log_loss_without"]
     sure = np.log(np.eye(4)[label] * 0.96 + 0.01)
-    assert max(weigh(sure, -sure, -sure, label)) < 0.05  # contradicting a correct network
+    assert max(weigh(sure, -sure, -sure, label)) < 0.05  # what contradicts a network that is right is left out
     share, _ = weigh(np.zeros((160, 4)), sure, np.zeros((160, 4)), label)
-    assert share > 0.95  # correct boxes, uniform network
+    assert share > 0.95  # a box that knows goes before a network that does not
