@@ -8,6 +8,7 @@ import numpy as np
 
 from modt.geometry import transform, transform_boxes
 from modt.geometry.kdop import DIRECTIONS, centres, kdops
+from modt.placement import Placement
 from modt.types import Bool, Float64, Int, Proposals
 
 
@@ -95,3 +96,40 @@ def observe(proposals: Proposals, T_world_sensor: Float64) -> Observations:
         partial=proposals.truncated | proposals.occluded,
         sensor_xy=T_world_sensor[:2, 3],
     )
+
+
+@dataclass(frozen=True, slots=True)
+class StaticTracks:
+    """What the odometry needs to know of the tracks after a frame; M rows in the order of their ids.
+
+    Attributes:
+        id: (M,) ascending.
+        observed: (M,) seen in the last frame.
+        stationary: (M,) at rest.
+        candidate: (M,) a landmark, or young enough to be one, and not lost for long.
+        kdop: (M, 8) last observed [m, world].
+        predicted_kdop: (8, M) where the filter expects it [m, world].
+    """
+
+    id: Int
+    observed: Bool
+    stationary: Bool
+    candidate: Bool
+    kdop: Float64
+    predicted_kdop: Float64
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A frame in the world.
+
+    Attributes:
+        placement: pose and motion of the sensor.
+        observations: the proposals, where they are at the stamp.
+    """
+
+    placement: Placement
+    observations: Observations
+
+    def __len__(self) -> int:
+        return len(self.observations)

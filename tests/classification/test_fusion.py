@@ -15,7 +15,7 @@ from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.prior import object_probability_reaches
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
-from modt.types import NONE, Bool, Float64, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 from tests.classification.scenes import blobs, new_tracks
 
 PAPER = FusionConfig(
@@ -38,6 +38,13 @@ def scene(counts: tuple[int, ...] = (50, 50)) -> tuple[Proposals, Tracks]:
 
 def moved(proposals: Proposals, **columns: np.ndarray) -> Proposals:
     return dataclasses.replace(proposals, **columns)
+
+
+def fuse(fusion: Fusion, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    """Fuse, and make final what is certain, as the state machine does."""
+    certain = fusion.fuse(tracks, proposals, rows, likelihood)
+    tracks.final[rows] = certain
+    return certain
 
 
 @pytest.mark.parametrize("fusion", ALL)
@@ -95,24 +102,23 @@ def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     assert EveryFrame().asks(tracks, proposals, np.zeros(2, np.bool_)).tolist() == [True, False]
 
 
-def test_first_view_is_final() -> None:
+def test_efficient_requests_one_view() -> None:
     proposals, tracks = scene()
     fusion = FirstView(FusionConfig(first_view_min_hits=3))
     asking, tracks.hits[:] = np.array([True, True]), 3
     assert fusion.asks(tracks, proposals, asking).all()
-    certain = fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
+    certain = fuse(fusion, tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
     assert certain.all()
     assert fusion.asks(tracks, proposals, asking).tolist() == [False, True]
     tracks.hits[1] = 2  # too few
     assert not fusion.asks(tracks, proposals, asking).any()
 
 
-def test_a_certain_first_view_is_final() -> None:
+def test_a_distinct_first_view_is_certain() -> None:
     proposals, tracks = scene()
     fusion = KeyViews(FusionConfig())
     view = np.array([[0.98, 0.01, 0.005, 0.005], [0.5, 0.3, 0.1, 0.1]])
     assert fusion.fuse(tracks, proposals, np.arange(2), view).tolist() == [True, False]
-    assert tracks.final.tolist() == [True, False]
     assert tracks.views.tolist() == [1, 0]
 
 
@@ -136,13 +142,13 @@ def test_a_final_class_of_few_points_is_reviewed_with_more() -> None:
     config = FusionConfig(review_point_ratio=4.0, review_max_points=60)
     fusion = KeyViews(config)
     sure = np.tile([0.99, 0.005, 0.0025, 0.0025], (3, 1))
-    assert fusion.fuse(tracks, proposals, np.arange(3), sure).all()
+    assert fuse(fusion, tracks, proposals, np.arange(3), sure).all()
     tracks.proposal[1] = NONE
     near = moved(proposals, offsets=np.array([0, 50, 100, 600]))
     asking = np.zeros(3, np.bool_)
     assert fusion.asks(tracks, near, asking).tolist() == [True, False, False]
     uncertain = np.array([[0.3, 0.5, 0.1, 0.1]])
-    assert not fusion.fuse(tracks, near, np.array([0]), uncertain).any()
+    assert not fuse(fusion, tracks, near, np.array([0]), uncertain).any()
     prior = np.append(1 - sum(config.prior), config.prior)
     expected = (sure[0] / prior) ** (10 / 50) * uncertain[0]  # previous evidence weighted by the ratio of points
     np.testing.assert_allclose(tracks.posterior[0], expected / expected.sum(), rtol=1e-6)
@@ -266,7 +272,7 @@ def test_no_review_where_the_box_excludes_an_object() -> None:
     prior = FixedPrior(CAR, CAR)
     fusion = KeyViews(FusionConfig(review_point_ratio=2.0), prior)
     fusion.asks(tracks, proposals, np.ones(2, np.bool_))
-    assert fusion.fuse(tracks, proposals, np.arange(2), np.array([[0.991, 0.003, 0.003, 0.003]] * 2)).all()
+    assert fuse(fusion, tracks, proposals, np.arange(2), np.array([[0.991, 0.003, 0.003, 0.003]] * 2)).all()
     prior.rows = np.array([WALL, CAR])
     nearer = moved(proposals, offsets=np.array([0, 100, 200]))
     assert fusion.asks(tracks, nearer, np.zeros(2, np.bool_)).tolist() == [False, True]
@@ -294,7 +300,7 @@ def test_posterior_mixes_in_the_box_prior_by_mismatch_probability() -> None:
     fusion = KeyViews(FusionConfig(mismatch_probability=0.2), prior)
     fusion.asks(tracks, proposals, np.ones(2, np.bool_))
     view = np.array([[0.001, 0.997, 0.001, 0.001]] * 2)
-    assert fusion.fuse(tracks, proposals, np.arange(2), view).all()
+    assert fuse(fusion, tracks, proposals, np.arange(2), view).all()
     np.testing.assert_allclose(tracks.posterior, view, rtol=1e-6)  # no mismatch in the frame of the view
     fusion.asks(tracks, proposals, np.zeros(2, np.bool_))
     np.testing.assert_allclose(tracks.posterior, 0.8 * view + 0.2 * np.array(CAR), rtol=1e-6)
@@ -306,7 +312,7 @@ def test_a_final_class_stays_while_its_posterior_follows_the_box(make: type[Firs
     prior = FixedPrior(CAR)
     fusion, asking = make(FusionConfig(box_update_weight=1.0), prior), np.array([False])
     fusion.asks(tracks, proposals, np.array([True]))
-    assert fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.04, 0.92, 0.02, 0.02]])).all()
+    assert fuse(fusion, tracks, proposals, np.array([0]), np.array([[0.04, 0.92, 0.02, 0.02]])).all()
     prior.rows = np.array([WALL])
     assert not fusion.asks(tracks, proposals, asking).any()
     assert tracks.posterior[0].argmax() == ObjectClass.BACKGROUND

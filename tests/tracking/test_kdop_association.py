@@ -2,13 +2,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import corners
 from modt.geometry.kdop import AXES, DIRECTIONS
-from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
-from modt.tracking.displacement import AGREE_M
+from modt.geometry.kdop_displacement import AGREE_M
 from modt.tracking.fragments import _fits
 from modt.tracking.kdop_association import SOFT_M, compare
 from modt.tracking.states import EFFICIENT

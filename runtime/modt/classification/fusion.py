@@ -1,7 +1,8 @@
 """Selection of views to classify and fusion of their likelihoods (section V-C): one `pipeline.Fusion` a mode.
 
 `asks` selects the tracks whose view is worth a classification; `fuse` takes the classifier's likelihoods and returns
-which tracks are certain. Both write their columns of the track table in place.
+which tracks are certain, upon which the state machine makes a class final or reopens it. Both write their columns of
+the track table in place.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 class EveryFrame:
     """Tracking by detection: every proposal is classified, its likelihood is the posterior (Fig. 2a)."""
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks with a proposal."""
         observed: Bool = tracks.proposal != NONE
         return observed
@@ -46,18 +47,18 @@ class FirstView:
         self.config = config
         self.prior = prior or FrequencyPrior(config.prior)
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
         config = self.config
         update_from_boxes(tracks, proposals, self.prior, config)
-        asks: Bool = asking & ~tracks.final & (tracks.proposal != NONE) & (tracks.hits >= config.first_view_min_hits)
+        observed = tracks.proposal != NONE
+        asks: Bool = wants_class & ~tracks.final & observed & (tracks.hits >= config.first_view_min_hits)
         return asks & self.prior.may_be_object(tracks.prior, config.first_view_min_object_probability)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Make the class final; every row is certain."""
+        """Replace the posterior; every row is certain."""
         tracks.posterior[rows] = normalise(likelihood)
         tracks.views[rows] = 1
-        tracks.final[rows] = True
         _record_key_view(tracks, proposals, rows)
         return np.ones(len(rows), np.bool_)
 
@@ -86,12 +87,12 @@ class KeyViews:
         frequency = np.maximum(with_background(config.prior), MIN_PROBABILITY)
         self._log_frequency = np.log(frequency / frequency.sum())
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first or an independent view, and final ones to review."""
         config = self.config
         update_from_boxes(tracks, proposals, self.prior, config)
         observed = tracks.proposal != NONE
-        asks: Bool = (asking | tracks.viewed) & ~tracks.final & observed
+        asks: Bool = (wants_class | tracks.viewed) & ~tracks.final & observed
         rows = np.flatnonzero(asks)
         started = tracks.age[rows] >= config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
@@ -124,7 +125,7 @@ class KeyViews:
         return independent
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Multiply the view into the posterior (Equation 6); (R,) certain: the class is final, else not."""
+        """Multiply the view into the posterior (Equation 6); (R,) which rows are certain now."""
         view, prior = np.log(normalise(likelihood)), self._log_pooled_prior(tracks.prior[rows])
         past = np.log(normalise(tracks.key_posterior[rows])) - self._log_pooled_prior(tracks.key_prior[rows])
         ratio = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
@@ -133,7 +134,6 @@ class KeyViews:
         posterior = from_log_weights(np.where(fused, prior + past + (view - prior), view))
         certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
-        tracks.final[rows] = certain
         tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
         _record_key_view(tracks, proposals, rows)
         return certain

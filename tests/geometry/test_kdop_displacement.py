@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.geometry.kdop import AXES, DIRECTIONS
-from modt.tracking.displacement import AGREE_M, DOUBT, KEPT, measured, shift_between
+from modt.geometry.kdop_displacement import AGREE_M, DOUBT, KEPT, measured, shift_between
 
 
 def kdops(rng, n):

@@ -18,6 +18,8 @@ AGREE_M = 0.6
 a longer one that comes into view by as much less as it is longer."""
 DOUBT = 0.3
 """Deviation of a shift by ends that disagree, relative to how far they do, or to what is seen if that is less."""
+SOFT_M = 0.3
+"""Added to lengths that are compared: a difference of a few returns is noise."""
 KEPT = 0.97
 """What is left of a doubt a frame later."""
 PRODUCTS = np.stack([AXES[0] * AXES[0], AXES[1] * AXES[1], AXES[0] * AXES[1]])
@@ -88,3 +90,28 @@ def _moved(a: Float64, b: Float64, seen: Float64) -> tuple[Float64, Float64, Flo
     unlike = 1 - np.square(np.maximum(1 - np.square(apart * (np.maximum(longest, 1.0) / AGREE_M)), 0.0))
     moved = (both - unlike * np.copysign(apart, both)) / 2  # the lesser: half the sum less half what parts them
     return moved, unlike, apart
+
+
+def compare(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64, Float64]:
+    """How outlines b (8, K) lie to outlines a (8, K), one by one.
+
+    Returns:
+        shift: (K, 2) from a to b [m], by both ends along each axis where they agree, else by that which moved less.
+        size: (K,) mean difference of the logarithms of their lengths.
+        overlap: (K,) intersection over union.
+        cover: (K,) intersection over the smaller of the two.
+    """
+    return shift_between(a, b), *shape_similarity(a, b)
+
+
+def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
+    """(K,) compare's size, overlap and cover."""
+    length_a, length_b = widths(a), widths(b)
+    size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).sum(axis=0) / 4
+    pad = SOFT_M / 3
+    common = np.maximum(widths(np.minimum(a, b)) + pad, 0.0)
+    squares = [side[:2] * side[2:] for side in (length_a + pad, length_b + pad)]
+    shared = common[:2] * common[2:]  # in the upright square, and in the one on its corner
+    overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)))
+    cover = np.minimum(*(shared / np.minimum(*squares)))
+    return size, overlap, cover
