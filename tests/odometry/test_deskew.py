@@ -13,10 +13,9 @@ from modt.observations import observe
 from modt.odometry.deskew import Motion, SweepSkew, delays
 from modt.odometry.registration import Registration
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
 from modt.types import Frame, Proposals
 from tests.odometry.test_registration import street
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 from tools.study.sweep_skew import displacement_m
 
 PERIOD_S = 0.1
@@ -126,7 +125,7 @@ def test_what_was_seen_goes_by_its_share_of_a_correction(speed, turn, faster, tu
 
 @pytest.mark.parametrize(("told", "least_deg", "most_deg"), [(True, 0.0, 0.02), (False, 0.03, 1.0)])
 def test_a_registration_that_is_told_the_shares_is_right_at_once(told, least_deg, most_deg):
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street(n=120)
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street(n=120)
     for i in range(6):
         tracker.follow(*skewed(world, i, 0.1, 8.0, 0.6, posed=True))
     frame, proposals = skewed(world, 6, 0.1, 8.0, 0.6, posed=True)
@@ -168,7 +167,7 @@ def test_no_time_is_no_motion():
 
 def drive(turn_s, known, posed=False, frames=25):
     """The tracker after a drive of 8 m/s that turns at 35 degrees a second, its sweeps skewed."""
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
 
     for i in range(frames):
         frame, proposals = skewed(street(n=60), i, turn_s, 8.0, 0.6, posed)
@@ -203,7 +202,7 @@ def test_what_stands_stays_where_it_is_though_its_sweeps_are_skewed():
 
 
 def test_sweeps_seen_at_once_are_left_as_they_are():
-    trackers = [Tracker(TrackingConfig(), EFFICIENT) for _ in range(2)]
+    trackers = [Follower(TrackingConfig(), EFFICIENT) for _ in range(2)]
     for i in range(8):
         T = pose(0.1 * i, 8.0, 0.6)
         frame, proposals = frame_of(street(n=30), i, None if i % 2 else T, points=40)

@@ -10,8 +10,7 @@ from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
 from modt.tracking.association import FORBIDDEN, PaperAssociation, assign, assign_all
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 EYE = np.eye(4)
 
@@ -60,7 +59,7 @@ def test_no_assignment_of_few_to_few_is_cheaper(n, k, seed):
 
 
 def candidates(before, after, **counts):
-    tracker = Tracker(TrackingConfig(association="paper"), EFFICIENT)
+    tracker = Follower(TrackingConfig(association="paper"), EFFICIENT)
     tracker.follow(*frame_of([before], 0, EYE))
     _, proposals = frame_of([after], 1, EYE, **counts)
     return tracker._tracks, observe(proposals, EYE)

@@ -12,23 +12,22 @@ from modt.geometry.kdop_displacement import AGREE_M
 from modt.tracking.fragments import _fits
 from modt.tracking.kdop_association import SOFT_M, compare
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
 from modt.types import NONE
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 EYE = np.eye(4)
 BACKGROUND, CAR = np.eye(4)[ObjectClass.BACKGROUND], np.eye(4)[ObjectClass.CAR]
 
 
 def tracker(regroupings=None, **options):
-    return Tracker(TrackingConfig(ask_from=1, **options), EFFICIENT, regroupings=regroupings)
+    return Follower(TrackingConfig(ask_from=1, **options), EFFICIENT, regroupings=regroupings)
 
 
 def classify(tracker, posterior):
     """Settle whatever asks."""
-    rows = np.flatnonzero(tracker.asking())
+    rows = np.flatnonzero(tracker.wants_class)
     tracker.tracks.posterior[rows], tracker.tracks.final[rows] = posterior, True
-    tracker.settle(rows, np.ones(len(rows), np.bool_))
+    tracker.conclude(rows, np.ones(len(rows), np.bool_))
     return len(rows)
 
 
@@ -165,7 +164,7 @@ def far(i):
 
 def test_background_is_remembered_where_it_stood():
     for background_map, asked in ((BackgroundMap(), 0), (NoBackgroundMap(), 1)):
-        t = Tracker(TrackingConfig(ask_from=1, max_missed=2), EFFICIENT, background_map=background_map)
+        t = Follower(TrackingConfig(ask_from=1, max_missed=2), EFFICIENT, background_map=background_map)
         run(t, [[far(0), box(10, 4, 1, 1)]] * 4)
         run(t, [[far(0)]] * 5, first=4)
         assert len(t.tracks) == 1
@@ -214,7 +213,7 @@ def test_what_a_view_said_since_holds_away_from_the_place_too():
 
 def test_memory_forgets_the_oldest():
     background_map = BackgroundMap(capacity=3)
-    t = Tracker(TrackingConfig(ask_from=1, max_missed=0), EFFICIENT, background_map=background_map)
+    t = Follower(TrackingConfig(ask_from=1, max_missed=0), EFFICIENT, background_map=background_map)
     for i in range(5):
         run(t, [[box(10 + 5 * i, 0, 1, 1)]] * 2, first=2 * i)
     assert len(background_map) == 3

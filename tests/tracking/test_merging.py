@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from modt.tracking.unions import Unions, united_proposals, united_sightings
 
 from modt.classes import N_CLASSES, ObjectClass
 from modt.config import TrackingConfig
@@ -14,10 +15,8 @@ from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
 from modt.segmentation.reflectance_statistics import brightness
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
-from modt.tracking.unions import Unions, united_proposals, united_sightings
 from modt.types import NONE
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 CAR = box(10, 3, 4.2, 1.8, 1.5)
 REAR, FRONT = box(8.6, 3, 1.4, 1.8, 1.5), box(11.1, 3, 2.0, 1.8, 1.5)
@@ -52,9 +51,9 @@ def seen(tracker, bodies, i, pose=still, points=80):
     return [tracker.tracks.id[row[own[0]]] for own in label.reshape(len(bodies), points)]
 
 
-def known(bodies, kinds, pose=still, frames=KNOWN, association="robust", fixed=True):
+def known(bodies, kinds, pose=still, frames=KNOWN, association="kdop", fixed=True):
     """A tracker that knows these bodies."""
-    tracker = Tracker(TrackingConfig(association=association), EFFICIENT)
+    tracker = Follower(TrackingConfig(association=association), EFFICIENT)
     for i in range(frames):
         seen(tracker, bodies, i, pose)
         settle(tracker, *kinds, fixed=fixed)

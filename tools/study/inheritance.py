@@ -17,11 +17,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from modt.tracking.background_map import NoBackgroundMap
 
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.cli.assemble import MODES
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.background_map import NoBackgroundMap
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Int
 from tools.study.truth_replay import Seen, add_drives, replay

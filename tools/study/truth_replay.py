@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
 
 from modt.cli import assemble
 from modt.cli.replay import frames as number_range
@@ -15,7 +16,6 @@ from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.simulation.simulator import Truth
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, FrameResult, Int, Proposals
 

@@ -4,12 +4,12 @@ import sys
 
 import numpy as np
 import pytest
+from modt.tracking.background_map import NoBackgroundMap
 
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.kitti_raw import DriveWriter
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.background_map import NoBackgroundMap
 from modt.types import NONE, Proposals
 from tools.study import ego_drift
 from tools.study.filter_consistency import Life, consistency, errors, lives, normalised, study
