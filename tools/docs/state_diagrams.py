@@ -16,15 +16,14 @@ def mermaid(machine: StateMachine) -> str:
     for t in machine.transitions:
         arrows.setdefault((t.source, t.target), []).append(t.label)
     lines = [f"    {a} --> {b}: {', '.join(dict.fromkeys(labels))}" for (a, b), labels in arrows.items()]
-    first, last = machine.names[machine.proposal], machine.names[machine.deleted]
+    first, last = machine.names[0], machine.names[-1]
     return "\n".join(["stateDiagram-v2", f"    [*] --> {first}", *lines, f"    {last} --> [*]"])
 
 
 def table(machine: StateMachine) -> str:
     """Markdown table of the transitions."""
     rows = [
-        f"| {t.event} | {t.source} | {t.target} | {t.happening.name.lower()} | {t.meaning} |"
-        for t in machine.transitions
+        f"| {t.label} | {t.source} | {t.target} | {t.event.name.lower()} | {t.meaning} |" for t in machine.transitions
     ]
     return "\n".join(["| event | from | to | set off by | meaning |", "|---|---|---|---|---|", *rows])
 

@@ -9,14 +9,15 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.prior import Prior
-from modt.classification.scheduler import Scheduler
+from modt.classification.scheduler import LinearCost, Scheduler
+from modt.config import SchedulerConfig
 from modt.energy.ledger import NullLedger
 from modt.pipeline import Fusion, Pipeline
 from modt.types import Bool, Float64, Frame, Int, Proposals, Tracks
 from tools.study.recording import Playback, Recording
 from tools.train.scores import average_precision
 
-CALLS = ("first views", "first key views", "further views", "reopenings")
+CALLS = ("first views", "first key views", "further views", "reviews")
 
 
 class CallCounter:
@@ -69,7 +70,10 @@ class Outcome:
 
 
 def replay(
-    recordings: Sequence[Recording], fusion: Callable[[Prior], Fusion], min_hits: int, scored_from: int | None = None
+    recordings: Sequence[Recording],
+    fusion: Callable[[Prior], Fusion],
+    min_hits: int = 1,
+    scored_from: int | None = None,
 ) -> Outcome:
     """Replay drives with a fusion, without a budget.
 
@@ -95,7 +99,9 @@ def replay(
 
 def _played(recording: Recording, playback: Playback, fusion: Fusion, scored_from: int) -> tuple[Float64, Int]:
     """(R, 4) posteriors of the scored proposals, and (R,) their true classes."""
-    pipeline = Pipeline(playback, playback, playback, fusion, Scheduler(), playback, NullLedger())
+    config = SchedulerConfig()
+    scheduler = Scheduler(config.worth, LinearCost(128, config.cost))
+    pipeline = Pipeline(playback, playback, playback, fusion, scheduler, playback, NullLedger())
     no_points = np.zeros((0, 4), np.float32)
     posterior, true = [np.zeros((0, N_CLASSES))], [np.zeros(0, np.int64)]
     for index, recorded in enumerate(recording.frames):

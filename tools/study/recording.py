@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modt.classification.prior import Prior, at_least
+from modt.classification.prior import Prior, object_probability_reaches
 from modt.config import ProfileConfig
 from modt.geometry import transform_boxes
 from modt.observations import Located, StaticTracks, observe
@@ -59,13 +59,13 @@ class Recording:
         name: of the drive.
         frames: in order.
         n_tracks: number of tracks.
-        share: weight of the box in the likelihood.
+        pool_weight: weight of the box in the likelihood.
     """
 
     name: str
     frames: tuple[RecordedFrame, ...]
     n_tracks: int
-    share: float = 0.0
+    pool_weight: float = 0.0
 
     @property
     def n_proposals(self) -> int:
@@ -116,13 +116,13 @@ def record(
                 proposals=proposals,
                 box=transform_boxes(located.placement.T_world_sensor, proposals.box),
                 track=np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64),
-                prior=prior.of(proposals),
+                prior=prior.probability(proposals),
                 likelihood=network.classify(frame.points, proposals, np.arange(len(proposals))),
                 kind=labels.kind,
                 scored=~labels.unknown & ~(labels.partial & ideal),
             )
         )
-    return Recording(name, tuple(frames), len(rows), prior.share)
+    return Recording(name, tuple(frames), len(rows), prior.pool_weight)
 
 
 def owners(scan: Scan, proposals: Proposals) -> Int:
@@ -153,7 +153,7 @@ class Playback:
     def __init__(self, recording: Recording, min_hits: int) -> None:
         self._frames = iter(recording.frames)
         self._min_hits = min_hits
-        self.share = recording.share
+        self.pool_weight = recording.pool_weight
         self._tracks = Tracks.blank(recording.n_tracks)
         self._tracks.id[:] = np.arange(recording.n_tracks)
 
@@ -191,13 +191,13 @@ class Playback:
         """(R, 4) recorded likelihoods."""
         return self._current.likelihood[which]
 
-    def of(self, proposals: Proposals) -> Float64:
+    def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) recorded priors."""
         return self._current.prior
 
-    def likely(self, said: Float64, least: float) -> Bool:
-        """(M,) rows of priors (M, 4) with an object probability of at least `least`."""
-        return at_least(said, least)
+    def may_be_object(self, probability: Float64, threshold: float) -> Bool:
+        """(M,) rows of priors (M, 4) with an object probability of at least `threshold`."""
+        return object_probability_reaches(probability, threshold)
 
     def facts(self) -> dict[str, str]:
         """Empty: no model runs."""

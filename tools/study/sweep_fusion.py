@@ -14,7 +14,7 @@ the results of those of --world.
 
 --own uses modt's tracker instead of the ideal one and counts fragments and merged objects as background. --paper is
 the setting of Figs. 10 and 11: classification from the first frame, views independent by their number of points
-alone, no reopening. --docs updates the tables of docs/classification.md.
+alone, no review. --docs updates the tables of docs/classification.md.
 
 --drive replaces the worlds by a KITTI drive with tracklets, in the camera's view. Drive 0001 has five scans, which
 are training data of pointnet-kitti. The test drive, 0005, requires --confirm, and no parameter is swept on it.
@@ -35,7 +35,7 @@ from modt import profile
 from modt.classes import CLASS_NAMES
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
-from modt.classification.prior import Prior, prior_of
+from modt.classification.prior import Prior, make_prior
 from modt.config import FusionConfig, ProfileConfig
 from modt.pipeline import Fusion
 from modt.reporting import page, svg
@@ -54,26 +54,24 @@ PERIOD_S = 0.1
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "classification.md"
 BEGIN, END = "<!-- tools/study/sweep_fusion.py -->\n", "<!-- end of tools/study/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
-ALPHAS = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
-FIRST_VIEW_KEY = "likely_once"
+POINT_CHANGES = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
+FIRST_VIEW_KEY = "first_view_min_object_probability"
 """The only swept key of mode `efficient`."""
 SWEEPS: dict[str, tuple[float | None, ...]] = {
-    "background_alpha": (0.2, 0.5, 1.0, 2.0, 4.0),
     "start_frame": (1, 2, 3, 4, 5, 6, 7, 8),
-    "threshold": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98),
+    "object_threshold": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98),
     "background_threshold": (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
-    "view_weight": (0.25, 0.5, 0.75, 1.0),
-    "reopen_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
-    "reopen_points": (30, 50, 100, 200, 400, 800),
-    "likely": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
+    "review_point_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
+    "review_max_points": (30, 50, 100, 200, 400, 800),
+    "min_object_probability": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
     FIRST_VIEW_KEY: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
-    "likely_again": (0.0, 0.02, 0.05, 0.1, 0.2),
-    "box_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
-    "slip": (0.0, 0.03, 0.1, 0.2, 0.3),
+    "review_min_object_probability": (0.0, 0.02, 0.05, 0.1, 0.2),
+    "box_update_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
+    "mismatch_probability": (0.0, 0.03, 0.1, 0.2, 0.3),
 }
 NO_BETTER = "No setting is better on both sets at no more calls."
-REOPENINGS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
-"""(reopen_ratio, reopen_points): a smaller ratio costs calls, fewer points save them."""
+REVIEWS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
+"""(review_point_ratio, review_max_points): a smaller ratio costs calls, fewer points save them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +106,7 @@ class Trial:
 def variants(config: FusionConfig) -> list[Setting]:
     """The modes, and the defaults with one part removed each."""
     uniform = dataclasses.replace(config, prior=(0.25, 0.25, 0.25))
-    never = dataclasses.replace(config, reopen_ratio=None)
+    never = dataclasses.replace(config, review_point_ratio=None)
     title = "variant"
     return [
         Setting(title, "conventional", lambda prior: EveryFrame()),
@@ -116,23 +114,24 @@ def variants(config: FusionConfig) -> list[Setting]:
         Setting(title, "first view, no box prior", lambda prior: FirstView(config)),
         Setting(title, "no box prior", lambda prior: KeyViews(config)),
         Setting(title, "uniform class prior", lambda prior: KeyViews(uniform, prior)),
-        Setting(title, "no reopening", lambda prior: KeyViews(never, prior)),
+        Setting(title, "no review", lambda prior: KeyViews(never, prior)),
         Setting(title, "defaults", lambda prior: KeyViews(config, prior)),
     ]
 
 
 def sweeps(config: FusionConfig) -> Iterator[Setting]:
-    """One value changed at a time; for reopening its two values together as well."""
-    for k, name in enumerate(OBJECTS):
-        for value in sorted({*ALPHAS, config.alpha[k]}):
-            alpha = (*config.alpha[:k], value, *config.alpha[k + 1 :])
-            yield _changed(config, f"alpha of {name}", _text(value), alpha=alpha)
+    """One value changed at a time; for the review of final classes its two values together as well."""
+    default = config.point_change
+    for k, name in enumerate(CLASS_NAMES):
+        for value in sorted({*POINT_CHANGES, default[k]}):
+            point_change = (*default[:k], value, *default[k + 1 :])
+            yield _changed(config, f"point_change of {name}", _text(value), point_change=point_change)
     for key, values in SWEEPS.items():
         for other in values:
             yield _changed(config, key, _text(other), **{key: other})
-    for ratio, points in REOPENINGS if config.reopen_ratio is not None else ():
-        changes = {"reopen_ratio": ratio, "reopen_points": points}
-        yield _changed(config, "reopen_ratio, reopen_points", f"{ratio:g}, {points}", **changes)
+    for ratio, points in REVIEWS if config.review_point_ratio is not None else ():
+        changes = {"review_point_ratio": ratio, "review_max_points": points}
+        yield _changed(config, "review_point_ratio, review_max_points", f"{ratio:g}, {points}", **changes)
 
 
 def _changed(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
@@ -146,14 +145,11 @@ def _text(value: float | None) -> str:
 
 
 def paper_config(config: ProfileConfig) -> ProfileConfig:
-    """The paper's fusion: views independent by alpha alone, from the first frame on; no reopening, no box prior."""
-    off: dict[str, Any] = {"bearing_deg": 180.0, "range_ratio": 10.0, "extent_ratio": 10.0, "reopen_ratio": None}
-    off |= {"likely": 0.0, "likely_once": 0.0, "box_weight": 0.0, "slip": 0.0}
-    return dataclasses.replace(
-        config,
-        fusion=dataclasses.replace(config.fusion, **off),
-        tracking=dataclasses.replace(config.tracking, ask_from=1),
-    )
+    """The paper's fusion: views independent by their number of points alone; no review, no box prior."""
+    off: dict[str, Any] = {"bearing_change_deg": 180.0, "range_change": 10.0, "extent_change": 10.0}
+    off |= {"review_point_ratio": None, "min_object_probability": 0.0, "first_view_min_object_probability": 0.0}
+    off |= {"box_update_weight": 0.0, "mismatch_probability": 0.0}
+    return dataclasses.replace(config, fusion=dataclasses.replace(config.fusion, **off))
 
 
 def world(name: str, frames: int, config: ProfileConfig, network: PointNet, *, ideal: bool) -> Recording:
@@ -171,13 +167,13 @@ def real(path: Path, config: ProfileConfig, network: PointNet, *, ideal: bool, c
 
 
 def _prior(config: ProfileConfig, network: PointNet) -> Prior:
-    return prior_of(network.boxes, config.fusion.prior, config.sensor, network.evidence)
+    return make_prior(network.boxes, network.reflectance, config.fusion.prior, config.sensor)
 
 
-def trial(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording], *when: int) -> Trial:
-    """Replay a setting on both sets of drives; `when`: ask_from and scored_from of `replay`."""
-    checked = replay(checks, setting.fusion, *when) if checks else None
-    return Trial(setting, replay(drives, setting.fusion, *when), checked)
+def trial(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording]) -> Trial:
+    """Replay a setting on both sets of drives."""
+    checked = replay(checks, setting.fusion) if checks else None
+    return Trial(setting, replay(drives, setting.fusion), checked)
 
 
 def pareto_front(results: Sequence[Trial]) -> list[Trial]:
@@ -335,9 +331,8 @@ def main() -> None:
             for names in (args.world, args.check)
         )
     drives, checks = ([d.scored_from(args.points) for d in of] for of in (drives, checks))
-    when = config.tracking.ask_from, shipped.tracking.ask_from
-    first = [trial(setting, drives, checks, *when) for setting in variants(config.fusion)]
-    moved = [] if testing else [trial(setting, drives, checks, *when) for setting in sweeps(config.fusion)]
+    first = [trial(setting, drives, checks) for setting in variants(config.fusion)]
+    moved = [] if testing else [trial(setting, drives, checks) for setting in sweeps(config.fusion)]
     about = f"`{network.path.stem}` ({network.sha256[:8]}) on {', '.join(d.name for d in drives)}"
     about += f";\nchecked on {', '.join(d.name for d in checks)}." if checks else "."
     short, whole = report(first, moved, about)

@@ -182,11 +182,11 @@ def main() -> None:
         fused = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
         report["reflectance"] = fused
         layers = load_layers(args.trained / "reflectance.npz")
-        metadata[reflectance_classifier.METADATA] = reflectance_classifier.encode(
+        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
             layers, fused["share"], fused["weight"], fused["sensor"]
         )
         share = fused["share_without"]
-    metadata[box_classifier.METADATA] = box_classifier.encode(load_layers(args.trained / "boxes.npz"), share)
+    metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(load_layers(args.trained / "boxes.npz"), share)
     helper.set_model_props(network, metadata)
     model = network.SerializeToString(deterministic=True)
     args.out.write_bytes(model)

@@ -17,8 +17,8 @@ from tools.study.fusion_replay import CALLS, Outcome, replay
 from tools.study.recording import RecordedFrame, Recording
 
 MIN_HITS = 2
-ALONE = FusionConfig(bearing_deg=180.0, range_ratio=10.0, extent_ratio=10.0, reopen_ratio=None)
-"""Views independent by their number of points alone; no reopening."""
+ALONE = FusionConfig(bearing_change_deg=180.0, range_change=10.0, extent_change=10.0, review_point_ratio=None)
+"""Views independent by their number of points alone; no review."""
 
 
 @pytest.fixture(scope="module")
@@ -59,29 +59,29 @@ def test_efficient_classifies_each_track_once(played: Recording) -> None:
 
 def test_only_independent_views_are_fused_after_the_first(played: Recording) -> None:
     never = dataclasses.replace(
-        ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=1, threshold=1.0, background_threshold=1.0
+        ALONE, point_change=(10.0,) * 4, start_frame=1, object_threshold=1.0, background_threshold=1.0
     )
     few = replay([played], keyed(never), MIN_HITS)
     assert few.calls == dict(zip(CALLS, (6, 0, 0, 0), strict=True))
-    always = dataclasses.replace(never, alpha=(0.0,) * 3, background_alpha=0.0)
+    always = dataclasses.replace(never, point_change=(0.0,) * 4)
     many = replay([played], keyed(always), MIN_HITS)
     assert many.calls == dict(zip(CALLS, (6, 0, 48, 0), strict=True))  # each of the nine frames that may ask
 
 
 def test_a_late_start_replaces_the_first_view(played: Recording) -> None:
     late = dataclasses.replace(
-        ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=5, threshold=1.0, background_threshold=1.0
+        ALONE, point_change=(10.0,) * 4, start_frame=5, object_threshold=1.0, background_threshold=1.0
     )
     assert replay([played], keyed(late), MIN_HITS).calls == dict(zip(CALLS, (6, 6, 0, 0), strict=True))
 
 
-def test_a_class_final_with_few_points_is_reopened(played: Recording) -> None:
+def test_a_class_final_with_few_points_is_reviewed(played: Recording) -> None:
     settled = dataclasses.replace(
-        ALONE, threshold=0.25, background_threshold=0.25, prior=(0.25,) * 3, reopen_ratio=2.0
+        ALONE, object_threshold=0.25, background_threshold=0.25, prior=(0.25,) * 3, review_point_ratio=2.0
     )
     outcome = replay([played], keyed(settled), MIN_HITS)
     assert outcome.calls["first views"] == 6
-    assert outcome.calls["reopenings"] == 6 * 2  # 18 points at first, then 42 and 86: each more than twice the last
+    assert outcome.calls["reviews"] == 6 * 2  # 18 points at first, then 42 and 86: each more than twice the last
     assert calls(outcome) == 18
 
 

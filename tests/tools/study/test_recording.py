@@ -8,7 +8,7 @@ import pytest
 from modt import profile
 from modt.classes import ObjectClass
 from modt.classification.fusion import EveryFrame
-from modt.classification.prior import Frequency
+from modt.classification.prior import FrequencyPrior
 from modt.geometry import FieldOfView
 from modt.types import NONE, Proposals
 from tools.study.fusion_replay import replay
@@ -37,7 +37,7 @@ def test_a_recording_has_one_track_per_body() -> None:
     network = PointNet(config.classification, config.sensor)
     sweeps = list(SyntheticStream("crossing", "hdl-64e", 0.4, 7).sweeps())
     drive = [(frame, labelled_scan(frame, truth, "x", "x", camera=True)) for frame, truth in sweeps]
-    recording = record("x", drive, config, network, Frequency(config.fusion.prior))
+    recording = record("x", drive, config, network, FrequencyPrior(config.fusion.prior))
     assert len(recording.frames) == 4
     bodies: dict[int, set[int]] = {}
     for recorded, (frame, scan) in zip(recording.frames, drive, strict=True):
@@ -51,7 +51,7 @@ def test_a_recording_has_one_track_per_body() -> None:
     assert bodies
     assert all(len(tracks) == 1 for tracks in bodies.values())
     assert replay([recording], lambda prior: EveryFrame(), 1).share == 1.0
-    own = record("x", drive, config, network, Frequency(config.fusion.prior), ideal=False)
+    own = record("x", drive, config, network, FrequencyPrior(config.fusion.prior), ideal=False)
     for recorded, ideal in zip(own.frames, recording.frames, strict=True):
         assert len(np.unique(recorded.track)) == len(recorded.track)
         assert (recorded.scored | ~ideal.scored).all()
