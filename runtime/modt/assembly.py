@@ -7,9 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
-from modt.classification.instrumentation import CostedClassifier
+from modt.classification.instrumentation import TimedClassifier
 from modt.classification.pointnet import PointNet
-from modt.classification.prior import Prior, prior_of
+from modt.classification.prior import Prior, make_prior
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, ProfileConfig
 from modt.energy.instrumentation import CountedClassifier
@@ -56,17 +56,17 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     Raises:
         MisuseError: the model cannot be used.
     """
-    cost = LinearCost(profile.classification.max_points)
     limits = profile.classification
+    cost = LinearCost(limits.max_points, profile.scheduler.cost)
     network = PointNet(limits, profile.sensor)
-    prior = prior_of(network.boxes, profile.fusion.prior, profile.sensor, network.evidence)
-    classifier = CostedClassifier(network, cost, time.thread_time_ns)
+    prior = make_prior(network.boxes, network.reflectance, profile.fusion.prior, profile.sensor)
+    classifier = TimedClassifier(network, cost, time.thread_time_ns)
     return Pipeline(
         segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
         odometry=Odometry(profile.odometry),
         tracker=Tracker(profile.tracking, mode.machine),
         fusion=mode.fusion(profile.fusion, prior),
-        scheduler=Scheduler(cost),
+        scheduler=Scheduler(profile.scheduler.worth, cost),
         classifier=CountedClassifier(classifier, ledger, limits.max_points, limits.batch),
         ledger=ledger,
     )
