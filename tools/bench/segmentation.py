@@ -29,7 +29,7 @@ from scipy.spatial import cKDTree
 
 from modt import profile
 from modt.geometry import FieldOfView
-from modt.segmentation.columns import Columns
+from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Float32
@@ -82,9 +82,9 @@ def tree_components(xyz: Float32) -> object:
 
 def raised(stage: Segmenter, points: Float32) -> Float32:
     """(n, 3) points that the stage makes objects of."""
-    sweep = Columns.of(points)
-    height = stage.ground.height(sweep, stage.sensor_height.of(sweep))
-    return points[stage.raised(sweep, height), :3]
+    sweep = PointColumns.from_array(points)
+    height = stage.ground.height_above(sweep, stage.sensor_height.height_m(sweep))
+    return points[stage.above_ground(sweep, height), :3]
 
 
 def cpu_ms(work: Contender, points: Float32) -> float:

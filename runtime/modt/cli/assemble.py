@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from modt import host
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.instrumentation import CostedClassifier
 from modt.classification.pointnet import PointNet
@@ -129,6 +130,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     Raises:
         MisuseError: the model cannot be used.
     """
+    host.keep_freed_pages()
     cost = LinearCost(profile.classification.max_points)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
