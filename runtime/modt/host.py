@@ -86,8 +86,8 @@ def thread_report() -> ThreadReport:
 def keep_freed_pages() -> None:
     """Make the C library reuse the memory of one sweep for the next.
 
-    glibc returns large blocks to the kernel when they are freed, and fresh pages cost a third of the time of
-    segmentation. After a block of almost 32 MB is freed once (untouched, at no cost), glibc keeps them.
+    glibc returns large blocks to the kernel when they are freed, and every sweep would pay for fresh pages. After a
+    block of almost 32 MB is freed once (untouched, at no cost), glibc keeps them.
     """
     bytes(31 << 20)
 

@@ -57,16 +57,16 @@ def test_targets_equal_those_of_pairs_one_by_one(seed, n):
 
 def test_random_strips_are_merged():
     """The comparison above covers pairs, chains and refusals."""
-    joined = chained = refused = 0
+    merged = chained = refused = 0
     for seed in range(60):
         bounds = strips(np.random.default_rng(seed), 24)
         stage = merger()
         target = stage.targets(bounds)
-        joined += np.count_nonzero(target != np.arange(24))
+        merged += np.count_nonzero(target != np.arange(24))
         chained += np.count_nonzero(np.bincount(target, minlength=24) > 2)
         front, back = stage.pairs(bounds)
         refused += np.count_nonzero(target[front] != target[back])
-    assert joined > 40
+    assert merged > 40
     assert chained > 5
     assert refused > 0
 
@@ -143,8 +143,8 @@ def test_merged_cars_stay_within_the_size_of_an_object():
         bounds = strips(np.random.default_rng(seed), 24)
         for limit_m in (2.0, 6.0):
             target = merger(max_extent_m=limit_m).targets(bounds)
-            joined = [np.flatnonzero(target == first) for first in np.unique(target) if np.sum(target == first) > 1]
-            for own in joined:
+            merged = [np.flatnonzero(target == first) for first in np.unique(target) if np.sum(target == first) > 1]
+            for own in merged:
                 car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))
                 diagonal_m = float(car.diagonal_m[0])
                 assert diagonal_m < limit_m

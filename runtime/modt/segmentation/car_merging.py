@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.clusters import CellClusters, ClusterSizes
+from modt.segmentation.clusters import Clusters, ClusterSizes
 from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.view_bounds import DIRECTION, ELEVATION, HEIGHT, RANGE, ViewBounds
 from modt.types import Bool, Float32, Int
@@ -17,9 +17,9 @@ from modt.types import Bool, Float32, Int
 class NoCarMerger:
     """Merges nothing."""
 
-    def merge(self, clusters: CellClusters, valid: Bool) -> Int:
+    def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
         """(G,) each cluster itself."""
-        return np.arange(len(valid))
+        return np.arange(clusters.n)
 
 
 class CarMerger:
@@ -39,12 +39,12 @@ class CarMerger:
         self.max_diagonal_m = min(c.max_diagonal_m, config.max_extent_m)
         self.min_sqrt_range = np.float32(np.sqrt(c.visible_m / (c.max_beams * beam)))
 
-    def merge(self, clusters: CellClusters, valid: Bool) -> Int:
+    def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
         """(G,) cluster into which each one is merged, itself where it is not merged."""
-        target, candidate = np.arange(len(valid)), valid & self.candidates(clusters.sizes)
+        target, candidate = np.arange(clusters.n), valid & self.candidates(sizes)
         rows = np.flatnonzero(candidate)
         if len(rows):
-            groups = Groups.from_labels(consecutive(candidate)[clusters.cluster], len(rows))
+            groups = Groups.from_labels(consecutive(candidate)[clusters.of_cell], len(rows))
             sample = clusters.sample[groups.rows]
             points, low, high = clusters.points.take(sample), clusters.cells.low, clusters.cells.high
             ground = points.z - clusters.height[sample]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.cells import Cells, connect, occupied_cells
-from modt.segmentation.clusters import CellClusters, Clusters, ClusterSizes, diagonals
+from modt.segmentation.clusters import Clusters, ClusterSizes, diagonals
 from modt.segmentation.grids import SqrtRangeGrid
 from modt.segmentation.groups import consecutive, label_max, label_min
 from modt.segmentation.point_columns import PointColumns
@@ -18,18 +19,15 @@ from modt.types import Bool, Float32, Int
 class Splitter(Protocol):
     """Splits clusters of several objects."""
 
-    def split(self, clusters: CellClusters, valid: Bool) -> tuple[Int, int]:
-        """(C,) cluster of each cell after splitting some of the (G,) valid ones, and the number of clusters.
-
-        New clusters are numbered from G.
-        """
+    def split(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> tuple[Int, int]:
+        """(C,) cluster of each cell after splitting some of the (G,) valid ones; their number, new ones from G."""
         ...
 
 
 class Merger(Protocol):
     """Merges clusters of one object."""
 
-    def merge(self, clusters: CellClusters, valid: Bool) -> Int:
+    def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
         """(G,) cluster into which each of the (G,) valid ones is merged, itself for the others."""
         ...
 
@@ -62,15 +60,15 @@ class Clusterer:
         row, column = self.fine.row_column(points)
         cells, sample, cell = occupied_cells(self.fine, row, column, height, height, points.sqrt_range)
         cluster, sizes = self._connect(cells, points.take(sample), np.bincount(cell))
-        found = CellClusters(points, height, cell, cells, sample, cluster, sizes)
-        valid, n = self._valid(sizes), len(sizes)
-        split, total = self.splitter.split(found, valid)
+        n, valid = len(sizes), self._valid(sizes)
+        clusters = Clusters(points, height, cell, cells, sample, cluster, n)
+        split, total = self.splitter.split(clusters, sizes, valid)
         mergeable = valid | ~sizes.is_part
         mergeable[cluster[split >= n]] = False
-        target = self.merger.merge(found, mergeable)
+        target = self.merger.merge(clusters, sizes, mergeable)
         valid = np.append(self._valid(sizes.merged(target)), np.ones(total - n, np.bool_))
         of_cell = consecutive(valid)[np.append(target, np.arange(n, total))[split]]
-        return Clusters(cell, sample, cells.high, of_cell, int(valid.sum()))
+        return replace(clusters, of_cell=of_cell, n=int(valid.sum()))
 
     def _connect(self, cells: Cells, points: PointColumns, count: Int) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and (C,) its number of points; sizes of the clusters."""

@@ -1,4 +1,4 @@
-"""Clusters of cells, and their sizes."""
+"""Clusters of cells, and sizes of clusters."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class ClusterSizes:
 
 
 @dataclass(frozen=True, slots=True)
-class CellClusters:
-    """Connected clusters, before splitting and merging.
+class Clusters:
+    """Points in cells, and cells in clusters.
 
     Attributes:
         points: (K,) points above ground.
@@ -55,8 +55,8 @@ class CellClusters:
         cell: (K,) cell of each point.
         cells: (C,) occupied cells.
         sample: (C,) last point of each cell.
-        cluster: (C,) cluster of each cell.
-        sizes: (G,) sizes of the clusters.
+        of_cell: (C,) cluster of each cell, NONE where it cannot be an object.
+        n: number of clusters.
     """
 
     points: PointColumns
@@ -64,25 +64,6 @@ class CellClusters:
     cell: Int
     cells: Cells
     sample: Int
-    cluster: Int
-    sizes: ClusterSizes
-
-
-@dataclass(frozen=True, slots=True)
-class Clusters:
-    """Clusters that can be objects.
-
-    Attributes:
-        cell: (K,) cell of each point.
-        sample: (C,) last point of each cell.
-        top: (C,) greatest height above ground of each cell's points [m].
-        of_cell: (C,) cluster of each cell, NONE where it cannot be an object.
-        n: number of clusters.
-    """
-
-    cell: Int
-    sample: Int
-    top: Float32
     of_cell: Int
     n: int
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from modt.config import SegmentationConfig
@@ -15,21 +13,6 @@ BINS = 1024
 """Direction bins around the sensor, a power of two: 0.35 degrees each."""
 UNSEEN_M = 1e4
 """Range of an empty bin, beyond every sensor's."""
-
-
-class Occlusion(Protocol):
-    """Decides which clusters are occluded."""
-
-    def occluded(self, x: Float32, y: Float32, top_m: Float32, groups: Groups) -> Bool:
-        """(G,) mask.
-
-        Args:
-            x: (C,) position of all that stands above ground [m].
-            y: (C,) position across [m].
-            top_m: (C,) height above ground [m].
-            groups: rows of each cluster.
-        """
-        ...
 
 
 class NoOcclusion:
@@ -51,7 +34,7 @@ class EdgeOcclusion:
         self.config = config.occlusion
 
     def occluded(self, x: Float32, y: Float32, top_m: Float32, groups: Groups) -> Bool:
-        """(G,) mask."""
+        """(G,) mask, given (C,) positions x, y and heights above ground [m], and the rows of each cluster."""
         direction = (pseudo_angle(x, y) * np.float32(BINS / 4)).astype(np.int64) & (BINS - 1)
         range_m = np.sqrt(x * x + y * y)
         nearest = np.full(BINS, UNSEEN_M, np.float32)
@@ -71,3 +54,6 @@ class EdgeOcclusion:
         beyond = direction[:, None] + side * np.arange(1, self.config.bins + 1) + first[:, None] - BINS // 2
         nearer: Bool = (nearest[beyond & (BINS - 1)] < range_m[:, None] - self.config.min_gap_m).any(axis=1)
         return nearer
+
+
+Occlusion = EdgeOcclusion | NoOcclusion

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.clusters import CellClusters, ClusterSizes
+from modt.segmentation.clusters import Clusters, ClusterSizes
 from modt.segmentation.groups import consecutive
 from modt.segmentation.point_columns import PointColumns
 from modt.types import Bool, Float32, Float64, Int
@@ -45,9 +45,9 @@ class AzimuthColumns:
 class NoPersonSplitter:
     """Splits nothing."""
 
-    def split(self, clusters: CellClusters, valid: Bool) -> tuple[Int, int]:
+    def split(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> tuple[Int, int]:
         """(C,) clusters as they are, and their number."""
-        return clusters.cluster, len(valid)
+        return clusters.of_cell, clusters.n
 
 
 class PersonSplitter:
@@ -73,23 +73,15 @@ class PersonSplitter:
         candidate &= np.square(sizes.sqrt_range) > c.min_range_extents * extent
         return candidate
 
-    def split(self, clusters: CellClusters, valid: Bool) -> tuple[Int, int]:
+    def split(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> tuple[Int, int]:
         """(C,) cluster of each cell after splitting, and the number of clusters."""
-        candidate = valid & self.candidates(clusters.sizes)
-        return self.separate(clusters.points, clusters.height, clusters.cell, clusters.cluster, candidate)
+        candidate = valid & self.candidates(sizes)
+        return self.separate(clusters.points, clusters.height, clusters.cell, clusters.of_cell, candidate)
 
     def separate(
         self, points: PointColumns, height: Float32, cell: Int, cluster: Int, candidate: Bool
     ) -> tuple[Int, int]:
-        """(C,) cluster of each cell after splitting the (G,) candidates, and the number of clusters.
-
-        Args:
-            points: (K,) points above ground.
-            height: (K,) height above ground [m].
-            cell: (K,) cell of each point.
-            cluster: (C,) cluster of each cell.
-            candidate: (G,) clusters to split, none of them empty.
-        """
+        """The same for (G,) candidates, given (K,) points, their height above ground [m] and their (K,) cell."""
         n = len(candidate)
         rows = np.flatnonzero(candidate[cluster].take(cell))
         if not len(rows):

@@ -45,6 +45,8 @@ class Segmenter:
         occlusion: Occlusion | None = None,
     ) -> None:
         self.config, self.sensor, self.fov = config, sensor, fov
+        self.margin_m = config.view_margin.margin_m
+        self.truncated_m = config.view_margin.truncation_m - self.margin_m
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
         self.max_sqrt_range = np.float32(np.sqrt(sensor.max_range_m))
         self.sensor_height = sensor_height(sensor, config)
@@ -55,8 +57,7 @@ class Segmenter:
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""
-        margin_m = self.config.view_margin.margin_m
-        region = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -margin_m)
+        region = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -self.margin_m)
         sweep = PointColumns.from_array(points if region is None else points[region])
         sensor_height_m = self.sensor_height.height_m(sweep)
         height = self.ground.height_above(sweep, sensor_height_m)
@@ -79,8 +80,9 @@ class Segmenter:
         """Clusters of the points above ground, with their boxes."""
         clusters = self.clusterer.cluster(points, height)
         cells = points.take(clusters.sample)
-        if not self.fov.full:
-            clusters = clusters.select(self._in_view(clusters, cells))
+        depth = None if self.fov.full else self.fov.depth(cells.xyz())
+        if depth is not None:
+            clusters = clusters.select(self._in_view(clusters, depth))
         if not clusters.n:
             return Proposals.empty()
         by_cell = Groups.from_labels(clusters.of_cell, clusters.n)
@@ -88,33 +90,23 @@ class Segmenter:
         yaw = fit_headings(cells.x[few.rows], cells.y[few.rows], few, self.config.boxes.noise_m)
         groups = Groups.from_labels(clusters.of_cell.take(clusters.cell), clusters.n)
         x, y, z = own = np.stack([column.take(groups.rows) for column in (points.x, points.y, points.z)])
-        members, offsets = index.take(groups.rows), groups.offsets
-        statistics = None
+        truncated, statistics, offsets = np.zeros(clusters.n, np.bool_), None, groups.offsets
+        if depth is not None:
+            truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m
         if reflectance is not None:
             statistics = reflectance_statistics(reflectance.take(groups.rows), offsets, self.config.reflectance)
         return Proposals(
-            members=members,
+            members=index.take(groups.rows),
             offsets=offsets,
             coordinates=own,
             centroid=np.stack([groups.mean(v) for v in own], axis=1),
             box=upright_boxes(x, y, z, groups, yaw),
-            truncated=self._truncated(cells, by_cell),
-            occluded=self.occlusion.occluded(cells.x, cells.y, clusters.top, by_cell),
+            truncated=truncated,
+            occluded=self.occlusion.occluded(cells.x, cells.y, clusters.cells.high, by_cell),
             reflectance=statistics,
         )
 
-    def _in_view(self, clusters: Clusters, cells: PointColumns) -> Bool:
-        """(n,) clusters in the field of view, or close to it."""
-        near = self.fov.depth(cells.xyz()) > -self.config.view_margin.object_m
-        seen = near & (clusters.of_cell != NONE)
+    def _in_view(self, clusters: Clusters, depth: Float32) -> Bool:
+        """(n,) clusters in the field of view or close to it, given the (C,) depth of each cell in it [m]."""
+        seen = (depth > -self.config.view_margin.object_m) & (clusters.of_cell != NONE)
         return np.bincount(clusters.of_cell[seen], minlength=clusters.n) > 0
-
-    def _truncated(self, cells: PointColumns, by_cell: Groups) -> Bool:
-        """(n,) clusters cut by the end of the margin."""
-        if self.fov.full:
-            return np.zeros(len(by_cell), np.bool_)
-        margin = self.config.view_margin
-        truncated: Bool = (
-            by_cell.min(self.fov.depth(cells.xyz())[by_cell.rows]) < margin.truncation_m - margin.margin_m
-        )
-        return truncated

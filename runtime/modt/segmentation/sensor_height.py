@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
@@ -12,20 +10,8 @@ from modt.segmentation.groups import label_max, label_min
 from modt.segmentation.point_columns import PointColumns
 
 
-class SensorHeight(Protocol):
-    """Source of the sensor height."""
-
-    def height_m(self, points: PointColumns) -> float:
-        """Height above the ground in a sweep [m]."""
-        ...
-
-
 class FixedHeight:
-    """Height of the mount.
-
-    Args:
-        height_m: above the ground [m].
-    """
+    """Height of the mount [m]."""
 
     def __init__(self, height_m: float) -> None:
         self.fixed_m = height_m
@@ -77,6 +63,6 @@ class HeightEstimator:
         return float(depth[np.abs(depth - mode) < 1.5 * bin_m].mean())
 
 
-def sensor_height(sensor: SensorConfig, config: SegmentationConfig) -> SensorHeight:
+def sensor_height(sensor: SensorConfig, config: SegmentationConfig) -> FixedHeight | HeightEstimator:
     """The height of the profile, or its estimator where the profile has none."""
     return HeightEstimator(sensor, config) if sensor.height_m is None else FixedHeight(sensor.height_m)

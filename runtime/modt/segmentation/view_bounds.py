@@ -31,14 +31,9 @@ class ViewBounds:
 
     @classmethod
     def of_cells(cls, points: PointColumns, ground: Float32, low: Float32, high: Float32, groups: Groups) -> Self:
-        """Bounds of cells, given in the order of their groups.
+        """Bounds of (C,) cells in the order of their groups.
 
-        Args:
-            points: (C,) one point of each cell.
-            ground: (C,) height of the ground below it [m, sensor frame].
-            low: (C,) least height above ground of a cell's points [m].
-            high: (C,) greatest height above ground of a cell's points [m].
-            groups: groups of the cells.
+        Given are a point of each cell, the ground below it [m, sensor frame], and the bounds of its height above it.
         """
         direction, range_m = pseudo_angle(points.x, points.y), np.square(points.sqrt_range)
         scale_m = np.square(np.abs(points.x) + np.abs(points.y)) / range_m
