@@ -58,7 +58,6 @@ class FirstView:
         """Settles the class."""
         tracks.posterior[rows] = sane(likelihood)
         tracks.views[rows] = 1
-        tracks.final[rows] = True
         _remember(tracks, proposals, rows)
         return np.ones(len(rows), np.bool_)
 
@@ -140,7 +139,6 @@ class KeyViews:
         posterior = normal(np.where(fused, before + past + evidence, view))
         certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
-        tracks.final[rows] = certain
         tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
         _remember(tracks, proposals, rows)
         return certain

@@ -6,20 +6,37 @@ from modt.config.classification import ClassificationConfig, FusionConfig, Sched
 from modt.config.energy import EnergyConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.profile import ProfileConfig
+from modt.config.registration import LandmarkConfig, RegistrationConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.sensor import SensorConfig
-from modt.config.tracking import TrackingConfig
+from modt.config.tracking import (
+    FilterConfig,
+    FragmentConfig,
+    KdopAssociationConfig,
+    MergeConfig,
+    PaperAssociationConfig,
+    SplitConfig,
+    TrackingConfig,
+)
 
 __all__ = [
     "BoxTrackingConfig",
     "ClassificationConfig",
     "EnergyConfig",
+    "FilterConfig",
+    "FragmentConfig",
     "FusionConfig",
+    "KdopAssociationConfig",
+    "LandmarkConfig",
+    "MergeConfig",
     "OdometryConfig",
+    "PaperAssociationConfig",
     "ProfileConfig",
+    "RegistrationConfig",
     "SchedulerConfig",
     "SegmentationConfig",
     "SensorConfig",
+    "SplitConfig",
     "StageConfig",
     "TrackingConfig",
     "ValueRangeError",

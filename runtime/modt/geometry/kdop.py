@@ -1,7 +1,7 @@
 """Outlines: how far points reach in eight directions, bird's-eye view.
 
-An outline is eight numbers: the greatest coordinate of its points along each of WAYS. What lies opposite is four
-further on, so the ends along axis k are at outline[k] and at -outline[k + 4]. As all eight say how far something
+An outline is eight numbers: the greatest coordinate of its points along each of DIRECTIONS. What lies opposite is
+four further on, so the ends along axis k are at outline[k] and at -outline[k + 4]. As all eight say how far something
 reaches, the outline of two things together is the greater of theirs in each direction, and both ends of an axis are
 treated alike. Many are an (8, n) array, a contiguous row a direction: arithmetic along an axis of eight is slow.
 """
@@ -12,11 +12,11 @@ import numpy as np
 
 from modt.types import Bool, Float64, Int, Int16, Proposals
 
-DIRECTIONS = np.deg2rad([0.0, 45.0, 90.0, 135.0])
+AXIS_BEARINGS_RAD = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 """Bearings of the axes along which an outline is measured, world frame [rad]."""
-AXES = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)])
+AXES = np.stack([np.cos(AXIS_BEARINGS_RAD), np.sin(AXIS_BEARINGS_RAD)])
 """(2, 4) their unit vectors."""
-WAYS = np.concatenate([AXES, -AXES], axis=1)
+DIRECTIONS = np.concatenate([AXES, -AXES], axis=1)
 """(2, 8) the directions: each axis forth, then each axis back."""
 PAD_M = 0.15
 """Outlines jitter by this much."""
@@ -26,7 +26,7 @@ HANDFUL, FEW_PAIRS = 4_000, 400_000
 """Up to so many pairs, looking at every one of them costs less than cells, and then than sorting."""
 
 
-def outlines(proposals: Proposals, T_world_sensor: Float64) -> Float64:
+def kdops(proposals: Proposals, T_world_sensor: Float64) -> Float64:
     """(8, P) outlines of the proposals in the world [m]."""
     n = len(proposals)
     if not n:
@@ -34,37 +34,37 @@ def outlines(proposals: Proposals, T_world_sensor: Float64) -> Float64:
     along = (AXES.T @ T_world_sensor[:2, :3]).astype(np.float32) @ proposals.coordinates
     starts = proposals.offsets[:-1]
     ahead, behind = np.maximum.reduceat(along, starts, axis=1), np.minimum.reduceat(along, starts, axis=1)
-    reach: Float64 = np.concatenate([ahead, -behind]) + (T_world_sensor[:2, 3] @ WAYS)[:, None]
+    reach: Float64 = np.concatenate([ahead, -behind]) + (T_world_sensor[:2, 3] @ DIRECTIONS)[:, None]
     return reach
 
 
-def lengths(outline: Float64) -> Float64:
+def widths(kdop: Float64) -> Float64:
     """(4, n) from end to end of each outline (8, n) along each axis [m]."""
-    length: Float64 = outline[:4] + outline[4:]
+    length: Float64 = kdop[:4] + kdop[4:]
     return length
 
 
-def girth(outline: Float64) -> Float64:
+def width_sum(kdop: Float64) -> Float64:
     """(n,) sum of the four lengths of each outline (8, n) [m]."""
-    total: Float64 = lengths(outline).sum(axis=0)
+    total: Float64 = widths(kdop).sum(axis=0)
     return total
 
 
-def middles(outline: Float64) -> Float64:
+def centres(kdop: Float64) -> Float64:
     """(4, n) middle of each outline (8, n) along each axis [m]."""
-    middle: Float64 = (outline[:4] - outline[4:]) / 2
+    middle: Float64 = (kdop[:4] - kdop[4:]) / 2
     return middle
 
 
-def covered(outline: Float64, place: Float64) -> Float64:
+def coverage(kdop: Float64, position: Float64) -> Float64:
     """(n,) part of each outline (8, n) within its place (8, n): the lesser for the two squares that hold them."""
-    common = np.maximum(lengths(np.minimum(outline, place + PAD_M)), 0.0)
-    part = common / np.maximum(lengths(outline), PAD_M)
+    common = np.maximum(widths(np.minimum(kdop, position + PAD_M)), 0.0)
+    part = common / np.maximum(widths(kdop), PAD_M)
     least: Float64 = np.minimum(part[0] * part[2], part[1] * part[3])
     return least
 
 
-def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
+def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
     """Pairs of outlines a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
 
     Of many, what is less than CELL_M apart may count as touching, and so may all that lies more than FAR cells away
@@ -74,7 +74,7 @@ def touching(a: Float64, b: Float64) -> tuple[Int, Int]:
     if n * k <= HANDFUL:
         pair = compare_all(a[::2], -b[::2])
     else:
-        origin = (b[:4:2, 0] @ WAYS[:, ::2])[:, None]
+        origin = (b[:4:2, 0] @ DIRECTIONS[:, ::2])[:, None]
         ends, facing = _cells(a[::2] - origin), _cells(-b[::2] + origin)
         pair = (compare_all if n * k < FEW_PAIRS else sweep)(ends, facing)
     i = pair // k

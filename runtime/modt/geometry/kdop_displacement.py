@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.geometry.kdop import AXES, lengths
+from modt.geometry.kdop import AXES, widths
 from modt.types import Float64
 
 AGREE_M = 0.6
@@ -18,6 +18,8 @@ AGREE_M = 0.6
 a longer one that comes into view by as much less as it is longer."""
 DOUBT = 0.3
 """Deviation of a shift by ends that disagree, relative to how far they do, or to what is seen if that is less."""
+SOFT_M = 0.3
+"""Added to lengths that are compared: a difference of a few returns is noise."""
 KEPT = 0.97
 """What is left of a doubt a frame later."""
 PRODUCTS = np.stack([AXES[0] * AXES[0], AXES[1] * AXES[1], AXES[0] * AXES[1]])
@@ -38,7 +40,7 @@ def least(a: Float64, b: Float64) -> Float64:
 
 def shift_between(a: Float64, b: Float64) -> Float64:
     """(K, 2) from outlines a to b [m], every axis as good as the other."""
-    moved, _, _ = _moved(a, b, lengths(b))
+    moved, _, _ = _moved(a, b, widths(b))
     shift: Float64 = (AXES @ moved).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     return shift
 
@@ -57,11 +59,13 @@ def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tupl
         covariance: (K, 2, 2) of it [m2].
         doubt: (4, K) variance along each axis by what its ends disagree, or did, no more than what is seen [m2].
     """
-    seen = lengths(b)
+    seen = widths(b)
     moved, unlike, apart = _moved(a, b, seen)
-    doubt = np.maximum(DOUBT**2 * unlike * np.square(apart), KEPT * before)
-    np.minimum(doubt, np.square(DOUBT * seen.max(axis=0)), out=doubt)
-    weight = 0.5 / (variance + doubt)  # were they alike, the four would say as much as one of them in each direction
+    end_variance = np.maximum(DOUBT**2 * unlike * np.square(apart), KEPT * before)
+    np.minimum(end_variance, np.square(DOUBT * seen.max(axis=0)), out=end_variance)
+    weight = 0.5 / (
+        variance + end_variance
+    )  # were they alike, the four would say as much as one of them in each direction
     (xx, yy, xy), (x, y) = PRODUCTS @ weight, AXES @ (weight * moved)
     scale = 1.0 / (xx * yy - xy * xy)
     xx, yy, xy = scale * yy, scale * xx, -scale * xy  # the inverse
@@ -69,7 +73,7 @@ def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tupl
     shift[:, 0], shift[:, 1] = xx * x + xy * y, xy * x + yy * y
     covariance[:, 0, 0], covariance[:, 1, 1] = xx, yy
     covariance[:, 0, 1] = covariance[:, 1, 0] = xy
-    return shift, covariance, doubt
+    return shift, covariance, end_variance
 
 
 def _moved(a: Float64, b: Float64, seen: Float64) -> tuple[Float64, Float64, Float64]:
@@ -86,3 +90,28 @@ def _moved(a: Float64, b: Float64, seen: Float64) -> tuple[Float64, Float64, Flo
     unlike = 1 - np.square(np.maximum(1 - np.square(apart * (np.maximum(longest, 1.0) / AGREE_M)), 0.0))
     moved = (both - unlike * np.copysign(apart, both)) / 2  # the lesser: half the sum less half what parts them
     return moved, unlike, apart
+
+
+def compare(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64, Float64]:
+    """How outlines b (8, K) lie to outlines a (8, K), one by one.
+
+    Returns:
+        shift: (K, 2) from a to b [m], by both ends along each axis where they agree, else by that which moved less.
+        size: (K,) mean difference of the logarithms of their lengths.
+        overlap: (K,) intersection over union.
+        cover: (K,) intersection over the smaller of the two.
+    """
+    return shift_between(a, b), *shape_similarity(a, b)
+
+
+def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
+    """(K,) compare's size, overlap and cover."""
+    length_a, length_b = widths(a), widths(b)
+    size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).sum(axis=0) / 4
+    pad = SOFT_M / 3
+    common = np.maximum(widths(np.minimum(a, b)) + pad, 0.0)
+    squares = [side[:2] * side[2:] for side in (length_a + pad, length_b + pad)]
+    shared = common[:2] * common[2:]  # in the upright square, and in the one on its corner
+    overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)))
+    cover = np.minimum(*(shared / np.minimum(*squares)))
+    return size, overlap, cover
