@@ -48,6 +48,7 @@ def found(label, inside):
     return bool(shared[best] > 0.5 * union)
 
 
+@pytest.mark.slow
 def test_labelled_objects_are_found(kitti_root):
     settings = profile.load("hdl-64e")
     hits = {kind: [] for kind in ("Car", "Van", "Pedestrian", "Cyclist")}

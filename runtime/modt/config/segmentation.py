@@ -31,7 +31,7 @@ class GroundConfig(StageConfig):
 
     noise_m: float = number(0.1, 0.0, 1.0, "m", "residual of a lowest return on the plane of its ray")
     max_bend_deg: float = number(4.0, 0.0, 45.0, "deg", "change of slope between two ground cells of a ray")
-    slope_gain: float = number(0.2, 0.0, 1.0, "", "weight of the newest slope in the running slope of a ray")
+    slope_gain: float = number(0.2, 0.01, 1.0, "", "weight of the newest slope in the running slope of a ray")
     start_m: float = number(0.3, 0.0, 2.0, "m", "deviation of the ground below the sensor from the sensor height")
     max_gap_m: float = number(
         6.0, 0.1, 100.0, "m", "distance between ground cells beyond which tolerance stops growing"
