@@ -69,9 +69,7 @@ class PersonSplitConfig(StageConfig):
     max_mean_depth_m: float = number(0.35, 0.0, 5.0, "m", "mean return behind the nearest; a car's roof exceeds it")
     min_points: int = number(8, 1, 1000, "", "of each side of a split; at least segmentation.min_points")
     visible_m: float = number(1.5, 0.1, 3.0, "m", "height of a person clear of the ground")
-    min_beams: float = number(
-        4.0, 1.0, 100.0, "beams", "on that height; fewer look like half a car"
-    )
+    min_beams: float = number(4.0, 1.0, 100.0, "beams", "on that height; fewer look like half a car")
     min_fill: float = number(0.3, 0.0, 1.0, "", "returns of a filled column over those expected of a person")
     column_m: float = number(0.06, 0.005, 1.0, "m", "least width of an azimuth column")
     min_gap_columns: int = number(2, 1, 100, "", "empty columns of a gap; a single one may be a lost return")
