@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.cli import assemble
+from modt import assembly
 from modt.cli.replay import frames as frame_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
@@ -83,10 +83,10 @@ class PoseRecorder:
 
 def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     """(n, 4, 4) poses estimated from proposals, without odometry."""
-    profile, mode = load(), assemble.MODES["efficient"]
+    profile, mode = load(), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
     recorder = PoseRecorder(pipeline.odometry)
     pipeline = replace(pipeline, odometry=recorder)
     for frame in PosedStream(stream, NoOdometry()):

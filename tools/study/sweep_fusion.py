@@ -146,7 +146,7 @@ def _text(value: float | None) -> str:
 
 def paper_config(config: ProfileConfig) -> ProfileConfig:
     """The paper's fusion: views independent by their number of points alone; no review, no box prior."""
-    off: dict[str, Any] = {"bearing_change_deg": 180.0, "range_change": 10.0, "extent_change": 10.0}
+    off: dict[str, Any] = {"extent_change": 10.0}
     off |= {"review_point_ratio": None, "min_object_probability": 0.0, "first_view_min_object_probability": 0.0}
     off |= {"box_update_weight": 0.0, "mismatch_probability": 0.0}
     return dataclasses.replace(config, fusion=dataclasses.replace(config.fusion, **off))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.cli import assemble
+from modt import assembly
 from modt.cli.replay import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
@@ -46,10 +46,10 @@ def add_drives(parser: ArgumentParser) -> None:
 
 def replay(stream: SyntheticStream, profile_name: str, *, camera: bool = False) -> Iterator[JudgedFrame]:
     """Run a stream in mode `efficient`, in the camera's view or over the full circle."""
-    profile, mode = load(profile_name), assemble.MODES["efficient"]
+    profile, mode = load(profile_name), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, mode.budget(profile))
         yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance))

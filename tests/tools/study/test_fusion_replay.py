@@ -17,7 +17,7 @@ from tools.study.fusion_replay import CALLS, Outcome, replay
 from tools.study.recording import RecordedFrame, Recording
 
 MIN_HITS = 2
-ALONE = FusionConfig(bearing_change_deg=180.0, range_change=10.0, extent_change=10.0, review_point_ratio=None)
+ALONE = FusionConfig(extent_change=10.0, review_point_ratio=None)
 """Views independent by their number of points alone; no review."""
 
 

@@ -20,7 +20,7 @@ from tools.train.synthetic_scans import labelled_scan
 def test_the_ideal_tracker_takes_the_largest_fragment_of_an_object() -> None:
     box, none, points = np.zeros((4, 7)), np.zeros(4, np.bool_), np.zeros((40, 4), np.float32)
     offsets = np.array([0, 10, 30, 35, 40])
-    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none, none)
+    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none)
     car, rider = np.arange(2, 28), np.arange(36, 40)  # pieces of 8 and of 18 points; 4 of 5 points
     kinds = (ObjectClass.CAR, ObjectClass.CYCLIST)
     unlabelled = np.zeros(40, np.bool_)
