@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.classes import ObjectClass
 from modt.cli import track
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
-from modt.sources.detections import T_LEVEL_CAMERA, Detections, kitti, read
+from modt.sources.detections import T_LEVEL_CAMERA, Detections, boxes_to_kitti, read
 
 
 def run(*arguments):
@@ -28,7 +29,7 @@ def parked(n, T_world_level):
 def write(path, n=20, T_world_level=lambda i: np.eye(4), score=9):
     with path.open("w") as out:
         for i, boxes in enumerate(parked(n, T_world_level)):
-            for d in kitti(boxes):
+            for d in boxes_to_kitti(boxes):
                 print(i, 2, 100, 100, 200, 200, score, *d, 0, sep=",", file=out)
 
 
@@ -99,7 +100,7 @@ def test_what_is_written_of_a_frame_depends_on_no_later_one(scene, data):
     box = np.array([[x, 2.0, -1.0, 4.0, 1.8, 1.5, 0.0] for _, x, _ in rows]).reshape(-1, 7)
     frame = np.array([i for i, _, _ in rows], np.int64)
     score = np.array([s for _, _, s in rows], np.float64)
-    whole = Detections("a", frame, np.ones(len(rows), np.int64), np.zeros((len(rows), 4)), score, box)
+    whole = Detections("a", frame, np.full(len(rows), ObjectClass.CAR), np.zeros((len(rows), 4)), score, box)
     until = data.draw(st.integers(0, len(scene) - 1))
     early = [line for line in track.follow(whole, None, 0.1)[0].splitlines() if int(line.split()[0]) <= until]
     assert track.follow(whole.take(frame <= until), None, 0.1)[0].splitlines() == early

@@ -16,7 +16,7 @@ from modt.sources.synthetic_stream import SyntheticStream
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drive")
     stream = SyntheticStream("street", "vlp-16", 1.5, seed=4)
-    writer = DriveWriter(folder, stream)
+    writer = DriveWriter(folder, stream.camera)
     sweeps = list(stream.sweeps())
     for frame, truth in sweeps:
         writer.write(frame, truth)
@@ -46,7 +46,7 @@ def test_the_reader_gives_back_points_times_poses_and_camera(written, layout):
 @pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
 def test_a_drive_says_whether_its_sweeps_are_distorted(tmp_path, distort, turn_s):
     stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
-    writer = DriveWriter(tmp_path, stream)
+    writer = DriveWriter(tmp_path, stream.camera)
     for frame, truth in stream.sweeps():
         assert frame.turn_s == turn_s
         writer.write(frame, truth)

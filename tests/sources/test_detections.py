@@ -4,8 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from modt.classes import ObjectClass
 from modt.errors import MisuseError
-from modt.sources.detections import files, kitti, level, read
+from modt.sources.detections import boxes_from_kitti, boxes_to_kitti, files, read
 
 AB3DMOT = "0,2,298.3,165.2,458.2,293.4,8.3,1.96,1.81,4.75,-4.57,1.84,13.53,-2.11,-1.79\n"
 LABEL = "0 7 Car 0 0 -1.79 298.3 165.2 458.2 293.4 1.96 1.81 4.75 -4.57 1.84 13.53 -2.11 8.3\n"
@@ -28,7 +29,7 @@ def test_both_formats_say_the_same(tmp_path):
     np.testing.assert_allclose(a.box, b.box)
     np.testing.assert_allclose(a.score, b.score)
     np.testing.assert_allclose(a.image_box, b.image_box)
-    assert a.type_[0] == b.type_[0] == 1
+    assert a.object_class[0] == b.object_class[0] == ObjectClass.CAR
     np.testing.assert_allclose(a.box[0, :6], [13.53, 4.57, 1.96 / 2 - 1.84, 4.75, 1.81, 1.96])
 
 
@@ -60,7 +61,7 @@ def test_what_is_not_there_is_said(tmp_path):
 
 @given(arrays(np.float64, (3, 7), elements=st.floats(-3, 3)))
 def test_coordinates_return(boxes):
-    np.testing.assert_allclose(level(kitti(boxes)), boxes, atol=1e-9)
+    np.testing.assert_allclose(boxes_from_kitti(boxes_to_kitti(boxes)), boxes, atol=1e-9)
 
 
 def scored(path, *scores):
