@@ -1,4 +1,4 @@
-"""Files that results go to: every write reaches the system before it returns, every failure is one clear error."""
+"""Output files: unbuffered writes, and failures as errors with a remedy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modt.errors import ModtError
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn a failure of the file system into an error that says what to do.
+    """Convert a failure of the file system to an error with a remedy.
 
     Raises:
         ModtError: the file cannot be written.
@@ -21,12 +21,12 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         cause = f"cannot be written ({error.strerror or error})"
-        remedy = "free or unlock the disk, or give another --out; what was recorded before is whole"
+        remedy = "free or unlock the disk, or give another --out; what was recorded before is intact"
         raise ModtError(path, cause, remedy) from None
 
 
 class LineFile:
-    """A text file that grows by whole lines, each handed to the system at once."""
+    """An unbuffered text file of whole lines."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -34,7 +34,7 @@ class LineFile:
             self._file: BinaryIO = path.open("wb", buffering=0)
 
     def write(self, text: str) -> None:
-        """Append lines; a partial line left by a full disk is taken back.
+        """Append lines; a partial line on a full disk is removed.
 
         Raises:
             ModtError: the file cannot be written.
@@ -52,6 +52,6 @@ class LineFile:
                 raise
 
     def close(self) -> None:
-        """No more will come."""
+        """Close the file."""
         with writing(self.path):
             self._file.close()

@@ -1,4 +1,4 @@
-"""What every sink offers."""
+"""Interface of the sinks."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ class Sink(Protocol):
     """Takes results, frame by frame."""
 
     def write(self, result: FrameResult) -> None:
-        """Keep one result; it is on its way to the disk when this returns."""
+        """Write one result; it has reached the operating system on return."""
         ...
 
     def close(self) -> None:
-        """No more will come."""
+        """Close the files."""
         ...
 
 
@@ -23,9 +23,9 @@ class LineSink(Protocol):
     """Takes records, line by line."""
 
     def write(self, record: dict[str, Any]) -> None:
-        """Keep one record."""
+        """Write one record."""
         ...
 
     def close(self) -> None:
-        """No more will come."""
+        """Close the file."""
         ...
