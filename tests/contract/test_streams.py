@@ -9,7 +9,7 @@ import pytest
 
 from modt.config import OdometryConfig
 from modt.sources.pose_socket import PoseSocket
-from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry, PosedStream
+from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
 from tests.sources import layouts
@@ -18,7 +18,7 @@ from tests.sources import layouts
 def listed(root):
     stream = open_stream(layouts.bare(root))
     (root / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 2\n" * 3)
-    return PosedStream(stream, ListedPoses(root / "poses.txt", stream.info.camera, stream.info.end))
+    return PosedStream(stream, PoseFile(root / "poses.txt", stream.info.camera, stream.info.end))
 
 
 def sent(root):
@@ -36,8 +36,8 @@ SOURCES = {
     "odometry": lambda root: open_stream(layouts.odometry(root)),
     "bare": lambda root: open_stream(layouts.bare(root)),
     "street": lambda root: SyntheticStream("street", "hdl-64e", 0.4, seed=3),
-    "own": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), OwnOdometry()),
-    "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoOdometry()),
+    "recorded": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), RecordedPoses()),
+    "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoPoses()),
     "listed": listed,
     "sent": sent,
     "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),

@@ -279,7 +279,7 @@ def test_between_in_space_ends_at_both_and_stays_rigid(begin, end):
     ],
 )
 def test_an_address_that_is_none_is_one_error(url):
-    with pytest.raises(MisuseError, match=r"write own, none, udp://HOST:PORT or unix:///PATH|cannot be bound"):
+    with pytest.raises(MisuseError, match=r"write recording, none, udp://HOST:PORT or unix:///PATH|cannot be bound"):
         open_socket(url)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError, ModtError
-from modt.sources.pose_source import NoOdometry, PosedStream
+from modt.sources.pose_source import NoPoses, PosedStream
 from modt.sources.recognise import open_stream
 from modt.sources.stream import FIRST
 
@@ -66,7 +66,7 @@ def test_stamps_count_from_the_first(tmp_path):
 def test_frames_say_how_long_the_head_took_to_turn(tmp_path, build, turn_s):
     stream = open_stream(build(tmp_path))
     np.testing.assert_allclose([f.turn_s for f in stream], turn_s, atol=1e-9)
-    assert [f.turn_s for f in PosedStream(stream, NoOdometry())] == [f.turn_s for f in stream]
+    assert [f.turn_s for f in PosedStream(stream, NoPoses())] == [f.turn_s for f in stream]
 
 
 def test_each_sweep_has_its_own_turn(tmp_path):

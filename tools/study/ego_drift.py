@@ -25,7 +25,7 @@ from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
 from modt.profile import load
 from modt.sources import kitti_calibration, oxts
-from modt.sources.pose_source import NoOdometry, PosedStream
+from modt.sources.pose_source import NoPoses, PosedStream
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 from modt.types import Float64
@@ -65,7 +65,7 @@ def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
     pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
     poses = []
-    for frame in PosedStream(stream, NoOdometry()):
+    for frame in PosedStream(stream, NoPoses()):
         pipeline.step(frame, mode.budget(profile))
         poses.append(pipeline.tracker.T_world_sensor)
     return np.array(poses)

@@ -21,7 +21,7 @@ from modt.pipeline import Fusion, Pipeline
 from modt.profile import DEFAULT
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.pose_socket import PoseSocket, open_socket
-from modt.sources.pose_source import ListedPoses, NoOdometry, Odometry, OwnOdometry
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 from modt.sources.synthetic_stream import SyntheticStream
@@ -30,7 +30,7 @@ from modt.tracking.tracker import Tracker
 from modt.types import UNLIMITED, Budget
 
 EMBEDDED_SECONDS = 10.0
-OWN, NONE = "own", "none"
+RECORDED, NONE = "recording", "none"
 """Odometries that need no address."""
 
 
@@ -45,7 +45,7 @@ class Request:
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
     labels: bool = False
-    odometry: str = OWN
+    odometry: str = RECORDED
     poses: Path | None = None
 
 
@@ -94,18 +94,18 @@ def stream(request: Request) -> Stream:
     return cut
 
 
-def odometry(request: Request, stream: Stream, config: OdometryConfig) -> Odometry:
+def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSource:
     """Where the poses of a stream's frames come from.
 
     Raises:
         MisuseError: a file of poses that cannot be used, an address that cannot be bound or is none.
     """
     if request.poses is not None:
-        return ListedPoses(request.poses, stream.info.camera, stream.info.end)
-    if request.odometry == OWN:
-        return OwnOdometry()
+        return PoseFile(request.poses, stream.info.camera, stream.info.end)
+    if request.odometry == RECORDED:
+        return RecordedPoses()
     if request.odometry == NONE:
-        return NoOdometry()
+        return NoPoses()
     return PoseSocket(open_socket(request.odometry), config, request.odometry)
 
 

@@ -25,7 +25,7 @@ from modt.types import Float64, Frame
 
 log = logging.getLogger(__name__)
 
-FORM = "write own, none, udp://HOST:PORT or unix:///PATH"
+FORM = "write recording, none, udp://HOST:PORT or unix:///PATH"
 
 
 class PoseSocket:

@@ -14,7 +14,7 @@ from modt.sources.stream import Faults, Stream, StreamInfo
 from modt.types import Frame
 
 
-class Odometry(Protocol):
+class PoseSource(Protocol):
     """Places frames."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
@@ -34,7 +34,7 @@ class Odometry(Protocol):
         ...
 
 
-class OwnOdometry:
+class RecordedPoses:
     """The stream's own."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
@@ -47,13 +47,13 @@ class OwnOdometry:
 
     def report(self) -> dict[str, Any]:
         """Which one it was."""
-        return {"source": "own"}
+        return {"source": "recording"}
 
     def close(self) -> None:
         """Nothing to be done."""
 
 
-class NoOdometry:
+class NoPoses:
     """Nobody knows: the proposals must tell."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
@@ -72,7 +72,7 @@ class NoOdometry:
         """Nothing to be done."""
 
 
-class ListedPoses:
+class PoseFile:
     """Poses of a file in KITTI's odometry format: line k, from 0, is that of frame number k.
 
     Args:
@@ -125,7 +125,7 @@ class PosedStream:
         odometry: their poses.
     """
 
-    def __init__(self, stream: Stream, odometry: Odometry) -> None:
+    def __init__(self, stream: Stream, odometry: PoseSource) -> None:
         self._stream, self.odometry = stream, odometry
         self.info: StreamInfo = odometry.of_stream(stream.info)
         self.faults: Faults = stream.faults
