@@ -28,7 +28,7 @@ def write(path, poses):
 
 
 @given(st.lists(pose, min_size=1, max_size=5))
-def test_poses_read_back_as_they_were_written(tmp_path_factory, poses):
+def test_poses_are_read_back(tmp_path_factory, poses):
     path = write(tmp_path_factory.mktemp("poses") / "p.txt", poses)
     np.testing.assert_allclose(read_poses(path), poses, atol=1e-9)
 
@@ -51,7 +51,7 @@ GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
         ("\u00e9", "no text"),
     ],
 )
-def test_a_bad_file_is_named_with_its_line(tmp_path, text, named):
+def test_an_invalid_file_is_refused_with_its_line(tmp_path, text, named):
     path = tmp_path / "p.txt"
     if text is not None:
         path.write_text(text, encoding="utf-8")
@@ -59,7 +59,7 @@ def test_a_bad_file_is_named_with_its_line(tmp_path, text, named):
         read_poses(path)
 
 
-def test_poses_of_a_camera_are_brought_to_the_sensor_and_others_taken_as_they_are(tmp_path):
+def test_camera_poses_are_converted_and_sensor_poses_unchanged(tmp_path):
     frame = next(iter(open_stream(layouts.bare(tmp_path))))
     T_sensor = se3(rotation_zyx(0.01, -0.02, 0.7), np.array([3.0, -2.0, 0.1]))
     path = write(tmp_path / "p.txt", [T_CAMERA_SENSOR @ T_sensor @ inverse(T_CAMERA_SENSOR)])
@@ -68,7 +68,7 @@ def test_poses_of_a_camera_are_brought_to_the_sensor_and_others_taken_as_they_ar
     np.testing.assert_allclose(PoseFile(path, None, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
 
 
-def test_a_line_belongs_to_the_frame_of_its_number(tmp_path):
+def test_a_line_belongs_to_the_frame_of_its_index(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     path = write(tmp_path / "p.txt", [se3(np.eye(3), np.array([0.0, 0.0, float(k)])) for k in range(5)])
     posed = PosedStream(stream, PoseFile(path, stream.info.camera, stream.info.end))
@@ -77,7 +77,7 @@ def test_a_line_belongs_to_the_frame_of_its_number(tmp_path):
     assert [f.T_world_sensor[0, 3] for f in posed.between(1, 5)] == [1, 4]
 
 
-def test_too_few_lines_are_named_before_the_start(tmp_path):
+def test_too_few_lines_are_refused_before_the_start(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     path = write(tmp_path / "p.txt", [np.eye(4)] * 3)
     with pytest.raises(MisuseError, match="3 poses, too few for frame 4"):
@@ -99,7 +99,7 @@ def test_the_streams_own_may_be_kept_or_switched_off(tmp_path):
         assert a.points.tobytes() == b.points.tobytes()
 
 
-def test_faults_of_the_stream_are_those_of_the_posed_one(tmp_path):
+def test_a_posed_stream_shares_the_faults(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     (drive / "velodyne_points" / "data" / f"{1:010d}.bin").write_bytes(b"short")
     posed = PosedStream(open_stream(drive), NoPoses()).between(0, 3)
@@ -107,7 +107,7 @@ def test_faults_of_the_stream_are_those_of_the_posed_one(tmp_path):
     assert [f.frame for f in posed.faults.first] == [1]
 
 
-def test_the_poses_beside_a_sequence_given_again_are_the_same(tmp_path):
+def test_the_poses_of_a_sequence_given_as_a_file_are_the_same(tmp_path):
     sequence = layouts.odometry(tmp_path)
     before = [f.T_world_sensor for f in open_stream(sequence)]
     path = shutil.copy(sequence / "poses.txt", tmp_path / "again.txt")

@@ -11,7 +11,7 @@ from modt.config.base import StageConfig, number
 class OdometryConfig(StageConfig):
     """Poses received by a socket."""
 
-    max_age_s: float = number(0.3, 0.001, 10.0, "s", "greatest distance in time of a frame from the poses used for it")
+    max_age_s: float = number(0.3, 0.001, 10.0, "s", "greatest distance in time of a frame from its poses")
     max_ahead_s: float = number(
         60.0, 0.1, 3600.0, "s", "greatest lead of a pose over its frame; a greater one means another clock"
     )

@@ -31,55 +31,34 @@ def car(rng: np.random.Generator, size: Size) -> Solids:
     boot = rng.choice([0.03, 0.1, 0.2], p=[0.6, 0.15, 0.25]) * length
     body_height = belt - clear
     middle = clear + body_height / 2
-    hull = wedge(
-        (0.0, 0.0, middle),
-        (length, 0.97 * width, body_height),
-        paint,
-        [
-            (belt - nose, 0.0, bonnet, (belt - nose) * (length / 2 - bonnet) + bonnet * body_height / 2),
-            (1.0, 0.0, -0.35, length / 2 + 0.35 * body_height * 0.2),
-            (-1.0, 0.0, -0.35, length / 2 + 0.35 * body_height * 0.2),
-        ],
-    )
+    bumper = length / 2 + 0.35 * body_height * 0.2
+    hood = (belt - nose, 0.0, bonnet, (belt - nose) * (length / 2 - bonnet) + bonnet * body_height / 2)
+    cuts = [hood, (1.0, 0.0, -0.35, bumper), (-1.0, 0.0, -0.35, bumper)]
+    hull = wedge((0.0, 0.0, middle), (length, 0.97 * width, body_height), paint, cuts)
     hull = rounded(hull, (0.515 * length, width * rng.uniform(0.95, 1.6), body_height * rng.uniform(1.4, 2.4)))
     front, rear = length / 2 - bonnet + 0.1, -length / 2 + boot
     cabin_height = height - belt + 0.02
     half = cabin_height / 2
     rake, tail, tuck = rng.uniform(0.65, 1.05), rng.uniform(0.15, 0.6), rng.uniform(0.28, 0.45)
     long = front - rear
-    glass = wedge(
-        ((front + rear) / 2, 0.0, belt + half - 0.02),
-        (long, 0.94 * width, cabin_height),
-        Material.GLASS,
-        [
-            (cabin_height, 0.0, rake, cabin_height * long / 2 - rake * half),
-            (-cabin_height, 0.0, tail, cabin_height * long / 2 - tail * half),
-            (0.0, 1.0, tuck, 0.47 * width - tuck * half),
-            (0.0, -1.0, tuck, 0.47 * width - tuck * half),
-        ],
-    )
+    cuts = [
+        (cabin_height, 0.0, rake, cabin_height * long / 2 - rake * half),
+        (-cabin_height, 0.0, tail, cabin_height * long / 2 - tail * half),
+        *((0.0, side, tuck, 0.47 * width - tuck * half) for side in (1.0, -1.0)),
+    ]
+    centre = ((front + rear) / 2, 0.0, belt + half - 0.02)
+    glass = wedge(centre, (long, 0.94 * width, cabin_height), Material.GLASS, cuts)
     glass = rounded(glass, (long * 0.52, width * rng.uniform(0.95, 1.6), np.inf))
     glass.density[:] = rng.uniform(0.6, 2.0)
     lid_length = max(long - rake - tail, 0.5)
-    lid = box(
-        ((front - rake + rear + tail) / 2, 0.0, height - 0.05),
-        (lid_length + 0.15, 0.94 * width - 2 * tuck * cabin_height + 0.04, 0.1),
-        paint,
-    )
+    size = (lid_length + 0.15, 0.94 * width - 2 * tuck * cabin_height + 0.04, 0.1)
+    lid = box(((front - rake + rear + tail) / 2, 0.0, height - 0.05), size, paint)
     lid = rounded(lid, (lid_length * 0.62 + 0.1, 0.62 * width, 0.11))
-    return Solids.join(
-        [
-            hull,
-            glass,
-            lid,
-            _seats(front - rake, rear + tail, belt, width),
-            _pillars(rng, (front, rear, rake, tail), (belt, height), width, tuck, paint),
-            _wheels(rng, length, width, rng.uniform(0.3, 0.34)),
-            _mirrors(front, belt, width, paint),
-            _plates(hull, 0.43, belt - 0.16),
-            _tail_lamps(hull, belt - 0.12),
-        ]
-    )
+    seats = _seats(front - rake, rear + tail, belt, width)
+    pillars = _pillars(rng, (front, rear, rake, tail), (belt, height), width, tuck, paint)
+    wheels = _wheels(rng, length, width, rng.uniform(0.3, 0.34))
+    reflectors = [_plates(hull, 0.43, belt - 0.16), _tail_lamps(hull, belt - 0.12)]
+    return Solids.join([hull, glass, lid, seats, pillars, wheels, _mirrors(front, belt, width, paint), *reflectors])
 
 
 def van(rng: np.random.Generator, size: Size) -> Solids:
@@ -90,44 +69,25 @@ def van(rng: np.random.Generator, size: Size) -> Solids:
     low, upper = belt - clear, height - belt
     bonnet, rake = rng.uniform(0.04, 0.19) * length, rng.uniform(0.4, 0.9)
     drop, roof = rng.uniform(0.1, 0.3), rng.uniform(0.12, 0.2)
-    hull = wedge(
-        (0.0, 0.0, clear + low / 2),
-        (length, 0.97 * width, low),
-        paint,
-        [(drop, 0.0, bonnet, drop * (length / 2 - bonnet) + bonnet * low / 2)],
-    )
+    hood = (drop, 0.0, bonnet, drop * (length / 2 - bonnet) + bonnet * low / 2)
+    hull = wedge((0.0, 0.0, clear + low / 2), (length, 0.97 * width, low), paint, [hood])
     hull = rounded(hull, (0.515 * length, width * rng.uniform(1.2, 2.2), np.inf))
     front, rear = length / 2 - bonnet, -length / 2 + rng.uniform(0.02, 0.2)
     cab = rake + rng.uniform(0.9, 1.3)
-    glass = wedge(
-        (front - cab / 2, 0.0, belt + upper / 2),
-        (cab, 0.95 * width, upper),
-        Material.GLASS,
-        [(upper, 0.0, rake, upper * (cab / 2 - rake / 2)), *_leaning(width)],
-    )
-    load = wedge(
-        ((front - cab + rear) / 2, 0.0, belt + upper / 2),
-        (front - cab - rear, 0.97 * width, upper),
-        Material.GLASS if rng.random() < 0.4 else paint,
-        _leaning(width),
-    )
+    leaning = [(0.0, side, LEAN, 0.485 * width) for side in (1.0, -1.0)]
+    cuts = [(upper, 0.0, rake, upper * (cab / 2 - rake / 2)), *leaning]
+    glass = wedge((front - cab / 2, 0.0, belt + upper / 2), (cab, 0.95 * width, upper), Material.GLASS, cuts)
+    centre, size = ((front - cab + rear) / 2, 0.0, belt + upper / 2), (front - cab - rear, 0.97 * width, upper)
+    load = wedge(centre, size, Material.GLASS if rng.random() < 0.4 else paint, leaning)
     for window in (glass, load):
         if window.material[0] == Material.GLASS:
             window.density[:] = rng.uniform(0.6, 2.0)
     lid = box(((front - rake + rear) / 2, 0.0, height - roof / 2), (front - rake - rear, 0.9 * width, roof), paint)
+    seats = _seats(front - 0.7 * rake, rear + 0.3, belt, width)
+    pillars = _pillars(rng, (front, rear, rake, 0.05), (belt, height), width, LEAN, paint)
+    trim = [_wheels(rng, length, width, 0.34), _mirrors(front - 0.3, belt, width, paint)]
     return Solids.join(
-        [
-            hull,
-            glass,
-            load,
-            lid,
-            _seats(front - 0.7 * rake, rear + 0.3, belt, width),
-            _pillars(rng, (front, rear, rake, 0.05), (belt, height), width, LEAN, paint),
-            _wheels(rng, length, width, 0.34),
-            _mirrors(front - 0.3, belt, width, paint),
-            _plates(hull, 0.45, 0.8),
-            _tail_lamps(hull, belt - 0.15),
-        ]
+        [hull, glass, load, lid, seats, pillars, *trim, _plates(hull, 0.45, 0.8), _tail_lamps(hull, belt - 0.15)]
     )
 
 
@@ -137,13 +97,9 @@ def truck(rng: np.random.Generator, size: Size) -> Solids:
     cab = rng.uniform(1.7, 2.2)
     cab_height = min(height, rng.uniform(2.5, 3.0))
     load = length - cab - 0.4
+    centre, size = (length / 2 - cab / 2, 0.0, 0.5 + (cab_height - 0.5) / 2), (cab, 0.96 * width, cab_height - 0.5)
     parts = [
-        wedge(
-            (length / 2 - cab / 2, 0.0, 0.5 + (cab_height - 0.5) / 2),
-            (cab, 0.96 * width, cab_height - 0.5),
-            Material.CAR_PAINT,
-            [(1.0, 0.0, 0.15, cab / 2)],
-        ),
+        wedge(centre, size, Material.CAR_PAINT, [(1.0, 0.0, 0.15, cab / 2)]),
         box((-length / 2 + load / 2, 0.0, 1.0 + (height - 1.0) / 2), (load, width, height - 1.0), Material.CAR_PAINT),
         box((-0.2, 0.0, 0.8), (0.9 * length, 0.8, 0.3), Material.METAL),
     ]
@@ -220,11 +176,6 @@ def truck_size(rng: np.random.Generator) -> Size:
     return float(rng.uniform(6.5, 12.0)), float(rng.uniform(2.3, 2.7)), float(rng.uniform(2.8, 3.8))
 
 
-def _leaning(width: float) -> list[tuple[float, float, float, float]]:
-    """Cuts that slope the sides of a van's upper half inwards."""
-    return [(0.0, side, LEAN, 0.485 * width) for side in (1.0, -1.0)]
-
-
 def _wheels(rng: np.random.Generator, length: float, width: float, radius: float) -> Solids:
     x = length * rng.uniform(0.29, 0.32)
     places: Float64 = np.array([[i * x, j * (width / 2 - 0.1)] for i in (-1, 1) for j in (-1, 1)])
@@ -243,12 +194,7 @@ def _seats(front: float, rear: float, belt: float, width: float) -> Solids:
 
 
 def _pillars(
-    rng: np.random.Generator,
-    ends: tuple[float, float, float, float],
-    rise: tuple[float, float],
-    width: float,
-    tuck: float,
-    paint: int,
+    rng: np.random.Generator, ends: tuple[float, ...], rise: tuple[float, ...], width: float, tuck: float, paint: int
 ) -> Solids:
     """Painted pillars beside the windscreen, between the doors and at the rear."""
     front, rear, rake, tail = ends

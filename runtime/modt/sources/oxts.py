@@ -56,7 +56,7 @@ def read_sequence(path: Path) -> Float64:
     try:
         return _checked(np.loadtxt(path, dtype=np.float64, ndmin=2), path)
     except (OSError, ValueError):
-        raise MisuseError(path, "holds no OXTS records", "restore it, or remove it to run without ego-motion") from None
+        raise MisuseError(path, "holds no OXTS records", "restore or remove it, to run without ego-motion") from None
 
 
 def _checked(records: Float64, path: Path) -> Float64:

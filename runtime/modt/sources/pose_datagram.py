@@ -1,7 +1,7 @@
 """A pose as a JSON datagram.
 
-Either {"stamp": s, "x": m, "y": m, "yaw": rad}, or {"stamp": s, "pose": [...]} with the 16 elements of T_world_sensor in
-row-major order, or the first 12 of them. Other keys are ignored.
+Either {"stamp": s, "x": m, "y": m, "yaw": rad}, or {"stamp": s, "pose": [...]} with the 16 elements of T_world_sensor
+in row-major order, or the first 12 of them. Other keys are ignored.
 """
 
 from __future__ import annotations

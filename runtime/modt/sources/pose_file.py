@@ -1,4 +1,4 @@
-"""Poses in KITTI's odometry format: a line per frame, the twelve elements of a (3, 4) transform in row-major order."""
+"""Poses in KITTI's odometry format: per frame a line of the twelve elements of a (3, 4) transform, row-major."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Poses received from another process, one per datagram.
 
-Stamps of poses and frames are on the clock of the stream, `stamp_s` of `tracks.jsonl`. No other clock is read: a replay
-is reproducible if it receives the same poses before the same frames.
+Stamps of poses and frames are on the clock of the stream, `stamp_s` of `tracks.jsonl`. No other clock is read: a
+replay is reproducible if it receives the same poses before the same frames.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from urllib.parse import urlsplit
 
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.pose_buffer import PoseBuffer
+from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.stream import StreamInfo
 from modt.types import Float64, Frame
 
@@ -31,8 +31,8 @@ FORM = "write recording, none, udp://HOST:PORT or unix:///PATH"
 class PoseSocket:
     """Reads the socket once a frame without blocking; refused poses are counted, and logged once of each kind.
 
-    A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses are
-    removed and the restart is passed on in `Frame.restarts`.
+    A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
+    are removed and the restart is passed on in `Frame.restarts`.
 
     Args:
         bound: bound socket; it is made non-blocking.
