@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         text, n = follow(sequence, poses, arguments.period, arguments.sure)
         spent_s += time.process_time() - began
         frames, ids = frames + sequence.n_frames, ids + n
-        lines = LineFile(arguments.out / f"{sequence.name}.txt")
+        lines = LineFile[str](arguments.out / f"{sequence.name}.txt")
         lines.write(text)
         lines.close()
     if not ids and any(map(len, sequences)):

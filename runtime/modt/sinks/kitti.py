@@ -34,7 +34,7 @@ class KittiResults:
     def __init__(self, path: Path, camera: Camera | None) -> None:
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-        self._lines = LineFile(path)
+        self._lines = LineFile[str](path)
         self._camera = camera or NO_CAMERA
 
     def write(self, result: FrameResult) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Generic, TypeVar
 
 from modt.errors import ModtError
+
+T = TypeVar("T")
 
 
 @contextmanager
@@ -25,21 +27,27 @@ def writing(path: Path) -> Iterator[None]:
         raise ModtError(path, cause, remedy) from None
 
 
-class LineFile:
-    """An unbuffered text file of whole lines."""
+class LineFile(Generic[T]):
+    """An unbuffered text file of whole lines.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    Args:
+        path: of the file.
+        encode: lines of an item.
+    """
+
+    def __init__(self, path: Path, encode: Callable[[T], str] = str) -> None:
+        self.path, self._encode = path, encode
         with writing(path):
             self._file: BinaryIO = path.open("wb", buffering=0)
 
-    def write(self, text: str) -> None:
-        """Append lines; a partial line on a full disk is removed.
+    def write(self, item: T, /) -> None:
+        """Append the lines of an item; a partial line on a full disk is removed.
 
         Raises:
             ModtError: the file cannot be written.
+            ValueError: the item cannot be encoded.
         """
-        data = text.encode()
+        data = self._encode(item).encode()
         with writing(self.path):
             whole = self._file.tell()
             try:

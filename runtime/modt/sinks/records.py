@@ -23,23 +23,11 @@ def line(record: dict[str, Any]) -> str:
     return json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-class JsonLines:
+class JsonLines(LineFile[dict[str, Any]]):
     """A growing file of records."""
 
     def __init__(self, path: Path) -> None:
-        self._lines = LineFile(path)
-
-    def write(self, record: dict[str, Any]) -> None:
-        """Append one record.
-
-        Raises:
-            ModtError: the file cannot be written.
-        """
-        self._lines.write(line(record))
-
-    def close(self) -> None:
-        """Close the file."""
-        self._lines.close()
+        super().__init__(path, line)
 
 
 def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iterator[dict[str, Any]]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from modt.types import FrameResult
 
+T_contra = TypeVar("T_contra", contravariant=True)
 
-class Sink(Protocol):
-    """Takes results, frame by frame."""
 
-    def write(self, result: FrameResult) -> None:
-        """Write one result; it has reached the operating system on return."""
+class Writer(Protocol[T_contra]):
+    """Takes items one by one."""
+
+    def write(self, item: T_contra, /) -> None:
+        """Write one item; it has reached the operating system on return."""
         ...
 
     def close(self) -> None:
@@ -19,13 +21,5 @@ class Sink(Protocol):
         ...
 
 
-class LineSink(Protocol):
-    """Takes records, line by line."""
-
-    def write(self, record: dict[str, Any]) -> None:
-        """Write one record."""
-        ...
-
-    def close(self) -> None:
-        """Close the file."""
-        ...
+Sink = Writer[FrameResult]
+LineSink = Writer[dict[str, Any]]

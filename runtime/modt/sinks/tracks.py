@@ -138,20 +138,8 @@ def _lists(values: Text) -> Text:
     return join_columns(len(values), *(p for k, prefix in enumerate(prefixes) for p in (prefix, values[:, k])), "]")
 
 
-class TrackLines:
+class TrackLines(LineFile[FrameResult]):
     """Writes tracks.jsonl."""
 
     def __init__(self, path: Path) -> None:
-        self._lines = LineFile(path)
-
-    def write(self, result: FrameResult) -> None:
-        """Append one frame.
-
-        Raises:
-            ModtError: the file cannot be written.
-        """
-        self._lines.write(frame_line(result))
-
-    def close(self) -> None:
-        """Close the file."""
-        self._lines.close()
+        super().__init__(path, frame_line)
