@@ -61,7 +61,7 @@ def test_windows_contain_every_ray_that_hits(seed):
     assert np.isfinite(found).sum() == np.isfinite(whole).sum()
 
 
-def test_a_ball_is_met_on_its_surface():
+def test_an_ellipsoid_is_hit_on_its_surface():
     ball = ellipsoid((10.0, 3.0, 0.5), (2.0, 2.0, 2.0), Material.WALL)
     caster = RayCaster(sensor("vlp-16"))
     image = caster.cast(ball, NO_GROUND, np.ones_like(NO_GROUND))

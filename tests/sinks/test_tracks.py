@@ -67,8 +67,8 @@ COUNTS = st.one_of(st.integers(0, 300), st.sampled_from([9999, 10_000, 10**8 - 1
 @st.composite
 def results(draw):
     """Frames of few or no tracks and proposals, with any numbers."""
-    seen, lost = draw(st.integers(0, 4)), draw(st.integers(0, 3))
-    r = result(draw(COUNTS), [3] * seen, {p: 7 + p for p in range(seen)}, lost=tuple(range(90, 90 + lost)))
+    tracked, lost = draw(st.integers(0, 4)), draw(st.integers(0, 3))
+    r = result(draw(COUNTS), [3] * tracked, {p: 7 + p for p in range(tracked)}, lost=tuple(range(90, 90 + lost)))
     t = r.tracks
     for column in (t.points, t.age, t.missed):
         column[:] = draw(arrays(np.int64, column.shape, elements=COUNTS))

@@ -1,4 +1,4 @@
-"""Dead reckoning against the development kit's formulas, written out."""
+"""Poses from OXTS records against the formulas of the development kit."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Poses that come in by a socket: any bytes are survived, and every datagram is counted once."""
+"""Poses received by a socket: any bytes are handled, and every datagram is counted once."""
 
 import json
 import logging
@@ -40,7 +40,7 @@ def matrix(T):
 
 @pytest.fixture(name="pair")
 def a_pair():
-    """A sender, and the odometry that it sends to."""
+    """A sender and the pose source that receives from it."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     odometry = PoseSocket(here, CONFIG, "test")
     yield there, odometry
@@ -244,7 +244,7 @@ def test_a_frame_reads_a_flood_up_to_the_capacity():
     st.floats(-1, 2),
 )
 def test_planar_interpolation_equals_the_closed_form(a, b, share):
-    """The slow, obvious way: each number by itself, the angle the short way round."""
+    """Reference: each coordinate by itself, the angle along the shorter arc."""
     turn = (b[2] - a[2] + np.pi) % (2 * np.pi) - np.pi
     if abs(abs(turn) - np.pi) < 1e-6:
         return  # both ways round are as short
@@ -317,7 +317,7 @@ def test_an_existing_file_is_not_replaced(tmp_path):
 
 
 def test_reading_does_not_block(pair):
-    """Nobody sends: the answer is there all the same, from another thread that would otherwise hang."""
+    """Without a sender; in a thread, which would hang otherwise."""
     _, odometry = pair
     answers = []
     asking = threading.Thread(target=lambda: answers.append(pose_of(odometry, frame(0.0))), daemon=True)

@@ -1,4 +1,4 @@
-"""Poses from files: which frame they are in, and what is wrong with a bad one."""
+"""Poses from files: their coordinate frames, and the errors of invalid files."""
 
 import dataclasses
 import shutil

@@ -1,4 +1,4 @@
-"""Layouts are told from what lies there, and what is missing is named."""
+"""Recognition of layouts, and notes on missing files."""
 
 import re
 import shutil
@@ -97,7 +97,7 @@ def test_impossible_sweep_durations_are_noted_and_ignored(tmp_path, end, text, n
 
 
 def lines_of(drive, end):
-    """A list of times of a drive, and its lines."""
+    """Path and lines of a list of times of a drive."""
     path = drive / "velodyne_points" / f"timestamps{end}.txt"
     return path, path.read_text().splitlines(keepends=True)
 

@@ -1,4 +1,4 @@
-"""Scan files, good and bad."""
+"""Scan files, valid and invalid."""
 
 import numpy as np
 import pytest

@@ -117,7 +117,7 @@ class Shape:
             middle = -_sum(quadric[i] * direction[i] * start[i] for i in range(3)) / a
             # Squared distance of the ray's nearest point: float32 holds it where b^2 - ac would cancel.
             outside: Float32 = _sum(quadric[i] * np.square(start[i] + middle * direction[i]) for i in range(3))
-            reach = np.sqrt((1 - outside) / a)  # not a number, hence no hit, where the ray misses
+            reach = np.sqrt((1 - outside) / a)  # NaN where the ray misses
             enter, leave = np.maximum(enter, middle - reach), np.minimum(leave, middle + reach)
         for cut, _ in zip(cuts, range(self.cuts), strict=False):
             slope = cut[0] * direction[0] + cut[1] * direction[1] + cut[2] * direction[2]
@@ -183,8 +183,8 @@ class RayCaster:
         self, solids: Solids, shape: Shape, windows: Windows, w: int, depth: Float32, image: RangeImage
     ) -> None:
         k, rows, columns = int(windows.solid[w]), slice(*windows.rows[w]), slice(*windows.columns[w])
-        seen = image.distance[rows, columns]
-        if windows.near[w] > seen.max():
+        nearest = image.distance[rows, columns]
+        if windows.near[w] > nearest.max():
             return
         R = solids.rotation[k]
         across = R[0][:, None] * self.cos[columns] + R[1][:, None] * self.sin[columns]
@@ -193,8 +193,8 @@ class RayCaster:
         enter, leave = shape.cross(direction, start, solids.half[k], solids.quadric[k], solids.cuts[k])
         if shape.foliage:
             enter = np.maximum(enter, NEAREST_M) + depth[rows, columns] / solids.density[k]
-        hit = (enter < leave) & (enter < seen) & (enter > NEAREST_M)
-        np.copyto(seen, enter, where=hit)
+        hit = (enter < leave) & (enter < nearest) & (enter > NEAREST_M)
+        np.copyto(nearest, enter, where=hit)
         np.copyto(image.solid[rows, columns], k, where=hit)
 
     def _cast_rays(
@@ -220,7 +220,7 @@ class RayCaster:
         depth: Float32,
         image: RangeImage,
     ) -> None:
-        nearest, met = image.distance.reshape(-1), image.solid.reshape(-1)
+        nearest, solid = image.distance.reshape(-1), image.solid.reshape(-1)
         ray, row, column, k = self._pairs(windows, chunk, nearest)
         cos, sin, tangent, origin = self.cos[column], self.sin[column], self.tangent[row, 0], self.origin[row, 0]
         R = table.rotation
@@ -235,7 +235,7 @@ class RayCaster:
         at, enter = ray[hit], enter[hit]
         np.minimum.at(nearest, at, enter)
         first = np.flatnonzero(enter == nearest[at])
-        met[at[first]] = k[hit[first]]
+        solid[at[first]] = k[hit[first]]
 
     @staticmethod
     def _pairs(windows: Windows, chunk: Int, nearest: Float32) -> tuple[Int, Int, Int, Int]:

@@ -62,7 +62,7 @@ class Road:
         line = self._left_of_centre(np.arange(self.start_m, self.end_m, 4.0), left_m)
         return line[::-1] if backwards else line
 
-    def beside(self, x: Float32, y: Float32) -> Float32:
+    def distance_to_centre(self, x: Float32, y: Float32) -> Float32:
         """Distance of world points from the centre line [m]."""
         c, s = np.float32(np.cos(self.turn_rad)), np.float32(np.sin(self.turn_rad))
         along, across = c * x + s * y, c * y - s * x
@@ -92,7 +92,7 @@ def terrain(
     """Cambered carriageways, kerbs, pavements and rough ground behind, between two corners [m, world]."""
     x = np.arange(low[0], high[0], CELL_M, dtype=np.float32)
     y = np.arange(low[1], high[1], CELL_M, dtype=np.float32)
-    side = [np.broadcast_to(r.beside(x[:, None], y[None]), (len(x), len(y))) for r in roads]
+    side = [np.broadcast_to(r.distance_to_centre(x[:, None], y[None]), (len(x), len(y))) for r in roads]
     carriage = np.logical_or.reduce([s < r.half_m for s, r in zip(side, roads, strict=True)])
     walk = np.logical_or.reduce([s < r.half_m + r.pavement_m for s, r in zip(side, roads, strict=True)])
     nearest = np.minimum.reduce([s - r.half_m for s, r in zip(side, roads, strict=True)])

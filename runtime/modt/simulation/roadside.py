@@ -99,8 +99,8 @@ def pedestrians(builder: SceneBuilder, road: Road, side: int, apart_m: float) ->
         if rng.random() < 0.65:
             backwards = bool(rng.random() < 0.5)
             speed = float(np.clip(rng.normal(1.35, 0.2), 0.7, 2.2))
-            for beside in range(int(rng.choice([1, 1, 1, 2]))):
-                line = road.lane(left + side * 0.75 * beside, backwards)
+            for row in range(int(rng.choice([1, 1, 1, 2]))):
+                line = road.lane(left + side * 0.75 * row, backwards)
                 start = (road.end_m - x) if backwards else (x - road.start_m)
                 builder.pedestrian(Path.steady(line, start, speed, builder.seconds), speed)
         elif road.free(x):

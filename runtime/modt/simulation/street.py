@@ -10,7 +10,7 @@ from modt.simulation.motion import Path, timetable
 from modt.simulation.road import Road, terrain_along
 from modt.simulation.world import World
 
-MARGIN_M = 95.0
+LEAD_IN_M = 95.0
 """Length of the road behind the ego vehicle's start."""
 
 
@@ -20,7 +20,7 @@ def street(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     if seconds >= 8:
         knots[len(knots) // 2] = rng.uniform(0.5, 2.5)
     speed = np.interp(np.linspace(0, 1, 200), np.linspace(0, 1, len(knots)), knots)
-    time, travelled = timetable(seconds, speed, MARGIN_M)
+    time, travelled = timetable(seconds, speed, LEAD_IN_M)
     road = residential(rng, float(travelled[-1]))
     builder = SceneBuilder(rng, seconds)
     roadside.cyclists(builder, road, 0.0, 2)
@@ -38,7 +38,7 @@ def street(rng: np.random.Generator, seconds: float, height_m: float) -> World:
 def residential(rng: np.random.Generator, travelled_m: float) -> Road:
     """A road of random width and bend, with room ahead of travelled_m."""
     return Road(
-        start_m=-MARGIN_M,
+        start_m=-LEAD_IN_M,
         end_m=travelled_m + 40.0,
         half_m=rng.uniform(3.6, 4.6),
         pavement_m=rng.uniform(1.8, 2.8),

@@ -8,13 +8,14 @@ from modt.simulation import kinds, scenery
 from modt.simulation.builder import SceneBuilder
 from modt.simulation.materials import Material
 from modt.simulation.motion import Path, timetable
+from modt.simulation.road import CELL_M
 from modt.simulation.solids import Solids, box, cylinder, rod
 from modt.simulation.terrain import Terrain
 from modt.simulation.world import World
 from modt.types import Float64
 
-CELL_M = 0.25
 ROBOT_MPS = (0.6, 1.4)
+"""Range of the robot's speed."""
 
 
 def yard(rng: np.random.Generator, seconds: float, height_m: float) -> World:

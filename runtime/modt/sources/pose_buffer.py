@@ -72,7 +72,7 @@ class PoseBuffer:
 
 
 def interpolate(a: Float64, b: Float64, share: float) -> Float64:
-    """(4, 4) pose at a share of the motion from a to b, constant velocity and turn rate; outside 0 to 1 beyond."""
+    """(4, 4) pose at a share of the motion from a to b, at constant velocity and turn rate."""
     turn = Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
     R = a[:3, :3] @ Rotation.from_rotvec(share * turn).as_matrix()
     return se3(R, a[:3, 3] + share * (b[:3, 3] - a[:3, 3]))
