@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.config.base import StageConfig, number
+from modt.config.base import StageConfig, mechanism, number
+from modt.config.registration import LandmarkConfig, RegistrationConfig
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,3 +23,5 @@ class OdometryConfig(StageConfig):
         0.5, 0.0, 10.0, "m", "distance between two poses that counts as noise, not as speed"
     )
     capacity: int = number(256, 2, 65536, "", "poses kept, and datagrams read per frame at most")
+    registration: RegistrationConfig = mechanism(RegistrationConfig)
+    landmarks: LandmarkConfig = mechanism(LandmarkConfig)
