@@ -38,7 +38,7 @@ class RunDirectory:
                 )
                 path.rename(self.kept)
             elif path.is_dir() and any(path.iterdir()):
-                raise MisuseError(path, "is no directory of a run", "give an empty or a new directory")
+                raise MisuseError(path, "holds files but no run", "give an empty or a new directory")
             path.mkdir(parents=True, exist_ok=True)
 
     def describe(self, text: str) -> None:
