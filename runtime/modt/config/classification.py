@@ -25,7 +25,7 @@ class CallWorthConfig(StageConfig):
     nearness_weight: float = number(0.3, 0.0, 1.0, "", "of exp(-distance / range_scale_m)")
     novelty_weight: float = number(0.3, 0.0, 1.0, "", "of the relative change of points since the last key view")
     range_scale_m: float = number(30.0, 1.0, 1000.0, "m", "distance at which nearness is 1/e")
-    partial_view_factor: float = number(0.5, 0.0, 1.0, "", "on the worth of truncated and occluded proposals")
+    partial_view_factor: float = number(0.5, 0.0, 1.0, "", "on the worth of truncated proposals")
     waiting_weight: float = number(0.1, 0.001, 10.0, "", "added per frame of waiting, so that every call is made")
 
 
@@ -70,8 +70,6 @@ class FusionConfig(StageConfig):
     point_change: tuple[float, ...] = per_class(
         "point_change", 0.0, 10.0, "relative change of points (Equation 4) of an independent view", tuple(CLASSES)
     )
-    bearing_change_deg: float = number(40.0, 0.0, 180.0, "deg", "change of direction of an independent view")
-    range_change: float = number(0.4, 0.0, 10.0, "", "relative change of distance of an independent view")
     extent_change: float = number(0.6, 0.0, 10.0, "", "relative change of extent of an independent view")
     review_point_ratio: float | None = number(
         1.5, 1.0, 1000.0, "", "points, relative to the last key view, for the review of a final class; none: never"
