@@ -111,7 +111,7 @@ def test_what_is_written_of_a_frame_depends_on_no_later_one(scene, data):
         (["--poses", "absent.txt"], "is missing"),
         (["--poses", "short.txt"], "1 poses for 20 frames"),
         (["--poses", "bad.txt"], r"bad.txt:1: 3 numbers"),
-        (["--period", "0"], "no time between frames"),
+        (["--period", "0"], "out of range"),
         (["--sure", "nan"], "out of range"),
     ],
 )

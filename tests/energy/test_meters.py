@@ -8,7 +8,7 @@ import pytest
 from modt.energy.meters.battery import find_batteries
 from modt.energy.meters.discovery import Discovery, discover
 from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Kind, MeterLostError, Quantity, Scope
+from modt.energy.meters.meter import Kind, Measurand, MeterLostError, Scope
 from modt.energy.meters.model import ModelMeter
 from modt.energy.meters.pmic import find_pmic, rail_power_W
 from modt.energy.meters.powercap import find_powercap
@@ -77,7 +77,7 @@ def test_facts_of_a_counter_come_from_its_files(tmp_path: Path) -> None:
     write_zone(powercap(tmp_path) / "intel-rapl:0", "package-0", wrap_uJ=65_532_610_987)
     facts = look(tmp_path).best.meters[0].facts
     assert facts.wrap_J == pytest.approx(65_532.610987)
-    assert (facts.quantity, facts.kind, facts.unit) == (Quantity.ENERGY, Kind.MEASURED, "uJ")
+    assert (facts.measurand, facts.kind, facts.unit) == (Measurand.ENERGY, Kind.MEASURED, "uJ")
 
 
 @pytest.mark.parametrize("content", [None, "", "garbage"])

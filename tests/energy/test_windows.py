@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from modt.config import WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Facts, Kind, MeterLostError, Quantity, Scope
+from modt.energy.meters.meter import Facts, Kind, Measurand, MeterLostError, Scope
 from modt.energy.meters.powercap import find_powercap
-from modt.energy.windows import SCHEMA, Tape, Windows
+from modt.energy.windows import SCHEMA, EnergyAccumulator, Windows
 
 from .simulated import SimulatedMachine, write_files
 
@@ -22,7 +23,7 @@ def machine(tmp_path: Path) -> SimulatedMachine:
 
 def windows_of(machine: SimulatedMachine, least_s: float = 1.0) -> Windows:
     meters = find_powercap(machine.sys)[0].meters
-    return Windows(meters, machine.clocks, Conditions(0, machine.sys), least_s)
+    return Windows(meters, machine.clocks, Conditions(0, machine.sys), WindowConfig(min_s=least_s))
 
 
 def second(machine: SimulatedMachine, ledger: Ledger, windows: Windows, frame: int = 0) -> dict[str, Any]:
@@ -130,7 +131,7 @@ def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path)
     rail = write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="ina226", power1_input=4_000_000, in1_input=5000,
                        curr1_input=800)  # fmt: skip
-    windows = Windows(find_hwmon(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
+    windows = Windows(find_hwmon(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path), WindowConfig())
     ledger = machine.ledger()
     (rail / "power1_input").write_text("6000000\n")
     line = second(machine, ledger, windows)
@@ -141,7 +142,7 @@ def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
 
 
 def test_without_a_meter_energy_is_unavailable(machine: SimulatedMachine) -> None:
-    windows = Windows((), machine.clocks, Conditions(0, machine.sys))
+    windows = Windows((), machine.clocks, Conditions(0, machine.sys), WindowConfig())
     line = second(machine, machine.ledger(), windows)
     assert (line["energy_J"], line["kind"]) == (None, "unavailable")
 
@@ -174,7 +175,16 @@ class Readings:
 
     def __init__(self, values: list[float | None], wrap_J: float | None) -> None:
         self.values = iter(values)
-        self.facts = Facts("test", Quantity.ENERGY, "J", 0.0, 0.0, wrap_J, 100.0, Scope.CPU, Kind.MEASURED, "none")
+        self.facts = Facts(
+            name="test",
+            measurand=Measurand.ENERGY,
+            unit="J",
+            resolution=0.0,
+            max_W=100.0,
+            scope=Scope.CPU,
+            kind=Kind.MEASURED,
+            wrap_J=wrap_J,
+        )
 
     def read(self) -> float:
         value = next(self.values)
@@ -185,7 +195,7 @@ class Readings:
 
 @given(st.lists(st.one_of(st.none(), st.floats(0, 1000)), min_size=1), st.one_of(st.none(), st.floats(1000, 2000)))
 def test_energy_is_never_negative_whatever_the_counter_shows(values: list[float | None], wrap: float | None) -> None:
-    tape = Tape(Readings(values, wrap))
+    tape = EnergyAccumulator(Readings(values, wrap))
     for value in values:
         energy_J, marks = tape.advance(1.0)
         assert energy_J is None or 0 <= energy_J <= 100.0

@@ -5,14 +5,14 @@ from modt.energy.meters.meter import Kind
 from modt.energy.savings import UnitCosts
 from modt.pipeline import STAGES
 from modt.reporting.comparison import COUNTS
-from modt.reporting.gamma import Evidence, mean_interval, saving, unit_costs
-from modt.reporting.quantity import Figure, brief, figure, plain
+from modt.reporting.gamma import RunCosts, mean_interval, saving, unit_costs
+from modt.reporting.quantity import Quantity, format_number, quantity, to_json
 
 TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
 FRAMES, N = 120, 50
 
 
-def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> Evidence:
+def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> RunCosts:
     """A run of known costs: so many of the 50 proposals classified in each frame."""
     random = np.random.default_rng(seed)
     counts = np.zeros((len(classified), len(COUNTS)), np.int64)
@@ -32,10 +32,10 @@ def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> Evidence:
         cost[:, STAGES.index(stage)] = value
     used = counts[:, [COUNTS.index(name) for name in ("calls", "classified", "points")]]
     cost[:, STAGES.index("classification")] = used @ [TRUE.class_call, TRUE.class_item, TRUE.class_point]
-    return Evidence(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
+    return RunCosts(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
 
 
-def varied(noise: float = 0.0, passes: int = 2) -> Evidence:
+def varied(noise: float = 0.0, passes: int = 2) -> RunCosts:
     return run(np.random.default_rng(7).integers(0, N, passes * FRAMES), noise, seed=9)
 
 
@@ -87,19 +87,19 @@ def test_interval_of_a_constant_is_a_point() -> None:
     ("value", "text"), [(0.0, "0"), (12345.6, "12346"), (0.01234, "0.0123"), (1.5e-7, "1.50e-07"), (None, "-")]
 )
 def test_numbers_are_brief(value: float | None, text: str) -> None:
-    assert brief(value) == text
+    assert format_number(value) == text
 
 
 def test_a_figure_without_a_value_is_unavailable() -> None:
-    assert figure(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
-    assert figure(float("nan")).value is None
-    assert figure(float("inf")).text() == "unavailable"
-    assert figure(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00 J (0.500 to 1.50)"
+    assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
+    assert quantity(float("nan")).value is None
+    assert quantity(float("inf")).text() == "unavailable"
+    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00 J (0.500 to 1.50)"
 
 
 def test_trees_of_figures_become_plain_data() -> None:
-    tree = {"a": [figure(1.0)], "b": {"c": Figure(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
-    assert plain(tree) == {
+    tree = {"a": [quantity(1.0)], "b": {"c": Quantity(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
+    assert to_json(tree) == {
         "a": [{"value": 1.0, "unit": "", "kind": "measured"}],
         "b": {"c": {"value": 2.0, "unit": "J", "kind": "integrated", "low": 1.0, "high": 3.0}},
         "d": "text",

@@ -8,7 +8,7 @@ import yaml
 from modt import profile
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
-from modt.reporting.quantity import plain
+from modt.reporting.quantity import to_json
 from modt.reporting.run_page import run_page
 from modt.reporting.run_report import run_tree
 from modt.reporting.run_text import run_text
@@ -193,7 +193,7 @@ def figures(tree):
 
 
 def test_every_figure_carries_its_kind(run):
-    found = list(figures(plain(run_tree(run))))
+    found = list(figures(to_json(run_tree(run))))
     assert len(found) > 40
     assert all(f.get("kind") in KINDS for f in found), [f for f in found if f.get("kind") not in KINDS]
 

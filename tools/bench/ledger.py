@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 from modt import host, profile
-from modt.cli.replay import frames
+from modt.cli.options import frames
 
 
 def main() -> None:

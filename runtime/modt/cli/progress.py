@@ -13,7 +13,7 @@ Tick = Callable[[FrameResult], None]
 
 @contextmanager
 def progress(total: int | None, *, shown: bool) -> Iterator[Tick]:
-    """Something to call after every frame; shows nothing unless asked to."""
+    """Function to call after every frame; without effect unless shown."""
     if not shown:
         yield lambda result: None
         return

@@ -3,7 +3,7 @@
 from modt.config.base import StageConfig, ValueRangeError
 from modt.config.box_tracking import BoxTrackingConfig
 from modt.config.classification import ClassificationConfig, FusionConfig, SchedulerConfig
-from modt.config.energy import EnergyConfig
+from modt.config.energy import EnergyConfig, WindowConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.profile import ProfileConfig
 from modt.config.segmentation import SegmentationConfig
@@ -23,4 +23,5 @@ __all__ = [
     "StageConfig",
     "TrackingConfig",
     "ValueRangeError",
+    "WindowConfig",
 ]

@@ -1,6 +1,6 @@
-"""What tracking saves, as the paper predicts it (section IV-D, Equations 2 and 3).
+"""Energy saved by tracking, as the paper predicts it (section IV-D, Equations 2 and 3).
 
-All energies share one unit, which cancels in gamma: joules where a meter gave them, CPU seconds otherwise.
+All energies share one unit, which cancels in gamma: joules where a meter was read, CPU seconds otherwise.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ class PaperModel:
         e_class: E(class), of the classification of one proposal.
         n_obj: N_obj, foreground proposals a frame.
         n_bg: N_bg, background proposals a frame.
-        n_go: N_go, average life of a track in frames.
+        n_go: N_go, mean life of a track in frames.
     """
 
     e_seg: float
@@ -41,7 +41,7 @@ class PaperModel:
 
     @property
     def gamma(self) -> float:
-        """E1(M) / E2(M), which M does not change (Equation 3, first line); 1 where nothing costs anything."""
+        """E1(M) / E2(M), independent of M (Equation 3, first line); 1 where nothing costs anything."""
         e2 = self.e2(1)
         return self.e1(1) / e2 if e2 else 1.0
 
@@ -57,11 +57,5 @@ class PaperModel:
 
 
 def gamma(a: float, n: float, n_go: float) -> float:
-    """Equation 3, second line: gamma of n = N_obj + N_bg proposals a frame.
-
-    Args:
-        a: E(class) / E(seg).
-        n: proposals a frame.
-        n_go: average life of a track in frames.
-    """
+    """Equation 3, second line, with a = E(class) / E(seg), n = N_obj + N_bg proposals a frame, and N_go [frames]."""
     return (1.0 + n * a) / (1.0 + n * a / n_go)
