@@ -11,11 +11,11 @@ from modt.energy.attribution import (
     CLASS,
     REGRESSORS,
     SEG,
-    CoefficientSplit,
-    CpuTimeSplit,
     Fit,
     FitError,
     fit,
+    split_by_coefficients,
+    split_by_cpu_time,
     unit_energy_J,
 )
 from modt.energy.conditions import Conditions
@@ -144,20 +144,19 @@ def test_bursts_agree_with_the_truth(tmp_path: Path) -> None:
     assert unit_energy_J(lines, 3.0, CLASS) is None
 
 
-@pytest.mark.parametrize(
-    "split", [CpuTimeSplit(3.0), CoefficientSplit({"idle_W": 3.0, "seg_J": 0.1, "class_J": 0.01})]
-)
 @given(energy_J=st.floats(0, 20), frames=st.integers(0, 9), load=st.integers(0, 9))
-def test_parts_add_up_to_the_window(split: Any, energy_J: float, frames: int, load: int) -> None:
-    parts = split.split(line_of(energy_J, frames, load))
-    assert sum(parts.values()) == pytest.approx(energy_J)
+def test_parts_sum_to_the_window(energy_J: float, frames: int, load: int) -> None:
+    line = line_of(energy_J, frames, load)
+    assert sum(split_by_cpu_time(line, 3.0).values()) == pytest.approx(energy_J)
+    by_fit = split_by_coefficients(line, {"idle_W": 3.0, "seg_J": 0.1, "class_J": 0.01})
+    assert sum(by_fit.values()) == pytest.approx(energy_J)
 
 
-def test_cpu_time_shares_what_is_above_idling() -> None:
-    parts = CpuTimeSplit(3.0).split(line_of(5.0, 1))
+def test_cpu_time_splits_the_energy_above_idling() -> None:
+    parts = split_by_cpu_time(line_of(5.0, 1), 3.0)
     assert parts == pytest.approx({"idle": 3.0, "segmentation": 1.2, "classification": 0.4, "unattributed": 0.4})
-    assert CpuTimeSplit(3.0).split(line_of(None, 1)) == {}
+    assert split_by_cpu_time(line_of(None, 1), 3.0) == {}
 
 
-def test_terms_count_what_they_are_named_for() -> None:
+def test_regressors_count_the_work_of_a_window() -> None:
     assert [term.count(line_of(1.0, 2, 3)) for term in REGRESSORS] == [1.0, 2.0, 3.0, 27.0]

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from modt.energy.instrumentation import CountingClassifier
 from modt.energy.ledger import Ledger
-from modt.energy.prediction import PaperModel
-from modt.energy.savings import Counts, FullModel, OtherCosts, UnitCosts, predict
+from modt.energy.prediction import EnergyModel
+from modt.energy.savings import Counts, OtherCosts, UnitCosts, predict
 from modt.types import Float32, Float64, Int, Proposals
 
 COSTS = UnitCosts(seg=5e-3, track=1e-3, class_call=1e-4, class_item=2e-4, class_point=1e-6)
@@ -29,7 +29,7 @@ def test_neutral_parameters_are_the_papers_equation(seg: float, item: float, n: 
     base = replace(baseline(n=n), points=0)
     run = replace(base, tracks=tracks, classified_tracks=tracks, classified=tracks)
     found = predict(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0), NOTHING, NOTHING)
-    paper = PaperModel(seg, item, n_obj=1.0, n_bg=n - 1.0, n_go=run.n_go)
+    paper = EnergyModel(seg, item, n, run.n_go)
     assert found.model.gamma == pytest.approx(paper.gamma)
     assert found.paper.gamma == pytest.approx(paper.gamma)
     assert found.paper.short_form_error == pytest.approx(paper.short_form_error)
@@ -47,9 +47,9 @@ counts = st.builds(
 @given(counts, st.floats(1e-6, 1e-2), st.floats(0, 1e-2), st.floats(0, 100))
 def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: float, measured: float) -> None:
     found = predict(baseline(), run, replace(COSTS, seg=seg), OtherCosts(1e-3, choose), OtherCosts(2e-3, 2 * choose))
-    assert found.paper.gamma_short + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
+    assert found.paper.n_go + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
     explained = found.explain(measured)
-    assert found.paper.gamma_short + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
+    assert found.paper.n_go + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
     assert explained[-1].gamma == measured
 
 
@@ -78,7 +78,7 @@ def test_empty_runs_save_nothing() -> None:
     found = predict(nothing, nothing, COSTS, SAME, SAME)
     assert found.model.gamma == pytest.approx(1.0)
     assert (nothing.beta, nothing.n_go, nothing.n, nothing.n_obj) == (1.0, 1.0, 0.0, 0.0)
-    assert FullModel(0, 0, 0, 1).gamma == 1.0
+    assert EnergyModel(0, 0, 0, 1).gamma == 1.0
 
 
 class Half:

@@ -1,10 +1,11 @@
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from modt.config import WindowConfig
+from modt.config import EnergyConfig, WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Facts, Kind, Measurand, Scope
@@ -14,7 +15,6 @@ from modt.reporting.compare_report import Basis, compare_tree
 from modt.reporting.compare_text import compare_text
 from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
 from modt.reporting.quantity import to_json
-from modt.reporting.repetitions import Repetition
 from modt.types import UNLIMITED, Frame
 from tests.results import CAR, result
 
@@ -88,19 +88,21 @@ def mode_run(name, metered):
     ledger, recorder = Ledger(lambda: board.now_ns, lambda: board.cpu_ns), RecordingClassifier(Network(board))
     windows = Windows([board], board.clocks(), Conditions(), WindowConfig(min_s=0.1)) if metered else None
     steps = Steps(board, ledger, recorder, EVERY[name])
-    return ModeRun(name, steps, ledger, recorder, lambda index: UNLIMITED, windows)
+    return ModeRun(steps, ledger, recorder, lambda index: UNLIMITED, windows)
 
 
 def tree_of(metered, coefficients=None):
-    made = [mode_run(name, metered) for name in EVERY]
-    interleave(FRAMES, made, 10**9 if metered else 1)
+    made = {name: mode_run(name, metered) for name in EVERY}
+    interleave(FRAMES, [*made.values()], 10**9 if metered else 1)
     kind = Kind.MEASURED if metered else Kind.ESTIMATED
-    basis = Basis(idle_W=1.0, busy_W=4.0, period_s=0.1, meter="board", kind=kind, coefficients=coefficients)
+    seg_J, class_J, point_J = coefficients or (None, None, None)
+    config = EnergyConfig(idle_W=1.0, busy_W=4.0, seg_J=seg_J, class_J=class_J, point_J=point_J)
+    basis = Basis(config, replace(Board().facts, kind=kind), period_s=0.1)
     about = {
         "stream": "street", "frames": len(FRAMES), "fov": "full", "repeat": 1, "turn": 1, "basis": "at 10 Hz",
         "board": "test", "conditions": {"governor": None, "frequency_MHz": None, "core": 0},
     }  # fmt: skip
-    return compare_tree([Repetition(made)], MODES, "varied", basis, about)
+    return compare_tree([made], MODES, "varied", basis, about)
 
 
 @pytest.fixture(scope="module")

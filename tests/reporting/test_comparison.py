@@ -49,7 +49,7 @@ class Network:
 
 def mode_run(name, log, budget=lambda index: UNLIMITED, windows=None):
     ledger, recorder = Ledger(), RecordingClassifier(Network())
-    return ModeRun(name, Scripted(name, ledger, recorder, log), ledger, recorder, budget, windows)
+    return ModeRun(Scripted(name, ledger, recorder, log), ledger, recorder, budget, windows)
 
 
 def column(made, name):

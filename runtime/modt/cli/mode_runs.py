@@ -56,14 +56,14 @@ class Comparison:
 
     def repetition(self, seed: int) -> Repetition:
         """Every mode once through the stream, from its initial state."""
-        runs = [self._mode_run(name, seed) for name in (*MODES, VARIED)]
+        runs = {name: self._mode_run(name, seed) for name in (*MODES, VARIED)}
         frames = iter(assemble.stream(self.request))
         first = list(islice(frames, 1))
         for frame in first:
-            for mode_run in runs:
+            for mode_run in runs.values():
                 _warm_up(mode_run, frame)
-        interleave(chain(first, frames), runs, self.turn_frames)
-        return Repetition(runs)
+        interleave(chain(first, frames), [*runs.values()], self.turn_frames)
+        return runs
 
     def _mode_run(self, name: str, seed: int) -> ModeRun:
         mode = assemble.MODES[BASELINE if name == VARIED else name]
@@ -73,7 +73,6 @@ class Comparison:
         recorder = RecordingClassifier(pipeline.classifier)
         budget = mode.budget(self.profile)
         return ModeRun(
-            name=name,
             pipeline=replace(pipeline, classifier=recorder),
             ledger=ledger,
             recorder=recorder,

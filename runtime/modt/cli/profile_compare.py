@@ -55,10 +55,10 @@ def run(arguments: argparse.Namespace) -> int:
         repetitions.append(comparison.repetition(number))
     if sys.stderr.isatty():
         print(file=sys.stderr)
-    frames = len(repetitions[0].runs[0].lines)
+    frames = len(repetitions[0][VARIED].lines)
     if not frames:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
-    basis = Basis(board.idle_W, board.busy_W, info.period_s, meter.name, meter.kind, board.coefficients)
+    basis = Basis(board, meter, info.period_s)
     about: dict[str, Any] = {
         "stream": info.name,
         "frames": frames,

@@ -166,42 +166,34 @@ def unit_energy_J(lines: Sequence[Line], idle_W: float, work: Regressor) -> floa
     return float(np.median(each)) if each else None
 
 
-class CoefficientSplit:
-    """Splits a window's energy by fitted coefficients; the remainder stays unattributed."""
+def split_by_coefficients(line: Line, values: dict[str, float]) -> dict[str, float]:
+    """Energy of idling and of each stage of a window by fitted coefficients, and the unattributed remainder [J].
 
-    def __init__(self, values: dict[str, float]) -> None:
-        self._values = values
-
-    def split(self, line: Line) -> dict[str, float]:
-        """Energy of idling and of each stage [J]; the parts sum to the window's energy where it is known."""
-        parts: dict[str, float] = {}
-        for regressor in REGRESSORS:
-            name = regressor.stage or "idle"
-            parts[name] = parts.get(name, 0.0) + self._values.get(regressor.name, 0.0) * regressor.count(line)
-        if line["energy_J"] is not None:
-            parts["unattributed"] = line["energy_J"] - sum(parts.values())
-        return parts
+    The parts sum to the window's energy where it is known.
+    """
+    parts: dict[str, float] = {}
+    for regressor in REGRESSORS:
+        name = regressor.stage or "idle"
+        parts[name] = parts.get(name, 0.0) + values.get(regressor.name, 0.0) * regressor.count(line)
+    if line["energy_J"] is not None:
+        parts["unattributed"] = line["energy_J"] - sum(parts.values())
+    return parts
 
 
-class CpuTimeSplit:
-    """Splits the energy above idling by CPU time, under the assumption of equal power in all stages.
+def split_by_cpu_time(line: Line, idle_W: float) -> dict[str, float]:
+    """Energy of idling and of each stage of a window by CPU time, under the assumption of equal power in all [J].
 
     Args:
+        line: the window.
         idle_W: power within the meter's scope while this process waits [W].
     """
-
-    def __init__(self, idle_W: float) -> None:
-        self._idle_W = idle_W
-
-    def split(self, line: Line) -> dict[str, float]:
-        """Energy of idling and of each stage [J]; the parts sum to the window's energy."""
-        energy_J = line["energy_J"]
-        if energy_J is None:
-            return {}
-        idle_J = min(self._idle_W * IDLE.count(line), energy_J)
-        busy_ns = {stage: row["cpu_ns"] for stage, row in line["stages"].items()}
-        busy_ns["unattributed"] = max(line["process_ns"] - sum(busy_ns.values()), 0)
-        total_ns = sum(busy_ns.values())
-        if not total_ns:
-            return {"idle": energy_J}
-        return {"idle": idle_J, **{name: (energy_J - idle_J) * ns / total_ns for name, ns in busy_ns.items()}}
+    energy_J = line["energy_J"]
+    if energy_J is None:
+        return {}
+    idle_J = min(idle_W * IDLE.count(line), energy_J)
+    busy_ns = {stage: row["cpu_ns"] for stage, row in line["stages"].items()}
+    busy_ns["unattributed"] = max(line["process_ns"] - sum(busy_ns.values()), 0)
+    total_ns = sum(busy_ns.values())
+    if not total_ns:
+        return {"idle": energy_J}
+    return {"idle": idle_J, **{name: (energy_J - idle_J) * ns / total_ns for name, ns in busy_ns.items()}}

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from modt.energy.prediction import PaperModel
+from modt.energy.prediction import EnergyModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,60 +99,6 @@ class OtherCosts:
 
 
 @dataclass(frozen=True, slots=True)
-class FullModel:
-    """Equation 3 with the costs it leaves out; every added parameter is neutral by default.
-
-    Attributes:
-        e_seg: E(seg).
-        e_class: E(class) of tracking-by-detection.
-        n: proposals a frame.
-        n_go: N_go.
-        classified_share: share of the tracks classified at least once.
-        repeats: further classifications a track, without those after a loss.
-        reacquired: further classifications a track after it was lost.
-        view_cost_ratio: E(class) of the views selected over e_class.
-        track: tracking common to both runs, a frame.
-        extra_track1, extra_track2: tracking beyond that, a frame, of tracking-by-detection and of the run.
-        schedule1, schedule2: scheduling and fusion a frame, of tracking-by-detection and of the run.
-    """
-
-    e_seg: float
-    e_class: float
-    n: float
-    n_go: float
-    classified_share: float = 1.0
-    repeats: float = 0.0
-    reacquired: float = 0.0
-    view_cost_ratio: float = 1.0
-    track: float = 0.0
-    extra_track1: float = 0.0
-    extra_track2: float = 0.0
-    schedule1: float = 0.0
-    schedule2: float = 0.0
-
-    @property
-    def views(self) -> float:
-        """k: classifications a track."""
-        return self.classified_share + self.repeats + self.reacquired
-
-    @property
-    def e1(self) -> float:
-        """Energy a frame of tracking-by-detection."""
-        return self.e_seg + self.n * self.e_class + self.track + self.extra_track1 + self.schedule1
-
-    @property
-    def e2(self) -> float:
-        """Energy a frame of the run: n / N_go new tracks, each classified k times."""
-        selected = self.n / self.n_go * self.views * self.view_cost_ratio * self.e_class
-        return self.e_seg + selected + self.track + self.extra_track2 + self.schedule2
-
-    @property
-    def gamma(self) -> float:
-        """E1 / E2; 1 where nothing costs anything."""
-        return self.e1 / self.e2 if self.e2 else 1.0
-
-
-@dataclass(frozen=True, slots=True)
 class GammaTerm:
     """One reason why gamma is not N_go: its change of gamma, and gamma after it and all terms before it."""
 
@@ -166,13 +112,13 @@ class Prediction:
     """Gamma predicted for a pair of runs.
 
     Attributes:
-        model: the full model.
+        model: with all costs.
         paper: Equation 3, at the same a, n and N_go.
-        terms: from gamma = N_go to the full model's gamma; their changes sum to the difference.
+        terms: from gamma = N_go to the gamma of the model; their changes sum to the difference.
     """
 
-    model: FullModel
-    paper: PaperModel
+    model: EnergyModel
+    paper: EnergyModel
     terms: tuple[GammaTerm, ...]
 
     def explain(self, measured: float) -> tuple[GammaTerm, ...]:
@@ -193,9 +139,7 @@ def predict(baseline: Counts, run: Counts, costs: UnitCosts, other1: OtherCosts,
     """
     tracks = run.tracks or 1
     e_class = costs.e_class(baseline)
-    paper = PaperModel(
-        e_seg=costs.seg, e_class=e_class, n_obj=baseline.n_obj, n_bg=baseline.n - baseline.n_obj, n_go=run.n_go
-    )
+    model = paper = EnergyModel(costs.seg, e_class, baseline.n, run.n_go)
     repeats = run.classified - run.classified_tracks - run.reacquired
     view_cost_ratio = costs.e_class(run) / e_class if e_class and run.classified else 1.0
     extra1, extra2 = other1.track - costs.track, other2.track - costs.track
@@ -209,7 +153,6 @@ def predict(baseline: Counts, run: Counts, costs: UnitCosts, other1: OtherCosts,
         "scheduling and fusion": {"schedule1": other1.schedule, "schedule2": other2.schedule},
     }
     terms = [GammaTerm("segmentation is not free (Equation 3 in full)", paper.gamma - paper.n_go, paper.gamma)]
-    model = FullModel(e_seg=costs.seg, e_class=e_class, n=baseline.n, n_go=run.n_go)
     for name, change in steps.items():
         before, model = model.gamma, replace(model, **change)
         terms.append(GammaTerm(name, model.gamma - before, model.gamma))

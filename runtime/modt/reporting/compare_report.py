@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from modt.config import EnergyConfig
 from modt.energy.attribution import usable_windows
-from modt.energy.meters.meter import Kind
+from modt.energy.meters.meter import Facts, Kind
 from modt.energy.savings import OtherCosts, UnitCosts, predict
 from modt.pipeline import STAGES
 from modt.reporting.comparison import COUNTS, total
@@ -34,28 +35,11 @@ _PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """The conversion of CPU time to energy.
+    """The conversion of CPU time to energy: powers and calibration of the board, meter, period of the stream."""
 
-    Attributes:
-        idle_W: power while the process waits.
-        busy_W: power while it computes.
-        period_s: of the stream, for the energy of idling.
-        meter: name of the meter.
-        kind: of its energy.
-        coefficients: seg_J, class_J and point_J of a calibration, None without one.
-    """
-
-    idle_W: float
-    busy_W: float
+    board: EnergyConfig
+    meter: Facts
     period_s: float
-    meter: str
-    kind: Kind
-    coefficients: tuple[float, float, float] | None = None
-
-    @property
-    def net_W(self) -> float:
-        """Power of computing above idling."""
-        return self.busy_W - self.idle_W
 
 
 def compare_tree(
@@ -80,11 +64,14 @@ def compare_tree(
         | {"gamma_calibrated": estimate(_calibrated(baseline, runs[mode], basis))}
         for mode in modes[1:]
     }
+    meter = {"name": basis.meter.name, "kind": basis.meter.kind.value} | {
+        key: getattr(basis.board, key) for key in ("idle_W", "busy_W")
+    }
     metered = all(e["net_J"].kind is not Kind.ESTIMATED for e in energy.values())
     return {
         "schema": SCHEMA,
         **about,
-        "meter": {"name": basis.meter, "kind": basis.kind.value, "idle_W": basis.idle_W, "busy_W": basis.busy_W},
+        "meter": meter,
         "test": _PHYSICS if metered else _COUNTING,
         "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
         "unit_costs": _costs(unit_costs(varied_run), baseline, basis),
@@ -102,7 +89,7 @@ def _energy(
     frames = np.array([line["frames"][2] for line in good])
     if frames.sum():
         gross_J = np.array([line["energy_J"] for line in good])
-        net_J = gross_J - basis.idle_W * 1e-9 * np.array([line["wall_ns"] for line in good])
+        net_J = gross_J - basis.board.idle_W * 1e-9 * np.array([line["wall_ns"] for line in good])
 
         def per_frame(energy_J: Float64) -> Quantity:
             bounds = interval(len(good), lambda k: float(energy_J[k].sum() / max(frames[k].sum(), 1)), random)
@@ -110,8 +97,8 @@ def _energy(
 
         return {"net_J": per_frame(net_J), "gross_J": per_frame(gross_J)}
     cpu_s = run.cost.sum(axis=1)
-    idle_J = basis.idle_W * basis.period_s
-    mean, low, high = (basis.net_W * s for s in (float(cpu_s.mean()), *mean_interval(cpu_s, random)))
+    idle_J = basis.board.idle_W * basis.period_s
+    mean, low, high = (basis.board.active_W * s for s in (float(cpu_s.mean()), *mean_interval(cpu_s, random)))
     return {
         "net_J": estimate(mean, "J", (low, high)),
         "gross_J": estimate(idle_J + mean, "J", (idle_J + low, idle_J + high)),
@@ -163,11 +150,12 @@ def _saving(found: Saving, energy1: dict[str, Quantity], energy2: dict[str, Quan
 
 def _calibrated(baseline: RunCosts, run: RunCosts, basis: Basis) -> float | None:
     """Gamma from the joules of a calibration; stages not calibrated count by their CPU time."""
-    if basis.coefficients is None:
+    if basis.board.coefficients is None:
         return None
-    seg_J, class_J, point_J = basis.coefficients
+    seg_J, class_J, point_J = basis.board.coefficients
     other1, other2 = (
-        OtherCosts(basis.net_W * c.track, basis.net_W * c.schedule) for c in map(other_costs, (baseline, run))
+        OtherCosts(basis.board.active_W * c.track, basis.board.active_W * c.schedule)
+        for c in map(other_costs, (baseline, run))
     )
     costs = UnitCosts(seg_J, other1.track, 0.0, class_J, point_J)
     return predict(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
@@ -176,9 +164,9 @@ def _calibrated(baseline: RunCosts, run: RunCosts, basis: Basis) -> float | None
 def _costs(costs: UnitCosts, baseline: RunCosts, basis: Basis) -> dict[str, Quantity]:
     e_class = costs.e_class(total(baseline.counts))
     return {
-        "E_seg": estimate(basis.net_W * costs.seg, "J"),
-        "E_class": estimate(basis.net_W * e_class, "J"),
-        "E_track": estimate(basis.net_W * costs.track, "J"),
+        "E_seg": estimate(basis.board.active_W * costs.seg, "J"),
+        "E_class": estimate(basis.board.active_W * e_class, "J"),
+        "E_track": estimate(basis.board.active_W * costs.track, "J"),
         "seg_cpu_ms": quantity(1e3 * costs.seg, "ms"),
         "class_cpu_ms": estimate(1e3 * e_class, "ms"),
         "track_cpu_ms": quantity(1e3 * costs.track, "ms"),

@@ -63,7 +63,6 @@ class ModeRun:
     """One pass of one mode through the stream.
 
     Attributes:
-        name: of the mode.
         pipeline: its stages, with the recorder as classifier.
         ledger: of the pipeline.
         recorder: the classifier.
@@ -74,7 +73,6 @@ class ModeRun:
         lives: frames with a proposal, of every track that ended.
     """
 
-    name: str
     pipeline: Pipeline
     ledger: Ledger
     recorder: RecordingClassifier

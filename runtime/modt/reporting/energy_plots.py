@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.energy.prediction import gamma
+from modt.energy.prediction import EnergyModel
 from modt.reporting import svg
 from modt.reporting.page import Plot, table
 from modt.reporting.quantity import Quantity
@@ -50,8 +50,8 @@ def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quanti
     traces = []
     if a.value is not None and n.value is not None:
         life = np.geomspace(1.0, _MAX_LIFE, 100)
-        short = life[life <= 10 * gamma(a.value, n.value, _MAX_LIFE)]
-        curve = np.array([gamma(a.value, n.value, v) for v in life])
+        curve = np.array([EnergyModel(1.0, a.value, n.value, n_go).gamma for n_go in life.tolist()])
+        short = life[life <= 10 * curve[-1]]
         traces = [
             svg.Trace("Equation 3 at this a and n", life, curve),
             svg.Trace("gamma = N_go", short, short, dashed=True),

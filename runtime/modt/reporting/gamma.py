@@ -109,7 +109,7 @@ def prediction_tree(found: Prediction, gamma: float) -> dict[str, Any]:
     """The paper's figures, the predicted gamma, and the terms from N_go to the gamma of the runs."""
     return {
         "a": estimate(found.paper.a),
-        "gamma_short": estimate(found.paper.gamma_short),
+        "gamma_short": estimate(found.paper.n_go),
         "gamma_equation_3": estimate(found.paper.gamma),
         "gamma_predicted": estimate(found.model.gamma),
         "terms": [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,15 +11,8 @@ from modt.reporting.comparison import ModeRun
 from modt.reporting.gamma import RunCosts
 from modt.types import Float64
 
-
-@dataclass(frozen=True, slots=True)
-class Repetition:
-    """One pass of every mode through the stream."""
-
-    runs: Sequence[ModeRun]
-
-    def __getitem__(self, name: str) -> ModeRun:
-        return next(run for run in self.runs if run.name == name)
+Repetition = dict[str, ModeRun]
+"""One pass of every mode through the stream, by the name of the mode."""
 
 
 def median_run(repetitions: Sequence[Repetition], name: str) -> RunCosts:

@@ -12,7 +12,7 @@ import numpy as np
 from modt import profile
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
-from modt.energy.attribution import CoefficientSplit, CpuTimeSplit, usable_windows
+from modt.energy.attribution import split_by_coefficients, split_by_cpu_time, usable_windows
 from modt.energy.instrumentation import padded_points
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.meters.meter import Kind
@@ -150,10 +150,13 @@ def _energy(windows: list[dict[str, Any]], lines: list[dict[str, Any]], board: d
     seconds = 1e-9 * sum(w["wall_ns"] for w in good)
     gross_J = sum(w["energy_J"] for w in good)
     kind = Kind(good[0]["kind"])
-    split = _split(board, kind)
+    coefficients = {name: board[name] for name in ("idle_W", "seg_J", "class_J", "point_J")}
+    calibrated = kind is not Kind.ESTIMATED and None not in coefficients.values()
     parts_J: Counter[str] = Counter()
-    for window in good:
-        parts_J.update(split.split(window))
+    for w in good:
+        parts_J.update(
+            split_by_coefficients(w, coefficients) if calibrated else split_by_cpu_time(w, board["idle_W"])
+        )
     error_J = 1.96 * float(np.sqrt(sum(w["resolution_J"] ** 2 for w in good)))
     bounds = ((gross_J - error_J) / frames, (gross_J + error_J) / frames)
     return {
@@ -177,13 +180,6 @@ def _modelled(line: dict[str, Any], board: dict[str, Any]) -> dict[str, Any]:
         "resolution_J": 0.0,
         "meters": [{"name": model_name(board["idle_W"], board["busy_W"])}],
     }
-
-
-def _split(board: dict[str, Any], kind: Kind) -> CoefficientSplit | CpuTimeSplit:
-    values = {name: board.get(name) for name in ("idle_W", "seg_J", "class_J", "point_J")}
-    if kind is Kind.ESTIMATED or None in values.values():
-        return CpuTimeSplit(board["idle_W"])
-    return CoefficientSplit({name: float(value) for name, value in values.items()})  # type: ignore[arg-type]
 
 
 def _times(lines: list[dict[str, Any]]) -> dict[str, Any]:
