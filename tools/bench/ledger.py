@@ -17,7 +17,7 @@ def main() -> None:
     parser.add_argument("--fov", choices=("camera", "full"), default="full")
     parser.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
     arguments = parser.parse_args()
-    host.confine(host.last_core())
+    host.pin_to_core(host.last_core())
     from modt.cli import assemble
     from modt.energy.ledger import STAGES, Ledger, NullLedger
 

@@ -39,7 +39,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Calibrate."""
-    pinned = host.confine(arguments.core)
+    pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from dataclasses import replace
 

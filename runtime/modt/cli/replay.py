@@ -44,7 +44,7 @@ def rate(text: str) -> float | None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Replay; SIGTERM ends it with exit status 0, SIGINT with 130, both with complete records."""
-    pinned = host.confine(arguments.core)
+    pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.cli.assemble import Request
     from modt.cli.progress import progress

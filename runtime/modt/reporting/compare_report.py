@@ -74,7 +74,7 @@ def compare_tree(
         "meter": meter,
         "test": _PHYSICS if metered else _COUNTING,
         "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
-        "unit_costs": _costs(unit_costs(varied_run), baseline, basis),
+        "unit_costs": _costs(unit_costs(varied_run), baseline, basis.board.active_W),
         "savings": savings,
         "series_kind": Kind.MEASURED.value,
         "series": {mode: _series(runs[mode], repetitions[0][mode].lives) for mode in modes},
@@ -153,20 +153,18 @@ def _calibrated(baseline: RunCosts, run: RunCosts, basis: Basis) -> float | None
     if basis.board.coefficients is None:
         return None
     seg_J, class_J, point_J = basis.board.coefficients
-    other1, other2 = (
-        OtherCosts(basis.board.active_W * c.track, basis.board.active_W * c.schedule)
-        for c in map(other_costs, (baseline, run))
-    )
+    net_W = basis.board.active_W
+    other1, other2 = (OtherCosts(net_W * c.track, net_W * c.schedule) for c in map(other_costs, (baseline, run)))
     costs = UnitCosts(seg_J, other1.track, 0.0, class_J, point_J)
     return predict(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
 
 
-def _costs(costs: UnitCosts, baseline: RunCosts, basis: Basis) -> dict[str, Quantity]:
+def _costs(costs: UnitCosts, baseline: RunCosts, net_W: float) -> dict[str, Quantity]:
     e_class = costs.e_class(total(baseline.counts))
     return {
-        "E_seg": estimate(basis.board.active_W * costs.seg, "J"),
-        "E_class": estimate(basis.board.active_W * e_class, "J"),
-        "E_track": estimate(basis.board.active_W * costs.track, "J"),
+        "E_seg": estimate(net_W * costs.seg, "J"),
+        "E_class": estimate(net_W * e_class, "J"),
+        "E_track": estimate(net_W * costs.track, "J"),
         "seg_cpu_ms": quantity(1e3 * costs.seg, "ms"),
         "class_cpu_ms": estimate(1e3 * e_class, "ms"),
         "track_cpu_ms": quantity(1e3 * costs.track, "ms"),

@@ -59,8 +59,8 @@ def summary_text(summary: dict[str, Any]) -> str:
 def _host_line(host: dict[str, Any]) -> str:
     core = "any core" if host["core"] is None else f"core {host['core']}"
     verified = "verified" if host["one_core_verified"] else "NOT kept to one core"
-    beside = f"{host['threads']} threads, {host['other_threads_cpu_s']:.2f} s of CPU in other threads"
-    return f"  {core} ({verified}; {beside}), peak memory {host['peak_rss_mb']:.0f} MB"
+    others = f"{host['threads']} threads, {host['other_threads_cpu_s']:.2f} s of CPU in other threads"
+    return f"  {core} ({verified}; {others}), peak memory {host['peak_rss_mb']:.0f} MB"
 
 
 def _number(value: float | None) -> str:
