@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.energy.attribution import FitError
     from modt.energy.instrumentation import CountingClassifier
     from modt.energy.ledger import Ledger
-    from modt.energy.window_fit_calibration import CalibrationSetup, calibrate
+    from modt.energy.window_fit_calibration import Workload
     from modt.geometry import FieldOfView
     from modt.segmentation.segmenter import Segmenter
     from modt.sinks.output import writing
@@ -64,17 +63,16 @@ def run(arguments: argparse.Namespace) -> int:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
     meter = metering.facts(loaded.energy, arguments.meter)
     ledger, limits, explicit = Ledger(), loaded.classification, WindowConfig(min_s=1e9)
-    setup = CalibrationSetup(
+    network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch)
+    workload = Workload(
         frames=scans,
-        segmenter=Segmenter(loaded.segmentation, loaded.sensor, FieldOfView()),
-        classifier=CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch),
+        segment=Segmenter(loaded.segmentation, loaded.sensor, FieldOfView()).segment,
+        classify=network.classify,
         ledger=ledger,
         windows=metering.windows(loaded.energy, pinned, arguments.meter, explicit),
-        sleep=time.sleep,
-        monotonic_ns=time.monotonic_ns,
     )
     try:
-        found = calibrate(setup, arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))
+        found = workload.calibrate(arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))
     except FitError as error:
         raise ModtError(meter.name, str(error), "use a better meter, or more and longer windows") from None
     energy = replace(

@@ -18,9 +18,7 @@ _BLOCK = 8
 """Frames resampled together, since neighbouring frames are correlated."""
 _RESAMPLES = 400
 _LOAD = [COUNTS.index(name) for name in ("calls", "classified", "points")]
-SEG, TRACK, CLASS, SCHEDULE, FUSE = (
-    STAGES.index(s) for s in (SEGMENTATION, TRACKING, CLASSIFICATION, SCHEDULING, FUSION)
-)
+SEG, TRACK, CLASS, SCHEDULE, FUSE = map(STAGES.index, (SEGMENTATION, TRACKING, CLASSIFICATION, SCHEDULING, FUSION))
 
 Interval = tuple[float, float]
 
