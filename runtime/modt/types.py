@@ -6,7 +6,7 @@ number of proposals in a frame, M the number of tracks alive, N the number of po
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from operator import attrgetter
@@ -62,8 +62,7 @@ class Proposals:
     Attributes:
         members: (K,) indices of points in the frame, grouped by proposal.
         offsets: (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]].
-        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once for all; (3, 0) after
-            tracking has joined some, the last step that could need them.
+        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once.
         centroid: (P, 3) mean of each proposal's points [m, sensor frame].
         box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
         truncated: (P,) cut by the edge of the field of view.
@@ -97,22 +96,34 @@ class Proposals:
         out[self.members] = np.repeat(np.arange(len(self)), self.count)
         return out
 
-    def take(self, which: Int) -> Proposals:
-        """A copy of those given, in their order."""
-        count = self.count[which]
-        offsets = np.append(0, np.cumsum(count))
-        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[which] - offsets[:-1], count)
+    def regrouped(self, runs: Sequence[slice | Int], count: Int, source: Int) -> Proposals:
+        """The members in another grouping.
+
+        Args:
+            runs: rows of members in their new order; few long slices are copied faster than one by one.
+            count: (Q,) members of each new proposal.
+            source: (Q,) proposal whose centroid, box and other columns each new one takes over.
+        """
+        offsets = np.zeros(len(count) + 1, np.int64)
+        count.cumsum(out=offsets[1:])
         return replace(
             self,
-            members=self.members[rows],
+            members=np.concatenate([self.members[:0], *(self.members[run] for run in runs)]),
             offsets=offsets,
-            coordinates=self.coordinates.take(rows, axis=1),
-            centroid=self.centroid.take(which, axis=0),
-            box=self.box.take(which, axis=0),
-            truncated=self.truncated[which],
-            occluded=self.occluded[which],
-            reflectance=None if self.reflectance is None else self.reflectance.take(which, axis=0),
+            coordinates=np.concatenate(
+                [self.coordinates[:, :0], *(self.coordinates[:, run] for run in runs)], axis=1
+            ),
+            centroid=self.centroid.take(source, axis=0),
+            box=self.box.take(source, axis=0),
+            truncated=self.truncated[source],
+            occluded=self.occluded[source],
+            reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
+
+    def take(self, which: Int) -> Proposals:
+        """A copy of the rows given, in their order."""
+        ends = zip(self.offsets[which].tolist(), self.offsets[which + 1].tolist(), strict=True)
+        return self.regrouped([slice(*pair) for pair in ends], self.count[which], which)
 
     @classmethod
     def empty(cls) -> Proposals:
@@ -274,6 +285,21 @@ class Tracks:
         seen = np.flatnonzero(self.proposal != NONE)
         rows[self.proposal[seen]] = seen
         return rows
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedFrame:
+    """What tracking hands to the stages after it.
+
+    Attributes:
+        tracks: the live table.
+        proposals: of the frame, regrouped where the tracks know better; each belongs to one track.
+        wants_class: (M,) tracks with a proposal whose state asks for a class.
+    """
+
+    tracks: Tracks
+    proposals: Proposals
+    wants_class: Bool
 
 
 @dataclass(frozen=True, slots=True)

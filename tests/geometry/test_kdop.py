@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.geometry import kdop
-from modt.geometry.kdop import PAD_M, WAYS, covered, girth, lengths, middles, touching
+from modt.geometry import kdop as kdop_module
+from modt.geometry.kdop import DIRECTIONS, PAD_M, centres, coverage, overlapping_pairs, width_sum, widths
 
 
 def ends(n, seed, longest):
@@ -16,7 +16,7 @@ def ends(n, seed, longest):
     return middle - length / 2, middle + length / 2
 
 
-def outline(low, high):
+def kdop(low, high):
     return np.concatenate([high, -low], axis=1).T
 
 
@@ -34,9 +34,9 @@ HOW = pytest.mark.parametrize("few", [(10**9, 0), (0, 10**9), (0, 0)], ids=["han
 
 def found(patch, few, a, b):
     """What touches, found as if so many pairs were few."""
-    patch.setattr(kdop, "HANDFUL", few[0])
-    patch.setattr(kdop, "FEW_PAIRS", few[1])
-    return touching(a, b)
+    patch.setattr(kdop_module, "HANDFUL", few[0])
+    patch.setattr(kdop_module, "FEW_PAIRS", few[1])
+    return overlapping_pairs(a, b)
 
 
 @HOW
@@ -44,21 +44,21 @@ def found(patch, few, a, b):
 def test_touching_outlines(few, n, k, seed, longest):
     a, b = ends(n, seed, longest), ends(k, seed + 1, longest)
     with pytest.MonkeyPatch.context() as patch:
-        i, j = found(patch, few, outline(*a), outline(*b))
+        i, j = found(patch, few, kdop(*a), kdop(*b))
     assert list(zip(i.tolist(), j.tolist(), strict=True)) == slow_touching(*a, *b)
 
 
 @HOW
 def test_what_was_never_seen_touches_nothing(few, monkeypatch):
-    something, nothing = outline(*ends(6, 0, 30)), np.full((8, 2), -np.inf)
+    something, nothing = kdop(*ends(6, 0, 30)), np.full((8, 2), -np.inf)
     assert not len(found(monkeypatch, few, nothing, something)[0])
 
 
 @HOW
 @pytest.mark.parametrize("origin", [(0, 0), (-458_000, 5_430_000)], ids=["here", "UTM"])
 def test_where_the_world_begins_does_not_matter(few, origin, monkeypatch):
-    start = (origin @ WAYS)[:, None]
-    a, b = outline(*ends(15, 1, 9)) + 0.51, outline(*ends(15, 2, 9))
+    start = (origin @ DIRECTIONS)[:, None]
+    a, b = kdop(*ends(15, 1, 9)) + 0.51, kdop(*ends(15, 2, 9))
     here, there = found(monkeypatch, few, a, b), found(monkeypatch, few, a + start, b + start)
     assert len(here[0])
     np.testing.assert_array_equal(there, here)
@@ -66,23 +66,23 @@ def test_where_the_world_begins_does_not_matter(few, origin, monkeypatch):
 
 @HOW
 def test_what_lies_apart_does_not_touch_however_far_away(few, monkeypatch):
-    a = outline(*ends(5, 1, 9)) + (np.array([2_000.0, 0.0]) @ WAYS)[:, None]
-    assert not len(found(monkeypatch, few, a, outline(*ends(5, 2, 9)))[0])
+    a = kdop(*ends(5, 1, 9)) + (np.array([2_000.0, 0.0]) @ DIRECTIONS)[:, None]
+    assert not len(found(monkeypatch, few, a, kdop(*ends(5, 2, 9)))[0])
 
 
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_lengths_and_middles(n, seed):
     low, high = ends(n, seed, 9)
-    one = outline(low, high)
-    np.testing.assert_array_equal(lengths(one), (high - low).T)
-    np.testing.assert_array_equal(middles(one), (high + low).T / 2)
-    np.testing.assert_array_equal(girth(one), (high - low).sum(axis=1))
+    one = kdop(low, high)
+    np.testing.assert_array_equal(widths(one), (high - low).T)
+    np.testing.assert_array_equal(centres(one), (high + low).T / 2)
+    np.testing.assert_array_equal(width_sum(one), (high - low).sum(axis=1))
 
 
 @given(st.integers(0, 9), st.integers(0, 2**16))
 def test_what_is_covered_is_so_in_both_squares(n, seed):
     (low, high), (low_place, high_place) = ends(n, seed, 9), ends(n, seed + 1, 30)
-    part = covered(outline(low, high), outline(low_place, high_place))
+    part = coverage(kdop(low, high), kdop(low_place, high_place))
     for i in range(n):
         along = [
             max(min(high[i, k], high_place[i, k] + PAD_M) - max(low[i, k], low_place[i, k] - PAD_M), 0.0)

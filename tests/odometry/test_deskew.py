@@ -9,14 +9,13 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
-from modt.observations import sight
-from modt.odometry.deskew import Motion, Skew, lateness
+from modt.observations import observe
+from modt.odometry.deskew import Motion, SweepSkew, delays
 from modt.odometry.registration import Registration
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
 from modt.types import Frame, Proposals
 from tests.odometry.test_registration import street
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 from tools.study.sweep_skew import displacement_m
 
 PERIOD_S = 0.1
@@ -93,8 +92,8 @@ def one(x, y, length, width):
     ("x", "y", "share"), [(10, 0, 0.0), (0, 10, -0.25), (0, -10, 0.25), (-7, 7, -0.375), (-7, -7, 0.375)]
 )
 def test_the_head_turns_clockwise_and_looks_ahead_at_the_stamp(x, y, share):
-    assert lateness(one(x, y, 1.0, 1.0), 0.1)[0] == pytest.approx(0.1 * share)
-    assert lateness(one(x, y, 1.0, 1.0), -0.1)[0] == pytest.approx(-0.1 * share)
+    assert delays(one(x, y, 1.0, 1.0), 0.1)[0] == pytest.approx(0.1 * share)
+    assert delays(one(x, y, 1.0, 1.0), -0.1)[0] == pytest.approx(-0.1 * share)
 
 
 @given(st.floats(2, 30), st.floats(-0.999, 0.999), st.floats(0.2, 4))
@@ -103,19 +102,19 @@ def test_what_lies_across_the_seam_is_seen_at_the_mean_time_of_its_parts(distanc
     bearing = np.pi + side * wide  # the seam is within it
     parts = np.linspace(bearing - wide, bearing + wide, 20001)
     mean = np.angle(np.exp(1j * parts)).mean()
-    found = lateness(one(distance * np.cos(bearing), distance * np.sin(bearing), length, 0.0), 1.0)[0]
+    found = delays(one(distance * np.cos(bearing), distance * np.sin(bearing), length, 0.0), 1.0)[0]
     assert found == pytest.approx(-mean / (2 * np.pi), abs=1e-3)
 
 
 @given(st.floats(0, 20), st.floats(-1, 1), st.floats(-1, 1), st.floats(-0.2, 0.2), st.sampled_from([0.1, -0.1]))
 def test_what_was_seen_goes_by_its_share_of_a_correction(speed, turn, faster, turns_more, turn_s):
-    """Placing it anew by the corrected pose, and by the motion that led there, moves it as far."""
+    """Placement it anew by the corrected pose, and by the motion that led there, moves it as far."""
     proposals = skewed(np.array([box(12, 4), box(-3, 8), box(-9, -9), box(2, -6)]), 0, turn_s, 0, 0, True)[1]
-    skew, before = Skew.of(proposals, turn_s), pose(0, 0, 0)
+    skew, before = SweepSkew.of(proposals, turn_s), pose(0, 0, 0)
 
     def place(after):
         step = skew.step(Motion.between(before, after, PERIOD_S), after)
-        return sight(proposals, after).centroid + step
+        return observe(proposals, after).centroid + step
 
     predicted, after = pose(PERIOD_S, speed, turn), pose(PERIOD_S, speed + faster, turn + turns_more)
     placed = np.c_[place(predicted), np.zeros((4, 2))] + [0, 0, 0, 1]
@@ -126,15 +125,15 @@ def test_what_was_seen_goes_by_its_share_of_a_correction(speed, turn, faster, tu
 
 @pytest.mark.parametrize(("told", "least_deg", "most_deg"), [(True, 0.0, 0.02), (False, 0.03, 1.0)])
 def test_a_registration_that_is_told_the_shares_is_right_at_once(told, least_deg, most_deg):
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street(n=120)
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street(n=120)
     for i in range(6):
         tracker.follow(*skewed(world, i, 0.1, 8.0, 0.6, posed=True))
     frame, proposals = skewed(world, 6, 0.1, 8.0, 0.6, posed=True)
-    before, true, skew = pose(0.5, 8.0, 0.6), frame.T_world_sensor, Skew.of(proposals, 0.1)
+    before, true, skew = pose(0.5, 8.0, 0.6), frame.T_world_sensor, SweepSkew.of(proposals, 0.1)
     predicted = true @ se3(rotation_zyx(0, 0, 0.01), np.array([0.2, 0.0, 0.0]))
     step = skew.step(Motion.between(before, predicted, PERIOD_S), predicted)
     share = skew.share(PERIOD_S) if told else 1.0
-    found = Registration().correct(tracker.tracks, sight(proposals, predicted).moved(step), share) @ predicted
+    found = Registration().correct(tracker.tracks, observe(proposals, predicted).moved(step), share) @ predicted
     assert least_deg <= abs(np.rad2deg(yaw_of(inverse(true) @ found))) < most_deg
 
 
@@ -148,13 +147,13 @@ def test_proposals_are_where_their_points_are_one_by_one(turn_s):
 
     world = np.array([box(12, 4), box(-3, 8), box(-14, 4), box(-9, -9), box(2, -6), box(25, -12)])
     frame, proposals = skewed(world, 0, turn_s, speed, turn, posed=True)
-    skew = Skew.of(proposals, turn_s)
-    mended = sight(proposals, at(0)).moved(skew.step(Motion.between(at(-PERIOD_S), at(0), PERIOD_S), at(0)))
+    skew = SweepSkew.of(proposals, turn_s)
+    mended = observe(proposals, at(0)).moved(skew.step(Motion.between(at(-PERIOD_S), at(0), PERIOD_S), at(0)))
     true_frame, true_proposals = frame_of(world, 0, points=80)
-    true = sight(true_proposals, np.eye(4))
-    raw = sight(proposals, at(0))
+    true = observe(true_proposals, np.eye(4))
+    raw = observe(proposals, at(0))
     assert np.abs(mended.centroid - true.centroid).max() < 0.03
-    assert np.abs(mended.outline - true.outline).max() < 0.08
+    assert np.abs(mended.kdop - true.kdop).max() < 0.08
     assert np.abs(raw.centroid - true.centroid).max() > 0.3
     np.testing.assert_allclose(mended.box[:, :2] - raw.box[:, :2], mended.centroid - raw.centroid)
     assert len(frame.points) == len(true_frame.points)
@@ -168,7 +167,7 @@ def test_no_time_is_no_motion():
 
 def drive(turn_s, known, posed=False, frames=25):
     """The tracker after a drive of 8 m/s that turns at 35 degrees a second, its sweeps skewed."""
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
 
     for i in range(frames):
         frame, proposals = skewed(street(n=60), i, turn_s, 8.0, 0.6, posed)
@@ -195,7 +194,7 @@ def test_what_stands_stays_where_it_is_though_its_sweeps_are_skewed():
         t = tracker.tracks
         assert len(t) == 60
         place = street(n=60)[:, :2]
-        near = np.hypot(*(t.outline[:, [0, 2]] / 2 - t.outline[:, [4, 6]] / 2 - place).T)
+        near = np.hypot(*(t.kdop[:, [0, 2]] / 2 - t.kdop[:, [4, 6]] / 2 - place).T)
         assert np.median(near) < 0.05
         assert near.max() < 0.3
     first, _ = drive(0.1, known=True, posed=True, frames=1)
@@ -203,7 +202,7 @@ def test_what_stands_stays_where_it_is_though_its_sweeps_are_skewed():
 
 
 def test_sweeps_seen_at_once_are_left_as_they_are():
-    trackers = [Tracker(TrackingConfig(), EFFICIENT) for _ in range(2)]
+    trackers = [Follower(TrackingConfig(), EFFICIENT) for _ in range(2)]
     for i in range(8):
         T = pose(0.1 * i, 8.0, 0.6)
         frame, proposals = frame_of(street(n=30), i, None if i % 2 else T, points=40)

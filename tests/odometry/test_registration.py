@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
-from modt.geometry.kdop import WAYS
-from modt.observations import sight
+from modt.geometry.kdop import DIRECTIONS
+from modt.observations import observe
 from modt.odometry import landmarks
 from modt.odometry.registration import GATE_M, REACH_M, SCALES, Fit, Registration, _fit, _mutual
 from modt.tracking.states import EFFICIENT
-from modt.tracking.track_table import Followed
-from modt.tracking.tracker import Tracker, rigid
-from tests.tracking.tracking_scenes import frame_of
+from modt.tracking.track_table import TrackTable
+from modt.tracking.tracker import rigid
+from tests.tracking.tracking_scenes import Follower, frame_of
 
 
 def street(seed=0, n=40):
@@ -30,7 +30,7 @@ def drive(i):
 
 
 def follow(n, moving=0, posed=False):
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
     world = street()
     for i in range(n):
         now = world.copy()
@@ -60,7 +60,7 @@ def test_a_pose_that_is_given_is_taken():
 
 
 def test_odometry_that_fails_for_a_while_is_bridged():
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street()
     for i in range(20):
         T = drive(i)
         frame = frame_of(transform_boxes(inverse(T), world), i, None if 8 <= i < 14 else T, points=150)
@@ -70,7 +70,7 @@ def test_odometry_that_fails_for_a_while_is_bridged():
 
 
 def test_odometry_that_begins_late_finds_the_tracks_where_they_are():
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street()
     T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
     for i in range(20):
         T = None if i < 6 or i in (12, 13) else T_elsewhere @ drive(i)
@@ -81,7 +81,7 @@ def test_odometry_that_begins_late_finds_the_tracks_where_they_are():
 
 
 def test_odometry_that_begins_anew_moves_no_track():
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street()
     for i in range(20):
         T = drive(i) if i < 8 else None if i in (8, 9) else inverse(drive(10)) @ drive(i)
         frame, proposals = frame_of(transform_boxes(inverse(drive(i)), world), i, T, points=150)
@@ -92,7 +92,7 @@ def test_odometry_that_begins_anew_moves_no_track():
 
 
 def test_a_first_pose_far_from_the_origin_is_no_motion():
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street()
     T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
     for i in range(4):
         T = T_elsewhere @ drive(0) if i == 0 else None
@@ -121,7 +121,7 @@ def outward(lever):
     out = np.zeros((3, 8, len(lever)))
     for k, (x, y) in enumerate(lever):
         for e in range(8):
-            out[:, e, k] = WAYS[0, e], WAYS[1, e], WAYS[0, e] * -y + WAYS[1, e] * x
+            out[:, e, k] = DIRECTIONS[0, e], DIRECTIONS[1, e], DIRECTIONS[0, e] * -y + DIRECTIONS[1, e] * x
     return out
 
 
@@ -171,7 +171,7 @@ def test_mutual_pairs_are_the_best_of_both(n, seed):
 
 def test_a_turn_that_begins_and_ends_at_once_is_followed():
     """The prediction is off by metres far away when it begins; pairs are then sought farther away."""
-    tracker, yaw, x, y = Tracker(TrackingConfig(), EFFICIENT), 0.0, 0.0, 0.0
+    tracker, yaw, x, y = Follower(TrackingConfig(), EFFICIENT), 0.0, 0.0, 0.0
     world = street()
     for i in range(30):
         yaw += 0.08 if 10 <= i < 20 else 0.0
@@ -187,7 +187,7 @@ def test_a_turn_that_begins_and_ends_at_once_is_followed():
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_turn_that_begins_too_suddenly_to_be_found_at_once_is_sought_again(seed):
-    tracker, world, yaw, x, y = Tracker(TrackingConfig(), EFFICIENT), street(seed, 150), 0.0, 0.0, 0.0
+    tracker, world, yaw, x, y = Follower(TrackingConfig(), EFFICIENT), street(seed, 150), 0.0, 0.0, 0.0
     for i in range(14):
         yaw += 0.1 if i >= 10 else 0.0
         x, y = x + 0.8 * np.cos(yaw), y + 0.8 * np.sin(yaw)
@@ -201,7 +201,7 @@ def test_a_turn_that_begins_too_suddenly_to_be_found_at_once_is_sought_again(see
 @pytest.mark.parametrize("turn", [0.15, -0.15])
 def test_a_sensor_that_turns_fast_from_the_outset_is_followed(turn):
     """Where nothing is known of the motion turns are tried: a vote among shifts alone would be led astray."""
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street(n=150)
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street(n=150)
     for i in range(4):
         T = se3(rotation_zyx(0, 0, turn * i), np.zeros(3))
         tracker.follow(*frame_of(transform_boxes(inverse(T), world), i, None, points=60))
@@ -224,14 +224,14 @@ def test_a_fit_of_a_few_is_doubted(near, far, taken, monkeypatch):
     registration._begun = registration._settled = True
     registration._agreed = 30
     monkeypatch.setattr(registration, "_solve", lambda *arguments, choices: fits[arguments[4]])
-    _, sightings = frame_of([], 0, np.eye(4))
-    motion = registration.correct(Followed.blank(), sight(sightings, np.eye(4)))
+    _, observations = frame_of([], 0, np.eye(4))
+    motion = registration.correct(TrackTable.blank(), observe(observations, np.eye(4)))
     np.testing.assert_allclose(motion[0, 3], {"near": 0.01, "far": 0.03}[taken])
 
 
 def test_the_error_of_one_frame_is_not_handed_on():
     """Landmarks keep to where they were seen on average, so a pose found wrongly does not move the world."""
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street()
     rng = np.random.default_rng(5)
     for i in range(80):
         seen = transform_boxes(inverse(drive(0)), world)
@@ -243,38 +243,38 @@ def test_the_error_of_one_frame_is_not_handed_on():
 
 def test_landmarks_begin_anew_where_odometry_fails_again():
     """What drifted while poses were given does not leap back to where it stood before."""
-    tracker, world = Tracker(TrackingConfig(), EFFICIENT), street()
+    tracker, world = Follower(TrackingConfig(), EFFICIENT), street()
     for i in range(206):
         drifted = None if i < 6 else se3(np.eye(3), np.array([0.15 * (i - 6) / 199, 0.0, 0.0]))
         tracker.follow(*frame_of(world, i, drifted, points=150))
-        assert i < 7 or not tracker.tracks.stood.any()
+        assert i < 7 or not tracker.tracks.stationary_frames.any()
     left = tracker.T_world_sensor[0, 3]
     for i in range(206, 211):
         tracker.follow(*frame_of(world, i, None, points=150))
         assert abs(tracker.T_world_sensor[0, 3] - left) < 0.01
-    assert tracker.tracks.stood.max() > 3
+    assert tracker.tracks.stationary_frames.max() > 3
 
 
 def test_the_mean_outline_is_the_mean_of_what_was_seen_since_it_stands():
     rng = np.random.default_rng(3)
-    tracks, place, seen = Followed.blank(3), rng.uniform(5, 20, (3, 8)), []
+    tracks, place, seen = TrackTable.blank(3), rng.uniform(5, 20, (3, 8)), []
     tracks.proposal[:2] = [1, 0]  # the third is not seen
-    tracks.still[:] = True
+    tracks.stationary[:] = True
     for _ in range(9):
-        tracks.outline[:] = place + rng.normal(0, 0.01, (3, 8))
-        seen.append(tracks.outline.copy())
+        tracks.kdop[:] = place + rng.normal(0, 0.01, (3, 8))
+        seen.append(tracks.kdop.copy())
         landmarks.keep(tracks)
-        np.testing.assert_allclose(tracks.landmark[:2], np.mean(seen, axis=0)[:2], atol=1e-9)
-    assert tracks.stood.tolist() == [9, 9, 0]
-    assert not tracks.landmark[2].any()
-    tracks.outline[0, 2] += 0.5  # another end comes into view
-    before = tracks.landmark.copy()
+        np.testing.assert_allclose(tracks.landmark_kdop[:2], np.mean(seen, axis=0)[:2], atol=1e-9)
+    assert tracks.stationary_frames.tolist() == [9, 9, 0]
+    assert not tracks.landmark_kdop[2].any()
+    tracks.kdop[0, 2] += 0.5  # another end comes into view
+    before = tracks.landmark_kdop.copy()
     landmarks.keep(tracks)
-    assert tracks.landmark[0, 2] == tracks.outline[0, 2]
-    np.testing.assert_allclose(np.delete(tracks.landmark[0], 2), np.delete(before[0], 2), atol=0.01)
-    tracks.still[:] = False
+    assert tracks.landmark_kdop[0, 2] == tracks.kdop[0, 2]
+    np.testing.assert_allclose(np.delete(tracks.landmark_kdop[0], 2), np.delete(before[0], 2), atol=0.01)
+    tracks.stationary[:] = False
     for _ in range(8):  # it drives off: what it was seen as before is no landmark
-        tracks.outline[:] += 0.4
+        tracks.kdop[:] += 0.4
         landmarks.keep(tracks)
-        np.testing.assert_array_equal(tracks.landmark[:2], tracks.outline[:2])
-    assert not tracks.stood.any()
+        np.testing.assert_array_equal(tracks.landmark_kdop[:2], tracks.kdop[:2])
+    assert not tracks.stationary_frames.any()

@@ -6,6 +6,7 @@ from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.meters.model import ModelMeter
 from modt.energy.windows import Clocks, Windows
+from modt.pipeline import STAGES
 from modt.reporting.comparison import COUNTS, ModeRun, RecordingClassifier, interleave, total
 from modt.types import UNLIMITED, Budget, Frame
 from tests.results import CAR, result
@@ -81,7 +82,7 @@ def test_lives_are_the_frames_in_which_a_track_was_seen(one):
 
 
 def test_cpu_time_has_a_column_a_stage(one):
-    assert one.cpu_s().shape == (6, 5)
+    assert one.cpu_s().shape == (len(FRAMES), len(STAGES))
     assert (one.cpu_s() >= 0).all()
 
 

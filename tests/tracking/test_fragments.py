@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.tracking.fragments import swapped
+from modt.tracking.fragments import swap_proposals
 from modt.types import NONE
 
 
@@ -36,7 +36,7 @@ def test_each_proposal_has_one_track_whoever_wants_it(data, n_tracks, n_proposal
     pair = st.tuples(st.integers(0, n_tracks - 1), st.integers(0, n_proposals - 1))
     pairs = [(elder, part) for elder, part in data.draw(st.lists(pair, max_size=8)) if owner[part] != elder]
     elders, parts = np.array(pairs, np.int64).reshape(-1, 2).T
-    changed, has = swapped(elders, parts, proposal, owner)
+    changed, has = swap_proposals(elders, parts, proposal, owner)
     expected, who = one_by_one(pairs, proposal.tolist(), owner.tolist())
     assert changed.tolist() == sorted(who)
     after = proposal.copy()

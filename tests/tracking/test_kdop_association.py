@@ -2,33 +2,32 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import corners
-from modt.geometry.kdop import AXES, WAYS
-from modt.tracking.background_map import BackgroundMemory, NoMemory
-from modt.tracking.displacement import AGREE_M
+from modt.geometry.kdop import AXES, DIRECTIONS
+from modt.geometry.kdop_displacement import AGREE_M
 from modt.tracking.fragments import _fits
 from modt.tracking.kdop_association import SOFT_M, compare
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
 from modt.types import NONE
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 EYE = np.eye(4)
 BACKGROUND, CAR = np.eye(4)[ObjectClass.BACKGROUND], np.eye(4)[ObjectClass.CAR]
 
 
 def tracker(regroupings=None, **options):
-    return Tracker(TrackingConfig(ask_from=1, **options), EFFICIENT, regroupings=regroupings)
+    return Follower(TrackingConfig(ask_from=1, **options), EFFICIENT, regroupings=regroupings)
 
 
 def classify(tracker, posterior):
     """Settle whatever asks."""
-    rows = np.flatnonzero(tracker.asking())
+    rows = np.flatnonzero(tracker.wants_class)
     tracker.tracks.posterior[rows], tracker.tracks.final[rows] = posterior, True
-    tracker.settle(rows, np.ones(len(rows), np.bool_))
+    tracker.conclude(rows, np.ones(len(rows), np.bool_))
     return len(rows)
 
 
@@ -40,13 +39,13 @@ def run(tracker, scenes, posterior=BACKGROUND, first=0, **options):
     return asked
 
 
-def outline(centre, half):
-    return (np.asarray(centre) @ WAYS + half)[:, None]
+def kdop(centre, half):
+    return (np.asarray(centre) @ DIRECTIONS + half)[:, None]
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(0.2, 3))
 def test_what_keeps_its_shape_shifts_as_it_moved(dx, dy, half):
-    shift, size, overlap, _ = compare(outline((0, 0), half), outline((dx, dy), half))
+    shift, size, overlap, _ = compare(kdop((0, 0), half), kdop((dx, dy), half))
     np.testing.assert_allclose(shift, [[dx, dy]], atol=1e-9)
     np.testing.assert_allclose(size, 0, atol=1e-9)
     assert 0 <= overlap[0] <= 1
@@ -87,7 +86,7 @@ def test_compare_is_the_slow_one_row_by_row(n, seed):
 
 
 def test_what_only_grows_does_not_shift():
-    before = outline((0, 0), 1.0)
+    before = kdop((0, 0), 1.0)
     for growth in ([2.0, 1.5, 0, 0, 0, 0, 0, 0], [0, 1.0, 2.0, 1.0, 0, 0, 0, 0]):
         shift, _, _, cover = compare(before, before + np.array(growth)[:, None])
         np.testing.assert_allclose(shift, 0, atol=1e-9)
@@ -126,8 +125,8 @@ def test_a_car_behind_a_pole_stays_one_object():
     run(t, [halves, halves[::-1], halves], CAR, first=4, points=(80, 40))
     for_the_larger = t.tracks.id[t.tracks.proposal == 0]
     assert list(for_the_larger) == [0]
-    swapped = [box(11.0, 4, l=1.2), box(13.0, 4, l=1.9)]
-    run(t, [swapped, swapped], CAR, first=7, points=(40, 80))
+    swap_proposals = [box(11.0, 4, l=1.2), box(13.0, 4, l=1.9)]
+    run(t, [swap_proposals, swap_proposals], CAR, first=7, points=(40, 80))
     assert list(t.tracks.id[t.tracks.proposal == 1]) == [0]
     run(t, [whole], CAR, first=9)
     assert list(t.tracks.id[t.tracks.proposal == 0]) == [0]
@@ -164,8 +163,8 @@ def far(i):
 
 
 def test_background_is_remembered_where_it_stood():
-    for memory, asked in ((BackgroundMemory(), 0), (NoMemory(), 1)):
-        t = Tracker(TrackingConfig(ask_from=1, max_missed=2), EFFICIENT, memory=memory)
+    for background_map, asked in ((BackgroundMap(), 0), (NoBackgroundMap(), 1)):
+        t = Follower(TrackingConfig(ask_from=1, max_missed=2), EFFICIENT, background_map=background_map)
         run(t, [[far(0), box(10, 4, 1, 1)]] * 4)
         run(t, [[far(0)]] * 5, first=4)
         assert len(t.tracks) == 1
@@ -213,10 +212,10 @@ def test_what_a_view_said_since_holds_away_from_the_place_too():
 
 
 def test_memory_forgets_the_oldest():
-    memory = BackgroundMemory(capacity=3)
-    t = Tracker(TrackingConfig(ask_from=1, max_missed=0), EFFICIENT, memory=memory)
+    background_map = BackgroundMap(capacity=3)
+    t = Follower(TrackingConfig(ask_from=1, max_missed=0), EFFICIENT, background_map=background_map)
     for i in range(5):
         run(t, [[box(10 + 5 * i, 0, 1, 1)]] * 2, first=2 * i)
-    assert len(memory) == 3
+    assert len(background_map) == 3
     assert run(t, [[box(10, 0, 1, 1)]], first=10) == 1
     assert run(t, [[box(20, 0, 1, 1)]], first=11) == 0

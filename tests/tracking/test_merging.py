@@ -6,18 +6,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from modt.tracking.unions import Unions, united_proposals, united_sightings
 
 from modt.classes import N_CLASSES, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import boxes_about, corners, inverse, rotation_zyx, se3, transform_boxes, upright_box
-from modt.geometry.kdop import WAYS
-from modt.observations import sight
+from modt.geometry.kdop import DIRECTIONS
+from modt.observations import observe
 from modt.segmentation.reflectance_statistics import brightness
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
-from modt.tracking.unions import Unions, united_proposals, united_sightings
 from modt.types import NONE
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 CAR = box(10, 3, 4.2, 1.8, 1.5)
 REAR, FRONT = box(8.6, 3, 1.4, 1.8, 1.5), box(11.1, 3, 2.0, 1.8, 1.5)
@@ -52,9 +51,9 @@ def seen(tracker, bodies, i, pose=still, points=80):
     return [tracker.tracks.id[row[own[0]]] for own in label.reshape(len(bodies), points)]
 
 
-def known(bodies, kinds, pose=still, frames=KNOWN, association="robust", fixed=True):
+def known(bodies, kinds, pose=still, frames=KNOWN, association="kdop", fixed=True):
     """A tracker that knows these bodies."""
-    tracker = Tracker(TrackingConfig(association=association), EFFICIENT)
+    tracker = Follower(TrackingConfig(association=association), EFFICIENT)
     for i in range(frames):
         seen(tracker, bodies, i, pose)
         settle(tracker, *kinds, fixed=fixed)
@@ -72,8 +71,8 @@ def known(bodies, kinds, pose=still, frames=KNOWN, association="robust", fixed=T
 def test_what_a_car_is_one_with_is_not_what_was_seen_of_it(kind, length_m, known_m):
     tracker = known([box(10, 3, 5.0, 1.8, 1.5)], [kind])
     assert seen(tracker, [box(10, 3, length_m, 1.8, 1.5)], KNOWN) == [0]
-    hull = tracker.tracks.hull[0]
-    assert hull[0] + hull[4] == pytest.approx(known_m, abs=0.25)
+    envelope = tracker.tracks.envelope[0]
+    assert envelope[0] + envelope[4] == pytest.approx(known_m, abs=0.25)
 
 
 @pytest.mark.parametrize("pose", [still, driving])
@@ -148,8 +147,8 @@ YOUNGER = box(15, 3, 4.2, 1.8, 1.5)
 def two_cars(ahead_m=0.0, behind_m=0.0):
     """A tracker that knows CAR, who was once taken for longer ahead, and YOUNGER, once taken for longer behind."""
     tracker = known([CAR, YOUNGER], [ObjectClass.CAR, ObjectClass.CAR])
-    tracker.tracks.hull[0] += np.maximum(WAYS[0], 0) * ahead_m
-    tracker.tracks.hull[1] += np.maximum(-WAYS[0], 0) * behind_m
+    tracker.tracks.envelope[0] += np.maximum(DIRECTIONS[0], 0) * ahead_m
+    tracker.tracks.envelope[1] += np.maximum(-DIRECTIONS[0], 0) * behind_m
     return tracker
 
 
@@ -213,13 +212,13 @@ def test_unions_hold_what_their_parts_did(counts, yaw, data):
 
     T = driving(3)
     seen = dataclasses.replace(after, coordinates=frame.points[after.members, :3].T)
-    fresh, said = sight(seen, T), united_sightings(sight(proposals, T), unions, after, T)
+    fresh, said = observe(seen, T), united_sightings(observe(proposals, T), unions, after, T)
     for column in dataclasses.fields(fresh):
         if column.name != "cut":
             np.testing.assert_allclose(
                 getattr(said, column.name), getattr(fresh, column.name), atol=1e-4, err_msg=column.name
             )
-    assert said.cut[unions.new].all()
+    assert said.partial[unions.new].all()
 
 
 def test_nothing_is_known_of_the_brightness_of_a_union_with_what_has_none():

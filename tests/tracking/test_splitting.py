@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from modt.tracking.carving import carved
 
 from modt.classes import N_CLASSES, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
-from modt.tracking.carving import carved
 from modt.tracking.splitting import AT_MOST, _Scene, _walks
 from modt.tracking.states import EFFICIENT
-from modt.tracking.track_table import Followed
-from modt.tracking.tracker import Tracker
+from modt.tracking.track_table import TrackTable
 from modt.types import NONE
 from tests.odometry.test_deskew import skewed
-from tests.tracking.tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 EYE = np.eye(4)
 WALL = box(12, 3, l=16.0, w=0.3, h=2.5, z=-0.5)
@@ -82,14 +81,14 @@ def held(tracker, n):
     return ids, shares
 
 
-def walk(frames, touching, association="robust", pose=still):
+def walk(frames, overlapping_pairs, association="kdop", pose=still):
     """A tracker, and (ids of walker and wall, proposals) of every frame, in some of which they touch."""
-    tracker, seen = Tracker(TrackingConfig(association=association), EFFICIENT), []
+    tracker, seen = Follower(TrackingConfig(association=association), EFFICIENT), []
     for i in range(frames):
         T = pose(i)
         bodies = transform_boxes(pose(0), np.array([walker(i), WALL]))
         found = frame_of(transform_boxes(inverse(T), bodies), i, T, points=[PERSON_POINTS, WALL_POINTS])
-        tracker.follow(*(merged(*found, [(0, 1)]) if i in touching else found))
+        tracker.follow(*(merged(*found, [(0, 1)]) if i in overlapping_pairs else found))
         seen.append((*held(tracker, 1)[0], len(tracker.proposals)))
     return tracker, seen
 
@@ -109,14 +108,14 @@ def test_the_paper_takes_proposals_as_they_are():
 def test_neither_what_is_taken_nor_what_is_left_measures_anything():
     (together, _), (apart, _) = walk(MEET + 1, {MEET}), walk(MEET + 1, ())
     assert (together.tracks.P[:, 0, 0] > 1.5 * apart.tracks.P[:, 0, 0]).all()
-    assert together.tracks.takes.tolist() == [1, 0]
+    assert together.tracks.splits.tolist() == [1, 0]
 
 
 def test_nobody_lives_on_what_is_taken():
-    touching = range(MEET, MEET + AT_MOST + 2)
-    tracker, seen = walk(touching.stop + 2, touching)
+    overlapping_pairs = range(MEET, MEET + AT_MOST + 2)
+    tracker, seen = walk(overlapping_pairs.stop + 2, overlapping_pairs)
     assert [n for *_, n in seen[MEET:]] == [2] * AT_MOST + [1] * 2 + [2] * 2
-    assert tracker.tracks.takes.tolist() == [0, 0]
+    assert tracker.tracks.splits.tolist() == [0, 0]
 
 
 @pytest.mark.parametrize(
@@ -129,7 +128,7 @@ def test_nobody_lives_on_what_is_taken():
     ],
 )
 def test_what_is_not_there_is_not_taken(change, points, wall, why):
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
     for i in range(MEET):
         tracker.follow(*scene(i))
     frame = frame_of([walker(MEET, **change), wall], MEET, EYE, points=[points, 40])
@@ -146,7 +145,7 @@ def test_what_is_not_there_is_not_taken(change, points, wall, why):
     ],
 )
 def test_who_stands_takes_only_what_a_known_object_does(kind, frames, parts):
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
     for i in range(frames + 1):
         tracker.tracks.posterior[:] = np.eye(N_CLASSES)[[kind, ObjectClass.BACKGROUND]] if i else 0
         tracker.follow(*scene(i, walker(0), together=i == frames))
@@ -155,7 +154,7 @@ def test_who_stands_takes_only_what_a_known_object_does(kind, frames, parts):
 
 def test_a_car_is_sought_in_what_is_longer_than_was_seen_of_it():
     """Two of which half is seen are no longer than one may be."""
-    tracker, halves, ids = Tracker(TrackingConfig(), EFFICIENT), [box(10, 3, 2.0, 1.6), box(12.4, 3, 2.0, 1.6)], []
+    tracker, halves, ids = Follower(TrackingConfig(), EFFICIENT), [box(10, 3, 2.0, 1.6), box(12.4, 3, 2.0, 1.6)], []
     for i in range(8):
         tracker.tracks.posterior[:] = np.eye(N_CLASSES)[ObjectClass.CAR]
         found = frame_of([*halves, [*WALL[:1], 9, *WALL[2:]]], i, EYE, points=[*[PERSON_POINTS] * 2, WALL_POINTS])
@@ -168,7 +167,7 @@ def test_a_car_is_sought_in_what_is_longer_than_was_seen_of_it():
 
 
 def test_what_was_away_takes_nothing():
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
     for i in range(MEET):
         tracker.follow(*scene(i))
     tracker.follow(*frame_of([WALL], MEET, EYE, points=WALL_POINTS))
@@ -178,7 +177,7 @@ def test_what_was_away_takes_nothing():
 
 def test_who_is_gone_takes_nothing_of_whom_he_walked_beside():
     """The other is seen where he is himself expected in part, and as large as before."""
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
     for i in range(MEET):
         tracker.follow(*scene(i, walker(i, 2.15), walker(i)))
     tracker.follow(*scene(MEET, walker(MEET, 2.15)))
@@ -187,7 +186,7 @@ def test_who_is_gone_takes_nothing_of_whom_he_walked_beside():
 
 
 def test_what_hangs_above_is_left():
-    tracker, roof = Tracker(TrackingConfig(), EFFICIENT), box(10, 2.5, l=8.0, w=3.0, h=0.5, z=1.2)
+    tracker, roof = Follower(TrackingConfig(), EFFICIENT), box(10, 2.5, l=8.0, w=3.0, h=0.5, z=1.2)
     for i in range(MEET + 1):
         found = frame_of([walker(i), roof], i, EYE, points=[PERSON_POINTS, WALL_POINTS])
         tracker.follow(*(merged(*found, [(0, 1)]) if i == MEET else found))
@@ -201,15 +200,15 @@ def test_what_hangs_above_is_left():
     ("change", "walks"),
     [
         ({}, True),
-        ({"hull": np.full(8, 0.8)}, False),  # as long as a bicycle
+        ({"envelope": np.full(8, 0.8)}, False),  # as long as a bicycle
         ({"top": 0.4}, False),  # a kerb
-        ({"home": [4.0, 0.0]}, False),  # back home
+        ({"rest_position": [4.0, 0.0]}, False),  # back home
         ({"P": np.eye(4)}, False),  # may stand
     ],
 )
 def test_walking_is_told_by_shape_and_way(change, walks):
-    tracks = Followed.blank(1)
-    tracks.x[:], tracks.P[:], tracks.hull[:], tracks.top[:] = [5, 0, 0, 1.3], 0.1 * np.eye(4), 0.3, 1.7
+    tracks = TrackTable.blank(1)
+    tracks.x[:], tracks.P[:], tracks.envelope[:], tracks.top[:] = [5, 0, 0, 1.3], 0.1 * np.eye(4), 0.3, 1.7
     for column, value in change.items():
         getattr(tracks, column)[:] = value
     assert _walks(tracks, np.array([0])).tolist() == [walks]
@@ -217,7 +216,7 @@ def test_walking_is_told_by_shape_and_way(change, walks):
 
 @pytest.mark.parametrize("apart_m", [0.62, 0.8])
 def test_two_who_walk_side_by_side_into_a_wall_share_no_point(apart_m):
-    tracker, ids = Tracker(TrackingConfig(), EFFICIENT), []
+    tracker, ids = Follower(TrackingConfig(), EFFICIENT), []
     for i in range(MEET + 4):
         tracker.follow(*scene(i, walker(i, 2.5 - apart_m), walker(i), together=i in {MEET, MEET + 1}))
         found, shares = held(tracker, 2)
@@ -227,7 +226,7 @@ def test_two_who_walk_side_by_side_into_a_wall_share_no_point(apart_m):
 
 
 def test_two_who_meet_are_told_apart_by_where_each_is_expected():
-    tracker, ids = Tracker(TrackingConfig(), EFFICIENT), []
+    tracker, ids = Follower(TrackingConfig(), EFFICIENT), []
     for i in range(MEET + 8):
         tracker.tracks.posterior[:] = np.eye(N_CLASSES)[ObjectClass.PEDESTRIAN]
         bodies = [walker(i, y=2.0), box(12.2 - STEP_M * i, 2.65, 0.6, 0.6, 1.7, z=-0.85), [*WALL[:1], 9, *WALL[2:]]]
@@ -241,7 +240,7 @@ def test_two_who_meet_are_told_apart_by_where_each_is_expected():
 
 def test_who_is_taken_was_seen_when_the_head_looked_there_not_at_the_middle_of_the_wall():
     """The wall, 40 m long, is seen over a third of a sweep, in which the sensor goes 0.7 m."""
-    tracker, wall = Tracker(TrackingConfig(), EFFICIENT), box(30, 6, l=40.0, w=0.3, h=2.5, z=-0.5)
+    tracker, wall = Follower(TrackingConfig(), EFFICIENT), box(30, 6, l=40.0, w=0.3, h=2.5, z=-0.5)
     for i in range(11):
         frame, proposals = skewed(np.array([walker(86, y=5.4), wall]), i, 0.1, 20.0, 0.0, True)
         tracker.tracks.posterior[:] = np.eye(N_CLASSES)[[ObjectClass.PEDESTRIAN, ObjectClass.BACKGROUND]] if i else 0

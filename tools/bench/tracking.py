@@ -19,7 +19,7 @@ import numpy as np
 from modt.cli import track
 from modt.config import TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
-from modt.observations import sight
+from modt.observations import observe
 from modt.odometry.registration import Registration
 from modt.sources.detections import TYPES, Detections, files, read
 from modt.tracking.states import EFFICIENT
@@ -87,9 +87,9 @@ def registration_ms(scene: list[tuple[Frame, Proposals]]) -> float:
     tracker, registration = Tracker(TrackingConfig(), EFFICIENT), Registration()
     times = []
     for frame, proposals in scene:
-        sightings = sight(proposals, se3(np.eye(3), frame.T_world_sensor[:3, 3] + OFF_M))
+        observations = observe(proposals, se3(np.eye(3), frame.T_world_sensor[:3, 3] + OFF_M))
         began = time.thread_time_ns()
-        registration.correct(tracker.tracks, sightings)
+        registration.correct(tracker.tracks, observations)
         times.append(time.thread_time_ns() - began)
         tracker.follow(frame, proposals)
         classify(tracker)

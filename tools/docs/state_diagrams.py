@@ -14,8 +14,8 @@ def mermaid(machine: StateMachine) -> str:
     """The machine as a Mermaid state diagram, one arrow for all events between two states."""
     arrows: dict[tuple[str, str], list[str]] = {}
     for t in machine.transitions:
-        arrows.setdefault((t.source, t.target), []).append(t.event)
-    lines = [f"    {a} --> {b}: {', '.join(dict.fromkeys(events))}" for (a, b), events in arrows.items()]
+        arrows.setdefault((t.source, t.target), []).append(t.label)
+    lines = [f"    {a} --> {b}: {', '.join(dict.fromkeys(labels))}" for (a, b), labels in arrows.items()]
     first, last = machine.names[machine.proposal], machine.names[machine.deleted]
     return "\n".join(["stateDiagram-v2", f"    [*] --> {first}", *lines, f"    {last} --> [*]"])
 

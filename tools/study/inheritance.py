@@ -17,12 +17,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from modt.tracking.background_map import NoBackgroundMap
 
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.cli.assemble import MODES
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.background_map import NoMemory
-from modt.tracking.track_table import Followed
+from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Int
 from tools.study.truth_replay import Seen, add_drives, replay
 
@@ -57,7 +57,7 @@ class Tally:
         still_wrong: dict[int, int] = {}
         for s in seen:
             table = s.tracker.tracks
-            assert isinstance(table, Followed)
+            assert isinstance(table, TrackTable)
             rows = np.flatnonzero(table.proposal != NONE)
             proposal = table.proposal[rows]
             sure = (s.body[proposal] != NONE) & (s.share[proposal] > PURE)
@@ -118,9 +118,11 @@ def main() -> None:
         for seed in range(*arguments.seeds):
             stream = SyntheticStream(scene, arguments.sensor, arguments.seconds, seed)
             kind_of = np.array([int(body.kind.object_class) for body in stream.simulator.world.bodies])
-            for tally, memory in ((with_memory, None), (without, NoMemory())):
+            for tally, background_map in ((with_memory, None), (without, NoBackgroundMap())):
                 camera = arguments.fov == "camera"
-                seen = replay(stream, arguments.sensor, mode_name=arguments.mode, camera=camera, memory=memory)
+                seen = replay(
+                    stream, arguments.sensor, mode_name=arguments.mode, camera=camera, background_map=background_map
+                )
                 tally.add(seen, kind_of)
         print(f"{scene}, {arguments.fov}, {arguments.mode}, seeds {arguments.seeds[0]} to {arguments.seeds[1] - 1}")
         print(table_of(with_memory, without), flush=True)

@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
 
-from modt.cli import assemble
+from modt import assembly
 from modt.cli.options import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.simulation.simulator import Truth
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.background_map import BackgroundMemory, NoMemory
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, FrameResult, Int, Proposals
 
@@ -54,14 +54,14 @@ def replay(
     *,
     mode_name: str = "efficient",
     camera: bool = False,
-    memory: NoMemory | BackgroundMemory | None = None,
+    background_map: NoBackgroundMap | BackgroundMap | None = None,
 ) -> Iterator[Seen]:
     """Every frame; the profile is that of the sensor, the memory the tracker's own where none is given."""
-    profile, mode = load(profile_name), assemble.MODES[mode_name]
+    profile, mode = load(profile_name), assembly.MODES[mode_name]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
-    tracker = Tracker(profile.tracking, mode.machine, memory=memory)
+    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
+    tracker = Tracker(profile.tracking, mode.machine, background_map=background_map)
     pipeline = replace(pipeline, tracker=tracker)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, mode.budget(profile))

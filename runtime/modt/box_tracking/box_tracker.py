@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from modt.box_tracking import constant_velocity
 from modt.config import BoxTrackingConfig
 from modt.geometry import wrap
-from modt.tracking.association import assign_all
 from modt.types import NONE, Bool, Float64, Int
 
 LIMIT = 1.0
@@ -164,3 +164,10 @@ class BoxTracker:
         box = self._box[rows]
         box[:, :2] = self._x[rows, :2]
         return Reported(self._id[rows], box, confidence[rows], self._source[rows])
+
+
+def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
+    """Rows and columns of a least-cost assignment of few to few; cost (n, k), not those of limit or more."""
+    rows, columns = linear_sum_assignment(np.minimum(cost, limit))
+    chosen = cost[rows, columns] < limit
+    return rows[chosen], columns[chosen]

@@ -8,6 +8,7 @@ from itertools import chain, islice
 
 import numpy as np
 
+from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
@@ -66,10 +67,10 @@ class Comparison:
         return runs
 
     def _mode_run(self, name: str, seed: int) -> ModeRun:
-        mode = assemble.MODES[BASELINE if name == VARIED else name]
+        mode = assembly.MODES[BASELINE if name == VARIED else name]
         ledger = Ledger()
         fov = assemble.field_of_view(self.request, assemble.stream(self.request))
-        pipeline = assemble.pipeline(mode, self.profile, fov, ledger)
+        pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
         recorder = RecordingClassifier(pipeline.classifier)
         budget = mode.budget(self.profile)
         return ModeRun(

@@ -2,24 +2,49 @@
 
 from modt.config.base import StageConfig, ValueRangeError
 from modt.config.box_tracking import BoxTrackingConfig
-from modt.config.classification import ClassificationConfig, FusionConfig, SchedulerConfig
+from modt.config.classification import (
+    CallWorthConfig,
+    ClassificationConfig,
+    CostModelConfig,
+    FusionConfig,
+    SchedulerConfig,
+)
 from modt.config.energy import EnergyConfig, WindowConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.profile import ProfileConfig
+from modt.config.registration import LandmarkConfig, RegistrationConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.sensor import SensorConfig
-from modt.config.tracking import TrackingConfig
+from modt.config.tracking import (
+    FilterConfig,
+    FragmentConfig,
+    KdopAssociationConfig,
+    MergeConfig,
+    PaperAssociationConfig,
+    SplitConfig,
+    TrackingConfig,
+)
 
 __all__ = [
     "BoxTrackingConfig",
+    "CallWorthConfig",
     "ClassificationConfig",
+    "CostModelConfig",
     "EnergyConfig",
+    "FilterConfig",
+    "FragmentConfig",
     "FusionConfig",
+    "KdopAssociationConfig",
+    "LandmarkConfig",
+    "MergeConfig",
     "OdometryConfig",
+    "PaperAssociationConfig",
     "ProfileConfig",
+    "RegistrationConfig",
     "SchedulerConfig",
     "SegmentationConfig",
     "SensorConfig",
+    "SplitConfig",
     "StageConfig",
     "TrackingConfig",
     "ValueRangeError",

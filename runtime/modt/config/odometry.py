@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.config.base import StageConfig, number
+from modt.config.base import StageConfig, mechanism, number
+from modt.config.registration import LandmarkConfig, RegistrationConfig
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -15,3 +16,5 @@ class OdometryConfig(StageConfig):
     max_ahead_s: float = number(60.0, 0.1, 3600.0, "s", "of a pose before its frame; more is another clock")
     max_speed_mps: float = number(60.0, 0.1, 1000.0, "m/s", "of the sensor; poses farther apart: a sender begun anew")
     capacity: int = number(256, 2, 65536, "", "poses kept, and taken in one frame at most")
+    registration: RegistrationConfig = mechanism(RegistrationConfig)
+    landmarks: LandmarkConfig = mechanism(LandmarkConfig)

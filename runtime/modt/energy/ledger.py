@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 SCHEMA = "modt.ledger/1"
-STAGES = ("source", "segmentation", "tracking", "scheduling", "classification", "fusion", "sink")
+STAGES = ("source", "segmentation", "odometry", "tracking", "scheduling", "classification", "fusion", "sink")
 
 Clock = Callable[[], int]
 Line = dict[str, Any]

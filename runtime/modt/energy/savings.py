@@ -66,7 +66,7 @@ class UnitCosts:
 
     Attributes:
         seg: E(seg), a frame.
-        track: tracking of a frame, as in tracking-by-detection.
+        track: odometry and tracking of a frame, as in tracking-by-detection.
         class_call, class_item, class_point: of a call of the classifier, of a proposal in it, and of a point of it.
     """
 
@@ -90,7 +90,7 @@ class OtherCosts:
     """Mean energy a frame of the stages that Equation 2 leaves out, in the unit of UnitCosts.
 
     Attributes:
-        track: tracking.
+        track: odometry and tracking.
         schedule: scheduling and fusion.
     """
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from modt.energy.savings import OtherCosts, Prediction, UnitCosts, predict
-from modt.pipeline import CLASSIFICATION, FUSION, SCHEDULING, SEGMENTATION, STAGES, TRACKING
+from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
 from modt.reporting.comparison import COUNTS, total
 from modt.reporting.quantity import estimate
 from modt.types import Float64, Int
@@ -18,7 +18,9 @@ _BLOCK = 8
 """Frames resampled together, since neighbouring frames are correlated."""
 _RESAMPLES = 400
 _LOAD = [COUNTS.index(name) for name in ("calls", "classified", "points")]
-SEG, TRACK, CLASS, SCHEDULE, FUSE = map(STAGES.index, (SEGMENTATION, TRACKING, CLASSIFICATION, SCHEDULING, FUSION))
+SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
+TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]
+SCHEDULE = [STAGES.index(SCHEDULING), STAGES.index(FUSION)]
 
 Interval = tuple[float, float]
 
@@ -74,7 +76,7 @@ def unit_costs(varied: RunCosts) -> UnitCosts:
     busy = X[:, 0] > 0
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
     solved = np.linalg.lstsq(X[busy] / scale, cost[busy, CLASS], rcond=None)[0] / scale if busy.any() else np.zeros(3)
-    return UnitCosts(float(cost[:, SEG].mean()), float(cost[:, TRACK].mean()), *solved.tolist())
+    return UnitCosts(float(cost[:, SEG].mean()), float(cost[:, TRACK].sum(axis=1).mean()), *solved.tolist())
 
 
 def saving(baseline: RunCosts, run: RunCosts, varied: RunCosts, random: np.random.Generator) -> Saving:
@@ -129,7 +131,7 @@ def mean_interval(values: Float64, random: np.random.Generator) -> Interval:
 def other_costs(run: RunCosts) -> OtherCosts:
     """Mean costs a frame of the stages that Equation 2 leaves out."""
     mean = run.cost.mean(axis=0)
-    return OtherCosts(track=float(mean[TRACK]), schedule=float(mean[[SCHEDULE, FUSE]].sum()))
+    return OtherCosts(float(mean[TRACK].sum()), float(mean[SCHEDULE].sum()))
 
 
 def _blocks(n: int, random: np.random.Generator) -> Int:

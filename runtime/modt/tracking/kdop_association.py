@@ -1,141 +1,72 @@
-"""The association that tracks live by: what survives a change of view, gated by the filter."""
+"""The default association: k-DOPs instead of centroids, gated by the filter."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import ObjectClass
-from modt.config import TrackingConfig
-from modt.geometry.kdop import AXES, WAYS, girth, lengths, touching
-from modt.observations import Sightings
+from modt.config import KdopAssociationConfig
+from modt.geometry.kdop import AXES, overlapping_pairs, width_sum
+from modt.geometry.kdop_displacement import least, measured, shape_similarity
+from modt.observations import Observations
 from modt.tracking import kalman
-from modt.tracking.association import Matches, assign
-from modt.tracking.displacement import least, measured, shift_between
-from modt.tracking.track_table import Followed
-from modt.types import Bool, Float64, Int
-
-SOFT_M = 0.3
-"""Lengths are compared with this added: a difference of a few returns says nothing."""
-GATE = 16.0
-"""Greatest squared Mahalanobis distance of a pair: one true pair in three thousand lies beyond."""
-JUMP_M = 0.2
-"""Outlines jump by this much beyond the filter's noise, as parts of an object come into view and go."""
-COVER = 0.3
-"""Overlap, of the smaller, of what is paired although it changed its shape."""
-GROWTH = 1.5
-"""An object does not become this many times longer, plus a metre, from one frame to the next."""
-LIMIT = 10.0
-"""Cost of leaving a track without a proposal."""
-W_SIZE, W_OVERLAP, W_HEIGHT, W_COUNT = 2.0, 3.0, 2.0, 0.5
+from modt.tracking.assignment import assign
+from modt.tracking.association import Matches
+from modt.tracking.track_table import TrackTable
+from modt.types import Float64
 
 
-class RobustAssociation:
-    """Matches outlines, not centres.
+class KdopAssociation:
+    """Matches k-DOPs.
 
-    What is seen of an object changes with the view: its far side appears, a pole hides its rear, the field of view
-    cuts it. Along each of four axes an outline has two ends. Where both moved alike, the object moved by their mean;
-    where they did not, one of them usually stayed, and the smaller of the two shifts from where the filter expects
-    them is taken for the object's own. (The smaller of two alike would fall short of every motion.) Pairs are
-    gated by the smaller shifts alone.
+    The visible part of an object changes with the view: its far side appears, a pole hides its rear, the field of
+    view cuts it. Along each of four axes a k-DOP has two ends, of which one usually stays: the smaller of their
+    displacements from where the filter expects them is the object's own, and pairs are gated by it alone.
 
     Args:
-        config: deviation of a measured place.
+        config: gate, weights of the cost and noise of the positions.
     """
 
-    def __init__(self, config: TrackingConfig) -> None:
+    def __init__(self, config: KdopAssociationConfig) -> None:
         self.config = config
 
-    def match(self, tracks: Followed, sightings: Sightings) -> Matches:
-        """Pairs within the gate; then, among what is left, those that overlap although they changed their shape."""
-        expected = carried(tracks)
-        variance = self.noise(sightings)
-        rows, columns = self._near(tracks, expected, sightings)
-        a, b = expected.take(rows, axis=1), sightings.outline.take(columns, axis=1)
-        size, overlap, cover = likeness(a, b)
+    def match(self, tracks: TrackTable, observations: Observations) -> Matches:
+        """Pairs of least cost within the gate."""
+        weight = self.config
+        expected = tracks.predicted_kdops()
+        variance = self.noise(observations)
+        reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
+        rows, columns = overlapping_pairs(expected + reach, observations.kdop)
+        a, b = expected.take(rows, axis=1), observations.kdop.take(columns, axis=1)
+        size, overlap = shape_similarity(a, b)
         S = tracks.P[:, :2, :2].transpose(1, 2, 0).copy().take(rows, axis=2)
-        noise = variance[columns] + JUMP_M**2
+        noise = variance[columns] + weight.jump_sigma_m**2
         for k in (0, 1):
             S[k, k] += noise
-        distance = kalman.mahalanobis_squared(AXES @ least(a, b) / 2, S)  # what changed its shape may be far off
-        height = np.abs(tracks.top[rows] - sightings.top[columns])
-        foot = np.abs(tracks.foot[rows] - sightings.foot[columns])
-        count = np.abs(np.log(tracks.points[rows] / sightings.count[columns]))
-        shape = W_SIZE * size + W_OVERLAP * (1 - overlap) + W_HEIGHT * (height + foot) / 2 + W_COUNT * count
+        distance = kalman.mahalanobis_squared(AXES @ least(a, b) / 2, S)
+        height = np.abs(tracks.top[rows] - observations.top[columns])
+        bottom = np.abs(tracks.bottom[rows] - observations.bottom[columns])
+        count = np.abs(np.log(tracks.points[rows] / observations.count[columns]))
+        shape = weight.size_weight * size + weight.overlap_weight * (1 - overlap)
+        shape += weight.height_weight * (height + bottom) / 2 + weight.count_weight * count
         cost = distance / 2 + shape
-        first = ((distance < GATE) & (cost < LIMIT)).nonzero()[0]
-        first = first[assign(rows[first], columns[first], cost[first], LIMIT)]
-        left = _left(rows, rows[first], len(tracks)) & _left(columns, columns[first], len(sightings))
-        second = (left & (cover > COVER)).nonzero()[0]
-        second = second[~self._swallowed(tracks, sightings, rows[second], columns[second])]
-        second = second[assign(rows[second], columns[second], 1 - cover[second], 1.0)]
-        kept = np.concatenate([first, second])
+        near = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
+        kept = near[assign(rows[near], columns[near], cost[near], weight.max_cost)]
         rows, columns = rows[kept], columns[kept]
-        x = tracks.x.take(rows, axis=0)[:, :2]
-        a, b = tracks.shape.T.take(rows, axis=1) + WAYS.T @ x.T, b.take(kept, axis=1)
-        shift, covariance, doubt = measured(a, b, variance[columns], tracks.doubt.T.take(rows, axis=1))
-        covariance *= np.maximum(1.0, distance[kept] / 4)[:, None, None]  # heavy tails: what lies far off says less
-        return Matches(rows, columns, x + shift, covariance, doubt.T)
+        before = tracks.end_variance.T.take(rows, axis=1)
+        shift, covariance, end_variance = measured(
+            a.take(kept, axis=1), b.take(kept, axis=1), variance[columns], before
+        )
+        return Matches(rows, columns, tracks.x.take(rows, axis=0)[:, :2] + shift, covariance, end_variance.T)
 
-    def _swallowed(self, tracks: Followed, sightings: Sightings, rows: Int, columns: Int) -> Bool:
-        """(K,) pairs in which an object would become a part of something larger: it waits until they part again."""
-        grown = lengths(sightings.outline.take(columns, axis=1)).max(axis=0)
-        known = lengths(tracks.hull.take(rows, axis=0).T).max(axis=0)
-        scenery = tracks.final[rows] & (tracks.kind[rows] == ObjectClass.BACKGROUND.value)
-        swallowed: Bool = ~scenery & (grown > GROWTH * known + 1.0)
-        return swallowed
+    def initial_position(self, observations: Observations) -> Float64:
+        """Centre of the k-DOP."""
+        return observations.position
 
-    def birthplace(self, sightings: Sightings) -> Float64:
-        """Middle of the outline."""
-        return sightings.place
-
-    def noise(self, sightings: Sightings) -> Float64:
-        """(P,) variance of a place [m2]: ends of outlines jitter by the spacing of returns, and more where cut."""
-        extent = girth(sightings.outline) / 4
-        sigma = 0.06 + 0.001 * sightings.range_m + 0.03 * np.minimum(extent, 3.0)
-        sigma = np.where(sightings.cut, 1.5 * sigma, sigma)
+    def noise(self, observations: Observations) -> Float64:
+        """(P,) variance of a position [m2]: k-DOPs jitter by the spacing of returns, and more where partial."""
+        noise = self.config
+        extent = np.minimum(width_sum(observations.kdop) / 4, 3.0)
+        sigma = noise.sigma_m + noise.sigma_per_range * observations.range_m + noise.sigma_per_extent * extent
+        sigma = np.where(observations.partial, noise.partial_factor * sigma, sigma)
         variance: Float64 = np.square(sigma)
         return variance
-
-    def _near(self, tracks: Followed, expected: Float64, sightings: Sightings) -> tuple[Int, Int]:
-        """Pairs whose outlines come near enough along x and along y."""
-        reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
-        return touching(expected + reach, sightings.outline)
-
-
-def carried(tracks: Followed, rows: Int | slice = slice(None)) -> Float64:
-    """(8, R) the outlines last seen of the rows, of all by default, where the filter expects them now."""
-    outline: Float64 = (tracks.outline[rows] + (tracks.x[rows, :2] - tracks.shown[rows]) @ WAYS).T.copy()
-    return outline
-
-
-def compare(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64, Float64]:
-    """How outlines b (8, K) lie to outlines a (8, K), one by one.
-
-    Returns:
-        shift: (K, 2) from a to b [m], by both ends along each axis where they agree, else by that which moved less.
-        size: (K,) mean difference of the logarithms of their lengths.
-        overlap: (K,) intersection over union.
-        cover: (K,) intersection over the smaller of the two.
-    """
-    return shift_between(a, b), *likeness(a, b)
-
-
-def likeness(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
-    """(K,) compare's size, overlap and cover."""
-    length_a, length_b = lengths(a), lengths(b)
-    size = np.abs(np.log((length_b + SOFT_M) / (length_a + SOFT_M))).sum(axis=0) / 4
-    pad = SOFT_M / 3
-    common = np.maximum(lengths(np.minimum(a, b)) + pad, 0.0)
-    squares = [side[:2] * side[2:] for side in (length_a + pad, length_b + pad)]
-    shared = common[:2] * common[2:]  # in the upright square, and in the one on its corner
-    overlap = np.minimum(*(shared / (squares[0] + squares[1] - shared)))
-    cover = np.minimum(*(shared / np.minimum(*squares)))
-    return size, overlap, cover
-
-
-def _left(all_: Int, taken: Int, n: int) -> Bool:
-    """(K,) which of the indices were not taken."""
-    gone = np.zeros(n, np.bool_)
-    gone[taken] = True
-    left: Bool = ~gone[all_]
-    return left

@@ -1,15 +1,9 @@
-"""Objects taken out of what they touch, where they are expected.
+"""Objects split off what they touch, where their tracks expect them.
 
-Somebody who walks along a wall touches it now and then, and for a frame or two both are one proposal. Left alone, the
-wall would have the walker, whose track would find nothing.
-
-The rule. A track of an object, or of what walks whatever it is held for, that finds no proposal although it had one
-a frame ago, and is expected within one that is longer, takes of that the points that lie where it is expected, if
-there are about as many as it had and they reach as high as it did. What changed hands measures nothing: the track
-goes on as it went.
-
-The risk. What is taken confirms where it was expected: somebody who stepped behind the wall would go on in it. So
-nothing is taken more than AT_MOST times since the track last had a proposal of its own.
+A person who walks along a wall touches it now and then, and for a frame or two both are one proposal. The track of an
+object that was matched a frame ago and is not now, and is expected within a longer proposal, takes the points of that
+proposal that lie where it is expected, if there are about as many as it had and they reach as high as it did. The
+split measures nothing: the track goes on as predicted.
 """
 
 from __future__ import annotations
@@ -17,177 +11,141 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.geometry import transform, yaw_of
-from modt.geometry.kdop import WAYS, covered, lengths, touching
-from modt.observations import Sightings, sight
-from modt.odometry.deskew import Placing
+from modt.config import SplitConfig
+from modt.geometry import yaw_of
+from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
+from modt.observations import Observations
+from modt.placement import Placement
 from modt.tracking.association import Matches
-from modt.tracking.carving import carved
-from modt.tracking.fragments import SETTLED
-from modt.tracking.kalman import SPEED, X, Y
-from modt.tracking.kdop_association import carried
-from modt.tracking.regrouping import Found
-from modt.tracking.track_table import Followed
+from modt.tracking.regrouping import Associated, Grouping
+from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int
 
-AT_MOST = 5
-"""Times that a track takes before it must have something of its own again."""
-SLIM_M, TALL_M, WAY_M, SIGMAS = 1.5, 0.5, 1.5, 2.5
-"""What is no longer, and taller, has come so far from its home, and is faster than its speed is unsure by so many
-deviations, walks. (On synthetic drives 28 of a hundred such were people; of what is slim and moves at all, 8.)"""
-WITHIN = 0.6
-"""Part of the expected outline that the larger proposal must cover."""
-LONGER_M = 0.3
-"""What is longer than what is expected by so much holds something else besides."""
-PAD_M = 0.2
-"""Points may lie this far beyond the outline and the top expected."""
-POINTS = 8
-"""What is taken and what is left have so many points ..."""
-KEPT = 0.4
-"""... and what is taken has this part of those seen last ..."""
-FALL_M = 0.4
-"""... and does not end lower than expected by more."""
 
-
-class ExpectedParting:
-    """Takes what lies where a track is expected."""
-
-    def regroup(self, tracks: Followed, found: Found, placing: Placing) -> Found:
-        """What was found, with one more proposal for each track that takes its own out of a larger one."""
-        tracks.takes[found.matches.rows] = 0
-        rows = _seeking(tracks, found.matches)
-        if not len(rows):
-            return found
-        rows, hosts = _hosts(tracks, found.sightings, rows)
-        if not len(rows):
-            return found
-        scene = _Scene(tracks, found, placing, rows, hosts)
-        pieces = [scene.piece(k) for k in range(len(rows))]
-        takers = np.array([k for k, piece in enumerate(pieces) if len(piece)], np.int64)
-        if not len(takers):
-            return found
-        tracks.takes[rows[takers]] += 1
-        return scene.parted(takers, [pieces[k] for k in takers])
-
-
-class _Scene:
-    """A frame in which some tracks seek their own within proposals that are too large to be them.
+class ExpectedSplitting:
+    """Splits objects off larger proposals.
 
     Args:
-        tracks: as predicted.
-        found: of the frame.
-        placing: by which it was put into the world.
-        rows: (R,) of the tracks that seek.
-        hosts: (R,) proposal that each is expected in.
+        config: what is split off.
+        min_hits: of a track that splits.
     """
 
-    def __init__(self, tracks: Followed, found: Found, placing: Placing, rows: Int, hosts: Int) -> None:
-        self.tracks, self.found, self.placing, self.rows, self.hosts = tracks, found, placing, rows, hosts
-        self.expected = carried(tracks)
-        self.step = placing.step(tracks.x.take(rows, axis=0)[:, :2])
-        self.owner = np.full(len(found.proposals), NONE)
-        self.owner[found.matches.proposals] = found.matches.rows
-        self.free = np.ones(len(found.proposals.members), np.bool_)
+    def __init__(self, config: SplitConfig, min_hits: int) -> None:
+        self.config, self.min_hits = config, min_hits
 
-    def piece(self, k: int) -> Int:
-        """(n,) which members of the proposals the k-th of those who seek takes, none where it has no claim.
+    def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
+        """The frame with one more proposal for each track that is split off a larger one."""
+        rows, hosts = self._hosts(tracks, frame.observations, self._unmatched(tracks, frame.matches))
+        if not len(rows):
+            return frame
+        position = placement.deskew(tracks.x.take(rows, axis=0)[:, :2])
+        expected = tracks.predicted_kdops(rows) + self.config.pad_m
+        free = np.ones(len(frame.proposals.members), np.bool_)
+        pieces = [
+            self._piece(tracks, frame, placement, row, host, step, kdop, free)
+            for row, host, step, kdop in zip(rows.tolist(), hosts.tolist(), position, expected.T, strict=True)
+        ]
+        takers = np.array([k for k, piece in enumerate(pieces) if len(piece)], np.int64)
+        if not len(takers):
+            return frame
+        return self._split(tracks, frame, placement, rows[takers], hosts[takers], [pieces[k] for k in takers])
 
-        What lies where another is expected as well, who seeks there too or has the host and is an object, is of him
-        who is expected nearer.
-        """
-        row, host = self.rows[k], self.hosts[k]
-        first, end = self.found.proposals.offsets[host : host + 2]
-        R, t = self.placing.T_world_sensor[:3, :3], self.placing.T_world_sensor[:3, 3:]
-        x, y, z = R.astype(np.float32) @ self.found.proposals.coordinates[:, first:end] + t
-        x += self.step[k, 0]
-        y += self.step[k, 1]
-        free = self.free[first:end]
-        own = free & (z < self.tracks.top[row] + PAD_M) & self._within(x, y, row)
-        for rival in self._rivals(k):
-            own &= ~(self._nearer(x, y, rival, row) & self._within(x, y, rival))
+    def _unmatched(self, tracks: TrackTable, matches: Matches) -> Int:
+        """Rows of objects that were matched a frame ago and are not now."""
+        lost = tracks.missed == 0
+        lost[matches.rows] = False
+        lost &= (tracks.hits >= self.min_hits) & (tracks.last_class != ObjectClass.BACKGROUND.value)
+        rows: Int = lost.nonzero()[0]
+        return rows
+
+    def _hosts(self, tracks: TrackTable, observations: Observations, rows: Int) -> tuple[Int, Int]:
+        """Those of the rows that are expected within a longer proposal, and the one that covers each best."""
+        if not len(rows):
+            return rows, rows
+        expected = tracks.predicted_kdops(rows)
+        i, j = overlapping_pairs(expected, observations.kdop)
+        kdop, expected = observations.kdop.take(j, axis=1), expected.take(i, axis=1)
+        covered = coverage(expected, kdop)
+        longer = widths(kdop).max(axis=0) > widths(expected).max(axis=0) + self.config.longer_m
+        order = covered.argsort(kind="stable")
+        order = order[(longer & (covered > self.config.min_coverage))[order]]
+        host = np.full(len(rows), NONE)
+        host[i[order]] = j[order]  # the last written covers most
+        found = host != NONE
+        return rows[found], host[found]
+
+    def _piece(
+        self,
+        tracks: TrackTable,
+        frame: Associated,
+        placement: Placement,
+        row: int,
+        host: int,
+        step: Float64,
+        kdop: Float64,
+        free: Bool,
+    ) -> Int:
+        """(n,) members of the host that the track takes, none where it may take none; they are free no more."""
+        first, end = frame.proposals.offsets[host : host + 2]
+        R, t = placement.T_world_sensor[:3, :3], placement.T_world_sensor[:3, 3:]
+        x, y, z = R.astype(np.float32) @ frame.proposals.coordinates[:, first:end] + t
+        x += step[0]
+        y += step[1]
+        available = free[first:end]
+        own = available & (z < tracks.top[row] + self.config.pad_m) & _within(x, y, kdop)
         n = np.count_nonzero(own)
-        if n < max(POINTS, KEPT * self.tracks.points[row]) or np.count_nonzero(free) - n < POINTS:
+        least = max(self.config.min_points, self.config.min_share * tracks.points[row])
+        if n < least or np.count_nonzero(available) - n < self.config.min_points:
             return np.zeros(0, np.int64)
-        if z[own].max() < self.tracks.top[row] - FALL_M:
+        if z[own].max() < tracks.top[row] - self.config.max_drop_m:
             return np.zeros(0, np.int64)
         piece: Int = first + own.nonzero()[0]
-        self.free[piece] = False
+        free[piece] = False
         return piece
 
-    def _rivals(self, k: int) -> list[int]:
-        """Rows of the others who may claim a part of the host of the k-th."""
-        owner = self.owner[self.hosts[k]]
-        others = self.rows[(self.hosts == self.hosts[k]) & (self.rows != self.rows[k])].tolist()
-        owns = owner != NONE and self.tracks.kind[owner] != ObjectClass.BACKGROUND.value
-        return [*others, int(owner)] if owns else others
-
-    def _nearer(self, x: Float64, y: Float64, row: int, than: int) -> Bool:
-        """(n,) which places are nearer to where one track is expected than to where another is."""
-        one, other = (np.square(x - self.tracks.x[r, X]) + np.square(y - self.tracks.x[r, Y]) for r in (row, than))
-        nearer: Bool = one < other
-        return nearer
-
-    def _within(self, x: Float64, y: Float64, row: int) -> Bool:
-        """(n,) which places lie where a track is expected."""
-        reach = self.expected[:, row] + PAD_M
-        within: Bool = (x <= reach[0]) & (x >= -reach[4]) & (y <= reach[2]) & (y >= -reach[6])
-        near = within.nonzero()[0]
-        within[near] = (WAYS.T @ np.array((x[near], y[near])) <= reach[:, None]).all(axis=0)
-        return within
-
-    def parted(self, takers: Int, pieces: list[Int]) -> Found:
-        """What is found once some of those who seek have taken their pieces."""
-        tracks, found, T_world_sensor = self.tracks, self.found, self.placing.T_world_sensor
-        rows, hosts, n = self.rows[takers], self.hosts[takers], len(found.proposals)
-        proposals = carved(found.proposals, hosts, pieces, tracks.box[rows, 6] - yaw_of(T_world_sensor))
-        source, cut, new = np.append(np.arange(n), hosts), np.unique(hosts), np.arange(n, n + len(hosts))
-        # Where a host stands at the stamp, seen when it was: a sensor that moves sees each from elsewhere.
-        moved = found.sightings.centroid[cut] - transform(T_world_sensor, found.proposals.centroid[cut])[:, :2]
-        sightings, seen = found.sightings.take(source), np.append(cut, new)
-        few = sight(proposals.take(seen), T_world_sensor)
-        sightings.put(seen, few.moved(np.concatenate([moved, self.step[takers]])))
-        # What was taken shows nothing new of the track, least of all what was taken too much.
-        sightings.outline[:, new] = self.expected[:, rows]
-        sightings.foot[new], sightings.top[new] = tracks.foot[rows], tracks.top[rows]
-        owned = cut[self.owner[cut] != NONE]
-        changed, of_changed = np.append(self.owner[owned], rows), np.append(owned, new)
-        return Found(proposals, sightings, found.matches.instead(tracks, changed, of_changed))
-
-
-def _seeking(tracks: Followed, matches: Matches) -> Int:
-    """Rows of objects, and of what walks whatever it is held for, that found nothing and did a frame ago."""
-    lost = tracks.missed == 0
-    lost[matches.rows] = False
-    rows = lost.nonzero()[0]
-    rows = rows[(tracks.hits[rows] >= SETTLED) & (tracks.takes[rows] < AT_MOST)]
-    thing = tracks.kind[rows] != ObjectClass.BACKGROUND.value
-    seeking: Int = rows[thing | _walks(tracks, rows)]
-    return seeking
+    def _split(
+        self, tracks: TrackTable, frame: Associated, placement: Placement, rows: Int, hosts: Int, pieces: list[Int]
+    ) -> Associated:
+        """The frame with the pieces (n,) of the hosts as further proposals, each matched with its row."""
+        old, n = frame.proposals, len(frame.proposals)
+        changed_hosts, new = np.unique(hosts), np.arange(n, n + len(hosts))
+        kept = np.ones(len(old.members), np.bool_)
+        kept[np.concatenate(pieces)] = False
+        runs: list[slice | Int] = []
+        end = 0
+        for host in changed_hosts:
+            begin, stop = old.offsets[host : host + 2]
+            runs += [slice(end, begin), begin + kept[begin:stop].nonzero()[0]]
+            end = stop
+        runs += [slice(end, None), *pieces]
+        size = np.array([len(piece) for piece in pieces])
+        count = np.append(old.count, size)
+        np.subtract.at(count, hosts, size)
+        yaw = tracks.box[rows, 6] - yaw_of(placement.T_world_sensor)
+        grouping = Grouping(
+            runs,
+            count,
+            np.append(np.arange(n), hosts),
+            np.append(changed_hosts, new),
+            np.append(old.box[changed_hosts, 6], yaw),
+            partial=new,
+        )
+        proposals, observations = grouping.apply(frame, placement)
+        if proposals.reflectance is not None:
+            proposals.reflectance[new] = np.nan
+        # A piece shows nothing new of its track, least of all where too much was taken.
+        observations.kdop[:, new] = tracks.predicted_kdops(rows)
+        observations.bottom[new], observations.top[new] = tracks.bottom[rows], tracks.top[rows]
+        owner = np.full(n, NONE)
+        owner[frame.matches.proposals] = frame.matches.rows
+        owned = changed_hosts[owner[changed_hosts] != NONE]
+        changed, of_changed = np.append(owner[owned], rows), np.append(owned, new)
+        return Associated(proposals, observations, frame.matches.reassigned(tracks, changed, of_changed))
 
 
-def _walks(tracks: Followed, rows: Int) -> Bool:
-    """(R,) what is as slim as a person, not flat, has come some way, and surely goes on."""
-    x, home = tracks.x.take(rows, axis=0), tracks.home.take(rows, axis=0)
-    walks: Bool = x[:, SPEED] > SIGMAS * np.sqrt(tracks.P[rows, SPEED, SPEED])
-    if walks.any():  # seldom
-        walks &= lengths(tracks.hull.take(rows, axis=0).T).max(axis=0) < SLIM_M
-        walks &= tracks.top[rows] - tracks.foot[rows] > TALL_M
-        walks &= np.square(x[:, X] - home[:, 0]) + np.square(x[:, Y] - home[:, 1]) > WAY_M**2
-    return walks
-
-
-def _hosts(tracks: Followed, sightings: Sightings, rows: Int) -> tuple[Int, Int]:
-    """Those of the rows that are expected within a proposal, and which covers each best."""
-    expected = carried(tracks, rows)
-    i, j = touching(expected, sightings.outline)
-    if not len(i):
-        return rows[i], j
-    outline, expected = sightings.outline.take(j, axis=1), expected.take(i, axis=1)
-    cover = covered(expected, outline)
-    large = lengths(outline).max(axis=0) > lengths(expected).max(axis=0) + LONGER_M
-    least_first = cover.argsort(kind="stable")
-    least_first = least_first[(large & (cover > WITHIN))[least_first]]
-    host = np.full(len(rows), NONE)
-    host[i[least_first]] = j[least_first]  # the last one written covers most
-    some = host != NONE
-    return rows[some], host[some]
+def _within(x: Float64, y: Float64, kdop: Float64) -> Bool:
+    """(n,) which positions lie within a k-DOP (8,)."""
+    within: Bool = (x <= kdop[0]) & (x >= -kdop[4]) & (y <= kdop[2]) & (y >= -kdop[6])
+    near = within.nonzero()[0]
+    within[near] = (DIRECTIONS.T @ np.array((x[near], y[near])) <= kdop[:, None]).all(axis=0)
+    return within

@@ -7,70 +7,58 @@ from typing import Self
 
 import numpy as np
 
-from modt.geometry.kdop import WAYS
+from modt.geometry.kdop import DIRECTIONS
 from modt.types import Bool, Float64, Int, Tracks
 
 
 @dataclass(slots=True)
-class Followed(Tracks):
-    """Tracks with what only the tracker needs to know of them.
+class TrackTable(Tracks):
+    """Tracks with the columns that only the tracker needs.
 
     Columns:
-        kind: class when the frame began.
-        outline: (M, 8) last seen, see outlines.py [m, world].
-        hull: (M, 8) outline of all that was seen of it, slowly forgotten, about its place [m].
-        shape: (M, 8) mean outline about its place, an end that jumped beginning anew [m].
-        doubt: (M, 4) variance along each axis of where the outline puts it, by what its ends disagreed [m2].
-        foot, top: lowest and highest point last seen [m, world].
-        shown: (M, 2) place that the outline was taken to show [m, world].
-        home: (M, 2) place at which the track was last known to stand [m, world].
-        still: the track stands.
-        stood: frames in a row without a pose in which it stood and was seen; 0 where poses are given (landmarks.py).
-        landmark: (M, 8) mean outline in these, an end that jumped beginning anew [m, world].
-        takes: times that its proposal was taken out of another since it last had one of its own.
-        inherited: its class was taken over from a remembered place, and it was not classified itself since.
+        last_class: class when the frame began.
+        kdop: (M, 8) last observed, see geometry/kdop.py [m, world].
+        envelope: (M, 8) k-DOP of all that was observed, slowly decaying, about the position [m].
+        end_variance: (M, 4) variance of the position along each axis by ends of the k-DOP that disagreed [m2].
+        bottom, top: lowest and highest point last observed [m, world].
+        anchor: (M, 2) position that the last k-DOP was assigned [m, world].
+        rest_position: (M, 2) position at which the track was last known to rest [m, world].
+        stationary: the track is at rest.
     """
 
-    kind: Int
-    outline: Float64
-    hull: Float64
-    shape: Float64
-    doubt: Float64
-    foot: Float64
+    last_class: Int
+    kdop: Float64
+    envelope: Float64
+    end_variance: Float64
+    bottom: Float64
     top: Float64
-    shown: Float64
-    home: Float64
-    still: Bool
-    stood: Int
-    landmark: Float64
-    takes: Int
-    inherited: Bool
+    anchor: Float64
+    rest_position: Float64
+    stationary: Bool
 
     @classmethod
     def blank(cls, m: int = 0) -> Self:
-        """M rows: nothing seen yet."""
+        """M rows: nothing observed yet."""
         shared = dict(Tracks.blank(m).columns())
         return cls(
             **shared,
-            kind=np.zeros(m, np.int64),
-            outline=np.zeros((m, 8)),
-            hull=np.full((m, 8), -np.inf),
-            shape=np.zeros((m, 8)),
-            doubt=np.zeros((m, 4)),
-            foot=np.zeros(m),
+            last_class=np.zeros(m, np.int64),
+            kdop=np.zeros((m, 8)),
+            envelope=np.full((m, 8), -np.inf),
+            end_variance=np.zeros((m, 4)),
+            bottom=np.zeros(m),
             top=np.zeros(m),
-            shown=np.zeros((m, 2)),
-            home=np.zeros((m, 2)),
-            still=np.zeros(m, np.bool_),
-            stood=np.zeros(m, np.int64),
-            landmark=np.zeros((m, 8)),
-            takes=np.zeros(m, np.int64),
-            inherited=np.zeros(m, np.bool_),
+            anchor=np.zeros((m, 2)),
+            rest_position=np.zeros((m, 2)),
+            stationary=np.zeros(m, np.bool_),
         )
 
-    def move(self, step: Float64) -> None:
-        """Put what is somewhere elsewhere, by (M, 2) [m, world]."""
-        for column in (self.x, self.box, self.shown, self.home):
-            column[:, :2] += step
-        self.outline += step @ WAYS
-        self.landmark += step @ WAYS
+    def predicted_kdops(self, rows: Int | slice = slice(None)) -> Float64:
+        """(8, R) k-DOPs last observed of the rows, of all by default, where the filter expects them now."""
+        kdop: Float64 = (self.kdop[rows] + (self.x[rows, :2] - self.anchor[rows]) @ DIRECTIONS).T.copy()
+        return kdop
+
+    def known_kdops(self, rows: Int) -> Float64:
+        """(8, R) k-DOPs of all that was observed of the rows, where the filter expects them now."""
+        kdop: Float64 = (self.envelope.take(rows, axis=0) + self.x.take(rows, axis=0)[:, :2] @ DIRECTIONS).T.copy()
+        return kdop

@@ -12,5 +12,5 @@ def test_every_transition_is_drawn_and_listed():
         drawn = mermaid(machine)
         for t in machine.transitions:
             (arrow,) = [line for line in drawn.splitlines() if f" {t.source} --> {t.target}:" in line]
-            assert t.event in arrow
+            assert t.label in arrow
         assert len(table(machine).splitlines()) == len(machine.transitions) + 2

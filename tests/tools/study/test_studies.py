@@ -4,12 +4,12 @@ import sys
 
 import numpy as np
 import pytest
+from modt.tracking.background_map import NoBackgroundMap
 
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.kitti_raw import DriveWriter
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.background_map import NoMemory
 from modt.types import NONE, Proposals
 from tools.study import ego_drift
 from tools.study.filter_consistency import Life, consistency, errors, lives, normalised, study
@@ -91,7 +91,7 @@ def test_both_sides_of_remembered_background_are_counted(crossing):
     kind_of = np.array([int(body.kind.object_class) for body in crossing.simulator.world.bodies])
     on, off = Tally(), Tally()
     on.add(replay(crossing, "vlp-16"), kind_of)
-    off.add(replay(crossing, "vlp-16", memory=NoMemory()), kind_of)
+    off.add(replay(crossing, "vlp-16", background_map=NoBackgroundMap()), kind_of)
     assert on.proposals == off.proposals
     assert off.inherited == sum(off.wrong.values()) == len(off.frames_wrong) == 0
     assert 0 < on.inherited <= on.born

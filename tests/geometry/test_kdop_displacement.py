@@ -2,11 +2,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.geometry.kdop import AXES, WAYS
-from modt.tracking.displacement import AGREE_M, DOUBT, KEPT, measured, shift_between
+from modt.geometry.kdop import AXES, DIRECTIONS
+from modt.geometry.kdop_displacement import AGREE_M, DOUBT, KEPT, measured, shift_between
 
 
-def outlines(rng, n):
+def kdops(rng, n):
     """(8, n) outlines, and others that are nearly alike, or not."""
     middle, half = rng.uniform(-2, 2, (4, n)), rng.uniform(0.1, 3.0, (4, n))
     a = np.concatenate([half + middle, half - middle])
@@ -33,7 +33,7 @@ def slow_measure(a, b, variance, before):
 @given(st.integers(0, 6), st.integers(0, 2**16))
 def test_a_measure_is_the_slow_one_row_by_row(n, seed):
     rng = np.random.default_rng(seed)
-    a, b = outlines(rng, n)
+    a, b = kdops(rng, n)
     variance, before = rng.uniform(0.01, 1.0, n), rng.uniform(0, 0.5, (4, n))
     shift, covariance, doubt = measured(a, b, variance, before)
     for k in range(n):
@@ -44,8 +44,8 @@ def test_a_measure_is_the_slow_one_row_by_row(n, seed):
 
 @given(st.integers(0, 2**16), st.floats(-1, 1), st.floats(-1, 1))
 def test_what_keeps_its_shape_is_not_doubted(seed, dx, dy):
-    a, _ = outlines(np.random.default_rng(seed), 5)
-    b = a + (np.array([dx, dy]) @ WAYS)[:, None]
+    a, _ = kdops(np.random.default_rng(seed), 5)
+    b = a + (np.array([dx, dy]) @ DIRECTIONS)[:, None]
     shift, covariance, doubt = measured(a, b, np.full(5, 0.04), np.zeros((4, 5)))
     np.testing.assert_allclose(shift, np.tile([dx, dy], (5, 1)), atol=1e-9)
     np.testing.assert_allclose(shift, shift_between(a, b), atol=1e-9)
@@ -54,7 +54,7 @@ def test_what_keeps_its_shape_is_not_doubted(seed, dx, dy):
 
 
 def test_what_comes_into_view_is_doubted_along_its_length_and_for_a_while():
-    before = (np.array([1.0, 0.0]) @ WAYS + 1.0)[:, None]
+    before = (np.array([1.0, 0.0]) @ DIRECTIONS + 1.0)[:, None]
     after = before + np.array([1.5, 0, 0, 0, 0, 0, 0, 0])[:, None]
     _, covariance, doubt = measured(before, after, np.full(1, 0.01), np.zeros((4, 1)))
     np.testing.assert_allclose(doubt[:, 0], [(DOUBT * 1.5) ** 2, 0, 0, 0])
