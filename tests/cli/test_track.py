@@ -111,8 +111,6 @@ def test_what_is_written_of_a_frame_depends_on_no_later_one(scene, data):
         (["--poses", "absent.txt"], "is missing"),
         (["--poses", "short.txt"], "1 poses for 20 frames"),
         (["--poses", "bad.txt"], r"bad.txt:1: 3 numbers"),
-        (["--period", "0"], "out of range"),
-        (["--sure", "nan"], "out of range"),
     ],
 )
 def test_misuse_is_named(tmp_path, monkeypatch, options, cause):
@@ -122,3 +120,10 @@ def test_misuse_is_named(tmp_path, monkeypatch, options, cause):
     (tmp_path / "bad.txt").write_text("1 2 3\n")
     with pytest.raises(MisuseError, match=cause):
         run(tmp_path / "a.txt", "--out", tmp_path / "out", *options)
+
+
+@pytest.mark.parametrize("option", [("--period", "0"), ("--sure", "nan"), ("--sure", "-1001")])
+def test_numbers_out_of_range_are_refused(tmp_path, option, capsys):
+    with pytest.raises(SystemExit):
+        run(tmp_path, "--out", tmp_path / "out", *option)
+    assert "from" in capsys.readouterr().err

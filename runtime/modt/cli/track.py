@@ -7,13 +7,12 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from modt.cli import options
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
     from modt.sources.detections import Detections
     from modt.types import Float64, Int
-
-PERIOD_S = 0.1
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -27,11 +26,15 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     motion.add_argument("--oxts", type=Path, metavar="DIR", help="OXTS records, KITTI tracking; calib/ beside it")
     p.add_argument(
-        "--period", type=float, default=PERIOD_S, metavar="S", help="time between frames (default: %(default)g)"
+        "--period",
+        type=options.real(0.001, 10, "seconds"),
+        default=0.1,
+        metavar="S",
+        help="time between frames (default: %(default)g)",
     )
     p.add_argument(
         "--sure",
-        type=float,
+        type=options.real(-1000, 1000, "a confidence"),
         metavar="CONFIDENCE",
         help="minimum of the tracks written (default: by type, for PointRCNN)",
     )
@@ -51,10 +54,6 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import LineFile, writing
     from modt.sources.detections import files, read
 
-    if arguments.sure is not None and not -1000 <= arguments.sure <= 1000:
-        raise MisuseError("--sure", f"{arguments.sure:g} is out of range", "give -1000, for all tracks, to 1000")
-    if not 0.001 <= arguments.period <= 10:
-        raise MisuseError("--period", f"{arguments.period:g} s is out of range", "give 0.001 to 10")
     paths = files(arguments.detections)
     sequences = read(paths)
     motions = [_poses(arguments, sequence, len(paths)) for sequence in sequences]

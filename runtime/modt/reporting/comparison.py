@@ -15,7 +15,7 @@ from modt.energy.ledger import Ledger
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
-from modt.types import NONE, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
+from modt.types import NONE, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
 
 COUNTS = ("proposals", "foreground", "tracks", "classified_tracks", "classified", "reacquired", "points", "calls")
 """Columns of a run's counts, as in energy.savings.Counts."""
@@ -43,21 +43,6 @@ class RecordingClassifier:
         return self._classifier.classify(points, proposals, which)
 
 
-@dataclass(frozen=True, slots=True)
-class TrackHistory:
-    """History of a track that is alive.
-
-    Attributes:
-        classified: at least once.
-        seen: with a proposal in the last frame.
-        life: frames with a proposal.
-    """
-
-    classified: bool = False
-    seen: bool = True
-    life: int = 0
-
-
 @dataclass
 class ModeRun:
     """One pass of one mode through the stream.
@@ -82,7 +67,9 @@ class ModeRun:
     energy_lines: list[dict[str, Any]] = field(default_factory=list)
     lives: list[int] = field(default_factory=list)
     _counts: list[tuple[int, ...]] = field(default_factory=list)
-    _alive: dict[int, TrackHistory] = field(default_factory=dict)
+    _life: dict[int, int] = field(default_factory=dict)
+    _classified: set[int] = field(default_factory=set)
+    _seen: set[int] = field(default_factory=set)
 
     def step(self, frame: Frame) -> None:
         """Process one frame; counting happens between the frames of the ledger."""
@@ -109,7 +96,7 @@ class ModeRun:
 
     def finish(self) -> None:
         """Count the lives of the tracks still alive at the end of the stream."""
-        self.lives += [track.life for track in self._alive.values()]
+        self.lives += self._life.values()
 
     def counts(self) -> Int:
         """(frames, 8) counts of each frame, columns as COUNTS."""
@@ -121,39 +108,25 @@ class ModeRun:
         return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
     def _count(self, result: FrameResult, line: dict[str, Any]) -> None:
-        tracks = result.tracks
-        seen = tracks.proposal != NONE
-        classified = np.zeros(len(tracks), np.bool_)
-        classified[tracks.row_of_proposal(len(result.proposals))[self.recorder.rows]] = True
-        new, first, reacquired = self._update_histories(tracks.id, seen, classified)
-        foreground = seen & (tracks.object_class != ObjectClass.BACKGROUND)
-        row = line["stages"].get(CLASSIFICATION, {})
+        tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
+        visible = tracks.proposal != NONE
+        rows = tracks.row_of_proposal(len(result.proposals))[self.recorder.rows]
+        alive, seen, classified = (set(ids.tolist()) for ids in (tracks.id, tracks.id[visible], tracks.id[rows]))
         self._counts.append(
             (
                 len(result.proposals),
-                int(foreground.sum()),
-                new,
-                first,
+                int((visible & (tracks.object_class != ObjectClass.BACKGROUND)).sum()),
+                len(alive - self._life.keys()),
+                len(classified - self._classified),
                 result.n_classified,
-                reacquired,
+                len((classified & self._classified) - self._seen),
                 row.get("points", 0),
                 row.get("calls", 0),
             )
         )
-
-    def _update_histories(self, ids: Int, seen: Bool, classified: Bool) -> tuple[int, int, int]:
-        """Update the histories; returns the tracks new, first classified, and classified again after a loss."""
-        alive: dict[int, TrackHistory] = {}
-        new = first = reacquired = 0
-        for id_, is_seen, is_classified in zip(ids.tolist(), seen.tolist(), classified.tolist(), strict=True):
-            before = self._alive.get(id_, TrackHistory())
-            new += id_ not in self._alive
-            first += is_classified and not before.classified
-            reacquired += is_classified and before.classified and not before.seen
-            alive[id_] = TrackHistory(before.classified or is_classified, is_seen, before.life + is_seen)
-        self.lives += [track.life for id_, track in self._alive.items() if id_ not in alive]
-        self._alive = alive
-        return new, first, reacquired
+        self.lives += [life for id_, life in self._life.items() if id_ not in alive]
+        self._life = {id_: self._life.get(id_, 0) + (id_ in seen) for id_ in alive}
+        self._classified, self._seen = (self._classified | classified) & alive, seen
 
 
 def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> None:
