@@ -52,7 +52,7 @@ def test_the_only_view_of_a_track_settles_its_class(runs):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_run_leaves_what_the_formats_say(runs, mode):
+def test_run_directory_has_the_documented_files(runs, mode):
     root, _ = runs
     names = sorted(p.name for p in (root / mode).iterdir())
     assert names == ["kitti", "labels", "ledger.jsonl", "run.yaml", "summary.json", "tracks.jsonl"]
@@ -83,7 +83,7 @@ def test_the_ledger_counts_what_each_stage_made(runs, mode):
     assert found == [line["stages"]["segmentation"]["items"] for line in in_conventional if "frame" in line]
 
 
-def test_every_mode_follows_the_same_points(runs):
+def test_every_mode_has_the_same_proposals(runs):
     root, _ = runs
     for i in range(FRAMES):
         labels = [np.fromfile(root / mode / "labels" / f"{i:06d}.label", np.uint32) >> 16 for mode in MODES]
@@ -133,7 +133,7 @@ def test_the_run_keeps_to_one_core(runs):
     assert host["one_core_verified"] is True
 
 
-def test_run_yaml_holds_what_it_was_made_with(runs):
+def test_run_yaml_describes_the_run(runs):
     root, _ = runs
     facts = yaml.safe_load((root / "accurate" / "run.yaml").read_text())
     assert facts["schema"] == "modt.run/1"
@@ -286,7 +286,7 @@ def test_a_signal_ends_the_run_well(tmp_path, number, status):
     assert summary["run"]["stopped_by"] == signal.Signals(number).name
 
 
-def test_systemd_is_told_that_it_is_up_and_alive(tmp_path):
+def test_systemd_is_notified(tmp_path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(str(tmp_path / "notify"))
         environment_ = environment() | {"NOTIFY_SOCKET": str(tmp_path / "notify")}

@@ -66,7 +66,7 @@ def test_two_runs_are_the_same(tmp_path):
     assert (tmp_path / "one/a.txt").read_bytes() == (tmp_path / "two/a.txt").read_bytes()
 
 
-def test_what_is_not_sure_is_left_out_unless_it_is_asked_for(tmp_path, caplog):
+def test_tracks_below_the_confidence_are_left_out(tmp_path, caplog):
     write(tmp_path / "a.txt", score=1.5)
     run(tmp_path / "a.txt", "--out", tmp_path / "none", "--quiet")
     assert (tmp_path / "none/a.txt").read_text() == ""
@@ -75,7 +75,7 @@ def test_what_is_not_sure_is_left_out_unless_it_is_asked_for(tmp_path, caplog):
     assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
 
 
-def test_a_detector_that_gives_probabilities_is_followed(tmp_path):
+def test_scores_may_be_probabilities(tmp_path):
     for name, score in (("likely", 0.9), ("unlikely", 0.01)):
         write(tmp_path / f"{name}.txt", score=score)
     run(tmp_path, "--out", tmp_path / "out", "--quiet")
@@ -83,7 +83,7 @@ def test_a_detector_that_gives_probabilities_is_followed(tmp_path):
     assert (tmp_path / "out/unlikely.txt").read_text() == ""
 
 
-def test_boxes_without_a_score_are_followed(tmp_path):
+def test_boxes_without_a_score_are_tracked(tmp_path):
     lines = [f"{i} {k} Car 0 0 0 1 1 9 9 1.5 1.8 4 {5 * k} 1.6 12 0" for i in range(5) for k in range(2)]
     (tmp_path / "a.txt").write_text("\n".join(lines))
     run(tmp_path / "a.txt", "--out", tmp_path / "out", "--quiet")
@@ -94,7 +94,7 @@ def test_boxes_without_a_score_are_followed(tmp_path):
     st.lists(st.lists(st.tuples(st.floats(-20, 20), st.floats(-2, 12)), max_size=4), min_size=2, max_size=9),
     st.data(),
 )
-def test_what_is_written_of_a_frame_depends_on_no_later_one(scene, data):
+def test_tracking_is_causal(scene, data):
     rows = [(i, x, score) for i, seen in enumerate(scene) for x, score in seen]
     box = np.array([[x, 2.0, -1.0, 4.0, 1.8, 1.5, 0.0] for _, x, _ in rows]).reshape(-1, 7)
     frame = np.array([i for i, _, _ in rows], np.int64)

@@ -95,7 +95,7 @@ def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: P
     assert lost > 100
 
 
-def test_an_interval_is_worth_something(tmp_path: Path) -> None:
+def test_interval_is_narrower_than_its_coefficient(tmp_path: Path) -> None:
     result, _ = trial(tmp_path, seed=1, windows=120)
     assert result["seg_J"].high - result["seg_J"].low < TRUE["seg_J"]
     assert result["idle_W"].high - result["idle_W"].low < TRUE["idle_W"]
@@ -128,7 +128,7 @@ def test_too_few_windows_are_refused() -> None:
         fit([line_of(None, 1), line_of(3.0, 1, marks=["suspended"]), line_of(3.0, 1)], np.random.default_rng(0))
 
 
-def test_bursts_agree_with_the_truth(tmp_path: Path) -> None:
+def test_unit_energy_of_bursts_is_the_true_one(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path, idle_W=3.0)
     ledger = machine.ledger()
     recorder = Windows(find_powercap(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path), WindowConfig())

@@ -90,7 +90,7 @@ class Half:
 
 
 @pytest.mark.parametrize(("batch", "points"), [(1, 10 + 290 + 400), (2, 2 * 290 + 400), (8, 3 * 400)])
-def test_points_are_booked_as_the_network_is_given_them(batch: int, points: int) -> None:
+def test_points_are_counted_with_padding(batch: int, points: int) -> None:
     ledger = Ledger()
     offsets = np.array([0, 10, 710, 1000, 1001])
     proposals = replace(Proposals.empty(), members=np.arange(1001), offsets=offsets)

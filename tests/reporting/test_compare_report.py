@@ -129,7 +129,7 @@ def test_estimated_energy_is_watts_times_cpu_time(estimated, mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_measured_energy_is_the_meters_and_nobody_elses(measured, mode):
+def test_measured_energy_is_that_of_the_meter(measured, mode):
     found = measured["modes"][mode]
     assert found["gross_J"].value == pytest.approx(BUSY_W * MEAN_MS[mode] / 1e3)
     assert found["net_J"].value == pytest.approx((BUSY_W - 1.0) * MEAN_MS[mode] / 1e3)
@@ -151,7 +151,7 @@ def said(tree):
     return " ".join(compare_text(tree).split())
 
 
-def test_calibrated_joules_predict_too():
+def test_gamma_by_calibrated_joules():
     seg_J = 3.0 * 10.975e-3
     tree = tree_of(False, coefficients=(seg_J, 3.0 * 1.5e-3, 0.0))
     for mode, saving in tree["savings"].items():
@@ -159,12 +159,12 @@ def test_calibrated_joules_predict_too():
     assert "by calibrated joules" in said(tree)
 
 
-def test_without_a_calibration_there_is_nothing_to_predict_by(estimated):
+def test_gamma_by_calibration_is_unavailable_without_one(estimated):
     assert estimated["savings"]["efficient"]["gamma_calibrated"].kind is Kind.UNAVAILABLE
     assert "calibrated" not in said(estimated)
 
 
-def test_the_report_says_what_it_tests(estimated, measured):
+def test_report_states_what_it_tests(estimated, measured):
     assert "not the physics" in said(estimated)
     assert "not the physics" not in said(measured)
     assert "against the meter" in said(measured)
@@ -182,7 +182,7 @@ def test_text_fits_a_terminal(estimated):
     assert max(map(len, compare_text(estimated).splitlines())) <= 100
 
 
-def test_page_holds_its_plots(estimated):
+def test_page_contains_its_plots(estimated):
     page = compare_page(estimated)
     plots = re.findall(r"<svg.*?</svg>", page, re.S)
     assert len(plots) == 8

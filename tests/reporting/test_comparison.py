@@ -64,7 +64,7 @@ def one():
     return made
 
 
-def test_counts_tell_first_views_from_further_ones_and_from_those_after_a_loss(one):
+def test_counts_of_first_further_and_reacquired_views(one):
     assert column(one, "proposals") == [2, 1, 2, 1, 0, 1]
     assert column(one, "tracks") == [2, 0, 0, 1, 0, 1]
     assert column(one, "classified_tracks") == [2, 0, 0, 0, 0, 1]
@@ -74,7 +74,7 @@ def test_counts_tell_first_views_from_further_ones_and_from_those_after_a_loss(o
     assert column(one, "foreground") == [2, 1, 2, 0, 0, 1]
 
 
-def test_lives_are_the_frames_in_which_a_track_was_seen(one):
+def test_lives_are_frames_with_a_proposal(one):
     assert sorted(one.lives) == [1, 1, 2, 3]
     counts = total(one.counts())
     assert counts.tracks == len(one.lives)
@@ -89,7 +89,7 @@ def test_cpu_time_has_a_column_a_stage(one):
 @pytest.mark.parametrize(
     ("turn", "order"), [(1, "ab ba ab ba ab ba"), (2, "aabb bbaa aabb"), (10**9, "aaaaaabbbbbb")]
 )
-def test_everyone_works_on_everything_and_begins_equally_often(turn, order):
+def test_every_run_has_every_frame_and_the_first_rotates(turn, order):
     log = []
     interleave(iter(FRAMES), [mode_run("a", log), mode_run("b", log)], turn)
     assert "".join(name for name, _ in log) == order.replace(" ", "")
@@ -103,7 +103,7 @@ def test_each_frame_has_the_budget_of_its_index():
     assert [b.calls for b in made.pipeline.budgets] == list(range(6))
 
 
-def test_meters_are_read_at_the_edges_of_turns_alone():
+def test_meters_are_read_at_the_ends_of_turns():
     now = [0]
 
     def tick():

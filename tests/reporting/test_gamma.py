@@ -49,14 +49,14 @@ def test_unit_costs_are_found_from_varied_load() -> None:
         assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
 
 
-def test_prediction_meets_the_measurement_where_costs_are_what_they_seem() -> None:
+def test_prediction_equals_measurement_at_constant_unit_costs() -> None:
     found = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
     assert found.predicted == pytest.approx(found.measured)
     assert found.deviation == pytest.approx(0.0, abs=1e-9)
     assert found.prediction.explain(found.measured)[-1].change == pytest.approx(0.0, abs=1e-6)
 
 
-def test_intervals_hold_the_truth_through_noise() -> None:
+def test_intervals_cover_the_truth_with_noise() -> None:
     truth = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured
     found = saving(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
     assert found.measured_interval[0] < truth < found.measured_interval[1]
@@ -64,7 +64,7 @@ def test_intervals_hold_the_truth_through_noise() -> None:
     assert found.deviation_interval[0] < 0 < found.deviation_interval[1]
 
 
-def test_a_cost_that_nobody_counted_is_left_unexplained() -> None:
+def test_uncounted_cost_is_unexplained() -> None:
     dear = run(FEW)
     dear.cost[:, STAGES.index("segmentation")] *= 2
     found = saving(run(EVERY), dear, varied(), np.random.default_rng(0))
@@ -86,18 +86,18 @@ def test_interval_of_a_constant_is_a_point() -> None:
 @pytest.mark.parametrize(
     ("value", "text"), [(0.0, "0"), (12345.6, "12346"), (0.01234, "0.0123"), (1.5e-7, "1.50e-07"), (None, "-")]
 )
-def test_numbers_are_brief(value: float | None, text: str) -> None:
+def test_numbers_have_three_digits(value: float | None, text: str) -> None:
     assert format_number(value) == text
 
 
-def test_a_figure_without_a_value_is_unavailable() -> None:
+def test_quantity_without_a_value_is_unavailable() -> None:
     assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
     assert quantity(float("nan")).value is None
     assert quantity(float("inf")).text() == "unavailable"
     assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00 J (0.500 to 1.50)"
 
 
-def test_trees_of_figures_become_plain_data() -> None:
+def test_trees_of_quantities_become_plain_data() -> None:
     tree = {"a": [quantity(1.0)], "b": {"c": Quantity(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
     assert to_json(tree) == {
         "a": [{"value": 1.0, "unit": "", "kind": "measured"}],

@@ -34,7 +34,7 @@ def test_a_short_run_is_exact(values):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_long_run_is_off_by_less_than_it_says_and_the_sums_by_nothing(seed):
+def test_quantiles_of_many_values_are_within_the_stated_error(seed):
     values = long_run(seed)
     spread = histogram_of(values)
     assert (spread.count, spread.total, spread.maximum) == (len(values), sum(values), max(values))
@@ -43,7 +43,7 @@ def test_a_long_run_is_off_by_less_than_it_says_and_the_sums_by_nothing(seed):
         assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1 / 256)
 
 
-def test_what_is_held_does_not_grow_with_the_run():
+def test_memory_is_bounded():
     spread = histogram_of(long_run(0, 2 * MAX_EXACT))
     held = len(spread)
     assert held < MAX_EXACT
@@ -56,7 +56,7 @@ def test_what_is_held_does_not_grow_with_the_run():
     assert len(spread) < 8000
 
 
-def test_the_order_in_which_times_come_is_of_no_account():
+def test_order_of_values_is_irrelevant():
     values = long_run(2)
     again = random.Random(0).sample(values, len(values))
     a, b = histogram_of(values), histogram_of(again)
@@ -64,6 +64,6 @@ def test_the_order_in_which_times_come_is_of_no_account():
 
 
 @given(st.integers(0, 2**62))
-def test_a_cut_value_is_near(value):
+def test_bucket_middle_is_near_its_value(value):
     assert abs(bucket_middle(value) - value) <= value / 256
     assert bucket_middle(value) == value or value >= 256

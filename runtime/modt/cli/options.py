@@ -15,7 +15,13 @@ Parser = argparse.ArgumentParser
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
     """Stream, frames, profile and core."""
     a, b = first_frames
-    p.add_argument("path", nargs="?", type=Path, metavar="PATH", help="KITTI drive, sequence or folder of .bin scans")
+    p.add_argument(
+        "path",
+        nargs="?",
+        type=Path,
+        metavar="PATH",
+        help="KITTI drive, sequence or folder of .bin scans (default: a synthetic stream)",
+    )
     p.add_argument(
         "--frames",
         type=frames,
