@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from modt import host
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.instrumentation import TimedClassifier
 from modt.classification.pointnet import PointNet
@@ -56,6 +57,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     Raises:
         MisuseError: the model cannot be used.
     """
+    host.keep_freed_pages()
     limits = profile.classification
     cost = LinearCost(limits.max_points, profile.scheduler.cost)
     network = PointNet(limits, profile.sensor)

@@ -161,8 +161,6 @@ class Tracks:
         views: key observations fused.
         key_prior, key_posterior: (M, 4) prior and posterior at the last key observation.
         key_points: points of it, 0 before any.
-        key_bearing: direction from which it was seen, relative to the object [rad].
-        key_range: distance from which it was seen [m].
         key_extent: (M, 3) its box l, w, h [m].
         waiting: frames since the track first asked for the class that it waits for.
     """
@@ -184,8 +182,6 @@ class Tracks:
     key_prior: Float64
     key_posterior: Float64
     key_points: Int
-    key_bearing: Float64
-    key_range: Float64
     key_extent: Float64
     waiting: Int
 
@@ -236,8 +232,6 @@ class Tracks:
             key_prior=uniform(),
             key_posterior=uniform(),
             key_points=count(),
-            key_bearing=zero(),
-            key_range=zero(),
             key_extent=zero(3),
             waiting=count(),
         )

@@ -147,7 +147,7 @@ def _text(value: float | None) -> str:
 
 def papers(config: ProfileConfig) -> ProfileConfig:
     """Views independent by their points alone, from the first frame on; no review, no box prior."""
-    off = {"bearing_change_deg": 180.0, "range_change": 10.0, "extent_change": 10.0, "review_point_ratio": None}
+    off = {"extent_change": 10.0, "review_point_ratio": None}
     off |= {
         "min_object_probability": 0.0,
         "first_view_min_object_probability": 0.0,

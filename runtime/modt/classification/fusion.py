@@ -12,7 +12,6 @@ import numpy as np
 from modt.classification.posterior import MIN_PROBABILITY, from_log_weights, normalise, update_from_boxes
 from modt.classification.prior import FrequencyPrior, Prior, with_background
 from modt.config import FusionConfig
-from modt.geometry import wrap
 from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
 
@@ -66,14 +65,14 @@ class FirstView:
 class KeyViews:
     """Mode accurate: the likelihoods of independent views are multiplied (Equations 4 to 6, Table II).
 
-    A view is independent of the last key view by its number of points, its direction, its distance or its extent. A
-    new track is classified at once: a certain class is final, any other is replaced by the first view at or after
-    `start_frame`, since first views are often far and partial (Fig. 11).
+    A view is independent of the last key view by its number of points or its extent. A new track is classified at
+    once: a certain class is final, any other is replaced by the first view at or after `start_frame`, since first
+    views are often far and partial (Fig. 11).
 
     The classifier returns a posterior under the class frequency and, by its pool weight, the box prior, so the
     prior is divided out of every further view. A final class of few points is reviewed when the object shows clearly
-    more of them; the previous evidence is then weighted by the ratio of points. So is a class inherited from a
-    place. Tracks whose box excludes an object are neither classified nor reviewed.
+    more of them; the previous evidence is then weighted by the ratio of points. Tracks whose box excludes an object
+    are neither classified nor reviewed.
 
     Args:
         config: thresholds of independence and certainty.
@@ -91,14 +90,12 @@ class KeyViews:
         """(M,) tracks at their first or an independent view, and final ones to review."""
         config = self.config
         update_from_boxes(tracks, proposals, self.prior, config)
-        observed = tracks.proposal != NONE
-        asks: Bool = (wants_class | tracks.viewed) & ~tracks.final & observed
-        rows = np.flatnonzero(asks)
+        asks, rows = wants_class.copy(), np.flatnonzero(wants_class)
         started = tracks.age[rows] >= config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
         may_be_object = self.prior.may_be_object(tracks.prior[rows], config.min_object_probability)
         asks[rows] = np.where(tracks.viewed[rows], started & fresh, may_be_object)
-        return asks | self._reviewed(tracks, proposals, np.flatnonzero(observed & tracks.final))
+        return asks | self._reviewed(tracks, proposals, np.flatnonzero(tracks.final & (tracks.proposal != NONE)))
 
     def _reviewed(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(M,) tracks of these rows, all final, whose number of points has grown enough for another view."""
@@ -113,15 +110,10 @@ class KeyViews:
     def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(R,) whether the view of each track differs enough from its last key view (Equation 4)."""
         config, own = self.config, tracks.proposal[rows]
-        bearing, distance = _line_of_sight(tracks, proposals, rows)
         points = _relative_change(proposals.count[own], tracks.key_points[rows])
         extent = _relative_change(proposals.box[own, 3:6], tracks.key_extent[rows]).max(axis=1, initial=0.0)
-        independent: Bool = (
-            (points > self._point_change[np.argmax(tracks.posterior[rows], axis=1)])
-            | (np.abs(wrap(bearing - tracks.key_bearing[rows])) > np.deg2rad(config.bearing_change_deg))
-            | (_relative_change(distance, tracks.key_range[rows]) > config.range_change)
-            | (extent > config.extent_change)
-        )
+        independent: Bool = points > self._point_change[np.argmax(tracks.posterior[rows], axis=1)]
+        independent |= extent > config.extent_change
         return independent
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
@@ -161,19 +153,8 @@ def _relative_change(now: Float64 | Int, before: Float64 | Int) -> Float64:
     return change
 
 
-def _line_of_sight(tracks: Tracks, proposals: Proposals, rows: Int) -> tuple[Float64, Float64]:
-    """(R,) direction of the line of sight in the world [rad], and distance [m].
-
-    A track has its proposal's box in the world frame, so the yaws of the two boxes differ by the sensor's.
-    """
-    box = proposals.box[tracks.proposal[rows]]
-    sensor_yaw = wrap(tracks.box[rows, 6] - box[:, 6])
-    return wrap(np.arctan2(box[:, 1], box[:, 0]) + sensor_yaw), np.hypot(box[:, 0], box[:, 1])
-
-
 def _record_key_view(tracks: Tracks, proposals: Proposals, rows: Int) -> None:
     own = tracks.proposal[rows]
     tracks.key_prior[rows], tracks.key_posterior[rows] = tracks.prior[rows], tracks.posterior[rows]
-    tracks.key_bearing[rows], tracks.key_range[rows] = _line_of_sight(tracks, proposals, rows)
     tracks.key_points[rows] = proposals.count[own]
     tracks.key_extent[rows] = proposals.box[own, 3:6]

@@ -39,6 +39,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def run(arguments: argparse.Namespace) -> int:
     """Calibrate."""
     pinned = host.pin_to_core(arguments.core)
+    host.keep_freed_pages()
     # NumPy is imported from here on, after the process is pinned.
     from dataclasses import replace
 

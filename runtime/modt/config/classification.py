@@ -70,8 +70,6 @@ class FusionConfig(StageConfig):
     point_change: tuple[float, ...] = per_class(
         "point_change", 0.0, 10.0, "relative change of points (Equation 4) of an independent view", tuple(CLASSES)
     )
-    bearing_change_deg: float = number(40.0, 0.0, 180.0, "deg", "change of direction of an independent view")
-    range_change: float = number(0.4, 0.0, 10.0, "", "relative change of distance of an independent view")
     extent_change: float = number(0.6, 0.0, 10.0, "", "relative change of extent of an independent view")
     review_point_ratio: float | None = number(
         1.5, 1.0, 1000.0, "", "points, relative to the last key view, for the review of a final class; none: never"

@@ -26,7 +26,7 @@ from tools.train.labelled_scans import TEST_DRIVE, Scan
 from tools.train.synthetic_scans import scan_of
 
 ASK_FROM = 2
-ALONE = FusionConfig(bearing_change_deg=180.0, range_change=10.0, extent_change=10.0, review_point_ratio=None)
+ALONE = FusionConfig(extent_change=10.0, review_point_ratio=None)
 """The number of points alone makes a view independent, and nothing is doubted."""
 
 
