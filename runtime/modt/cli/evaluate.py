@@ -1,0 +1,88 @@
+"""`modt evaluate`: recorded runs against labels."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from modt.errors import MisuseError
+
+if TYPE_CHECKING:
+    from modt.evaluation.rules import Rules
+
+IGNORABLE = ("cut", "few", "parked", "dontcare")
+DIGITS = 6
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("evaluate", help="judge recorded runs against labels")
+    p.add_argument(
+        "pairs", nargs="+", type=Path, metavar="RUN TRUTH", help="run directories (of replay --labels) and their labels"
+    )
+    p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
+    p.add_argument(
+        "--classes", choices=("all", "paper"), default="all", help="KITTI's vans as cars (all), or ignored (paper)"
+    )
+    p.add_argument(
+        "--count", nargs="+", choices=IGNORABLE, default=[], metavar="WHAT", help=f"of {', '.join(IGNORABLE)}: judge it, too"
+    )
+    p.add_argument("--sector", type=float, metavar="DEG", help="half the labelled sector (KITTI: 40; cuboids: 180)")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Evaluate and print.
+
+    Raises:
+        MisuseError: a run or its labels cannot be used, or do not belong together.
+    """
+    import json
+
+    from modt.evaluation.evaluation import SCHEMA, Evidence, collect, evaluation
+    from modt.evaluation.report import report
+    from modt.evaluation.run_record import RunRecord
+    from modt.evaluation.truth_files import open_truth
+
+    paths: list[Path] = arguments.pairs
+    if len(paths) % 2:
+        raise MisuseError("RUN TRUTH", f"{len(paths)} paths are no pairs", "give each run followed by its labels")
+    if arguments.sector is not None and not 0 < arguments.sector <= 180:
+        raise MisuseError("--sector", f"{arguments.sector:g} is no half sector", "give more than 0 and at most 180")
+    by_sensor: dict[str, list[Evidence]] = {}
+    for drive, (path, labels) in enumerate(zip(paths[::2], paths[1::2], strict=True)):
+        record = RunRecord.open(path)
+        truth = open_truth(labels, record.stream, arguments.classes)
+        rules = _rules(truth.rules, arguments)
+        try:
+            found = collect(record.frames(truth), rules, drive)
+        except ValueError:
+            raise MisuseError(path, "no frames are recorded", "give the directory of a run") from None
+        by_sensor.setdefault(record.sensor, []).append(found)
+    sensors = {name: evaluation(found) for name, found in by_sensor.items()}
+    if len(sensors) > 1:
+        sensors["all sensors"] = evaluation([e for found in by_sensor.values() for e in found])
+    if arguments.json:
+        plain = {name: _rounded(found.json()) for name, found in sensors.items()}
+        print(json.dumps({"schema": SCHEMA, "sensors": plain}, indent=1))
+    else:
+        print(report(sensors))
+    return 0
+
+
+def _rules(rules: Rules, arguments: argparse.Namespace) -> Rules:
+    from dataclasses import replace
+
+    sector = rules.sector_deg if arguments.sector is None else arguments.sector
+    return replace(rules, sector_deg=sector, ignored=rules.ignored - set(arguments.count))
+
+
+def _rounded(tree: Any) -> Any:
+    if isinstance(tree, float):
+        return round(tree, DIGITS)
+    if isinstance(tree, dict):
+        return {key: _rounded(value) for key, value in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [_rounded(value) for value in tree]
+    return tree
