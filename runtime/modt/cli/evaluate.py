@@ -19,14 +19,23 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare the command and its options."""
     p = commands.add_parser("evaluate", help="judge recorded runs against labels")
     p.add_argument(
-        "pairs", nargs="+", type=Path, metavar="RUN TRUTH", help="run directories (of replay --labels) and their labels"
+        "pairs",
+        nargs="+",
+        type=Path,
+        metavar="RUN TRUTH",
+        help="run directories (of replay --labels) and their labels",
     )
     p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
     p.add_argument(
         "--classes", choices=("all", "paper"), default="all", help="KITTI's vans as cars (all), or ignored (paper)"
     )
     p.add_argument(
-        "--count", nargs="+", choices=IGNORABLE, default=[], metavar="WHAT", help=f"of {', '.join(IGNORABLE)}: judge it, too"
+        "--count",
+        nargs="+",
+        choices=IGNORABLE,
+        default=[],
+        metavar="WHAT",
+        help=f"of {', '.join(IGNORABLE)}: judge it, too",
     )
     p.add_argument("--sector", type=float, metavar="DEG", help="half the labelled sector (KITTI: 40; cuboids: 180)")
     p.set_defaults(run=run)
@@ -40,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     """
     import json
 
-    from modt.evaluation.evaluation import SCHEMA, Evidence, collect, evaluation
+    from modt.evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
     from modt.evaluation.report import report
     from modt.evaluation.run_record import RunRecord
     from modt.evaluation.truth_files import open_truth
@@ -50,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError("RUN TRUTH", f"{len(paths)} paths are no pairs", "give each run followed by its labels")
     if arguments.sector is not None and not 0 < arguments.sector <= 180:
         raise MisuseError("--sector", f"{arguments.sector:g} is no half sector", "give more than 0 and at most 180")
-    by_sensor: dict[str, list[Evidence]] = {}
+    by_sensor: dict[str, list[DriveRows]] = {}
     for drive, (path, labels) in enumerate(zip(paths[::2], paths[1::2], strict=True)):
         record = RunRecord.open(path)
         truth = open_truth(labels, record.stream, arguments.classes)

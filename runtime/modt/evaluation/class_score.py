@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.evaluation.matching import ObjectRows, ProposalRows
+from modt.evaluation.rows import ObjectRows, ProposalRows
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 
 BINS = 15
@@ -24,7 +24,8 @@ class ClassScore:
         curve: threshold of the posterior, precision and recall, where recall first reaches each twentieth.
         called: proposals that the program says are of the class.
         precision: share of them that lie on an object of the class.
-        recall: share of the objects to be segmented that are found and said to be of it.
+        segmentable: objects of the class that are judged for segmentation.
+        recall: share of them that are found and said to be of the class.
         recall_of_found: share of those that are found.
         calibration_error: of the class's posterior over all judged proposals.
     """
@@ -34,6 +35,7 @@ class ClassScore:
     curve: tuple[tuple[float, float, float], ...]
     called: int
     precision: float | None
+    segmentable: int
     recall: float | None
     recall_of_found: float | None
     calibration_error: float | None
@@ -58,6 +60,7 @@ def class_scores(objects: ObjectRows, proposals: ProposalRows) -> dict[str, Clas
             curve=_sampled(threshold, precision, recall) if n else (),
             called=int(said.sum()),
             precision=_ratio(int(right.sum()), int(said.sum())),
+            segmentable=len(own.id),
             recall=_ratio(correct, len(own.id)),
             recall_of_found=_ratio(correct, found),
             calibration_error=expected_calibration_error(rows.posterior[:, c], rows.label == c),

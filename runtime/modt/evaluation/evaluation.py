@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from modt.evaluation.class_score import ClassScore, class_scores, top_calibration_error
-from modt.evaluation.matching import Association, JudgedFrame, ObjectRows, ProposalRows, judge
+from modt.evaluation.frame import JudgedFrame
+from modt.evaluation.matching import judge
+from modt.evaluation.rows import Association, ObjectRows, ProposalRows
 from modt.evaluation.rules import KITTI_RULES, Rules
 from modt.evaluation.segmentation_score import SegmentationScore, segmentation
 from modt.evaluation.track_score import TrackScore, track_metrics, track_scores
@@ -21,7 +23,7 @@ RANGES = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0), 
 
 
 @dataclass(frozen=True, slots=True)
-class Evidence:
+class DriveRows:
     """What became of the frames of one drive.
 
     Attributes:
@@ -90,7 +92,7 @@ def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES, *, metrics:
     return evaluation([collect(frames, rules)], metrics=metrics)
 
 
-def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Evidence:
+def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> DriveRows:
     """What became of a drive's frames; drives that are pooled need numbers of their own.
 
     Raises:
@@ -102,7 +104,7 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Evid
         n, proposals, classified = n + 1, proposals + frame.n_proposals, classified + frame.classified
     if not judged:
         raise ValueError("no frames")
-    return Evidence(
+    return DriveRows(
         frames=n,
         proposals=proposals,
         classified=classified,
@@ -112,7 +114,7 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Evid
     )
 
 
-def evaluation(evidence: Sequence[Evidence], *, metrics: bool = True) -> Evaluation:
+def evaluation(evidence: Sequence[DriveRows], *, metrics: bool = True) -> Evaluation:
     """Every figure over all drives together."""
     objects = ObjectRows.joined([e.objects for e in evidence])
     rows = ProposalRows.joined([e.rows for e in evidence])
@@ -137,13 +139,11 @@ def _in_range(objects: ObjectRows, rows: ProposalRows, low_m: float, high_m: flo
     return RangeScore(segmentation(seen), class_scores(seen, found))
 
 
-def _metrics(evidence: Sequence[Evidence]) -> dict[str, dict[str, float]] | None:
+def _metrics(evidence: Sequence[DriveRows]) -> dict[str, dict[str, float]] | None:
     try:
         import trackeval  # noqa: F401
     except ImportError:
         return None
-    by_class = {
-        name: track_metrics([e.associations[k] for e in evidence]) for k, name in enumerate(CLASS_NAMES[1:])
-    }
+    by_class = {name: track_metrics([e.associations[k] for e in evidence]) for k, name in enumerate(CLASS_NAMES[1:])}
     everything = track_metrics([frames for e in evidence for frames in e.associations])
     return {name: found for name, found in {ALL: everything, **by_class}.items() if found}

@@ -7,6 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from modt.evaluation.evaluation import ALL, Evaluation
 from modt.evaluation.track_score import TrackScore
 
+CLASS_TABLES = (
+    ("average precision [%]", "average_precision", "objects"),
+    ("precision as said [%]", "precision", "called"),
+    ("recall as said [%]", "recall", "segmentable"),
+)
+"""Title, figure and count of each."""
 METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")
 
 
@@ -23,19 +29,21 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
         [
             [
                 kind,
-                *(_percent(band.segmentation[kind].recall if kind in band.segmentation else None) for band in e.ranges.values()),
+                *(
+                    _percent(band.segmentation[kind].recall if kind in band.segmentation else None)
+                    for band in e.ranges.values()
+                ),
                 *(str(n) for n in (s.objects, s.merged, s.split, s.partial, s.missed, s.cut)),
             ]
             for kind, s in e.ranges[ALL].segmentation.items()
         ],
     )
     yield ""
-    for title, key in (("average precision [%]", "average_precision"), ("precision as said [%]", "precision"), ("recall as said [%]", "recall")):
-        rows = []
-        for class_, s in e.ranges[ALL].classification.items():
-            cells = [_percent(getattr(band.classification[class_], key)) for band in e.ranges.values()]
-            rows.append([class_, *cells, str(s.called if key == "precision" else s.objects)])
-        yield from _table([title, *e.ranges, "called" if key == "precision" else "objects"], rows)
+    for title, key, counted in CLASS_TABLES:
+        scores = e.ranges[ALL].classification
+        cells = {c: [_percent(getattr(band.classification[c], key)) for band in e.ranges.values()] for c in scores}
+        rows = [[c, *cells[c], str(getattr(score, counted))] for c, score in scores.items()]
+        yield from _table([title, *e.ranges, counted], rows)
         yield ""
     errors = ", ".join(f"{c} {_percent(s.calibration_error)}" for c, s in e.ranges[ALL].classification.items())
     yield (
@@ -45,15 +53,32 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
     if e.tracks:
         yield ""
         yield from _table(
-            ["tracks", "objects", "life", "ideal", "ratio", "as seen", "ideal", "labelled", "breaks", "taken", "mixed"],
-            [[kind, *_track_cells(s)] for kind, s in e.tracks.items()],
+            [
+                "tracks",
+                "objects",
+                "life",
+                "ideal",
+                "ratio",
+                "as seen",
+                "ideal",
+                "labelled",
+                "breaks",
+                "taken",
+                "mixed",
+            ],
+            [[kind, *_track_cells(s)] for kind, s in e.tracks.items() if s.life.objects],
         )
     if e.metrics:
         yield ""
         yield from _table(
             ["metrics [%]", *METRICS, "id switches", "fragments"],
             [
-                [kind, *(_percent(m[key]) for key in METRICS), f"{m['id_switches']:.0f}", f"{m['fragmentations']:.0f}"]
+                [
+                    kind,
+                    *(_percent(m[key]) for key in METRICS),
+                    f"{m['id_switches']:.0f}",
+                    f"{m['fragmentations']:.0f}",
+                ]
                 for kind, m in e.metrics.items()
             ],
         )
@@ -73,7 +98,9 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
     """Lines of aligned columns, the first to the left."""
     widths = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
     for row in (head, *rows):
-        yield "  " + row[0].ljust(widths[0]) + "".join(f"  {c:>{w}}" for c, w in zip(row[1:], widths[1:], strict=True))
+        yield (
+            "  " + row[0].ljust(widths[0]) + "".join(f"  {c:>{w}}" for c, w in zip(row[1:], widths[1:], strict=True))
+        )
 
 
 def _number(value: float | None) -> str:

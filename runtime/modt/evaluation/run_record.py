@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from modt.errors import MisuseError, ModtError
-from modt.evaluation.matching import JudgedFrame
+from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.truth import Truth
 from modt.geometry import FieldOfView
-from modt.profile import from_yaml
+from modt.profile import DEFAULT, from_yaml
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.sources.scan_file import read_scan
-from modt.types import CLASS_NAMES, Float32, Int
+from modt.types import CLASS_NAMES, Float32, Float64, Int
 
 LABELS = "labels"
 
@@ -73,7 +73,7 @@ class RunRecord:
             place = f"{self.path / TRACKS}:{number}"
             try:
                 index = int(record["frame"])
-                columns = _track_columns(record)
+                track, of_track, said, posterior = _track_columns(record)
                 counts = int(record["proposals"]), int(record["classified"])
             except (KeyError, TypeError, ValueError, IndexError) as error:
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
@@ -85,7 +85,9 @@ class RunRecord:
                 points, _ = read_scan(scan)
             except ModtError as error:
                 raise MisuseError(scan, error.cause, "restore the scan") from None
-            yield JudgedFrame(index, points, self._proposals(index, points), *counts, *columns, labels, fov)
+            yield JudgedFrame(
+                index, points, self._proposals(index, points), *counts, track, of_track, said, posterior, labels, fov
+            )
 
     def _proposals(self, index: int, points: Float32) -> Int:
         """(N,) proposal of each point."""
@@ -101,7 +103,7 @@ class RunRecord:
         return (labels >> 16).astype(np.int64) - 1
 
 
-def _track_columns(record: dict[str, Any]) -> tuple[Int, Int, Int, np.ndarray[Any, np.dtype[np.float64]]]:
+def _track_columns(record: dict[str, Any]) -> tuple[Int, Int, Int, Float64]:
     """Identity, proposal, class and posterior of the tracks that are seen: all that is read of tracks.jsonl."""
     seen = [track for track in record["tracks"] if track["proposal"] is not None]
     said = [CLASS_NAMES.index(track["class"]) for track in seen]
@@ -114,8 +116,6 @@ def _track_columns(record: dict[str, Any]) -> tuple[Int, Int, Int, np.ndarray[An
 
 def _profile_of(command: list[str]) -> str:
     """Name of the profile in a command line, that of the default where it names none."""
-    from modt.profile import DEFAULT
-
     for word, after in zip(command, [*command[1:], ""], strict=True):
         if word == "--profile":
             return Path(after).stem

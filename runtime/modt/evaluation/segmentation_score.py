@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.evaluation.matching import ObjectRows, Outcome
+from modt.evaluation.rows import ObjectRows, Outcome
 from modt.types import CLASS_NAMES
 
 
@@ -33,9 +33,9 @@ class SegmentationScore:
     def of(cls, rows: ObjectRows) -> SegmentationScore:
         """The score of some objects."""
         outcome = rows.outcome[rows.to_segment]
-        found, *failed = (int(n) for n in np.bincount(outcome, minlength=len(Outcome)))
+        found, merged, split, partial, missed = np.bincount(outcome, minlength=len(Outcome)).tolist()
         recall = found / len(outcome) if len(outcome) else None
-        return cls(len(outcome), recall, *failed, cut=int(rows.cut.sum()))
+        return cls(len(outcome), recall, merged, split, partial, missed, int(rows.cut.sum()))
 
 
 def segmentation(rows: ObjectRows) -> dict[str, SegmentationScore]:

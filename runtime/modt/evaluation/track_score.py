@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.evaluation.matching import Association, ObjectRows, ProposalRows
+from modt.evaluation.rows import Association, ObjectRows, ProposalRows
 from modt.types import CLASS_NAMES, NONE, Bool, Float64, Int
 
 SIMILARITY_THRESHOLD = 0.25
@@ -99,7 +100,7 @@ def _score(labelled: ObjectRows, first_seen: dict[tuple[int, int], int]) -> Trac
     for history in histories.values():
         history.sort()
         past = set()
-        for (_, _, before), (frame, drive, track) in zip(history, history[1:], strict=False):
+        for (_, _, before), (frame, drive, track) in pairwise(history):
             past.add(before)
             if track != before:
                 breaks += 1

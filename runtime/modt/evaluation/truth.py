@@ -10,7 +10,7 @@ import numpy as np
 
 from modt.evaluation.rules import Rules
 from modt.geometry import Camera, inverse, transform_boxes
-from modt.sources.annotations import Tracklet
+from modt.sources.kitti_labels import Tracklet
 from modt.sources.scan_stream import ScanStream
 from modt.types import Bool, Float32, Float64, Int, ObjectClass
 

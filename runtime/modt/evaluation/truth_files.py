@@ -13,8 +13,8 @@ from modt.errors import MisuseError
 from modt.evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt.evaluation.truth import KITTI_TYPES, PANDASET_TYPES, PAPER_TYPES, FrameTruth, Regions, Truth, parked_outside
 from modt.geometry import Camera
-from modt.sources import annotations, calibration
-from modt.sources.annotations import DONT_CARE, Label, Tracklet
+from modt.sources import calibration, kitti_labels
+from modt.sources.kitti_labels import DONT_CARE, Label, Tracklet
 from modt.sources.poses import read_poses
 from modt.sources.recognise import open_stream
 from modt.sources.scan_stream import ScanStream
@@ -92,7 +92,9 @@ def _followed(
     frames = {
         f: FrameTruth.of(
             types,
-            *([row[k] for row in rows[f]] for k in range(3)),
+            [id_ for id_, _, _ in rows[f]],
+            [type_ for _, type_, _ in rows[f]],
+            [box for _, _, box in rows[f]],
             parked=parked.get(f, none),
             regions=regions.get(f),
         )
@@ -102,13 +104,13 @@ def _followed(
 
 
 def _raw_drive(drive: Path, scans: ScanStream | None, classes: str) -> Truth:
-    tracklets = annotations.read_tracklets(drive / TRACKLETS)
+    tracklets = kitti_labels.read_tracklets(drive / TRACKLETS)
     return _followed(tracklets, scans, classes, list(range(len(tracklets))), {})
 
 
 def _tracking(path: Path, scans: ScanStream | None, classes: str) -> Truth:
     camera = calibration.camera_of_sequence(path.parent.parent / "calib" / path.name)
-    labels = annotations.read_labels(path, tracking=True)
+    labels = kitti_labels.read_labels(path, tracking=True)
     pieces = [piece for labels_of in _by_object(labels) for piece in _tracklets(labels_of, camera)]
     regions = {f: _regions(group, camera) for f, group in _by_frame(labels).items()}
     ids = [id_ for id_, _ in pieces]
@@ -132,7 +134,7 @@ def _by_frame(labels: list[Label]) -> dict[int, list[Label]]:
 
 def _tracklets(labels: list[Label], camera: Camera) -> Iterator[tuple[int, Tracklet]]:
     """An object's labels, cut where a frame is left out."""
-    frames, boxes = np.array([label.frame for label in labels]), annotations.boxes(labels, camera)
+    frames, boxes = np.array([label.frame for label in labels]), kitti_labels.boxes(labels, camera)
     for rows in np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames) != 1) + 1):
         yield labels[0].id, Tracklet(labels[0].type_, int(frames[rows[0]]), boxes[rows])
 
@@ -146,13 +148,13 @@ def _object_frames(folder: Path, scans: ScanStream | None, classes: str) -> Trut
     frames = {}
     for path in sorted((folder / "label_2").glob("*.txt")):
         camera = calibration.camera_of_sequence(folder / "calib" / path.name)
-        labels = annotations.read_labels(path, tracking=False)
+        labels = kitti_labels.read_labels(path, tracking=False)
         own = [label for label in labels if label.type_ != DONT_CARE]
         frames[int(path.stem)] = FrameTruth.of(
             PAPER_TYPES if classes == "paper" else KITTI_TYPES,
             [NONE] * len(own),
             [label.type_ for label in own],
-            annotations.boxes(own, camera),
+            kitti_labels.boxes(own, camera),
             regions=_regions(labels, camera),
         )
     return Truth(frames, scans, KITTI_RULES)
@@ -172,7 +174,13 @@ def _cuboids(folder: Path, scans: ScanStream | None) -> Truth:
     if rows and max(rows) >= len(poses):
         raise MisuseError(folder / POSES, f"{len(poses)} poses, none for frame {max(rows)}", "give one a frame")
     frames = {
-        f: FrameTruth.of(PANDASET_TYPES, *([row[k] for row in rows[f]] for k in range(3)), T_box_sensor=T)
+        f: FrameTruth.of(
+            PANDASET_TYPES,
+            [id_ for id_, _, _ in rows[f]],
+            [type_ for _, type_, _ in rows[f]],
+            np.array([box for _, _, box in rows[f]]),
+            T_box_sensor=T,
+        )
         for f, T in enumerate(poses)
     }
     return Truth(frames, scans, CUBOID_RULES)

@@ -106,4 +106,5 @@ def boxes(labels: Sequence[Label], camera: Camera) -> Float64:
     table = np.array([label.hwlxyzry for label in labels]).reshape(-1, 7)
     foot = transform(inverse(camera.T_camera_sensor), table[:, 3:6])
     centre = foot + np.array([0, 0, 0.5]) * table[:, :1]
-    return np.c_[centre, table[:, 2::-1], wrap(-table[:, 6] - np.pi / 2)]
+    placed: Float64 = np.c_[centre, table[:, 2::-1], wrap(-table[:, 6] - np.pi / 2)]
+    return placed
