@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.evaluation.rows import ObjectRows, ProposalRows
+from modt.evaluation.rows import Outcome, Rows
+from modt.evaluation.truth import Role
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 
 BINS = 15
@@ -41,29 +42,27 @@ class ClassScore:
     calibration_error: float | None
 
 
-def class_scores(objects: ObjectRows, proposals: ProposalRows) -> dict[str, ClassScore]:
+def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
     """The score of each class."""
-    rows = proposals.take(proposals.to_classify)
-    called = proposals.take(proposals.to_call)
+    judged, called = proposals[proposals["to_classify"]], proposals[proposals["to_call"]]
     scores = {}
-    for c, name in enumerate(CLASS_NAMES):
-        if not c:
-            continue
-        n = int((objects.to_classify & (objects.object_class == c)).sum())
-        own = objects.take(objects.to_segment & (objects.object_class == c) & (objects.role == 0))
-        said, right = called.said == c, (called.said == c) & (called.owner == c)
-        correct, found = int((own.said == c).sum()), int((own.outcome == 0).sum())
-        threshold, precision, recall = precision_recall(rows.posterior[:, c], rows.label == c, n)
+    for c, name in enumerate(CLASS_NAMES[1:], 1):
+        of_class = objects[(objects["class"] == c) & (objects["role"] == Role.COUNTED)]
+        wanted = of_class[of_class["to_segment"]]
+        n, correct = int(of_class["to_classify"].sum()), int((wanted["said"] == c).sum())
+        said = called["said"] == c
+        score, hit = judged["posterior"][:, c], judged["label"] == c
+        curve = precision_recall(score, hit, n)
         scores[name] = ClassScore(
             objects=n,
-            average_precision=_area(precision, recall) if n else None,
-            curve=_sampled(threshold, precision, recall) if n else (),
+            average_precision=_area(*curve[1:]) if n else None,
+            curve=_sampled(*curve) if n else (),
             called=int(said.sum()),
-            precision=_ratio(int(right.sum()), int(said.sum())),
-            segmentable=len(own.id),
-            recall=_ratio(correct, len(own.id)),
-            recall_of_found=_ratio(correct, found),
-            calibration_error=expected_calibration_error(rows.posterior[:, c], rows.label == c),
+            precision=_ratio(int((said & (called["owner"] == c)).sum()), int(said.sum())),
+            segmentable=len(wanted),
+            recall=_ratio(correct, len(wanted)),
+            recall_of_found=_ratio(correct, int((wanted["outcome"] == Outcome.FOUND).sum())),
+            calibration_error=expected_calibration_error(score, hit),
         )
     return scores
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
+
+import numpy as np
 
 from modt.evaluation.class_score import ClassScore, class_scores, top_calibration_error
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.matching import judge
-from modt.evaluation.rows import Association, ObjectRows, ProposalRows
+from modt.evaluation.rows import Association, Rows
 from modt.evaluation.rules import KITTI_RULES, Rules
 from modt.evaluation.segmentation_score import SegmentationScore, segmentation
 from modt.evaluation.track_score import TrackScore, track_metrics, track_scores
@@ -18,25 +21,19 @@ from modt.types import CLASS_NAMES, NONE
 
 SCHEMA = "modt.evaluation/1"
 ALL = "all"
-RANGES = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0), "40-60": (40.0, 60.0)}
-"""Bands of range [m] by name."""
+RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0), "40-60": (40.0, 60.0)}
+"""Bands of range by name."""
 
 
 @dataclass(frozen=True, slots=True)
 class DriveRows:
-    """What became of the frames of one drive.
-
-    Attributes:
-        frames, proposals, classified: how many.
-        objects, rows: the tables of labelled objects and of proposals.
-        associations: by class, frame by frame.
-    """
+    """What became of the frames of one drive: how many, both tables, and by class the associations frame by frame."""
 
     frames: int
-    proposals: int
+    n_proposals: int
     classified: int
-    objects: ObjectRows
-    rows: ProposalRows
+    objects: Rows
+    proposals: Rows
     associations: tuple[tuple[Association, ...], ...]
 
 
@@ -98,52 +95,44 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Driv
     Raises:
         ValueError: there are no frames.
     """
-    judged, n, proposals, classified = [], 0, 0, 0
+    judged, n_proposals, classified = [], 0, 0
     for frame in frames:
         judged.append(judge(frame, rules, drive))
-        n, proposals, classified = n + 1, proposals + frame.n_proposals, classified + frame.classified
+        n_proposals, classified = n_proposals + frame.n_proposals, classified + frame.classified
     if not judged:
         raise ValueError("no frames")
-    return DriveRows(
-        frames=n,
-        proposals=proposals,
-        classified=classified,
-        objects=ObjectRows.joined([j.objects for j in judged]),
-        rows=ProposalRows.joined([j.proposals for j in judged]),
-        associations=tuple(zip(*(j.associations for j in judged), strict=True)),
-    )
+    objects, proposals, associations = zip(*judged, strict=True)
+    tables = np.concatenate(objects), np.concatenate(proposals)
+    return DriveRows(len(judged), n_proposals, classified, *tables, tuple(zip(*associations, strict=True)))
 
 
-def evaluation(evidence: Sequence[DriveRows], *, metrics: bool = True) -> Evaluation:
+def evaluation(drives: Sequence[DriveRows], *, metrics: bool = True) -> Evaluation:
     """Every figure over all drives together."""
-    objects = ObjectRows.joined([e.objects for e in evidence])
-    rows = ProposalRows.joined([e.rows for e in evidence])
-    proposals, judged = sum(e.proposals for e in evidence), rows.take(rows.to_classify)
-    on_objects = judged.take(judged.label > 0)
+    objects = np.concatenate([drive.objects for drive in drives])
+    proposals = np.concatenate([drive.proposals for drive in drives])
+    n_proposals, judged = sum(drive.n_proposals for drive in drives), proposals[proposals["to_classify"]]
+    on_objects = judged[judged["label"] > 0]
     return Evaluation(
-        drives=len(evidence),
-        frames=sum(e.frames for e in evidence),
-        proposals=proposals,
-        beta=sum(e.classified for e in evidence) / proposals if proposals else None,
-        ranges={name: _in_range(objects, rows, *band) for name, band in RANGES.items()},
-        tracks=track_scores(objects, rows),
-        metrics=_metrics(evidence) if metrics and (objects.id != NONE).any() else None,
-        calibration_error=top_calibration_error(judged.posterior, judged.label),
-        calibration_error_of_objects=top_calibration_error(on_objects.posterior, on_objects.label),
+        drives=len(drives),
+        frames=sum(drive.frames for drive in drives),
+        proposals=n_proposals,
+        beta=sum(drive.classified for drive in drives) / n_proposals if n_proposals else None,
+        ranges={name: _in_range(objects, proposals, *band) for name, band in RANGES_M.items()},
+        tracks=track_scores(objects, proposals),
+        metrics=_metrics(drives) if metrics and (objects["id"] != NONE).any() else None,
+        calibration_error=top_calibration_error(judged["posterior"], judged["label"]),
+        calibration_error_of_objects=top_calibration_error(on_objects["posterior"], on_objects["label"]),
     )
 
 
-def _in_range(objects: ObjectRows, rows: ProposalRows, low_m: float, high_m: float) -> RangeScore:
-    seen = objects.take((objects.range_m >= low_m) & (objects.range_m < high_m))
-    found = rows.take((rows.range_m >= low_m) & (rows.range_m < high_m))
+def _in_range(objects: Rows, proposals: Rows, low_m: float, high_m: float) -> RangeScore:
+    seen, found = (rows[(rows["range_m"] >= low_m) & (rows["range_m"] < high_m)] for rows in (objects, proposals))
     return RangeScore(segmentation(seen), class_scores(seen, found))
 
 
-def _metrics(evidence: Sequence[DriveRows]) -> dict[str, dict[str, float]] | None:
-    try:
-        import trackeval  # noqa: F401
-    except ImportError:
+def _metrics(drives: Sequence[DriveRows]) -> dict[str, dict[str, float]] | None:
+    if find_spec("trackeval") is None:
         return None
-    by_class = {name: track_metrics([e.associations[k] for e in evidence]) for k, name in enumerate(CLASS_NAMES[1:])}
-    everything = track_metrics([frames for e in evidence for frames in e.associations])
-    return {name: found for name, found in {ALL: everything, **by_class}.items() if found}
+    by_class = {name: [drive.associations[k] for drive in drives] for k, name in enumerate(CLASS_NAMES[1:])}
+    groups = {ALL: [frames for drive in drives for frames in drive.associations], **by_class}
+    return {name: found for name, sequences in groups.items() if (found := track_metrics(sequences))}

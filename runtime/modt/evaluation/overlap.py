@@ -18,63 +18,6 @@ PAD_M, FOOT_M = 0.15, 0.25
 CELL_M, REACH_M = 1.0, 128.0
 
 
-def inside(points: NDArray[Any], box: Float64, pad_m: float = PAD_M, foot_m: float = FOOT_M) -> Bool:
-    """(N,) whether each of (N, 3 or more) points lies in a (7,) box grown by pad_m, foot_m above its foot."""
-    c, s = float(np.cos(box[6])), float(np.sin(box[6]))
-    x, y, z = (points[:, k] - float(box[k]) for k in range(3))
-    length, width, height = (box[3:6] / 2).tolist()
-    within: Bool = (
-        (np.abs(c * x + s * y) < length + pad_m)
-        & (np.abs(c * y - s * x) < width + pad_m)
-        & (z > foot_m - height)
-        & (z < height + pad_m)
-    )
-    return within
-
-
-def points_of(points: Float32, truth: FrameTruth) -> tuple[list[Int], list[Int]]:
-    """Points of each object, clear of the ground; and all in its box."""
-    if not len(truth.id):
-        return [], []
-    centre = transform(inverse(truth.T_box_sensor), truth.box[:, :3])
-    reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
-    near = np.flatnonzero(_beside(points, centre, reach))
-    near = near[np.argsort(points[near, 0])]
-    local = points[near]
-    tilted = (reach + 0.05 * truth.box[:, 5])[:, None]  # sensors are tilted by a few degrees at most
-    ends = np.searchsorted(local[:, 0], centre[:, :1] + tilted * [-1, 1])
-    own, whole = [], []
-    for row, (begin, end) in enumerate(ends.tolist()):
-        box = truth.box[row]
-        k = begin + np.flatnonzero(np.abs(local[begin:end, 1] - np.float32(centre[row, 1])) < tilted[row])
-        moved = in_box_frame(local[k], truth)
-        within = inside(moved, box, foot_m=-PAD_M)
-        clear = within & (moved[:, 2] > float(box[2] - box[5] / 2) + FOOT_M)
-        whole.append(near[k[within]])
-        own.append(near[k[clear]])
-    return own, whole
-
-
-def _beside(points: Float32, centre: Float64, reach: Float64) -> Bool:
-    """(N,) whether each point lies in a cell of the ground plane that a circle touches; a few more than needed."""
-    n = int(2 * REACH_M / CELL_M)
-    table = np.zeros((n, n), np.bool_)
-    low = np.clip(((centre[:, :2] - reach[:, None] + REACH_M) / CELL_M).astype(np.int64) - 1, 0, n - 1)
-    high = np.clip(((centre[:, :2] + reach[:, None] + REACH_M) / CELL_M).astype(np.int64) + 1, 0, n - 1)
-    for (a, b), (c, d) in zip(low.tolist(), high.tolist(), strict=True):
-        table[a : c + 1, b : d + 1] = True
-    cell = ((points[:, :2] + np.float32(REACH_M)) * np.float32(1 / CELL_M)).astype(np.int32)
-    np.clip(cell, 0, n - 1, out=cell)
-    beside: Bool = table.ravel()[cell[:, 0] * n + cell[:, 1]]
-    return beside
-
-
-def in_box_frame(points: Float32, truth: FrameTruth) -> NDArray[Any]:
-    """(N, 3 or more) points in the frame in which boxes are upright."""
-    T = truth.T_box_sensor
-    return points if np.array_equal(T, np.eye(4)) else transform(T, points[:, :3].astype(np.float64))
-
-
 @dataclass(frozen=True, slots=True)
 class Overlap:
     """Points that n objects and P proposals of a frame share; the last proposal is none, without points.
@@ -86,6 +29,7 @@ class Overlap:
         held: (n, P) points of a proposal in an object's box, those near the ground too.
         best, most: (n,) proposal that shares most with each object, and how many points.
         iou: (n,) intersection over union of the points of both.
+        most_of_object, most_of_proposal: (n,) whether they share more than half of either.
     """
 
     own: list[Int]
@@ -96,30 +40,69 @@ class Overlap:
     best: Int
     most: Int
     iou: Float64
+    most_of_object: Bool
+    most_of_proposal: Bool
 
     @classmethod
     def of(cls, frame: JudgedFrame) -> Overlap:
         """Of a frame."""
         p = max(frame.n_proposals, int(frame.proposal.max(initial=NONE)) + 1) + 1
         size = np.bincount(frame.proposal + 1, minlength=p + 1)[1:]
-        own, whole = points_of(frame.points, frame.truth)
+        own, whole = _points_of(frame.points, frame.truth)
         shared, held = (_shared(points, frame.proposal, p) for points in (own, whole))
         count = np.array([len(points) for points in own], np.int64)
         best, most = shared.argmax(axis=1), shared.max(axis=1)
         iou = most / np.maximum(size[best] + count - most, 1)
-        return cls(own, count, size, shared, held, best, most, iou)
+        return cls(own, count, size, shared, held, best, most, iou, most > 0.5 * count, most > 0.5 * size[best])
 
-    @property
-    def most_of_object(self) -> Bool:
-        """(n,) whether the best proposal holds more than half of the object."""
-        most: Bool = self.most > 0.5 * self.count
-        return most
 
-    @property
-    def most_of_proposal(self) -> Bool:
-        """(n,) whether the object holds more than half of its best proposal."""
-        most: Bool = self.most > 0.5 * self.size[self.best]
-        return most
+def inside(points: NDArray[Any], box: Float64, pad_m: float = PAD_M, foot_m: float = FOOT_M) -> Bool:
+    """(N,) whether (N, 3 or more) points lie in a (7,) box grown by pad_m, and foot_m or more above its foot."""
+    x, y, z = (points[:, k] - float(box[k]) for k in range(3))
+    c, s = float(np.cos(box[6])), float(np.sin(box[6]))
+    length, width, height = (box[3:6] / 2).tolist()
+    along, across = np.abs(c * x + s * y), np.abs(c * y - s * x)
+    within: Bool = (along < length + pad_m) & (across < width + pad_m) & (z > foot_m - height) & (z < height + pad_m)
+    return within
+
+
+def in_box_frame(points: Float32, truth: FrameTruth) -> NDArray[Any]:
+    """(N, 3 or more) points in the frame in which boxes are upright."""
+    T = truth.T_box_sensor
+    return points if np.array_equal(T, np.eye(4)) else transform(T, points[:, :3].astype(np.float64))
+
+
+def _points_of(points: Float32, truth: FrameTruth) -> tuple[list[Int], list[Int]]:
+    """Points of each object, clear of the ground; and all in its box."""
+    centre = transform(inverse(truth.T_box_sensor), truth.box[:, :3])
+    reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
+    reach += 0.05 * truth.box[:, 5]  # sensors are tilted by a few degrees at most
+    near = np.flatnonzero(_beside(points, centre, reach))
+    near = near[np.argsort(points[near, 0])]
+    local = points[near]
+    ends = np.searchsorted(local[:, 0], centre[:, :1] + reach[:, None] * [-1, 1])
+    own, whole = [], []
+    for box, y, r, (begin, end) in zip(truth.box, centre[:, 1].tolist(), reach.tolist(), ends.tolist(), strict=True):
+        k = begin + np.flatnonzero(np.abs(local[begin:end, 1] - y) < r)
+        moved = in_box_frame(local[k], truth)
+        within = inside(moved, box, foot_m=-PAD_M)
+        clear = within & (moved[:, 2] > float(box[2] - box[5] / 2) + FOOT_M)
+        own.append(near[k[clear]])
+        whole.append(near[k[within]])
+    return own, whole
+
+
+def _beside(points: Float32, centre: Float64, reach: Float64) -> Bool:
+    """(N,) whether each point lies in a cell of the ground plane that a box may touch."""
+    n = int(2 * REACH_M / CELL_M)
+    table = np.zeros((n, n), np.bool_)
+    ends = (centre[:, None, :2] + reach[:, None, None] * [[-1], [1]] + REACH_M) / CELL_M + [[-1], [2]]
+    for (a, b), (c, d) in np.clip(ends.astype(np.int64), [[0], [1]], [[n - 1], [n]]).tolist():
+        table[a:c, b:d] = True
+    cell = ((points[:, :2] + np.float32(REACH_M)) * np.float32(1 / CELL_M)).astype(np.int32)
+    np.clip(cell, 0, n - 1, out=cell)
+    beside: Bool = table.ravel()[cell[:, 0] * n + cell[:, 1]]
+    return beside
 
 
 def _shared(objects: list[Int], proposal: Int, p: int) -> Int:

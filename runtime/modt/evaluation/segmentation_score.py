@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.evaluation.rows import ObjectRows, Outcome
-from modt.types import CLASS_NAMES
+from modt.evaluation.rows import Outcome, Rows, kinds
+from modt.evaluation.truth import Role
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +18,7 @@ class SegmentationScore:
         objects: judged.
         recall: share of them that is found.
         merged, split, partial, missed: of those not found (`Outcome`).
-        cut: by the view, counted apart where they are ignored.
+        cut: objects of which most is out of view, judged or not.
     """
 
     objects: int
@@ -29,18 +29,15 @@ class SegmentationScore:
     missed: int
     cut: int
 
-    @classmethod
-    def of(cls, rows: ObjectRows) -> SegmentationScore:
-        """The score of some objects."""
-        outcome = rows.outcome[rows.to_segment]
-        found, merged, split, partial, missed = np.bincount(outcome, minlength=len(Outcome)).tolist()
-        recall = found / len(outcome) if len(outcome) else None
-        return cls(len(outcome), recall, merged, split, partial, missed, int(rows.cut.sum()))
 
-
-def segmentation(rows: ObjectRows) -> dict[str, SegmentationScore]:
-    """By class, of counted objects, and by labelled type, of all."""
-    groups = {name: (rows.object_class == c) & (rows.role == 0) for c, name in enumerate(CLASS_NAMES) if c}
-    groups |= {name: rows.type_ == name for name in sorted(set(rows.type_.tolist()))}
-    scores = {name: SegmentationScore.of(rows.take(which)) for name, which in groups.items()}
-    return {name: score for name, score in scores.items() if score.objects or score.cut}
+def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
+    """The score of each class and of each labelled type."""
+    scores = {}
+    for name, which in kinds(objects).items():
+        judged = objects["outcome"][which & objects["to_segment"]]
+        found, merged, split, partial, missed = np.bincount(judged, minlength=len(Outcome)).tolist()
+        cut = int((which & ~objects["in_view"] & (objects["role"] != Role.IGNORED)).sum())
+        if len(judged) or cut:
+            recall = found / len(judged) if len(judged) else None
+            scores[name] = SegmentationScore(len(judged), recall, merged, split, partial, missed, cut)
+    return scores

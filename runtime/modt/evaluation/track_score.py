@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -10,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.evaluation.rows import Association, ObjectRows, ProposalRows
-from modt.types import CLASS_NAMES, NONE, Bool, Float64, Int
+from modt.evaluation.rows import Association, Rows, kinds
+from modt.evaluation.truth import Role
+from modt.types import NONE, Int
 
 SIMILARITY_THRESHOLD = 0.25
 """Similarity from which CLEAR and Identity count a match."""
@@ -71,72 +73,47 @@ class TrackScore:
     mis_associations: int
 
 
-def track_scores(objects: ObjectRows, proposals: ProposalRows) -> dict[str, TrackScore]:
-    """Of all objects that should be followed, by class and by labelled type; nothing where none has an identity."""
-    rows = objects.take((objects.object_class > 0) & (objects.role != 2) & (objects.id != NONE))
-    groups: dict[str, Bool] = {"all": np.ones(len(rows.id), np.bool_)}
-    groups |= {name: (rows.object_class == c) & (rows.role == 0) for c, name in enumerate(CLASS_NAMES) if c}
-    groups |= {name: rows.type_ == name for name in sorted(set(rows.type_.tolist()))}
-    first = _first_seen(proposals)
-    return {name: _score(rows.take(which), first) for name, which in groups.items() if which.any()}
+def track_scores(objects: Rows, proposals: Rows) -> dict[str, TrackScore]:
+    """Of all objects, by class and by labelled type; nothing where none has an identity."""
+    rows = objects[(objects["class"] > 0) & (objects["role"] != Role.IGNORED) & (objects["id"] != NONE)]
+    first: dict[tuple[int, int], int] = {}
+    for drive, track, frame in proposals[["drive", "track", "frame"]].tolist():
+        first[drive, track] = min(frame, first.get((drive, track), frame))
+    groups = {"all": np.ones(len(rows), np.bool_)} | kinds(rows)
+    return {name: _score(rows[which], first) for name, which in groups.items() if which.any()}
 
 
-def _first_seen(proposals: ProposalRows) -> dict[tuple[int, int], int]:
-    """First frame of every track, by drive and identity."""
-    order = np.argsort(proposals.frame, kind="stable")[::-1]
-    columns = (column[order].tolist() for column in (proposals.drive, proposals.track, proposals.frame))
-    return {(drive, track): frame for drive, track, frame in zip(*columns, strict=True)}
-
-
-def _score(labelled: ObjectRows, first_seen: dict[tuple[int, int], int]) -> TrackScore:
-    rows = labelled.take(labelled.to_follow)
-    objects, key = _keys(rows)
-    seen = rows.track != NONE
-    histories: dict[int, list[tuple[int, int, int]]] = {}
-    columns = (column[seen].tolist() for column in (key, rows.drive, rows.frame, rows.track))
-    for k, drive, frame, track in zip(*columns, strict=True):
-        histories.setdefault(k, []).append((frame, drive, track))
+def _score(labelled: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore:
+    rows = labelled[labelled["to_follow"]]
+    seen = rows[rows["track"] != NONE]
+    histories: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for drive, id_, frame, track in seen[["drive", "id", "frame", "track"]].tolist():
+        histories.setdefault((drive, id_), []).append((frame, track))
     breaks = taken = returned = 0
-    for history in histories.values():
-        history.sort()
+    for (drive, _), history in histories.items():
         past = set()
-        for (_, _, before), (frame, drive, track) in pairwise(history):
+        for (_, before), (frame, track) in pairwise(sorted(history)):
             past.add(before)
-            if track != before:
-                breaks += 1
-                returned += track in past
-                taken += track not in past and first_seen[drive, track] < frame
-    followed = int(seen.sum())
-    pairs = np.stack([rows.drive[seen], rows.track[seen], key[seen]])
-    owned, times = np.unique(pairs, axis=1, return_counts=True)
-    owners, held = np.unique(owned[:2, times >= STAY], axis=1, return_counts=True)
-    del owners
+            breaks += track != before
+            returned += track != before and track in past
+            taken += track not in past and first_seen[drive, track] < frame
+    frames_of = Counter(seen[["drive", "track", "id"]].tolist())
+    owned = Counter((drive, track) for (drive, track, _), n in frames_of.items() if n >= STAY)
     return TrackScore(
-        life=Life.of(objects, len(rows.id), followed, breaks),
-        life_as_seen=Life.of(len(histories), followed, followed, breaks),
-        ideal_labelled=len(labelled.id) / _keys(labelled)[0],
-        followed=followed / len(rows.id) if len(rows.id) else None,
+        life=Life.of(_count(rows), len(rows), len(seen), breaks),
+        life_as_seen=Life.of(len(histories), len(seen), len(seen), breaks),
+        ideal_labelled=len(labelled) / _count(labelled),
+        followed=len(seen) / len(rows) if len(rows) else None,
         discontinuities=breaks,
         taken_over=taken,
         returned=returned,
-        mis_associations=int((held > 1).sum()),
+        mis_associations=sum(n > 1 for n in owned.values()),
     )
 
 
-def _keys(rows: ObjectRows) -> tuple[int, Int]:
-    """How many objects there are, and the number of each row's."""
-    unique, key = np.unique(np.stack([rows.drive, rows.id]), axis=1, return_inverse=True)
-    return unique.shape[1], key.reshape(-1)
-
-
-Similarity = Callable[[Float64, Float64], Float64]
-"""Of boxes (n, 7) and (n, 7), row by row, 0 to 1: tracking.overlap.iou_3d or birds_eye_iou."""
-
-
-def box_association(truth: Int, boxes: Float64, track: Int, found: Float64, similarity: Similarity) -> Association:
-    """Objects and tracks compared by their boxes (n, 7) and (k, 7)."""
-    i, j = np.divmod(np.arange(len(boxes) * len(found)), max(len(found), 1))
-    return Association(truth, track, similarity(boxes[i], found[j]).reshape(len(boxes), len(found)))
+def _count(rows: Rows) -> int:
+    """Objects of the rows."""
+    return len(set(rows[["drive", "id"]].tolist()))
 
 
 def track_metrics(sequences: Sequence[Sequence[Association]]) -> dict[str, float]:
