@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labelled import FOOT_M, Scan, object_scans
+from labelled import Scan, object_scans
 from modt import profile
+from modt.evaluation.overlap import FOOT_M
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.types import CLASS_NAMES

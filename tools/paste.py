@@ -14,7 +14,8 @@ import numpy as np
 from numpy.random import Generator
 
 from augment import Beams
-from labelled import PAD_M, Scan
+from labelled import Scan
+from modt.evaluation.overlap import PAD_M
 from modt.geometry import FieldOfView
 from modt.types import Float32, Float64, Int, ObjectClass
 

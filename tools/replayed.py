@@ -10,10 +10,10 @@ import numpy as np
 from modt.classification.prior import Prior
 from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import NullLedger
+from modt.evaluation.class_score import average_precision
 from modt.pipeline import Fusion, Pipeline
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Frame, Int, Proposals, Tracks
 from recording import Player, Recording
-from scores import average_precision
 
 FIRST, FIRST_KEY, FURTHER, DOUBT = CALLS = ("first views", "first key views", "further views", "doubts")
 

@@ -21,8 +21,8 @@ from dataset import SHIPPED, Dataset, load
 from modt.classification.crops import Crops, canonical
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
+from modt.evaluation.class_score import average_precision
 from modt.types import N_CLASSES, Float32, Float64, Int
-from scores import average_precision
 
 BATCH = 8
 

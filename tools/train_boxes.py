@@ -24,8 +24,8 @@ from crop_boxes import all_described, described
 from dataset import Dataset, load
 from held_out import Model, cross_validated
 from modt.classification.layers import Layers, logits
+from modt.evaluation.class_score import average_precision
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
-from scores import average_precision
 from small_network import Batch, trained
 from weights import save_layers
 

@@ -27,14 +27,14 @@ import train_boxes
 import train_reflectance
 from augment import Beams, augment, limit
 from batches import BATCH, draw, odds
-from calibration import Calibration, expected_error
+from calibration import Calibration
 from dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
 from held_out import HeldOut, Model, cross_validated
 from modt.classification.crops import Crops, canonical
 from modt.classification.layers import logits as layer_logits
+from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
 from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
 from network import PointNet
-from scores import average_precision, confusion
 from teaching import Ensemble, Labels, Teaching
 from weights import save_layers
 
@@ -154,8 +154,10 @@ def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) 
         "average_precision": average_precision(probability, held.label, held.truth),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], held.truth[1:], strict=True)},
         "confusion": confusion(probability[clear], label),
-        "ece": expected_error(probability[clear], label),
-        "ece_uncalibrated": expected_error(Calibration.none().apply(held.logits[clear]), label),
+        "ece": round(top_calibration_error(probability[clear], label) or 0.0, 4),
+        "ece_uncalibrated": round(
+            top_calibration_error(Calibration.none().apply(held.logits[clear]), label) or 0.0, 4
+        ),
     }
 
 

@@ -21,13 +21,13 @@ from scipy.special import softmax
 
 import train_boxes
 from batches import draw, odds
-from calibration import Calibration, expected_error, fit
+from calibration import Calibration, fit
 from crop_boxes import all_described
 from dataset import Dataset, load
 from held_out import Model, cross_validated
 from modt.classification.layers import Layers, logits
+from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
 from modt.types import Bool, Float64, Int
-from scores import average_precision, confusion
 from small_network import Batch, trained
 from weights import load_layers, save_layers
 
@@ -103,7 +103,7 @@ def cross_validate(
         "network": {
             "average_precision": average_precision(word, added.label, added.truth),
             "confusion": confusion(word[clear], label),
-            "ece": expected_error(word[clear], label),
+            "ece": round(top_calibration_error(word[clear], label) or 0.0, 4),
             "log_loss": round(log_loss(word[clear], label), 4),
             "log_loss_without": round(log_loss(network[clear], label), 4),
         },

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from augment import Beams, augment, limit
 from build_crops import label
-from calibration import Calibration, expected_error, fit
+from calibration import Calibration, fit
 from dataset import SHIPPED, SYNTHETIC, UNLABELLED, folds
 from held_out import cross_validated
 from labelled import Scan, argoverse_scans, inside
 from modt.classification.crops import Crops, gather
+from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
 from modt.geometry import FieldOfView
 from modt.types import N_REFLECTANCE, NONE, ObjectClass, Proposals
 from paste import Item, pasted
-from scores import average_precision, confusion
 from tests.classification.datasets import data_of
 from tests.classification.scenes import blobs
 
@@ -184,8 +184,8 @@ def test_calibration_finds_the_temperature_and_what_is_common() -> None:
     found = fit(distorted, label)
     assert found.temperature == pytest.approx(3.0, rel=0.1)
     assert found.offset[1:] == pytest.approx(np.full(3, -2.0), abs=0.2)
-    assert expected_error(found.apply(distorted), label) < 0.02
-    assert expected_error(Calibration.none().apply(distorted), label) > 0.1
+    assert top_calibration_error(found.apply(distorted), label) < 0.02
+    assert top_calibration_error(Calibration.none().apply(distorted), label) > 0.1
 
 
 def test_calibration_folds_into_the_last_layer() -> None:

@@ -2,9 +2,9 @@ import sys
 
 import numpy as np
 import pytest
+from modt.evaluation.tracks import SIMILARITIES, Labelled, evaluate
 
 from modt.errors import MisuseError
-from modt.evaluation.tracks import SIMILARITIES, Labelled, evaluate
 
 
 def car(x):
