@@ -17,7 +17,7 @@ from dataset import SHIPPED, SYNTHETIC, UNLABELLED, folds
 from held_out import cross_validated
 from labelled import Scan, argoverse_scans, inside
 from modt.classification.crops import Crops, gather
-from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
+from modt.evaluation.class_score import top_calibration_error
 from modt.geometry import FieldOfView
 from modt.types import N_REFLECTANCE, NONE, ObjectClass, Proposals
 from paste import Item, pasted
@@ -146,33 +146,6 @@ def test_a_pasted_object_stands_on_the_ground_and_hides_what_is_behind_it() -> N
         assert np.hypot(*scan.points[own, :2].T) == pytest.approx(np.hypot(*box[:2]), abs=1.0)
         assert not scan.unlabelled[own].any()
     assert scan.unlabelled.sum() == len(scan.points) - sum(map(len, scan.objects))
-
-
-@given(
-    st.lists(st.tuples(st.integers(0, 3), st.floats(0, 1)), min_size=1, max_size=40),
-    st.integers(0, 5),
-)
-def test_average_precision_agrees_with_the_definition(rows: list[tuple[int, float]], missed: int) -> None:
-    label = np.array([r[0] for r in rows])
-    score = np.array([r[1] for r in rows])
-    probability = np.c_[1 - score, score, np.zeros((len(rows), 2))]
-    truth = np.bincount(label, minlength=4)
-    truth[1] += missed
-    order = np.argsort(-score, kind="stable")
-    points, true = [], 0
-    for k, i in enumerate(order, start=1):
-        true += label[i] == 1
-        points.append((true / max(truth[1], 1), true / k))
-    area, before = 0.0, 0.0
-    for k, (recall, _) in enumerate(points):
-        area += (recall - before) * max(p for _, p in points[k:])
-        before = recall
-    assert average_precision(probability, label, truth)["car"] == pytest.approx(area, abs=1e-3)
-
-
-def test_confusion_counts_true_by_called() -> None:
-    probability = np.eye(4)[[0, 1, 1, 3]]
-    assert confusion(probability, np.array([0, 1, 2, 3]))[2] == [0, 1, 0, 0]
 
 
 def test_calibration_finds_the_temperature_and_what_is_common() -> None:

@@ -91,7 +91,7 @@ def _track_cells(s: TrackScore) -> list[str]:
     (life, ideal), (seen, ideal_seen) = ([_number(v) for v in pair] for pair in lives)
     counts = (s.discontinuities, s.taken_over, s.mis_associations)
     ratio = "-" if s.life.ratio is None else f"{s.life.ratio:.2f}"
-    return [str(s.life.objects), life, ideal, ratio, seen, ideal_seen, _number(s.ideal_labelled), *map(str, counts)]
+    return [str(s.life.objects), life, ideal, ratio, seen, ideal_seen, _number(s.labelled.ideal), *map(str, counts)]
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:

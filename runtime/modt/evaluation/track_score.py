@@ -55,7 +55,7 @@ class TrackScore:
     Attributes:
         life: misses count as misses.
         life_as_seen: over the objects and frames that are followed.
-        ideal_labelled: labelled frames over labelled objects, whatever points they have.
+        labelled: objects and frames that are labelled, whatever points they have; its ideal is that of Table III.
         followed: share of the frames in which an object is followed.
         discontinuities: times that another track than before follows an object.
         taken_over: of these, by a track that was there before.
@@ -65,7 +65,7 @@ class TrackScore:
 
     life: Life
     life_as_seen: Life
-    ideal_labelled: float
+    labelled: Life
     followed: float | None
     discontinuities: int
     taken_over: int
@@ -102,7 +102,7 @@ def _score(labelled: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
     return TrackScore(
         life=Life.of(_count(rows), len(rows), len(seen), breaks),
         life_as_seen=Life.of(len(histories), len(seen), len(seen), breaks),
-        ideal_labelled=len(labelled) / _count(labelled),
+        labelled=Life.of(_count(labelled), len(labelled), len(seen), breaks),
         followed=len(seen) / len(rows) if len(rows) else None,
         discontinuities=breaks,
         taken_over=taken,
