@@ -12,9 +12,8 @@ import numpy as np
 from modt.evaluation import overlap
 from modt.evaluation.truth import Regions
 from modt.geometry import FieldOfView
-from modt.sources import kitti_labels
 from modt.sources.calibration import camera_of_raw, camera_of_sequence
-from modt.sources.kitti_labels import DONT_CARE
+from modt.sources.kitti_labels import DONT_CARE, read_labels, read_tracklets
 from modt.types import Bool, Float32, Float64, Int, ObjectClass
 
 CLASS_OF = {
@@ -122,11 +121,11 @@ def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
     """One scan of the object benchmark."""
     camera = camera_of_sequence(calib)
     points = np.fromfile(path, np.float32).reshape(-1, 4)
-    labels = kitti_labels.read_labels(label, tracking=False)
+    labels = read_labels(label, camera, tracking=False)
     objects = [item for item in labels if item.type_ != DONT_CARE]
     edges = np.array([item.image_box for item in labels if item.type_ == DONT_CARE]).reshape(-1, 4)
     unlabelled = Regions(edges, camera).contains(points)
-    boxes, kinds = footed(kitti_labels.boxes(objects, camera)).tolist(), [item.type_ for item in objects]
+    boxes, kinds = [footed(item.box).tolist() for item in objects], [item.type_ for item in objects]
     return boxed(path.stem, drive, points, boxes, kinds, FieldOfView.of_camera(camera), unlabelled)
 
 
@@ -134,17 +133,15 @@ def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
     """Scans of a KITTI raw drive with tracklets; of the test drive only to confirm what was found elsewhere."""
     assert confirm or drive.name != TEST_DRIVE, drive
     camera = camera_of_raw(drive.parent / "calib_cam_to_cam.txt")
-    tracklets = kitti_labels.read_tracklets(drive / "tracklet_labels.xml")
+    tracklets = read_tracklets(drive / "tracklet_labels.xml")
     for path in sorted((drive / "velodyne_points" / "data").glob("*.bin")):
         frame = int(path.stem)
-        seen = [k for k, t in enumerate(tracklets) if 0 <= frame - t.first < len(t.box)]
-        here = [tracklets[k] for k in seen]
+        here = [label for label in tracklets if label.frame == frame]
         points = np.fromfile(path, np.float32).reshape(-1, 4)
-        boxes = [footed(t.box[frame - t.first]).tolist() for t in here]
+        boxes, kinds = [footed(label.box).tolist() for label in here], [label.type_ for label in here]
         name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
-        kinds = [t.type_ for t in here]
         scan = boxed(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
-        yield replace(scan, numbers=tuple(seen))
+        yield replace(scan, numbers=tuple(label.id for label in here))
 
 
 def semantic_scans(folder: Path) -> Iterator[Scan]:

@@ -74,7 +74,7 @@ def test_a_part_of_drive_0005(drive_0005, camera):
 
 @pytest.mark.kitti
 def test_the_objects_of_drive_0005_as_the_paper_counts_them(kitti_root):
-    truth = open_truth(kitti_root / "tracking" / "label_02" / "0000.txt", classes="paper")
+    truth = open_truth(kitti_root / "tracking" / "label_02" / "0000.txt", paper=True)
     assert len(truth.frames) == 154
     nothing = np.zeros((0, 4), np.float32)
     none = np.zeros(0, np.int64)

@@ -31,7 +31,7 @@ def test_raw_drive(tmp_path):
     assert (first.type_, first.object_class.tolist(), first.id.tolist()) == (("Tram",), [0], [1])
     assert second.box[0] == pytest.approx([10, 8, -0.95, 4, 2, 1.5, 0.5])
     assert truth.frames[3].role.tolist() == [Role.COUNTED]
-    assert open_truth(drive, classes="paper").frames[3].role.tolist() == [Role.IGNORED]
+    assert open_truth(drive, paper=True).frames[3].role.tolist() == [Role.IGNORED]
 
 
 def test_parked_cars_before_and_after_their_tracklets(tmp_path):
@@ -104,7 +104,7 @@ def test_a_table_beside_each_scan(tmp_path):
         (lambda p: p / "nowhere", "no such file"),
         (lambda p: p, "holds no labels that are recognised"),
         (lambda p: cuboids(p, "0,3,Car,9,x,0.5,2,1,1.5,0.1\n"), r"truth\.csv:2: no cuboid"),
-        (lambda p: cuboids(p, "0,b,Car,9,1,0.5,2,1,1.5,0.1\n"), r"truth\.csv:2: no frame and track"),
+        (lambda p: cuboids(p, "0,b,Car,9,1,0.5,2,1,1.5,0.1\n"), r"truth\.csv:2: no cuboid"),
         (lambda p: cuboids(p, "2,3,Car,9,1,0.5,2,1,1.5,0.1\n"), r"2 poses, none for frame 2"),
         (lambda p: tracklets(layouts.raw_drive(p), ("Car", "x", [1])), "item 0 is no tracklet"),
     ],

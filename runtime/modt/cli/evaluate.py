@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from modt.errors import MisuseError
-
-if TYPE_CHECKING:
-    from modt.evaluation.rules import Rules
 
 IGNORABLE = ("cut", "few", "parked", "dontcare")
 DIGITS = 6
@@ -48,6 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: a run or its labels cannot be used, or do not belong together.
     """
     import json
+    from dataclasses import asdict, replace
 
     from modt.evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
     from modt.evaluation.report import report
@@ -62,8 +59,10 @@ def run(arguments: argparse.Namespace) -> int:
     by_sensor: dict[str, list[DriveRows]] = {}
     for drive, (path, labels) in enumerate(zip(paths[::2], paths[1::2], strict=True)):
         record = RunRecord.open(path)
-        truth = open_truth(labels, record.stream, arguments.classes)
-        rules = _rules(truth.rules, arguments)
+        truth = open_truth(labels, record.stream, paper=arguments.classes == "paper")
+        sector_deg = truth.rules.sector_deg if arguments.sector is None else arguments.sector
+        ignored = truth.rules.ignored - set(arguments.count)
+        rules = replace(truth.rules, sector_deg=sector_deg, ignored=ignored)
         try:
             found = collect(record.frames(truth), rules, drive)
         except ValueError:
@@ -73,25 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([e for found in by_sensor.values() for e in found])
     if arguments.json:
-        plain = {name: _rounded(found.json()) for name, found in sensors.items()}
-        print(json.dumps({"schema": SCHEMA, "sensors": plain}, indent=1))
+        text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(found) for name, found in sensors.items()}})
+        print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))
     else:
         print(report(sensors))
     return 0
-
-
-def _rules(rules: Rules, arguments: argparse.Namespace) -> Rules:
-    from dataclasses import replace
-
-    sector = rules.sector_deg if arguments.sector is None else arguments.sector
-    return replace(rules, sector_deg=sector, ignored=rules.ignored - set(arguments.count))
-
-
-def _rounded(tree: Any) -> Any:
-    if isinstance(tree, float):
-        return round(tree, DIGITS)
-    if isinstance(tree, dict):
-        return {key: _rounded(value) for key, value in tree.items()}
-    if isinstance(tree, list | tuple):
-        return [_rounded(value) for value in tree]
-    return tree

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 
@@ -69,10 +67,6 @@ class Evaluation:
     metrics: dict[str, dict[str, float]] | None
     calibration_error: float | None
     calibration_error_of_objects: float | None
-
-    def json(self) -> dict[str, Any]:
-        """As plain data."""
-        return dataclasses.asdict(self)
 
 
 def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES, *, metrics: bool = True) -> Evaluation:

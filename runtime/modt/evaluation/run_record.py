@@ -54,7 +54,9 @@ class RunRecord:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
         if not (path / LABELS).is_dir():
             raise MisuseError(path, "holds no labels of points", "run it again with `modt replay --labels`")
-        return cls(path, Path(stream) if stream else None, fov, _profile_of(command))
+        words = [word for argument in command for word in argument.split("=", 1)]
+        sensor = Path(words[words.index("--profile") + 1]).stem if "--profile" in words else DEFAULT
+        return cls(path, Path(stream) if stream else None, fov, sensor)
 
     def frames(self, truth: Truth) -> Iterator[JudgedFrame]:
         """Every recorded frame beside its truth.
@@ -112,13 +114,3 @@ def _track_columns(record: dict[str, Any]) -> tuple[Int, Int, Int, Float64]:
     if len(proposals) and not 0 <= proposals.min() <= proposals.max() < record["proposals"]:
         raise ValueError("a track's proposal is none of the frame's")
     return ids, proposals, np.array(said, np.int64), posterior
-
-
-def _profile_of(command: list[str]) -> str:
-    """Name of the profile in a command line, that of the default where it names none."""
-    for word, after in zip(command, [*command[1:], ""], strict=True):
-        if word == "--profile":
-            return Path(after).stem
-        if word.startswith("--profile="):
-            return Path(word.partition("=")[2]).stem
-    return DEFAULT

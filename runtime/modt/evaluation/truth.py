@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from modt.evaluation.rules import Rules
 from modt.geometry import Camera, inverse, transform_boxes
-from modt.sources.kitti_labels import Tracklet
+from modt.sources.kitti_labels import Label
 from modt.sources.scan_stream import ScanStream
 from modt.types import Bool, Float32, Float64, Int, ObjectClass
 
-STILL_M = 1.0
-"""A car whose centre stays within this, in x and in y, is parked."""
-LEAST_FRAMES = 3
-"""A car labelled in fewer frames is not known to be parked."""
+STILL_M, LEAST_FRAMES = 1.0, 3
+"""A car is parked if its centre stays within STILL_M, in x and in y, over LEAST_FRAMES or more."""
 
 
 class Role(IntEnum):
@@ -34,35 +34,24 @@ Types = Mapping[str, tuple[ObjectClass, Role]]
 """Class and role of each labelled type; any other one is background, judged for segmentation alone."""
 
 CAR, PEDESTRIAN, CYCLIST = ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST
-KITTI_TYPES: Types = {
-    "Car": (CAR, Role.COUNTED),
-    "Van": (CAR, Role.COUNTED),
-    "Pedestrian": (PEDESTRIAN, Role.COUNTED),
-    "Person": (PEDESTRIAN, Role.COUNTED),
-    "Person_sitting": (PEDESTRIAN, Role.COUNTED),
-    "Cyclist": (CYCLIST, Role.COUNTED),
-}
-PAPER_TYPES: Types = {
-    name: (class_, Role.COUNTED if name in ("Car", "Pedestrian", "Cyclist") else Role.IGNORED)
-    for name, (class_, _) in KITTI_TYPES.items()
-}
+
+
+def _counted(names: Mapping[ObjectClass, str]) -> dict[str, tuple[ObjectClass, Role]]:
+    return {name: (class_, Role.COUNTED) for class_, listed in names.items() for name in listed.split(", ")}
+
+
+PAPER_COUNTED = _counted({CAR: "Car", PEDESTRIAN: "Pedestrian", CYCLIST: "Cyclist"})
+KITTI_TYPES: Types = _counted({CAR: "Car, Van", PEDESTRIAN: "Pedestrian, Person, Person_sitting", CYCLIST: "Cyclist"})
+PAPER_TYPES: Types = {name: (class_, Role.IGNORED) for name, (class_, _) in KITTI_TYPES.items()} | PAPER_COUNTED
 """Table III counts Car, Pedestrian and Cyclist only."""
-LARGE = (CAR, Role.NEUTRAL)
-PANDASET_TYPES: Types = {
-    "Car": (CAR, Role.COUNTED),
-    "Pickup Truck": (CAR, Role.COUNTED),
-    "Medium-sized Truck": LARGE,
-    "Semi-truck": LARGE,
-    "Bus": LARGE,
-    "Towed Object": LARGE,
-    "Other Vehicle - Construction Vehicle": LARGE,
-    "Pedestrian": (PEDESTRIAN, Role.COUNTED),
-    "Pedestrian with Object": (PEDESTRIAN, Role.COUNTED),
-    "Motorcycle": (CYCLIST, Role.COUNTED),
-    "TYPE_VEHICLE": (CAR, Role.COUNTED),
-    "TYPE_PEDESTRIAN": (PEDESTRIAN, Role.COUNTED),
-    "TYPE_CYCLIST": (CYCLIST, Role.COUNTED),
-}
+LARGE = "Medium-sized Truck", "Semi-truck", "Bus", "Towed Object", "Other Vehicle - Construction Vehicle"
+PANDASET_TYPES: Types = dict.fromkeys(LARGE, (CAR, Role.NEUTRAL)) | _counted(
+    {
+        CAR: "Car, Pickup Truck, TYPE_VEHICLE",
+        PEDESTRIAN: "Pedestrian, Pedestrian with Object, TYPE_PEDESTRIAN",
+        CYCLIST: "Motorcycle, TYPE_CYCLIST",
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +76,6 @@ class Regions:
         return within
 
 
-def _no_boxes() -> Float64:
-    return np.zeros((0, 7))
-
-
 @dataclass(frozen=True, slots=True)
 class FrameTruth:
     """The objects of one frame.
@@ -111,24 +96,16 @@ class FrameTruth:
     object_class: Int
     role: Int
     box: Float64
-    parked: Float64 = field(default_factory=_no_boxes)
+    parked: Float64 = field(default_factory=lambda: np.zeros((0, 7)))
     regions: Regions | None = None
     T_box_sensor: Float64 = field(default_factory=lambda: np.eye(4))
 
     @classmethod
-    def of(
-        cls,
-        types: Types,
-        id_: Sequence[int],
-        type_: Sequence[str],
-        box: Sequence[Float64] | Float64,
-        **more: Float64 | Regions | None,
-    ) -> FrameTruth:
-        """Truth of labelled types."""
-        class_role = [types.get(name, (ObjectClass.BACKGROUND, Role.COUNTED)) for name in type_]
-        table = np.array(class_role, np.int64).reshape(-1, 2)
+    def of(cls, types: Types, id_: Sequence[int], type_: Sequence[str], box: ArrayLike, **more: Any) -> FrameTruth:
+        """Objects of labelled types; more: the fields that have a default."""
+        table = np.array([types.get(name, (0, Role.COUNTED)) for name in type_], np.int64).reshape(-1, 2)
         boxes = np.asarray(box, np.float64).reshape(-1, 7)
-        return cls(np.asarray(id_, np.int64), tuple(type_), table[:, 0], table[:, 1], boxes, **more)  # type: ignore[arg-type]
+        return cls(np.asarray(id_, np.int64), tuple(type_), table[:, 0], table[:, 1], boxes, **more)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,25 +123,24 @@ class Truth:
     rules: Rules
 
 
-def parked_outside(objects: Sequence[Tracklet], types: Types, poses: Mapping[int, Float64]) -> dict[int, Float64]:
-    """By frame, (k, 7) boxes of parked cars in the frames that their labels do not cover.
+def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Float64]) -> dict[int, Float64]:
+    """By frame, (k, 7) boxes of parked cars that are not labelled in it, as they stood when last or next labelled.
 
     Args:
-        objects: of a recording.
+        labels: of a recording.
         types: classes of their types.
         poses: T_world_sensor by frame.
     """
+    cars: dict[int, dict[int, Float64]] = {}
+    for label in labels:
+        if types.get(label.type_, (None,))[0] == CAR and label.frame in poses:
+            placed = transform_boxes(poses[label.frame], label.box[None])
+            cars.setdefault(label.id, {})[label.frame] = placed[0]
     found: dict[int, list[Float64]] = {}
-    for item in objects:
-        frames_of = range(item.first, item.first + len(item.box))
-        posed = [f for f in frames_of if f in poses]
-        if types.get(item.type_, (None,))[0] != CAR or len(posed) < LEAST_FRAMES:
+    for boxes in cars.values():
+        if len(boxes) < LEAST_FRAMES or np.ptp([box[:2] for box in boxes.values()], axis=0).max() > STILL_M:
             continue
-        world = np.concatenate([transform_boxes(poses[f], item.box[f - item.first][None]) for f in posed])
-        if np.ptp(world[:, :2], axis=0).max() > STILL_M:
-            continue
-        for frame, T in poses.items():
-            if frame not in frames_of:
-                last = world[0] if frame < item.first else world[-1]
-                found.setdefault(frame, []).append(transform_boxes(inverse(T), last[None])[0])
+        for frame in poses.keys() - boxes.keys():
+            nearest = boxes[min(boxes, key=lambda labelled: abs(labelled - frame))]
+            found.setdefault(frame, []).append(transform_boxes(inverse(poses[frame]), nearest[None])[0])
     return {frame: np.array(boxes) for frame, boxes in found.items()}

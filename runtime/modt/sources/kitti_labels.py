@@ -3,82 +3,63 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.geometry import Camera, inverse, transform, wrap
-from modt.types import Float64
+from modt.geometry import Camera, inverse, transform
+from modt.types import NONE, Float64
 
 DONT_CARE = "DontCare"
 REMEDY = "restore the label file"
 
 
 @dataclass(frozen=True, slots=True)
-class Tracklet:
-    """An annotated object.
-
-    Attributes:
-        type_: as labelled.
-        first: frame of its first box.
-        box: (m, 7) x, y, z of the centre, l, w, h [m], yaw [rad], sensor frame, frame by frame.
-    """
-
-    type_: str
-    first: int
-    box: Float64
-
-
-@dataclass(frozen=True, slots=True)
 class Label:
-    """A line of a label file.
+    """An object in a frame.
 
     Attributes:
-        frame, id: of the tracking benchmark, 0 and NONE in the object benchmark.
+        frame, id: 0 and NONE in the object benchmark.
         type_: as labelled.
-        image_box: (4,) left, top, right, bottom [pixel].
-        hwlxyzry: (7,) size [m], middle of the foot in rectified camera coordinates [m], rotation about y [rad].
+        box: (7,) x, y, z of the centre, l, w, h [m], yaw [rad], sensor frame.
+        image_box: (4,) left, top, right, bottom [pixel], None where it is not labelled.
     """
 
     frame: int
     id: int
     type_: str
-    image_box: Float64
-    hwlxyzry: Float64
+    box: Float64
+    image_box: Float64 | None = None
 
 
-def read_tracklets(path: Path) -> list[Tracklet]:
-    """The objects of a tracklet_labels.xml.
+def read_tracklets(path: Path) -> list[Label]:
+    """The labels of a tracklet_labels.xml; an object's identity is its place in the file.
 
     Raises:
-        MisuseError: it cannot be read, or an item of it is no tracklet.
+        MisuseError: it cannot be read, or an item of it is no tracklet; it names the item.
     """
     try:
         root = ET.parse(path).getroot()
     except (OSError, ET.ParseError) as error:
         raise MisuseError(path, f"cannot be read ({error})", REMEDY) from None
-    found = []
+    labels = []
     for number, item in enumerate(root.iterfind("tracklets/item")):
         try:
             height, width, length = (float(item.findtext(key, "")) for key in "hwl")
-            first = int(item.findtext("first_frame", ""))
-            keys = ("tx", "ty", "tz", "rz")
-            poses = np.array([[float(p.findtext(k, "")) for k in keys] for p in item.iterfind("poses/item")])
+            first, type_ = int(item.findtext("first_frame", "")), item.findtext("objectType", "")
+            for frame, pose in enumerate(item.iterfind("poses/item"), first):
+                x, y, foot, yaw = (float(pose.findtext(key, "")) for key in ("tx", "ty", "tz", "rz"))
+                box = np.array([x, y, foot + height / 2, length, width, height, yaw])
+                labels.append(Label(frame, number, type_, box))
         except ValueError:
             raise MisuseError(path, f"item {number} is no tracklet", REMEDY) from None
-        x, y, foot, yaw = poses.reshape(-1, 4).T
-        size = np.tile([length, width, height], (len(x), 1))
-        found.append(
-            Tracklet(item.findtext("objectType", ""), first, np.c_[x, y, foot + height / 2, size, wrap(yaw)])
-        )
-    return found
+    return labels
 
 
-def read_labels(path: Path, *, tracking: bool) -> list[Label]:
-    """The lines of a label file of the tracking or the object benchmark.
+def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
+    """The labels of a file of the tracking or the object benchmark, as the sensor beside the camera sees them.
 
     Raises:
         MisuseError: it cannot be read, or a line is no label; it names the line.
@@ -87,24 +68,17 @@ def read_labels(path: Path, *, tracking: bool) -> list[Label]:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(path, f"cannot be read ({error})", REMEDY) from None
+    T_sensor_camera = inverse(camera.T_camera_sensor)
     labels = []
     for number, line in enumerate(lines, 1):
         words = line.split()
         try:
-            frame, id_ = (int(words.pop(0)), int(words.pop(0))) if tracking else (0, -1)
-            values = np.array([float(word) for word in words[1:15]])
-            if len(values) != 14:
-                raise ValueError
+            frame, id_ = (int(words.pop(0)), int(words.pop(0))) if tracking else (0, NONE)
+            values = np.array(words[1:15], np.float64)
+            height, width, length, *foot, turn = values[7:].tolist()
+            x, y, z = transform(T_sensor_camera, np.array(foot)).tolist()
         except (ValueError, IndexError):
             raise MisuseError(f"{path}:{number}", "no label of KITTI's", REMEDY) from None
-        labels.append(Label(frame, id_, words[0], values[3:7], values[7:14]))
+        box = np.array([x, y, z + height / 2, length, width, height, -turn - np.pi / 2])
+        labels.append(Label(frame, id_, words[0], box, values[3:7]))
     return labels
-
-
-def boxes(labels: Sequence[Label], camera: Camera) -> Float64:
-    """(n, 7) x, y, z of the centre, l, w, h [m], yaw [rad] of labels, sensor frame."""
-    table = np.array([label.hwlxyzry for label in labels]).reshape(-1, 7)
-    foot = transform(inverse(camera.T_camera_sensor), table[:, 3:6])
-    centre = foot + np.array([0, 0, 0.5]) * table[:, :1]
-    placed: Float64 = np.c_[centre, table[:, 2::-1], wrap(-table[:, 6] - np.pi / 2)]
-    return placed
