@@ -15,7 +15,6 @@ from modt.types import NONE, Bool, Float32, Float64, Int
 
 PAD_M, FOOT_M = 0.15, 0.25
 """Points of an object: up to PAD_M beyond its box, and FOOT_M above its foot."""
-CELL_M, REACH_M = 1.0, 128.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,32 +76,16 @@ def _points_of(points: Float32, truth: FrameTruth) -> tuple[list[Int], list[Int]
     centre = transform(inverse(truth.T_box_sensor), truth.box[:, :3])
     reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
     reach += 0.05 * truth.box[:, 5]  # sensors are tilted by a few degrees at most
-    near = np.flatnonzero(_beside(points, centre, reach))
-    near = near[np.argsort(points[near, 0])]
-    local = points[near]
-    ends = np.searchsorted(local[:, 0], centre[:, :1] + reach[:, None] * [-1, 1])
+    across = np.ascontiguousarray(points[:, :2].T)
     own, whole = [], []
-    for box, y, r, (begin, end) in zip(truth.box, centre[:, 1].tolist(), reach.tolist(), ends.tolist(), strict=True):
-        k = begin + np.flatnonzero(np.abs(local[begin:end, 1] - y) < r)
-        moved = in_box_frame(local[k], truth)
+    for box, (x, y), r in zip(truth.box, centre[:, :2].tolist(), reach.tolist(), strict=True):
+        k = np.flatnonzero((np.abs(across[0] - x) < r) & (np.abs(across[1] - y) < r))
+        moved = in_box_frame(points[k], truth)
         within = inside(moved, box, foot_m=-PAD_M)
         clear = within & (moved[:, 2] > float(box[2] - box[5] / 2) + FOOT_M)
-        own.append(near[k[clear]])
-        whole.append(near[k[within]])
+        own.append(k[clear])
+        whole.append(k[within])
     return own, whole
-
-
-def _beside(points: Float32, centre: Float64, reach: Float64) -> Bool:
-    """(N,) whether each point lies in a cell of the ground plane that a box may touch."""
-    n = int(2 * REACH_M / CELL_M)
-    table = np.zeros((n, n), np.bool_)
-    ends = (centre[:, None, :2] + reach[:, None, None] * [[-1], [1]] + REACH_M) / CELL_M + [[-1], [2]]
-    for (a, b), (c, d) in np.clip(ends.astype(np.int64), [[0], [1]], [[n - 1], [n]]).tolist():
-        table[a:c, b:d] = True
-    cell = ((points[:, :2] + np.float32(REACH_M)) * np.float32(1 / CELL_M)).astype(np.int32)
-    np.clip(cell, 0, n - 1, out=cell)
-    beside: Bool = table.ravel()[cell[:, 0] * n + cell[:, 1]]
-    return beside
 
 
 def _shared(objects: list[Int], proposal: Int, p: int) -> Int:

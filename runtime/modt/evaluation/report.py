@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from modt.evaluation.evaluation import ALL, Evaluation
-from modt.evaluation.track_score import TrackScore
 
 CLASS_TABLES = (
     ("average precision [%]", "average_precision", "objects"),
@@ -13,7 +12,10 @@ CLASS_TABLES = (
     ("recall as said [%]", "recall", "segmentable"),
 )
 """Title, figure and count of each."""
+FAILURES = ("merged", "split", "partial", "missed", "cut")
+TRACKS = ["objects", "life", "ideal", "ratio", "as seen", "ideal", "labelled", "breaks", "taken", "mixed"]
 METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")
+EVENTS = ("id_switches", "fragmentations")
 
 
 def report(sensors: Mapping[str, Evaluation]) -> str:
@@ -23,89 +25,48 @@ def report(sensors: Mapping[str, Evaluation]) -> str:
 
 def _lines(name: str, e: Evaluation) -> Iterator[str]:
     yield f"{name}: {e.drives} drives, {e.frames} frames, {e.proposals} proposals, beta {_percent(e.beta)} %"
-    yield ""
-    yield from _table(
-        ["segmentation [%]", *e.ranges, "objects", "merged", "split", "partial", "missed", "cut"],
-        [
-            [
-                kind,
-                *(
-                    _percent(band.segmentation[kind].recall if kind in band.segmentation else None)
-                    for band in e.ranges.values()
-                ),
-                *(str(n) for n in (s.objects, s.merged, s.split, s.partial, s.missed, s.cut)),
-            ]
-            for kind, s in e.ranges[ALL].segmentation.items()
-        ],
-    )
-    yield ""
-    for title, key, counted in CLASS_TABLES:
-        scores = e.ranges[ALL].classification
-        cells = {c: [_percent(getattr(band.classification[c], key)) for band in e.ranges.values()] for c in scores}
-        rows = [[c, *cells[c], str(getattr(score, counted))] for c, score in scores.items()]
-        yield from _table([title, *e.ranges, counted], rows)
-        yield ""
-    errors = ", ".join(f"{c} {_percent(s.calibration_error)}" for c, s in e.ranges[ALL].classification.items())
-    yield (
-        f"  calibration error {_percent(e.calibration_error)} % of proposals, "
-        f"{_percent(e.calibration_error_of_objects)} % of objects; {errors}"
-    )
-    if e.tracks:
-        yield ""
+    bands, whole = e.ranges.values(), e.ranges[ALL]
+    rows = []
+    for kind, s in whole.segmentation.items():
+        found = [band.segmentation.get(kind) for band in bands]
+        recall = [_percent(score.recall if score else None) for score in found]
+        rows.append([kind, *recall, s.objects, *(getattr(s, failure) for failure in FAILURES)])
+    yield from _table(["segmentation [%]", *e.ranges, "objects", *FAILURES], rows)
+    for title, key, count in CLASS_TABLES:
+        shares = {c: [_percent(getattr(band.classification[c], key)) for band in bands] for c in whole.classification}
+        rows = [[c, *shares[c], getattr(score, count)] for c, score in whole.classification.items()]
+        yield from _table([title, *e.ranges, count], rows)
+    errors = {"proposals": e.calibration_error, "objects": e.calibration_error_of_objects}
+    errors |= {c: score.calibration_error for c, score in whole.classification.items()}
+    yield from _table(["calibration error [%]", *errors], [["", *map(_percent, errors.values())]])
+    lives = []
+    for kind, t in e.tracks.items():
+        figures = (t.life.life, t.life.ideal, t.life_as_seen.life, t.life_as_seen.ideal, t.labelled.ideal)
+        life, ideal, *others = (_number(value) for value in figures)
+        counts = (t.discontinuities, t.taken_over, t.mis_associations)
+        lives.append([kind, t.life.objects, life, ideal, _number(t.life.ratio, 2), *others, *counts])
+    if lives:
+        yield from _table(["tracks", *TRACKS], [row for row in lives if row[1]])
+        measured = (e.metrics or {}).items()
+        rows = [[k, *(_percent(m[n]) for n in METRICS), *(_number(m[n], 0) for n in EVENTS)] for k, m in measured]
         yield from _table(
-            [
-                "tracks",
-                "objects",
-                "life",
-                "ideal",
-                "ratio",
-                "as seen",
-                "ideal",
-                "labelled",
-                "breaks",
-                "taken",
-                "mixed",
-            ],
-            [[kind, *_track_cells(s)] for kind, s in e.tracks.items() if s.life.objects],
+            ["metrics [%]" if rows else "metrics: pip install 'modt[evaluate]'", *METRICS, *EVENTS], rows
         )
-    if e.metrics:
-        yield ""
-        yield from _table(
-            ["metrics [%]", *METRICS, "id switches", "fragments"],
-            [
-                [
-                    kind,
-                    *(_percent(m[key]) for key in METRICS),
-                    f"{m['id_switches']:.0f}",
-                    f"{m['fragmentations']:.0f}",
-                ]
-                for kind, m in e.metrics.items()
-            ],
-        )
-    elif e.tracks:
-        yield "  HOTA, CLEAR and Identity: pip install 'modt[evaluate]'"
 
 
-def _track_cells(s: TrackScore) -> list[str]:
-    lives = (s.life.life, s.life.ideal), (s.life_as_seen.life, s.life_as_seen.ideal)
-    (life, ideal), (seen, ideal_seen) = ([_number(v) for v in pair] for pair in lives)
-    counts = (s.discontinuities, s.taken_over, s.mis_associations)
-    ratio = "-" if s.life.ratio is None else f"{s.life.ratio:.2f}"
-    return [str(s.life.objects), life, ideal, ratio, seen, ideal_seen, _number(s.labelled.ideal), *map(str, counts)]
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
     """Lines of aligned columns, the first to the left."""
-    widths = [max(len(row[k]) for row in (head, *rows)) for k in range(len(head))]
-    for row in (head, *rows):
-        yield (
-            "  " + row[0].ljust(widths[0]) + "".join(f"  {c:>{w}}" for c, w in zip(row[1:], widths[1:], strict=True))
-        )
+    lines = [[str(cell) for cell in row] for row in (head, *rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    yield ""
+    for first, *row in lines:
+        cells = (f"{cell:>{width}}" for cell, width in zip(row, widths[1:], strict=True))
+        yield "  ".join([f"  {first:<{widths[0]}}", *cells])
 
 
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1f}"
+def _number(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
 
 
 def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f}"
+    return _number(None if value is None else 100 * value)
