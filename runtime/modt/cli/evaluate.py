@@ -25,14 +25,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument(
         "--classes", choices=("all", "paper"), default="all", help="KITTI's vans as cars (all), or ignored (paper)"
     )
-    p.add_argument(
-        "--count",
-        nargs="+",
-        choices=IGNORABLE,
-        default=[],
-        metavar="WHAT",
-        help=f"of {', '.join(IGNORABLE)}: judge it, too",
-    )
+    what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
+    p.add_argument("--count", action="append", choices=IGNORABLE, default=[], metavar="WHAT", help=what)
     p.add_argument("--sector", type=float, metavar="DEG", help="half the labelled sector (KITTI: 40; cuboids: 180)")
     p.set_defaults(run=run)
 
