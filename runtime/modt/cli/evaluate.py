@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 
 from modt.errors import MisuseError
+from modt.evaluation.rules import IGNORABLE
 
-IGNORABLE = ("cut", "few", "parked", "dontcare")
 DIGITS = 6
 
 
@@ -57,14 +57,10 @@ def run(arguments: argparse.Namespace) -> int:
         sector_deg = truth.rules.sector_deg if arguments.sector is None else arguments.sector
         ignored = truth.rules.ignored - set(arguments.count)
         rules = replace(truth.rules, sector_deg=sector_deg, ignored=ignored)
-        try:
-            found = collect(record.frames(truth), rules, drive)
-        except ValueError:
-            raise MisuseError(path, "no frames are recorded", "give the directory of a run") from None
-        by_sensor.setdefault(record.sensor, []).append(found)
+        by_sensor.setdefault(record.sensor, []).append(collect(record.frames(truth), rules, drive))
     sensors = {name: evaluation(found) for name, found in by_sensor.items()}
     if len(sensors) > 1:
-        sensors["all sensors"] = evaluation([e for found in by_sensor.values() for e in found])
+        sensors["all sensors"] = evaluation([rows for found in by_sensor.values() for rows in found])
     if arguments.json:
         text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(found) for name, found in sensors.items()}})
         print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))

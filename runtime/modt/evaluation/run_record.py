@@ -62,7 +62,7 @@ class RunRecord:
         """Every recorded frame beside its truth.
 
         Raises:
-            MisuseError: the run is of another recording, or a record is broken.
+            MisuseError: the run is of another recording or empty, or a record is broken.
         """
         if truth.scans is None:
             raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
@@ -71,6 +71,7 @@ class RunRecord:
             raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
         fov = FieldOfView.of_camera(camera) if self.fov == "camera" and camera is not None else FieldOfView()
         scans = {scan.index: scan.path for scan in truth.scans.scans}
+        number = 0
         for number, record in enumerate(read_records(self.path / TRACKS, SCHEMA), 1):
             place = f"{self.path / TRACKS}:{number}"
             try:
@@ -90,6 +91,9 @@ class RunRecord:
             yield JudgedFrame(
                 index, points, self._proposals(index, points), *counts, track, of_track, said, posterior, labels, fov
             )
+
+        if not number:
+            raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
 
     def _proposals(self, index: int, points: Float32) -> Int:
         """(N,) proposal of each point."""
