@@ -1,26 +1,33 @@
 # Two commands, each does its own set-up on a machine that has Python 3.11 or later and make:
 #   make replay   the whole method on the embedded stream
 #   make test     every check
+# For those who change it: `make check` (the checks short of the tests), `make format`, `make hooks` (checks at each commit).
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 
-.PHONY: replay test format clean
+.PHONY: replay test check format hooks clean
 
 replay: $(VENV)/.run
 	$(BIN)/modt replay --out runs/embedded
 	$(BIN)/modt-profile report runs/embedded
 
-test: $(VENV)/.test
+test: check
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	PYTHONPATH=runtime $(BIN)/lint-imports
-	$(BIN)/python -m pytest
 
 format: $(VENV)/.test
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+hooks: $(VENV)/.test
+	$(BIN)/python -m pip install --quiet 'pre-commit>=3.5'
+	$(BIN)/pre-commit install
 
 clean:
 	rm -rf $(VENV) runs build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache

@@ -13,12 +13,11 @@ from hypothesis import strategies as st
 from modt.config import OdometryConfig
 from modt.energy.ledger import NullLedger
 from modt.loop import FixedPeriod, FullSpeed, Stop, drive
-from modt.sources.odometry import PosedStream
 from modt.sources.pose_socket import PoseSocket
+from modt.sources.pose_source import PosedStream
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import UNLIMITED, Frame
-
-from .results import result
+from tests.results import result
 
 
 class Time:

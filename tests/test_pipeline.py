@@ -6,8 +6,7 @@ import pytest
 from modt.energy.ledger import Ledger
 from modt.pipeline import STAGES, Pipeline
 from modt.types import NONE, Budget, Frame, Tracks
-
-from .results import STATES, proposals
+from tests.results import STATES, proposals
 
 
 class Selected:
@@ -80,7 +79,7 @@ def test_the_stages_run_once_and_in_order():
         ("fuse", [0, 2], (2, 4)),
         ("settle", [0, 2], [True, True]),
     ]
-    assert (result.classified, result.deferred) == (2, 0)
+    assert (result.n_classified, result.n_deferred) == (2, 0)
     assert set(pipe.ledger.close_frame(7)["stages"]) == set(STAGES)
 
 
@@ -89,7 +88,7 @@ def test_without_a_choice_nothing_is_classified():
     pipe = pipeline(stages)
     result = pipe.step(FRAME)
     assert [c[0] for c in stages.calls] == ["segment", "follow", "asks", "select"]
-    assert (result.classified, result.deferred) == (0, 2)
+    assert (result.n_classified, result.n_deferred) == (0, 2)
     assert "classification" not in pipe.ledger.close_frame(7)["stages"]
 
 

@@ -6,9 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.types import N_CLASSES, NONE, Proposals, Tracks
-
-from .results import proposals
+from modt.classes import N_CLASSES
+from modt.types import NONE, Proposals, Tracks
+from tests.results import proposals
 
 
 @given(st.lists(st.integers(1, 9), max_size=6))
@@ -57,7 +57,7 @@ def test_a_blank_track_knows_nothing():
     blank = Tracks.blank(2)
     assert blank.posterior.tolist() == [[1 / N_CLASSES] * N_CLASSES] * 2
     assert blank.proposal.tolist() == [NONE, NONE]
-    assert not blank.fixed.any()
+    assert not blank.final.any()
 
 
 def test_a_copy_is_independent():

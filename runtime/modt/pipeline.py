@@ -2,21 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from modt.energy.ledger import StageLedger
-from modt.types import UNLIMITED, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
+from modt.observations import Located, StaticTracks
+from modt.types import (
+    UNLIMITED,
+    Bool,
+    Budget,
+    Float32,
+    Float64,
+    Frame,
+    FrameResult,
+    Int,
+    Proposals,
+    TrackedFrame,
+    Tracks,
+)
 
 SOURCE, SINK = "source", "sink"
-SEGMENTATION, TRACKING, SCHEDULING, CLASSIFICATION, FUSION = STAGES = (
+SEGMENTATION, ODOMETRY, TRACKING, SCHEDULING, CLASSIFICATION, FUSION = STAGES = (
     "segmentation",
+    "odometry",
     "tracking",
     "scheduling",
     "classification",
     "fusion",
 )
 """Names of the stages in the ledger."""
+_NOTHING: Bool = np.zeros(0, np.bool_)
 
 
 class Segmenter(Protocol):
@@ -27,29 +45,32 @@ class Segmenter(Protocol):
         ...
 
 
+class Odometry(Protocol):
+    """Proposals to the world."""
+
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+        """Placement of the frame and observations of its proposals."""
+        ...
+
+
 class Tracker(Protocol):
-    """Proposals to tracks."""
+    """Observations to tracks."""
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Name of each value of tracks.state."""
         ...
 
-    @property
-    def proposals(self) -> Proposals:
-        """Those followed last: the frame's, parted and joined where need be."""
+    def static_tracks(self) -> StaticTracks:
+        """What the odometry needs to know of the tracks."""
         ...
 
-    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
-        """Predict, associate and update; afterwards every one of its proposals belongs to one track."""
+    def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+        """Predict, associate and update; afterwards every proposal belongs to one track."""
         ...
 
-    def asking(self) -> Bool:
-        """(M,) tracks seen in this frame whose state asks for a class."""
-        ...
-
-    def settle(self, rows: Int, certain: Bool) -> None:
-        """Tell the state machine of the classifications just made."""
+    def conclude(self, rows: Int, certain: Bool) -> Tracks:
+        """Tell the state machine of the frame's classifications; a copy of the tracks."""
         ...
 
 
@@ -90,7 +111,7 @@ class Classifier(Protocol):
 class Fusion(Protocol):
     """Which views count, and what they add up to."""
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks whose view of this frame is worth a classification."""
         ...
 
@@ -104,6 +125,7 @@ class Pipeline:
     """The stages in their order; a mode of the method is a choice of these parts."""
 
     segmenter: Segmenter
+    odometry: Odometry
     tracker: Tracker
     fusion: Fusion
     scheduler: Scheduler
@@ -114,13 +136,14 @@ class Pipeline:
         """One frame, within a budget of classifications (Figs. 2 and 5)."""
         run = self.ledger.run
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
-        tracks = run(TRACKING, self.tracker.follow, frame, proposals)
-        proposals = self.tracker.proposals
-        asks = run(FUSION, self.fusion.asks, tracks, proposals, self.tracker.asking())
+        located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
+        tracked = run(TRACKING, self.tracker.follow, frame.stamp_s, proposals, located)
+        tracks, proposals = tracked.tracks, tracked.proposals
+        asks = run(FUSION, self.fusion.asks, tracks, proposals, tracked.wants_class)
         chosen = run(SCHEDULING, self.scheduler.select, tracks, proposals, asks, budget)
-        rows = chosen.rows
+        rows, certain = chosen.rows, _NOTHING
         if len(rows):
             likelihood = run(CLASSIFICATION, self.classifier.classify, frame.points, proposals, tracks.proposal[rows])
             certain = run(FUSION, self.fusion.fuse, tracks, proposals, rows, likelihood)
-            self.tracker.settle(rows, certain)
-        return FrameResult(frame, proposals, tracks.copy(), self.tracker.state_names, len(rows), chosen.deferred)
+        final = run(TRACKING, self.tracker.conclude, rows, certain)
+        return FrameResult(frame, proposals, final, self.tracker.state_names, len(rows), chosen.deferred)

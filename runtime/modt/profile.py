@@ -58,10 +58,15 @@ def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
     """The whole of a profile as plain data, defaults filled in."""
-    return {
-        stage: {key: list(v) if isinstance(v, tuple) else v for key, v in values.items()}
-        for stage, values in dataclasses.asdict(config).items()
-    }
+    tree: dict[str, dict[str, Any]] = _listed(dataclasses.asdict(config))
+    return tree
+
+
+def _listed(tree: Any) -> Any:
+    """A tree with lists for tuples, as YAML and JSON have them."""
+    if isinstance(tree, dict):
+        return {key: _listed(value) for key, value in tree.items()}
+    return list(tree) if isinstance(tree, tuple) else tree
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:
@@ -86,9 +91,13 @@ def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: i
     values: dict[str, Any] = {}
     lines: dict[str, int] = {}
     for key, value, at in _entries(node, origin, known, kind.__name__, line):
+        lines[key] = at
+        nested = known[key].default_factory
+        if isinstance(nested, type) and issubclass(nested, StageConfig):
+            values[key] = _stage(nested, value, origin, at)
+            continue
         plain = _plain(value, origin, at)
         values[key] = tuple(plain) if isinstance(plain, list) else plain
-        lines[key] = at
     try:
         return kind(**values)
     except ValueRangeError as error:

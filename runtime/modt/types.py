@@ -6,15 +6,16 @@ number of proposals in a frame, M the number of tracks alive, N the number of po
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from enum import IntEnum
 from functools import cache
 from operator import attrgetter
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
+from modt.classes import N_CLASSES
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
@@ -26,19 +27,6 @@ NONE = -1
 """Index of nothing: a track without a proposal, a proposal without a track."""
 UNRECORDED = -1.0
 """Reflectance of a return of which none was recorded; any below 0 is none."""
-
-
-class ObjectClass(IntEnum):
-    """What a proposal can be; the value is its index in every posterior."""
-
-    BACKGROUND = 0
-    CAR = 1
-    PEDESTRIAN = 2
-    CYCLIST = 3
-
-
-CLASS_NAMES = tuple(c.name.lower() for c in ObjectClass)
-N_CLASSES = len(ObjectClass)
 N_REFLECTANCE = 5
 """Numbers that tell of the reflectance of a proposal."""
 
@@ -74,8 +62,7 @@ class Proposals:
     Attributes:
         members: (K,) indices of points in the frame, grouped by proposal.
         offsets: (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]].
-        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once for all; (3, 0) after
-            tracking has joined some, the last step that could need them.
+        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once.
         centroid: (P, 3) mean of each proposal's points [m, sensor frame].
         box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
         truncated: (P,) cut by the edge of the field of view.
@@ -109,22 +96,34 @@ class Proposals:
         out[self.members] = np.repeat(np.arange(len(self)), self.count)
         return out
 
-    def take(self, which: Int) -> Proposals:
-        """A copy of those given, in their order."""
-        count = self.count[which]
-        offsets = np.append(0, np.cumsum(count))
-        rows = np.arange(offsets[-1]) + np.repeat(self.offsets[which] - offsets[:-1], count)
+    def regrouped(self, runs: Sequence[slice | Int], count: Int, source: Int) -> Proposals:
+        """The members in another grouping.
+
+        Args:
+            runs: rows of members in their new order; few long slices are copied faster than one by one.
+            count: (Q,) members of each new proposal.
+            source: (Q,) proposal whose centroid, box and other columns each new one takes over.
+        """
+        offsets = np.zeros(len(count) + 1, np.int64)
+        count.cumsum(out=offsets[1:])
         return replace(
             self,
-            members=self.members[rows],
+            members=np.concatenate([self.members[:0], *(self.members[run] for run in runs)]),
             offsets=offsets,
-            coordinates=self.coordinates.take(rows, axis=1),
-            centroid=self.centroid.take(which, axis=0),
-            box=self.box.take(which, axis=0),
-            truncated=self.truncated[which],
-            occluded=self.occluded[which],
-            reflectance=None if self.reflectance is None else self.reflectance.take(which, axis=0),
+            coordinates=np.concatenate(
+                [self.coordinates[:, :0], *(self.coordinates[:, run] for run in runs)], axis=1
+            ),
+            centroid=self.centroid.take(source, axis=0),
+            box=self.box.take(source, axis=0),
+            truncated=self.truncated[source],
+            occluded=self.occluded[source],
+            reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
+
+    def take(self, which: Int) -> Proposals:
+        """A copy of the rows given, in their order."""
+        ends = zip(self.offsets[which].tolist(), self.offsets[which + 1].tolist(), strict=True)
+        return self.regrouped([slice(*pair) for pair in ends], self.count[which], which)
 
     @classmethod
     def empty(cls) -> Proposals:
@@ -158,7 +157,7 @@ class Tracks:
     Columns of the fusion:
         prior: (M, 4) P(class | box) of the last box seen, uniform before any.
         posterior: (M, 4) P(class | views, box), the prior before any view.
-        fixed: the class is settled and not asked for again.
+        final: the class is final: it is not asked for again unless the view improves.
         views: key observations fused.
         key_prior, key_posterior: (M, 4) prior and posterior at the last key observation.
         key_points: points of it, 0 before any.
@@ -180,7 +179,7 @@ class Tracks:
     missed: Int
     prior: Float64
     posterior: Float64
-    fixed: Bool
+    final: Bool
     views: Int
     key_prior: Float64
     key_posterior: Float64
@@ -194,15 +193,15 @@ class Tracks:
         return len(self.id)
 
     @property
-    def classified(self) -> Bool:
-        """(M,) whether it was ever classified."""
-        classified: Bool = self.key_points > 0
-        return classified
+    def viewed(self) -> Bool:
+        """(M,) whether the network ever saw it."""
+        viewed: Bool = self.key_points > 0
+        return viewed
 
     @property
     def object_class(self) -> Int:
         """(M,) class: the one settled, whatever the box of the moment says; else the likeliest."""
-        settled = (self.fixed & self.classified)[:, None]
+        settled = (self.final & self.viewed)[:, None]
         object_class: Int = np.where(settled, self.key_posterior, self.posterior).argmax(axis=1)
         return object_class
 
@@ -232,7 +231,7 @@ class Tracks:
             missed=count(),
             prior=uniform(),
             posterior=uniform(),
-            fixed=np.zeros(m, np.bool_),
+            final=np.zeros(m, np.bool_),
             views=count(),
             key_prior=uniform(),
             key_posterior=uniform(),
@@ -289,6 +288,21 @@ class Tracks:
 
 
 @dataclass(frozen=True, slots=True)
+class TrackedFrame:
+    """What tracking hands to the stages after it.
+
+    Attributes:
+        tracks: the live table.
+        proposals: of the frame, regrouped where the tracks know better; each belongs to one track.
+        wants_class: (M,) tracks with a proposal whose state asks for a class.
+    """
+
+    tracks: Tracks
+    proposals: Proposals
+    wants_class: Bool
+
+
+@dataclass(frozen=True, slots=True)
 class Budget:
     """What one frame may spend on classification; None where nothing binds.
 
@@ -313,13 +327,13 @@ class FrameResult:
         proposals: its segments.
         tracks: a copy of the tracks alive after the frame.
         state_names: name of each value of tracks.state.
-        classified: proposals classified in this frame.
-        deferred: proposals that asked for a class and must wait for the next frame's budget.
+        n_classified: proposals classified in this frame.
+        n_deferred: tracks whose request for a class waits for the next frame's budget.
     """
 
     frame: Frame
     proposals: Proposals
     tracks: Tracks
     state_names: tuple[str, ...]
-    classified: int
-    deferred: int
+    n_classified: int
+    n_deferred: int

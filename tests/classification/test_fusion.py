@@ -10,11 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from modt.classes import ObjectClass
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.prior import at_least
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
-from modt.types import NONE, Bool, Float64, ObjectClass, Proposals, Tracks
+from modt.types import NONE, Bool, Float64, Proposals, Tracks
 from tests.classification.scenes import blobs, seen
 
 PAPER = FusionConfig(
@@ -90,7 +91,7 @@ def test_no_class_is_ruled_out_for_good() -> None:
 
 def test_every_frame_asks_for_whatever_is_seen() -> None:
     proposals, tracks = scene()
-    tracks.fixed[:] = True
+    tracks.final[:] = True
     tracks.proposal[1] = NONE
     assert EveryFrame().asks(tracks, proposals, np.zeros(2, np.bool_)).tolist() == [True, False]
 
@@ -112,7 +113,7 @@ def test_a_distinct_first_view_settles_the_class_at_once() -> None:
     fusion = KeyViews(FusionConfig())
     view = np.array([[0.98, 0.01, 0.005, 0.005], [0.5, 0.3, 0.1, 0.1]])
     assert fusion.fuse(tracks, proposals, np.arange(2), view).tolist() == [True, False]
-    assert tracks.fixed.tolist() == [True, False]
+    assert tracks.final.tolist() == [True, False]
     assert tracks.views.tolist() == [1, 0]
 
 
@@ -149,7 +150,7 @@ def test_a_class_settled_from_afar_is_looked_at_again_from_near() -> None:
     nearer = moved(proposals, offsets=np.array([0, 200, 210, 310]))
     tracks.age[:] = 9
     assert fusion.asks(tracks, nearer, settled)[0]
-    tracks.fixed[0] = True
+    tracks.final[0] = True
     never = KeyViews(FusionConfig(reopen_ratio=None))
     assert not never.asks(tracks, near, settled).any()
 
@@ -273,7 +274,7 @@ def test_before_it_is_classified_a_track_is_what_its_box_makes_it(
     tracks.hits[:] = 1
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
     np.testing.assert_allclose(tracks.posterior, [WALL, DOUBTFUL, CAR])
-    assert not tracks.classified.any()
+    assert not tracks.viewed.any()
 
 
 def test_what_by_its_box_is_no_object_is_not_doubted() -> None:
@@ -326,7 +327,7 @@ def test_a_settled_class_stays_and_how_sure_it_is_goes_with_the_box(make: type[F
     assert not fusion.asks(tracks, proposals, unasked).any()
     assert tracks.posterior[0].argmax() == ObjectClass.BACKGROUND
     assert tracks.object_class.tolist() == [ObjectClass.CAR]
-    tracks.fixed[:] = False
+    tracks.final[:] = False
     assert tracks.object_class.tolist() == [ObjectClass.BACKGROUND]
 
 
@@ -361,7 +362,7 @@ def test_a_further_view_that_says_what_is_known_without_it_adds_nothing(share: f
 
 def test_what_took_its_class_over_is_looked_at_where_its_box_may_be_an_objects() -> None:
     proposals, tracks = scene((50, 50))
-    tracks.fixed[:] = True
+    tracks.final[:] = True
     tracks.posterior[:] = [1.0, 0.0, 0.0, 0.0]
     settled = np.zeros(2, np.bool_)
     assert KeyViews(FusionConfig(), Told(WALL, CAR)).asks(tracks, proposals, settled).tolist() == [False, True]

@@ -11,13 +11,13 @@ import numpy as np
 import onnx
 import pytest
 
-from export_pointnet import graph
 from modt import assets
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Proposals
 from tests.classification.scenes import blobs
+from tools.train.export_pointnet import graph
 
 SIZES = (3, 32, 64, 512, 256, 128, 4)
 SENSOR = SensorConfig()

@@ -7,7 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt.classification.boxes import (
+from modt.classes import ObjectClass
+from modt.classification.box_classifier import (
     METADATA,
     N_FEATURES,
     KnownBoxes,
@@ -19,9 +20,9 @@ from modt.classification.boxes import (
 )
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import BoxPrior, Frequency, prior_of
-from modt.classification.reflectance import NoEvidence
+from modt.classification.reflectance_classifier import NoEvidence
 from modt.config import ClassificationConfig, SensorConfig
-from modt.types import ObjectClass, Proposals
+from modt.types import Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(5)

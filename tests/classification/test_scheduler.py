@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.costed import CostedClassifier
+from modt.classification.instrumentation import CostedClassifier
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.types import NONE, UNLIMITED, Budget, Float32, Float64, Int, Proposals
 from tests.classification.scenes import blobs, seen

@@ -12,13 +12,13 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.evaluation.summary import summarise
+from modt.classes import CLASS_NAMES
+from modt.reporting.summary import summarise
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
-from modt.sources.synthetic.stream import SyntheticStream
-from modt.types import CLASS_NAMES
+from modt.sources.synthetic_stream import SyntheticStream
+from tests.sources import layouts
 
-from ..sources import layouts
 from .commands import begin, environment, modt
 
 MODES = ("conventional", "efficient", "accurate")
@@ -45,7 +45,7 @@ def test_the_only_view_of_a_track_settles_its_class(runs):
     classes = {}
     for frame in tracks(root / "efficient"):
         for t in frame["tracks"]:
-            if t["fixed"] and t["classified"]:
+            if t["final"] and t["viewed"]:
                 classes.setdefault(t["id"], set()).add(t["class"])
     assert classes
     assert all(len(seen) == 1 for seen in classes.values())
@@ -65,7 +65,7 @@ def test_a_run_leaves_what_the_formats_say(runs, mode):
         for t in frame["tracks"]:
             assert sum(t["posterior"]) == pytest.approx(1, abs=1e-5)
             likeliest = CLASS_NAMES[int(np.argmax(t["posterior"]))]
-            assert t["class"] == likeliest or (t["fixed"] and t["classified"])
+            assert t["class"] == likeliest or (t["final"] and t["viewed"])
             assert (t["box"] is None) == (t["proposal"] is None) == (t["missed"] > 0)
 
 
@@ -120,7 +120,7 @@ def test_the_summary_is_what_the_records_say(runs, mode):
     written = json.loads((root / mode / "summary.json").read_text())
     again = summarise(root / mode)
     assert {k: written[k] for k in again} == again
-    assert sum(f["classified"] for f in tracks(root / mode)) == written["classifications"]
+    assert sum(f["classifications"] for f in tracks(root / mode)) == written["classifications"]
 
 
 def test_the_run_keeps_to_one_core(runs):

@@ -14,10 +14,10 @@ from modt.cli.session import Session
 from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
-from modt.sources.synthetic.stream import SyntheticStream
+from modt.sources.synthetic_stream import SyntheticStream
 from modt.supervisor import NoSupervisor
+from tests.sources import layouts
 
-from ..sources import layouts
 from .commands import modt
 
 FRAMES = 10

@@ -6,8 +6,7 @@ from modt.errors import ModtError
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
 from modt.sinks.tracks import TrackLines
-
-from ..results import CAR, result
+from tests.results import CAR, result
 
 SINKS = {
     "tracks": lambda root: TrackLines(root / "tracks.jsonl"),

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from modt.config import OdometryConfig
-from modt.sources.odometry import ListedPoses, NoOdometry, OwnOdometry, PosedStream
 from modt.sources.pose_socket import PoseSocket
+from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry, PosedStream
 from modt.sources.recognise import open_stream
-from modt.sources.synthetic.stream import SyntheticStream
-
-from ..sources import layouts
+from modt.sources.synthetic_stream import SyntheticStream
+from tests.sources import layouts
 
 
 def listed(root):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.energy.counted import CountedClassifier
+from modt.energy.instrumentation import CountedClassifier
 from modt.energy.ledger import Ledger
 from modt.energy.prediction import PaperModel
 from modt.energy.savings import Beside, Counts, Model, UnitCosts, predict

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES
 from modt.evaluation.overlap import inside
-from modt.types import CLASS_NAMES
 
 NAMED = {"Car": 1, "Van": 1, "Pedestrian": 2, "Person_sitting": 2, "Cyclist": 3}
 

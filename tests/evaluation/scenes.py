@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.truth import KITTI_TYPES, FrameTruth
-from modt.types import CLASS_NAMES
 
 SURE = {name: np.eye(4)[k] * 0.96 + 0.01 for k, name in enumerate(CLASS_NAMES)}
 

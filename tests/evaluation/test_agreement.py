@@ -15,7 +15,7 @@ from modt.evaluation.truth import KITTI_TYPES, FrameTruth
 from modt.evaluation.truth_files import open_truth
 from modt.geometry import FieldOfView
 from modt.sources.recognise import open_stream
-from modt.sources.synthetic.stream import SyntheticStream
+from modt.sources.synthetic_stream import SyntheticStream
 from tests.evaluation.reference import life, precision_of_ranking, recall
 
 ALL_COUNTS = dataclasses.replace(KITTI_RULES, ignored=frozenset({"parked"}))

@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.classes import ObjectClass
 from modt.evaluation.matching import judge
 from modt.evaluation.overlap import Overlap, inside
 from modt.evaluation.rows import Outcome
 from modt.evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt.evaluation.truth import KITTI_TYPES, PANDASET_TYPES, PAPER_TYPES, FrameTruth, Regions
 from modt.geometry import Camera, FieldOfView, rotation_zyx, se3, transform
-from modt.types import NONE, ObjectClass
+from modt.types import NONE
 from tests.evaluation.scenes import blob, car, cars, frame
 
 CAR, BACKGROUND = ObjectClass.CAR, ObjectClass.BACKGROUND

@@ -1,10 +1,11 @@
 import pytest
 
+from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.evaluation.rules import CUBOID_RULES, KITTI_RULES
-from modt.evaluation.truth import CYCLIST, Role
+from modt.evaluation.truth import Role
 from modt.evaluation.truth_files import open_truth
-from modt.types import NONE, ObjectClass
+from modt.types import NONE
 from tests.sources import layouts
 
 ITEM = """<item><objectType>{type}</objectType><h>1.5</h><w>2</w><l>4</l><first_frame>{first}</first_frame>
@@ -82,7 +83,7 @@ def test_cuboids(tmp_path):
     layouts.write_scans(tmp_path / "scans", range(2))
     truth = open_truth(cuboids(tmp_path, "0,3,Motorcycle,9,1,0.5,2,1,1.5,0.1\n0,4,Bus,9,5,0.5,9,2,3,0\n"))
     frame = truth.frames[0]
-    assert (truth.rules, frame.object_class.tolist()) == (CUBOID_RULES, [CYCLIST, ObjectClass.CAR])
+    assert (truth.rules, frame.object_class.tolist()) == (CUBOID_RULES, [ObjectClass.CYCLIST, ObjectClass.CAR])
     assert frame.role.tolist() == [Role.COUNTED, Role.NEUTRAL]
     assert frame.T_box_sensor[0, 3] == 5
     assert len(truth.frames[1].id) == 0

@@ -10,13 +10,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from modt.classes import CLASS_NAMES
 from modt.cli import assemble
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.sinks.tracks import frame_record
-from modt.sources.synthetic.stream import SyntheticStream
-from modt.types import CLASS_NAMES
+from modt.sources.synthetic_stream import SyntheticStream
 
 FOLDER = Path(__file__).parent
 SCENES = {"street-vlp-16": ("street", "vlp-16", "vlp-16"), "street-hdl-64e": ("street", "hdl-64e", "hdl-64e")}
@@ -37,11 +37,11 @@ def behaviour(scene: str, mode_name: str) -> list[dict[str, object]]:
             {
                 "frame": record["frame"],
                 "proposals": record["proposals"],
-                "classified": record["classified"],
+                "classifications": record["classifications"],
                 "deferred": record["deferred"],
                 "born": sum(t["age"] == 1 for t in tracks),
                 "lost": sum(t["proposal"] is None for t in tracks),
-                "fixed": sum(t["fixed"] for t in tracks),
+                "final": sum(t["final"] for t in tracks),
                 "classes": {c: sum(t["class"] == c for t in tracks) for c in CLASS_NAMES},
             }
         )

@@ -17,7 +17,7 @@ def test_behaviour_is_golden(scene, mode):
     assert len(found) == len(expected)
     for got, want in zip(found, expected, strict=True):
         assert got["frame"] == want["frame"]
-        for key in ("proposals", "classified", "deferred", "born", "lost", "fixed"):
+        for key in ("proposals", "classifications", "deferred", "born", "lost", "final"):
             assert abs(got[key] - want[key]) <= TOLERANCE, f"frame {want['frame']}: {key} {got[key]}, was {want[key]}"
         assert got["classes"].keys() == want["classes"].keys()
         for name, count in want["classes"].items():

@@ -7,8 +7,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from modt.segmentation import pieces, silhouettes
-from modt.segmentation.boxes import HEADINGS, NEAREST_M
+from modt.segmentation import car_merging, person_splitting
+from modt.segmentation.box_fitting import HEADINGS, NEAREST_M
 from modt.segmentation.clusters import GAP_BEAMS, GAP_M
 from modt.segmentation.grids import SECTORS
 from modt.segmentation.ground import BEND, BRIDGE_M, GAIN, NOISE_M
@@ -85,17 +85,17 @@ def people_cuts(x, y, height, step_rad, beam_rad, least_points):
     mx, my = x.mean(), y.mean()
     away = np.hypot(mx, my)
     c, s = np.float32(mx / away), np.float32(my / away)
-    step = max(step_rad, silhouettes.COLUMN_M / away)
+    step = max(step_rad, person_splitting.COLUMN_M / away)
     depth = x * c + y * s
-    column = np.floor((y * c - x * s) / (np.maximum(depth, silhouettes.NEAR_M) * np.float32(step))).astype(int)
-    expected = silhouettes.UPRIGHT_M / (away * beam_rad) * step / step_rad
+    column = np.floor((y * c - x * s) / (np.maximum(depth, person_splitting.NEAR_M) * np.float32(step))).astype(int)
+    expected = person_splitting.UPRIGHT_M / (away * beam_rad) * step / step_rad
     runs = []
     for here in range(column.min(), column.max() + 1):
         own = np.flatnonzero(column == here)
-        if len(own) < max(silhouettes.FILLED * expected, 1.0):
+        if len(own) < max(person_splitting.FILLED * expected, 1.0):
             continue
         beside = runs and runs[-1][-1][0] == here - 1
-        if beside and abs(runs[-1][-1][1] - depth[own].mean(dtype=float)) <= silhouettes.STEP_M:
+        if beside and abs(runs[-1][-1][1] - depth[own].mean(dtype=float)) <= person_splitting.STEP_M:
             runs[-1].append((here, depth[own].mean(dtype=float), own))
         else:
             runs.append([(here, depth[own].mean(dtype=float), own)])
@@ -104,15 +104,17 @@ def people_cuts(x, y, height, step_rad, beam_rad, least_points):
         own = np.concatenate([c[2] for c in run])
         near = np.array([depth[c[2]].min() for c in run])
         breadth, head = len(run) * step * away, height[own].max()
-        if breadth <= silhouettes.BREADTH_M[0] or len(own) < least_points:
+        if breadth <= person_splitting.BREADTH_M[0] or len(own) < least_points:
             continue
-        person = breadth < silhouettes.BREADTH_M[1] and silhouettes.HEAD_M[0] < head < silhouettes.HEAD_M[1]
-        person = person and near.max() - near.min() < silhouettes.DEPTH_M
-        person = person and depth[own].mean(dtype=float) - near.min() < silhouettes.HOLLOW_M
+        person = (
+            breadth < person_splitting.BREADTH_M[1] and person_splitting.HEAD_M[0] < head < person_splitting.HEAD_M[1]
+        )
+        person = person and near.max() - near.min() < person_splitting.DEPTH_M
+        person = person and depth[own].mean(dtype=float) - near.min() < person_splitting.HOLLOW_M
         parts.append((run[0][0], run[-1][0], near.mean(dtype=float), person))
     cuts = []
     for right, left in pairwise(parts):
-        apart = left[0] - right[1] > silhouettes.GAP or abs(left[2] - right[2]) > silhouettes.STEP_M
+        apart = left[0] - right[1] > person_splitting.GAP or abs(left[2] - right[2]) > person_splitting.STEP_M
         if apart and (right[3] or left[3]):
             cuts.append((right[1] + left[0] + 1) // 2)
     return column, cuts
@@ -128,11 +130,15 @@ def whole(bounds, beam):
 
     def small(own):
         size = np.hypot(far[own].max() - near[own].min(), breadth(own))
-        return size < pieces.DIAGONAL_M and breadth(own) < pieces.BREADTH_M[1] and top[own].max() < pieces.TOP_M[1]
+        return (
+            size < car_merging.DIAGONAL_M
+            and breadth(own) < car_merging.BREADTH_M[1]
+            and top[own].max() < car_merging.TOP_M[1]
+        )
 
     def person(one):
-        narrow = breadth([one]) < pieces.UPRIGHT_M[0] and top[one] > pieces.UPRIGHT_M[1]
-        return narrow and top[one] - low[one] > pieces.UPRIGHT_M[2]
+        narrow = breadth([one]) < car_merging.UPRIGHT_M[0] and top[one] > car_merging.UPRIGHT_M[1]
+        return narrow and top[one] - low[one] > car_merging.UPRIGHT_M[2]
 
     linked = [[] for _ in range(n)]
     for front in range(n):
@@ -142,9 +148,11 @@ def whole(bounds, beam):
                 continue
             meets = max(right[front], right[back]) <= min(left[front], left[back])
             beams = (down[back] - up[front]) / beam
-            follows = near[back] - far[front] < pieces.BEHIND_M and pieces.BEAMS[0] < beams < pieces.BEAMS[1]
-            like = breadth(pair) > pieces.BREADTH_M[0] and top[pair].max() > pieces.TOP_M[0]
-            if meets and follows and like and low[pair].min() < pieces.BOTTOM_M:
+            follows = (
+                near[back] - far[front] < car_merging.BEHIND_M and car_merging.BEAMS[0] < beams < car_merging.BEAMS[1]
+            )
+            like = breadth(pair) > car_merging.BREADTH_M[0] and top[pair].max() > car_merging.TOP_M[0]
+            if meets and follows and like and low[pair].min() < car_merging.BOTTOM_M:
                 linked[front].append(back)
                 linked[back].append(front)
     first = np.arange(n)

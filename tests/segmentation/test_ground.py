@@ -7,7 +7,7 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.columns import Columns
 from modt.segmentation.grids import SECTORS, PolarGrid, pseudo_angle
 from modt.segmentation.ground import Ground
-from modt.segmentation.height import USUAL_M, EstimatedHeight, sensor_height
+from modt.segmentation.sensor_height import USUAL_M, EstimatedHeight, sensor_height
 from tests.segmentation import reference, scans
 
 HEIGHT_M = 1.73

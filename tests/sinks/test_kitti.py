@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 
 from modt.geometry import corners
 from modt.sinks.kitti import KittiResults
-
-from ..results import CAR, proposals, result
-from ..test_geometry import forward_camera
+from tests.geometry.test_transforms import forward_camera
+from tests.results import CAR, proposals, result
 
 
 def written(tmp_path, frame_result, camera):

@@ -3,8 +3,7 @@
 import numpy as np
 
 from modt.sinks.labels import PointLabels, encode
-
-from ..results import CAR, PEDESTRIAN, result
+from tests.results import CAR, PEDESTRIAN, result
 
 
 def test_every_point_of_the_input_has_its_label_in_order(tmp_path):

@@ -4,8 +4,7 @@ import pytest
 
 from modt.errors import MisuseError, ModtError
 from modt.sinks.run_directory import RunDirectory
-
-from ..results import result
+from tests.results import result
 
 
 def test_a_new_directory_is_made_with_its_parents(tmp_path):

@@ -6,26 +6,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.sinks.numerals import beside, probabilities, text, thousandths
+from modt.sinks.fast_json import beside, probabilities, text, thousandths
 from modt.sinks.records import line, read_records
 from modt.sinks.tracks import SCHEMA, TrackLines, frame_line, frame_record
-
-from ..results import CAR, result
+from tests.results import CAR, result
 
 
 def test_a_record_holds_what_the_format_says():
     record = frame_record(result(3, [7, 5], {0: 11, 1: 12}, {11: CAR}, lost=(9,), classified=2))
     assert record["schema"] == SCHEMA
     assert (record["frame"], record["stamp_s"], record["proposals"]) == (3, 0.3, 2)
-    assert (record["classified"], record["deferred"]) == (2, 0)
+    assert (record["classifications"], record["deferred"]) == (2, 0)
     seen, unsure, lost = record["tracks"]
     assert seen == {
         "id": 11,
         "state": "tracked",
         "class": "car",
         "posterior": CAR,
-        "classified": False,
-        "fixed": False,
+        "viewed": False,
+        "final": False,
         "proposal": 0,
         "points": 0,
         "age": 0,
@@ -75,7 +74,7 @@ def results(draw):
         column[:] = draw(arrays(np.int64, column.shape, elements=COUNTS))
     for column, elements in ((t.x, NUMBERS), (r.proposals.box, NUMBERS), (t.posterior, LIKELIHOODS)):
         column[:] = draw(arrays(np.float64, column.shape, elements=elements))
-    t.fixed[:] = draw(arrays(np.bool_, len(t)))
+    t.final[:] = draw(arrays(np.bool_, len(t)))
     return r
 
 

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
-from modt.sources.odometry import ListedPoses, NoOdometry, OwnOdometry, PosedStream
-from modt.sources.poses import read_poses
+from modt.sources.pose_file import read_poses
+from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry, PosedStream
 from modt.sources.recognise import open_stream
 
 from . import layouts

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError, ModtError
-from modt.sources.odometry import NoOdometry, PosedStream
+from modt.sources.pose_source import NoOdometry, PosedStream
 from modt.sources.recognise import open_stream
 from modt.sources.stream import FIRST
 

@@ -6,13 +6,11 @@ from hypothesis.extra.numpy import arrays
 from scipy.optimize import linear_sum_assignment
 
 from modt.config import TrackingConfig
+from modt.geometry.kdop import DIRECTIONS
+from modt.observations import observe
 from modt.tracking.association import FORBIDDEN, PaperAssociation, assign, assign_all
-from modt.tracking.outlines import WAYS
-from modt.tracking.sightings import sight
 from modt.tracking.states import EFFICIENT
-from modt.tracking.tracker import Tracker
-
-from .tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 EYE = np.eye(4)
 
@@ -61,10 +59,10 @@ def test_no_assignment_of_few_to_few_is_cheaper(n, k, seed):
 
 
 def candidates(before, after, **counts):
-    tracker = Tracker(TrackingConfig(association="paper"), EFFICIENT)
+    tracker = Follower(TrackingConfig(association="paper"), EFFICIENT)
     tracker.follow(*frame_of([before], 0, EYE))
     _, proposals = frame_of([after], 1, EYE, **counts)
-    return tracker._tracks, sight(proposals, EYE)
+    return tracker._tracks, observe(proposals, EYE)
 
 
 @pytest.mark.parametrize(
@@ -77,8 +75,8 @@ def candidates(before, after, **counts):
     ],
 )
 def test_the_papers_cost_penalises_each_difference(after, points, expected):
-    tracks, sightings = candidates(box(10, 0), after, points=points)
-    cost = PaperAssociation(TrackingConfig()).cost(tracks, sightings, np.array([0]), np.array([0]))
+    tracks, observations = candidates(box(10, 0), after, points=points)
+    cost = PaperAssociation(TrackingConfig()).cost(tracks, observations, np.array([0]), np.array([0]))
     np.testing.assert_allclose(cost, expected, atol=1e-9)
 
 
@@ -95,8 +93,8 @@ def test_outlines_hold_every_point_and_touch_one_each():
         [[np.cos(yaw), -np.sin(yaw), 0, 5], [np.sin(yaw), np.cos(yaw), 0, -3], [0, 0, 1, 1.7], [0, 0, 0, 1.0]]
     )
     frame, proposals = frame_of([box(10, 0, yaw=0.3), box(-4, 7)], 0, T)
-    seen = sight(proposals, T)
+    seen = observe(proposals, T)
     world = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
     for i in range(2):
-        along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ WAYS
-        np.testing.assert_allclose(seen.outline[:, i], along.max(axis=0), atol=1e-4)
+        along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ DIRECTIONS
+        np.testing.assert_allclose(seen.kdop[:, i], along.max(axis=0), atol=1e-4)

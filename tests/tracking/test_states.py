@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from modt.tracking.states import ACCURATE, EFFICIENT, Happening, UndefinedTransitionError
+from modt.tracking.states import ACCURATE, EFFICIENT, Event, UndefinedTransitionError
 from modt.types import NONE
 
 MACHINES = [EFFICIENT, ACCURATE]
@@ -40,11 +40,11 @@ pytestmark = pytest.mark.parametrize("machine", MACHINES, ids=lambda m: m.title)
 
 
 def test_every_state_by_every_event(machine):
-    defined = {(t.source, t.event): t.target for t in machine.transitions}
+    defined = {(t.source, t.label): t.target for t in machine.transitions}
     for state in range(len(machine.names)):
-        for event in range(len(machine.events)):
-            one, which = np.array([state]), np.array([event])
-            target = defined.get((machine.names[state], machine.events[event]))
+        for label in range(len(machine.labels)):
+            one, which = np.array([state]), np.array([label])
+            target = defined.get((machine.names[state], machine.labels[label]))
             if target is None:
                 with pytest.raises(UndefinedTransitionError, match=machine.title):
                     machine.fire(one, which)
@@ -53,40 +53,38 @@ def test_every_state_by_every_event(machine):
 
 
 def test_the_papers_events_stand_as_the_paper_has_them(machine):
-    rows = {(t.source, t.event, t.target) for t in machine.transitions if t.event.startswith("a")}
+    rows = {(t.source, t.label, t.target) for t in machine.transitions if t.label.startswith("a")}
     assert rows == PAPER[machine]
 
 
 def test_every_state_by_every_happening_answers_with_at_most_one_event(machine):
-    pairs = [(t.source, t.happening) for t in machine.transitions]
+    pairs = [(t.source, t.event) for t in machine.transitions]
     assert len(pairs) == len(set(pairs))
     for state in range(len(machine.names)):
-        for happening in Happening:
-            event = machine.answer[state, happening]
-            if event == NONE:
+        for event in Event:
+            label = machine.answer[state, event]
+            if label == NONE:
                 with pytest.raises(UndefinedTransitionError):
-                    machine.meet(np.array([state]), happening)
+                    machine.transition(np.array([state]), event)
             else:
-                (t,) = [
-                    t for t in machine.transitions if t.source == machine.names[state] and t.happening is happening
-                ]
-                assert machine.events[event] == t.event
-                assert machine.meet(np.array([state]), happening)[0] == machine.index(t.target)
+                (t,) = [t for t in machine.transitions if t.source == machine.names[state] and t.event is event]
+                assert machine.labels[label] == t.label
+                assert machine.transition(np.array([state]), event)[0] == machine.index(t.target)
 
 
 def test_arrays_of_states_move_together(machine):
     sources = np.array([machine.index(t.source) for t in machine.transitions])
-    events = np.array([machine.events.index(t.event) for t in machine.transitions])
+    labels = np.array([machine.labels.index(t.label) for t in machine.transitions])
     targets = np.array([machine.index(t.target) for t in machine.transitions])
-    np.testing.assert_array_equal(machine.fire(sources, events), targets)
-    happenings = np.array([t.happening for t in machine.transitions])
-    np.testing.assert_array_equal(machine.meet(sources, happenings), targets)
+    np.testing.assert_array_equal(machine.fire(sources, labels), targets)
+    events = np.array([t.event for t in machine.transitions])
+    np.testing.assert_array_equal(machine.transition(sources, events), targets)
 
 
 def test_one_bad_row_is_an_error(machine):
     states = np.array([machine.proposal, machine.deleted])
     with pytest.raises(UndefinedTransitionError, match="deleted"):
-        machine.meet(states, Happening.ASSOCIATED)
+        machine.transition(states, Event.ASSOCIATED)
 
 
 def test_every_state_is_reached_and_only_the_end_is_final(machine):
@@ -99,18 +97,16 @@ def test_every_state_is_reached_and_only_the_end_is_final(machine):
 
 def test_no_rows_are_fine(machine):
     none = np.zeros(0, np.int64)
-    assert len(machine.meet(none, Happening.ASSOCIATED)) == 0
+    assert len(machine.transition(none, Event.ASSOCIATED)) == 0
 
 
 def test_a_proposal_inherits_what_its_track_then_is(machine):
     """A matched proposal and the track that it joined end in the same state."""
     alive = [
-        s
-        for s in range(len(machine.names))
-        if s != machine.proposal and machine.answer[s, Happening.ASSOCIATED] != NONE
+        s for s in range(len(machine.names)) if s != machine.proposal and machine.answer[s, Event.ASSOCIATED] != NONE
     ]
     track = np.array(alive)
-    matched = machine.meet(np.full(len(track), machine.proposal), Happening.ASSOCIATED)
+    matched = machine.transition(np.full(len(track), machine.proposal), Event.ASSOCIATED)
     np.testing.assert_array_equal(
-        machine.meet(matched, machine.inherits(track)), machine.meet(track, Happening.ASSOCIATED)
+        machine.transition(matched, machine.inherits(track)), machine.transition(track, Event.ASSOCIATED)
     )

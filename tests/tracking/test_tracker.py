@@ -5,10 +5,8 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.tracking.states import ACCURATE, EFFICIENT
-from modt.tracking.tracker import Tracker
 from modt.types import NONE, Proposals
-
-from .tracking_scenes import box, frame_of
+from tests.tracking.tracking_scenes import Follower, box, frame_of
 
 ASSOCIATIONS = ["robust", "paper"]
 EYE = np.eye(4)
@@ -16,7 +14,7 @@ EYE = np.eye(4)
 
 @pytest.fixture(params=ASSOCIATIONS)
 def tracker(request):
-    return Tracker(TrackingConfig(association=request.param, ask_from=1), EFFICIENT)
+    return Follower(TrackingConfig(association=request.param, ask_from=1), EFFICIENT)
 
 
 def names(tracker):
@@ -27,8 +25,8 @@ def run(tracker, frames, settle=True):
     for frame, proposals in frames:
         tracks = tracker.follow(frame, proposals)
         if settle:
-            rows = np.flatnonzero(tracker.asking())
-            tracker.settle(rows, np.ones(len(rows), np.bool_))
+            rows = np.flatnonzero(tracker.wants_class)
+            tracker.conclude(rows, np.ones(len(rows), np.bool_))
     return tracks
 
 
@@ -41,7 +39,7 @@ def test_a_standing_box_keeps_its_track(tracker):
 
 @pytest.mark.parametrize("course", np.deg2rad([0, 90, 180, -45]))
 def test_a_moving_box_keeps_its_track_and_shows_its_course(course):
-    tracker = Tracker(TrackingConfig(), EFFICIENT)
+    tracker = Follower(TrackingConfig(), EFFICIENT)
     v = 8.0
     step = v * 0.1 * np.array([np.cos(course), np.sin(course)])
     tracks = run(tracker, [frame_of([box(12 + i * step[0], 6 + i * step[1], yaw=course)], i, EYE) for i in range(12)])
@@ -53,12 +51,12 @@ def test_a_moving_box_keeps_its_track_and_shows_its_course(course):
 def test_states_of_a_life(tracker):
     tracker.follow(*frame_of([box(10, 0)], 0, EYE))
     assert names(tracker) == ["unmatched"]
-    assert tracker.asking().all()
-    tracker.settle(np.array([0]), np.array([True]))
+    assert tracker.wants_class.all()
+    tracker.conclude(np.array([0]), np.array([True]))
     assert names(tracker) == ["tracked"]
     tracker.follow(*frame_of([box(10, 0)], 1, EYE))
     assert names(tracker) == ["tracked"]
-    assert not tracker.asking().any()
+    assert not tracker.wants_class.any()
     tracker.follow(*frame_of([], 2, EYE))
     assert names(tracker) == ["lost"]
     assert tracker.tracks.proposal[0] == NONE
@@ -75,10 +73,10 @@ def test_a_track_that_waits_for_its_class_is_followed_and_dies_like_others(track
     for i in range(3):
         tracker.follow(*frame_of([box(10, 0)], i, EYE))
         assert names(tracker) == ["unmatched"]
-        assert tracker.asking().all()
+        assert tracker.wants_class.all()
     tracker.follow(*frame_of([], 3, EYE))
     assert names(tracker) == ["lost_unmatched"]
-    assert not tracker.asking().any()
+    assert not tracker.wants_class.any()
     tracker.follow(*frame_of([box(10, 0)], 4, EYE))
     assert names(tracker) == ["unmatched"]
     assert list(tracker.tracks.id) == [0]
@@ -89,7 +87,7 @@ def test_a_track_that_waits_for_its_class_is_followed_and_dies_like_others(track
 
 @pytest.mark.parametrize(("seen", "patience"), [(2, 4), (3, 8)])
 def test_what_was_never_asked_for_is_given_up_sooner(seen, patience):
-    tracker = Tracker(TrackingConfig(ask_from=3, max_missed=8), EFFICIENT)
+    tracker = Follower(TrackingConfig(ask_from=3, max_missed=8), EFFICIENT)
     for i in range(seen):
         tracker.follow(*frame_of([box(10, 0)], i, EYE))
     for i in range(seen, seen + patience):
@@ -100,17 +98,17 @@ def test_what_was_never_asked_for_is_given_up_sooner(seen, patience):
 
 
 def test_doubt_is_asked_again_until_it_is_gone():
-    tracker = Tracker(TrackingConfig(ask_from=1), ACCURATE)
+    tracker = Follower(TrackingConfig(ask_from=1), ACCURATE)
     tracker.follow(*frame_of([box(10, 0)], 0, EYE))
-    tracker.settle(np.array([0]), np.array([False]))
+    tracker.conclude(np.array([0]), np.array([False]))
     assert names(tracker) == ["tracked_unclassified"]
     tracker.follow(*frame_of([box(10, 0)], 1, EYE))
-    assert tracker.asking().all()
-    tracker.settle(np.array([0]), np.array([False]))
+    assert tracker.wants_class.all()
+    tracker.conclude(np.array([0]), np.array([False]))
     tracker.follow(*frame_of([], 2, EYE))
     assert names(tracker) == ["lost_unclassified"]
     tracker.follow(*frame_of([box(10, 0)], 3, EYE))
-    tracker.settle(np.array([0]), np.array([True]))
+    tracker.conclude(np.array([0]), np.array([True]))
     assert names(tracker) == ["tracked_classified"]
     tracker.follow(*frame_of([], 4, EYE))
     assert names(tracker) == ["lost_classified"]
@@ -118,7 +116,7 @@ def test_doubt_is_asked_again_until_it_is_gone():
 
 def test_classifying_what_did_not_ask_changes_no_state(tracker):
     run(tracker, [frame_of([box(10, 0)], i, EYE) for i in range(2)])
-    tracker.settle(np.array([0]), np.array([False]))
+    tracker.conclude(np.array([0]), np.array([False]))
     assert names(tracker) == ["tracked"]
 
 
@@ -137,7 +135,7 @@ def test_classifying_what_did_not_ask_changes_no_state(tracker):
     st.booleans(),
 )
 def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine, posed):
-    tracker = Tracker(TrackingConfig(association=association, max_missed=2), machine)
+    tracker = Follower(TrackingConfig(association=association, max_missed=2), machine)
     seen = set()
     for i, boxes in enumerate(scene):
         frame, proposals = frame_of(
@@ -155,22 +153,22 @@ def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine
         assert np.isfinite(tracks.x).all()
         assert np.isfinite(tracks.P).all()
         assert tracker.tracks is tracks
-        asking = np.flatnonzero(tracker.asking())
-        tracker.settle(asking, np.arange(len(asking)) % 2 == 0)
+        asking = np.flatnonzero(tracker.wants_class)
+        tracker.conclude(asking, np.arange(len(asking)) % 2 == 0)
 
 
 def test_frames_without_anything(tracker):
     frame, _ = frame_of([], 0)
     assert len(tracker.follow(frame, Proposals.empty())) == 0
-    assert len(tracker.asking()) == 0
-    tracker.settle(np.zeros(0, np.int64), np.zeros(0, np.bool_))
+    assert len(tracker.wants_class) == 0
+    tracker.conclude(np.zeros(0, np.int64), np.zeros(0, np.bool_))
 
 
 def test_two_runs_are_the_same():
     frames = [
         frame_of([box(10 + 0.5 * i, 0), box(8, 5), box(15, -4, 0.6, 0.6)][: 2 + i % 2], i, EYE) for i in range(9)
     ]
-    first, second = (run(Tracker(TrackingConfig(), EFFICIENT), frames) for _ in range(2))
+    first, second = (run(Follower(TrackingConfig(), EFFICIENT), frames) for _ in range(2))
     for (name, a), (_, b) in zip(first.columns(), second.columns(), strict=True):
         np.testing.assert_array_equal(a, b, err_msg=name)
 
@@ -179,10 +177,10 @@ def test_background_that_went_away_is_as_agile_as_anything():
     """It was not what it was taken for."""
     grown = []
     for step_m in (0.0, 0.15):
-        tracker = Tracker(TrackingConfig(), EFFICIENT)
+        tracker = Follower(TrackingConfig(), EFFICIENT)
         for i in range(12):
             tracks = tracker.follow(*frame_of([box(12 + step_m * i, 3, 0.6, 0.6, 1.7)], i, EYE))
-            tracks.posterior[:], tracks.fixed[:] = np.eye(4)[0], True
+            tracks.posterior[:], tracks.final[:] = np.eye(4)[0], True
         before = tracks.P[0, 3, 3]
         grown.append(tracker.follow(*frame_of([], 12, EYE)).P[0, 3, 3] - before)
     assert grown[1] == pytest.approx(np.square(0.1 * TrackingConfig().acceleration_sigma_mps2))

@@ -2,7 +2,34 @@
 
 import numpy as np
 
+from modt.config import OdometryConfig, TrackingConfig
+from modt.odometry.odometry import Odometry
+from modt.tracking.states import EFFICIENT
+from modt.tracking.tracker import Tracker
 from modt.types import Frame, Proposals
+
+
+class Follower:
+    """Odometry and tracker in a row, with what the last frame gave."""
+
+    def __init__(self, config=None, machine=EFFICIENT, **parts):
+        self.odometry = Odometry(OdometryConfig())
+        self.tracker = Tracker(config or TrackingConfig(), machine, **parts)
+        self.proposals = self.wants_class = self.T_world_sensor = None
+
+    @property
+    def tracks(self):
+        return self.tracker.tracks
+
+    def follow(self, frame, proposals):
+        located = self.odometry.locate(frame, proposals, self.tracker.static_tracks)
+        self.T_world_sensor = located.placement.T_world_sensor
+        tracked = self.tracker.follow(frame.stamp_s, proposals, located)
+        self.proposals, self.wants_class = tracked.proposals, tracked.wants_class
+        return tracked.tracks
+
+    def conclude(self, rows, certain):
+        return self.tracker.conclude(np.asarray(rows), np.asarray(certain))
 
 
 def frame_of(boxes, index=0, T_world_sensor=None, points=60, seed=0, period_s=0.1):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classification.belief import FLOOR, expect, normal, sane
+from modt.classification.posterior import FLOOR, expect, normal, sane
 from modt.classification.prior import Frequency, Prior, shares
 from modt.config import FusionConfig
 from modt.geometry import wrap
@@ -51,14 +51,13 @@ class FirstView:
     def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
         """The tracks that have no class."""
         expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
-        asks: Bool = asking & ~tracks.fixed & (tracks.proposal != NONE) & (tracks.hits >= self.config.once_from)
+        asks: Bool = asking & ~tracks.final & (tracks.proposal != NONE) & (tracks.hits >= self.config.once_from)
         return asks & self.prior.likely(tracks.prior, self.config.likely_once)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Settles the class."""
         tracks.posterior[rows] = sane(likelihood)
         tracks.views[rows] = 1
-        tracks.fixed[rows] = True
         _remember(tracks, proposals, rows)
         return np.ones(len(rows), np.bool_)
 
@@ -93,13 +92,13 @@ class KeyViews:
         """Those asking that were never classified or show an independent view, and the settled that came close."""
         expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
         seen = tracks.proposal != NONE
-        asks: Bool = (asking | tracks.classified) & ~tracks.fixed & seen
+        asks: Bool = (asking | tracks.viewed) & ~tracks.final & seen
         rows = np.flatnonzero(asks)
         started = tracks.age[rows] >= self.config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
-        first = ~tracks.classified[rows]
+        first = ~tracks.viewed[rows]
         asks[rows] = np.where(first, self.prior.likely(tracks.prior[rows], self.config.likely), started & fresh)
-        return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.fixed))
+        return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.final))
 
     def _reopened(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(M,) which of these rows, settled as they are, show so much more that they are worth another look."""
@@ -136,11 +135,10 @@ class KeyViews:
         fused = (tracks.views[rows] > 0)[:, None]
         past = np.log(sane(tracks.key_posterior[rows])) - self._unseen(tracks.key_prior[rows])
         share = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
-        past *= np.where(tracks.fixed[rows], np.minimum(share, 1.0), 1.0)[:, None]
+        past *= np.where(tracks.final[rows], np.minimum(share, 1.0), 1.0)[:, None]
         posterior = normal(np.where(fused, before + past + evidence, view))
         certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
-        tracks.fixed[rows] = certain
         tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
         _remember(tracks, proposals, rows)
         return certain

@@ -12,13 +12,14 @@ from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
 from scipy.special import softmax
 
 from modt import assets
-from modt.classification.boxes import N_FEATURES, Boxes, boxes_of, described
+from modt.classes import N_CLASSES
+from modt.classification.box_classifier import N_FEATURES, Boxes, boxes_of, described
 from modt.classification.crops import canonical, gather, height_of
 from modt.classification.prior import share_of
-from modt.classification.reflectance import Evidence, evidence_of
+from modt.classification.reflectance_classifier import Evidence, evidence_of
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
-from modt.types import N_CLASSES, Float32, Float64, Int, Proposals
+from modt.types import Float32, Float64, Int, Proposals
 
 _UNUSABLE = (
     ort_errors.Fail,
@@ -124,7 +125,9 @@ def _session(path: Path) -> ort.InferenceSession:
         session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
     except _UNUSABLE as error:
         cause = str(error).splitlines()[0]
-        raise MisuseError(path, f"no ONNX model ({cause})", "give one made by tools/export_pointnet.py") from None
+        raise MisuseError(
+            path, f"no ONNX model ({cause})", "give one made by tools/train/export_pointnet.py"
+        ) from None
     shapes = [tuple(end.shape) for end in (*session.get_inputs(), *session.get_outputs())]
     if len(shapes) != 2 or not _fits(shapes[0], (None, None, 3)) or not _fits(shapes[1], (None, N_CLASSES)):
         raise MisuseError(

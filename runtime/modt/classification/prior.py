@@ -11,10 +11,11 @@ from typing import Protocol
 import numpy as np
 from scipy.special import softmax
 
-from modt.classification.boxes import Boxes, NoBoxes, described
-from modt.classification.reflectance import Evidence
+from modt.classes import ObjectClass
+from modt.classification.box_classifier import Boxes, NoBoxes, described
+from modt.classification.reflectance_classifier import Evidence
 from modt.config import SensorConfig
-from modt.types import Bool, Float64, ObjectClass, Proposals
+from modt.types import Bool, Float64, Proposals
 
 
 class Prior(Protocol):

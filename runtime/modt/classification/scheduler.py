@@ -7,7 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.types import N_CLASSES, NONE, Bool, Budget, Float64, Int, Proposals, Tracks
+from modt.classes import N_CLASSES
+from modt.types import NONE, Bool, Budget, Float64, Int, Proposals, Tracks
 
 WAITING_WORTH = 0.1
 """What a frame of waiting adds to the worth of a call, itself at most 1: a track that has waited for 1 / this many

@@ -7,25 +7,27 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from modt.classification.costed import CostedClassifier
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.instrumentation import CostedClassifier
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, prior_of
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, OdometryConfig, ProfileConfig
-from modt.energy.counted import CountedClassifier
+from modt.energy.instrumentation import CountedClassifier
 from modt.energy.ledger import StageLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
+from modt.odometry.odometry import Odometry
 from modt.pipeline import Fusion, Pipeline
 from modt.profile import DEFAULT
 from modt.segmentation.segmenter import Segmenter
-from modt.sources.odometry import ListedPoses, NoOdometry, Odometry, OwnOdometry
 from modt.sources.pose_socket import PoseSocket, open_socket
+from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry
+from modt.sources.pose_source import Odometry as PoseSource
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
-from modt.sources.synthetic.stream import SyntheticStream
-from modt.tracking.states import ACCURATE, EFFICIENT, StateMachine
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
 from modt.tracking.tracker import Tracker
 from modt.types import UNLIMITED, Budget
 
@@ -69,7 +71,7 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
 
 
 MODES = {
-    "conventional": Mode(EFFICIENT, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
+    "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
     "efficient": Mode(EFFICIENT, FirstView, _profile_budget),
     "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
 }
@@ -94,7 +96,7 @@ def stream(request: Request) -> Stream:
     return cut
 
 
-def odometry(request: Request, stream: Stream, config: OdometryConfig) -> Odometry:
+def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSource:
     """Where the poses of a stream's frames come from.
 
     Raises:
@@ -136,6 +138,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     classifier = CostedClassifier(network, cost, time.thread_time_ns)
     return Pipeline(
         segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
+        odometry=Odometry(profile.odometry),
         tracker=Tracker(profile.tracking, mode.machine),
         fusion=mode.fusion(profile.fusion, prior),
         scheduler=Scheduler(cost),

@@ -11,8 +11,8 @@ import numpy as np
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
-from modt.evaluation.comparison import Contender, Watched, interleave
-from modt.evaluation.trials import Trial
+from modt.reporting.comparison import Contender, Watched, interleave
+from modt.reporting.repetitions import Trial
 from modt.types import Budget, Frame
 
 BASELINE = "conventional"

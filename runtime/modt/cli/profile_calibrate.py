@@ -13,7 +13,7 @@ from modt.errors import ModtError
 from modt.profile import DEFAULT
 
 if TYPE_CHECKING:
-    from modt.energy.calibration import Calibration
+    from modt.energy.window_fit_calibration import Calibration
 
 NEVER_S = 1e9
 """Shortest window where windows are closed by hand."""
@@ -66,9 +66,9 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.classification.pointnet import PointNet
     from modt.cli import assemble, metering
     from modt.energy.attribution import FitError
-    from modt.energy.calibration import Work, calibrate
-    from modt.energy.counted import CountedClassifier
+    from modt.energy.instrumentation import CountedClassifier
     from modt.energy.ledger import Ledger
+    from modt.energy.window_fit_calibration import Work, calibrate
     from modt.geometry import FieldOfView
     from modt.segmentation.segmenter import Segmenter
     from modt.sinks.output import writing

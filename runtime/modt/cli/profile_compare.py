@@ -45,9 +45,9 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.cli import assemble, metering
     from modt.cli.contenders import MODES, VARIED, Contest
     from modt.energy.conditions import Conditions
-    from modt.evaluation.compare_report import Basis, compare_tree
-    from modt.evaluation.compare_text import compare_text
-    from modt.evaluation.figure import plain
+    from modt.reporting.compare_report import Basis, compare_tree
+    from modt.reporting.compare_text import compare_text
+    from modt.reporting.quantity import plain
 
     loaded = profile.load(arguments.profile)
     request = assemble.Request(
@@ -90,8 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
     }
     tree = compare_tree(trials, MODES, VARIED, basis, about)
     if arguments.html is not None:
-        from modt.evaluation.compare_page import compare_page
-        from modt.evaluation.page import save
+        from modt.reporting.compare_page import compare_page
+        from modt.reporting.page import save
 
         save(arguments.html, compare_page(tree))
     print(json.dumps(plain(tree), indent=2) if arguments.json else compare_text(tree))

@@ -18,11 +18,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, and print."""
-    from modt.evaluation.figure import plain
-    from modt.evaluation.page import save
-    from modt.evaluation.run_page import run_page
-    from modt.evaluation.run_report import run_tree
-    from modt.evaluation.run_text import run_text
+    from modt.reporting.page import save
+    from modt.reporting.quantity import plain
+    from modt.reporting.run_page import run_page
+    from modt.reporting.run_report import run_tree
+    from modt.reporting.run_text import run_text
 
     tree = run_tree(arguments.run_directory)
     if arguments.html is not None:

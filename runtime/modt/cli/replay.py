@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.cli.assemble import Request
     from modt.cli.progress import progress
     from modt.cli.session import Session
-    from modt.evaluation.table import summary_table
+    from modt.reporting.summary_text import summary_table
     from modt.supervisor import supervisor_of
 
     request = Request(

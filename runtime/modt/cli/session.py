@@ -12,13 +12,13 @@ from modt import host, profile
 from modt.cli import assemble, metering
 from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
-from modt.evaluation.summary import Summary
 from modt.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
+from modt.reporting.summary import Summary
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.sink import Sink
-from modt.sources.odometry import PosedStream
+from modt.sources.pose_source import PosedStream
 from modt.supervisor import Supervisor
 from modt.types import FrameResult, Proposals
 

@@ -28,8 +28,8 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: no such scene or sensor, or there is a drive already.
         ModtError: the drive cannot be written.
     """
-    from modt.sources.synthetic.drive import DATE, DriveWriter
-    from modt.sources.synthetic.stream import SyntheticStream
+    from modt.sinks.kitti_raw import DATE, DriveWriter
+    from modt.sources.synthetic_stream import SyntheticStream
 
     out: Path = arguments.out
     if (out / DATE).exists() or (out / "sequences").exists():

@@ -92,10 +92,10 @@ def follow(
 
     import numpy as np
 
+    from modt.box_tracking.box_tracker import BoxTracker, box_config
     from modt.geometry import inverse, transform_boxes
     from modt.sinks.kitti_detections import result_lines
     from modt.sources.detections import T_LEVEL_CAMERA, TYPES, kitti
-    from modt.tracking.boxes import BoxTracker, box_config
 
     lines: list[str] = []
     order: list[int] = []
@@ -130,8 +130,8 @@ def follow(
 def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) -> Float64 | None:
     """(n, 4, 4) T_world_camera of every frame of the sequence."""
     from modt.geometry import inverse
-    from modt.sources import calibration, oxts
-    from modt.sources.poses import read_poses
+    from modt.sources import kitti_calibration, oxts
+    from modt.sources.pose_file import read_poses
 
     given: Path | None = arguments.poses or arguments.oxts
     if given is None:
@@ -145,8 +145,8 @@ def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) 
         poses = read_poses(path)
     else:
         calib = path.parent.parent / "calib" / path.name
-        T_imu_sensor = calibration.T_imu_sensor_of_sequence(calib)
-        T_sensor_camera = inverse(calibration.camera_of_sequence(calib).T_camera_sensor)
+        T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
+        T_sensor_camera = inverse(kitti_calibration.camera_of_sequence(calib).T_camera_sensor)
         poses = oxts.poses(oxts.read_sequence(path)) @ T_imu_sensor @ T_sensor_camera
     if len(poses) < sequence.n_frames:
         raise MisuseError(path, f"{len(poses)} poses for {sequence.n_frames} frames", "give one a frame")

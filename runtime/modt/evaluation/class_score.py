@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.evaluation.rows import Outcome, Rows
 from modt.evaluation.truth import Role
-from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
+from modt.types import Bool, Float64, Int
 
 BINS = 15
 """Of confidence, equally wide."""

@@ -8,6 +8,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES
 from modt.evaluation.class_score import ClassScore, class_scores, top_calibration_error
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.matching import judge
@@ -15,7 +16,7 @@ from modt.evaluation.rows import Association, Rows
 from modt.evaluation.rules import KITTI_RULES, Rules
 from modt.evaluation.segmentation_score import SegmentationScore, segmentation
 from modt.evaluation.track_score import TrackScore, track_metrics, track_scores
-from modt.types import CLASS_NAMES, NONE
+from modt.types import NONE
 
 SCHEMA = "modt.evaluation/1"
 ALL = "all"

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.overlap import Overlap, in_box_frame, inside
 from modt.evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
 from modt.evaluation.rules import Rules
 from modt.evaluation.truth import Role
-from modt.types import CLASS_NAMES, N_CLASSES, NONE, Bool, Float32, Int
+from modt.types import NONE, Bool, Float32, Int
 
 PARKED_PAD_M = 0.4
 """A proposal is of a parked car if it lies in its box or up to this beyond."""

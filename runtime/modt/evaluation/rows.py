@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.evaluation.truth import Role
-from modt.types import CLASS_NAMES, N_CLASSES, Bool, Float64, Int
+from modt.types import Bool, Float64, Int
 
 Rows = NDArray[np.void]
 """A structured array: of OBJECT, a row an object and frame, or of PROPOSAL, a row a tracked proposal and frame."""

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from modt.classes import CLASS_NAMES
 from modt.errors import MisuseError, ModtError
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.truth import Truth
@@ -18,7 +19,7 @@ from modt.sinks.records import read_records
 from modt.sinks.run_directory import RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.sources.scan_file import read_scan
-from modt.types import CLASS_NAMES, Float32, Float64, Int
+from modt.types import Float32, Float64, Int
 
 LABELS = "labels"
 
@@ -77,7 +78,7 @@ class RunRecord:
             try:
                 index = int(record["frame"])
                 track, of_track, said, posterior = _track_columns(record)
-                counts = int(record["proposals"]), int(record["classified"])
+                counts = int(record["proposals"]), int(record["classifications"])
             except (KeyError, TypeError, ValueError, IndexError) as error:
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
             labels, scan = truth.frames.get(index), scans.get(index)

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from modt.classes import CLASSES, ObjectClass
 from modt.evaluation.rules import Rules
 from modt.geometry import Camera, inverse, transform_boxes
 from modt.sources.kitti_labels import Label
 from modt.sources.scan_stream import ScanStream
-from modt.types import Bool, Float32, Float64, Int, ObjectClass
+from modt.types import Bool, Float32, Float64, Int
 
 STILL_M, LEAST_FRAMES = 1.0, 3
 """A car is parked if its centre stays within STILL_M, in x and in y, over LEAST_FRAMES or more."""
@@ -33,25 +34,20 @@ class Role(IntEnum):
 Types = Mapping[str, tuple[ObjectClass, Role]]
 """Class and role of each labelled type; any other one is background, judged for segmentation alone."""
 
-CAR, PEDESTRIAN, CYCLIST = ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST
-
-
-def _counted(names: Mapping[ObjectClass, str]) -> dict[str, tuple[ObjectClass, Role]]:
-    return {name: (class_, Role.COUNTED) for class_, listed in names.items() for name in listed.split(", ")}
-
-
-PAPER_COUNTED = _counted({CAR: "Car", PEDESTRIAN: "Pedestrian", CYCLIST: "Cyclist"})
-KITTI_TYPES: Types = _counted({CAR: "Car, Van", PEDESTRIAN: "Pedestrian, Person, Person_sitting", CYCLIST: "Cyclist"})
-PAPER_TYPES: Types = {name: (class_, Role.IGNORED) for name, (class_, _) in KITTI_TYPES.items()} | PAPER_COUNTED
+KITTI_TYPES: Types = {name: (c, Role.COUNTED) for c, spec in CLASSES.items() for name in spec.kitti}
+PAPER_TYPES: Types = {
+    name: (c, Role.COUNTED if name == CLASSES[c].kitti[0] else Role.IGNORED) for name, (c, _) in KITTI_TYPES.items()
+}
 """Table III counts Car, Pedestrian and Cyclist only."""
+PANDASET_CLASSES = {
+    ObjectClass.CAR: ("Car", "Pickup Truck", "TYPE_VEHICLE"),
+    ObjectClass.PEDESTRIAN: ("Pedestrian", "Pedestrian with Object", "TYPE_PEDESTRIAN"),
+    ObjectClass.CYCLIST: ("Motorcycle", "TYPE_CYCLIST"),
+}
 LARGE = "Medium-sized Truck", "Semi-truck", "Bus", "Towed Object", "Other Vehicle - Construction Vehicle"
-PANDASET_TYPES: Types = dict.fromkeys(LARGE, (CAR, Role.NEUTRAL)) | _counted(
-    {
-        CAR: "Car, Pickup Truck, TYPE_VEHICLE",
-        PEDESTRIAN: "Pedestrian, Pedestrian with Object, TYPE_PEDESTRIAN",
-        CYCLIST: "Motorcycle, TYPE_CYCLIST",
-    }
-)
+PANDASET_TYPES: Types = {
+    name: (c, Role.COUNTED) for c, names in PANDASET_CLASSES.items() for name in names
+} | dict.fromkeys(LARGE, (ObjectClass.CAR, Role.NEUTRAL))
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +129,7 @@ def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Fl
     """
     cars: dict[int, dict[int, Float64]] = {}
     for label in labels:
-        if types.get(label.type_, (None,))[0] == CAR and label.frame in poses:
+        if types.get(label.type_, (None,))[0] == ObjectClass.CAR and label.frame in poses:
             placed = transform_boxes(poses[label.frame], label.box[None])
             cars.setdefault(label.id, {})[label.frame] = placed[0]
     found: dict[int, list[Float64]] = {}

@@ -23,9 +23,9 @@ from modt.evaluation.truth import (
     parked_outside,
 )
 from modt.geometry import Camera
-from modt.sources.calibration import camera_of_sequence
+from modt.sources.kitti_calibration import camera_of_sequence
 from modt.sources.kitti_labels import DONT_CARE, Label, read_labels, read_tracklets
-from modt.sources.poses import read_poses
+from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_stream
 from modt.sources.scan_stream import ScanStream
 from modt.types import NONE

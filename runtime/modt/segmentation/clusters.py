@@ -9,11 +9,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from modt.config import SegmentationConfig, SensorConfig
+from modt.segmentation.car_merging import Bounds, Pieces
 from modt.segmentation.columns import Columns
 from modt.segmentation.grids import Int32, RootGrid
 from modt.segmentation.groups import Groups
-from modt.segmentation.pieces import Bounds, Pieces
-from modt.segmentation.silhouettes import Silhouettes
+from modt.segmentation.person_splitting import Silhouettes
 from modt.types import NONE, Bool, Float32, Int
 
 GAP_M = 0.3

@@ -8,14 +8,14 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.boxes import headings, upright_boxes
-from modt.segmentation.brightness import brightness, recorded
+from modt.segmentation.box_fitting import headings, upright_boxes
 from modt.segmentation.clusters import Clusterer, Clusters
 from modt.segmentation.columns import Columns
 from modt.segmentation.ground import Ground
 from modt.segmentation.groups import Groups
-from modt.segmentation.height import sensor_height
 from modt.segmentation.occlusion import occluded
+from modt.segmentation.reflectance_statistics import brightness, recorded
+from modt.segmentation.sensor_height import sensor_height
 from modt.types import NONE, Bool, Float32, Int, Proposals
 
 MARGIN_M = 6.0

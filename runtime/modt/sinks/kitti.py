@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.geometry import Camera, corners, transform
 from modt.sinks.output import LineFile, writing
-from modt.types import NONE, FrameResult, ObjectClass
+from modt.types import NONE, FrameResult
 
 NAMES = {ObjectClass.CAR: "Car", ObjectClass.PEDESTRIAN: "Pedestrian", ObjectClass.CYCLIST: "Cyclist"}
 

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from modt.sinks.numerals import LIMIT, Words, beside, probabilities, table, text, thousandths, whole, words
+from modt.classes import CLASS_NAMES
+from modt.sinks.fast_json import LIMIT, Words, beside, probabilities, table, text, thousandths, whole, words
 from modt.sinks.output import LineFile
 from modt.sinks.records import line
-from modt.types import CLASS_NAMES, NONE, FrameResult
+from modt.types import NONE, FrameResult
 
-SCHEMA = "modt.frame/2"
+SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 
@@ -34,8 +35,8 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
         tracks.state.tolist(),
         tracks.object_class.tolist(),
         np.round(tracks.posterior, 6).tolist(),
-        tracks.classified.tolist(),
-        tracks.fixed.tolist(),
+        tracks.viewed.tolist(),
+        tracks.final.tolist(),
         tracks.proposal.tolist(),
         tracks.points.tolist(),
         tracks.age.tolist(),
@@ -51,8 +52,8 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "state": result.state_names[state],
                 "class": CLASS_NAMES[class_],
                 "posterior": posterior,
-                "classified": classified,
-                "fixed": fixed,
+                "viewed": viewed,
+                "final": final,
                 "proposal": None if proposal == NONE else proposal,
                 "points": points,
                 "age": age,
@@ -60,7 +61,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
                 "box": None if proposal == NONE else dict(zip(BOX_KEYS, box, strict=True)),
                 "world": dict(zip(WORLD_KEYS, world, strict=True)),
             }
-            for id_, state, class_, posterior, classified, fixed, proposal, points, age, missed, box, world in columns
+            for id_, state, class_, posterior, viewed, final, proposal, points, age, missed, box, world in columns
         ],
     }
 
@@ -72,8 +73,8 @@ def _around(result: FrameResult) -> dict[str, Any]:
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 6),
         "proposals": len(result.proposals),
-        "classified": result.classified,
-        "deferred": result.deferred,
+        "classifications": result.n_classified,
+        "deferred": result.n_deferred,
     }
 
 
@@ -110,10 +111,10 @@ def frame_line(result: FrameResult) -> str:
         *(
             ',"posterior":',
             _listed(probabilities(tracks.posterior)),
-            ',"classified":',
-            TRUTH[tracks.classified.astype(np.int64)],
-            ',"fixed":',
-            TRUTH[tracks.fixed.astype(np.int64)],
+            ',"viewed":',
+            TRUTH[tracks.viewed.astype(np.int64)],
+            ',"final":',
+            TRUTH[tracks.final.astype(np.int64)],
         ),
         *(',"proposal":', proposal, ',"points":', points, ',"age":', age, ',"missed":', missed),
         *(',"box":', box, ',"world":', _keyed(WORLD_KEYS, thousandths(tracks.x)), "}"),

@@ -13,8 +13,8 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.sources import calibration, oxts
-from modt.sources.poses import read_poses, sensor_poses
+from modt.sources import kitti_calibration, oxts
+from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_stream import ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt.types import Float64
@@ -44,7 +44,7 @@ def raw_drive(drive: Path) -> ScanStream:
         MisuseError: it holds no scans, or a file that is there is broken.
     """
     notes = Notes()
-    camera = _camera(calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
+    camera = _camera(kitti_calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
     poses = _poses_of_raw(drive, notes)
     data = drive / "velodyne_points" / "data"
     frames, _ = _scans(data)
@@ -64,7 +64,7 @@ def tracking_sequence(scans: Path) -> ScanStream:
     root, number = scans.parent.parent, scans.name
     notes = Notes()
     calib = root / "calib" / f"{number}.txt"
-    camera = _camera(calibration.camera_of_sequence, calib, notes)
+    camera = _camera(kitti_calibration.camera_of_sequence, calib, notes)
     records = root / "oxts" / f"{number}.txt"
     poses: Poses = {}
     if not records.is_file():
@@ -72,7 +72,7 @@ def tracking_sequence(scans: Path) -> ScanStream:
     elif not calib.is_file():
         notes.of_poses.append(f"{calib} is missing, and its Tr_imu_velo: {NO_POSES}")
     else:
-        T_imu_sensor = calibration.T_imu_sensor_of_sequence(calib)
+        T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
         poses = dict(enumerate(oxts.poses(oxts.read_sequence(records)) @ T_imu_sensor))
     name = f"tracking {number}"
     return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turn_s=PERIOD_S)
@@ -88,7 +88,7 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     """
     notes = Notes()
     calib = sequence / "calib.txt"
-    camera = _camera(calibration.camera_of_sequence, calib, notes)
+    camera = _camera(kitti_calibration.camera_of_sequence, calib, notes)
     places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
     found = next((p for p in places if p.is_file()), None)
     poses: Poses = {}
@@ -185,7 +185,7 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
     if not records or not calib.is_file():
         notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
-    T_imu_sensor = calibration.T_imu_sensor_of_raw(drive.parent)
+    T_imu_sensor = kitti_calibration.T_imu_sensor_of_raw(drive.parent)
     T_world_imu = oxts.poses(np.stack([oxts.read_record(r)[: len(oxts.FIELDS)] for r in records]))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 

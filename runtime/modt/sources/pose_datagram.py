@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from modt.geometry import rotation_zyx, se3
-from modt.sources.poses import fault
+from modt.sources.pose_file import fault
 from modt.types import Float64
 
 LARGEST_BYTES = 4096

@@ -1,41 +1,89 @@
-"""Proposals put right by what is known of the tracks: what a frame shows, and what changes it."""
+"""Regrouping of a frame's proposals by what the tracks know: objects split off, parts merged."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
+from modt.geometry import transform, upright_box
+from modt.observations import Observations, observe
+from modt.placement import Placement
 from modt.tracking.association import Matches
-from modt.tracking.followed import Followed
-from modt.tracking.sightings import Sightings
-from modt.tracking.turning import Placing
-from modt.types import Proposals
+from modt.tracking.track_table import TrackTable
+from modt.types import Float64, Int, Proposals
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
-    """What a frame shows, and whose it is.
+class Associated:
+    """A frame after association.
 
     Attributes:
         proposals: of the frame.
-        sightings: the proposals in the world.
-        matches: those that belong to tracks.
+        observations: the proposals in the world.
+        matches: pairs of tracks and proposals.
     """
 
     proposals: Proposals
-    sightings: Sightings
+    observations: Observations
     matches: Matches
 
 
 class Regrouping(Protocol):
-    """Groups the points of a frame's proposals anew."""
+    """Corrects the grouping of a frame's points."""
 
-    def regroup(self, tracks: Followed, found: Found, placing: Placing) -> Found:
-        """What was found, put right where something is known better; no point gets lost.
+    def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
+        """The frame in a better grouping; every point stays in one proposal.
 
         Args:
             tracks: as predicted.
-            found: of the frame.
-            placing: by which it was put into the world.
+            frame: proposals, observations and matches.
+            placement: of the frame in the world.
         """
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class Grouping:
+    """How P proposals become Q.
+
+    Attributes:
+        runs: rows of members in their new order.
+        count: (Q,) members of each.
+        source: (Q,) proposal whose columns each takes over.
+        changed: (C,) those of the Q whose members changed.
+        yaw: (C,) heading of their boxes [rad, sensor frame].
+        partial: (n,) those of the Q of which something nearer hides a part.
+    """
+
+    runs: Sequence[slice | Int]
+    count: Int
+    source: Int
+    changed: Int
+    yaw: Float64
+    partial: Int
+
+    def apply(self, frame: Associated, placement: Placement) -> tuple[Proposals, Observations]:
+        """Proposals and observations in the new grouping; boxes and k-DOPs of what changed come from its points."""
+        proposals = frame.proposals.regrouped(self.runs, self.count, self.source)
+        for row, yaw in zip(self.changed.tolist(), self.yaw.tolist(), strict=True):  # one to three a frame
+            xyz = proposals.coordinates[:, slice(*proposals.offsets[row : row + 2])].astype(np.float64)
+            proposals.box[row], proposals.centroid[row] = upright_box(xyz, yaw), xyz.mean(axis=1)
+        proposals.occluded[self.partial] = True
+        # The deskew of a proposal that changed is that of the one whose columns it took over.
+        old, T = self.source[self.changed], placement.T_world_sensor
+        deskew = frame.observations.centroid[old] - transform(T, frame.proposals.centroid[old])[:, :2]
+        observations = frame.observations.take(self.source)
+        observations.put(self.changed, observe(proposals.take(self.changed), T).moved(deskew))
+        return proposals, observations
+
+
+def contiguous_runs(order: Int, offsets: Int) -> list[slice]:
+    """Members of P proposals in a new order of the proposals, as few slices as possible."""
+    begin = np.diff(order - np.arange(len(order)), prepend=-1) != 0
+    begin[:1] = True
+    end = np.append(begin[1:], True)
+    pairs = zip(offsets[order[begin]].tolist(), offsets[order[end] + 1].tolist(), strict=True)
+    return [slice(*pair) for pair in pairs]

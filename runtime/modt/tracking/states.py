@@ -1,14 +1,13 @@
 """The finite-state machines of a proposal, as tables (Tables I and II, Figs. 3 and 6).
 
-A table says where each event leads. What befalls a track (it found a proposal, it was classified, ...) is a
-`Happening`; in each state at most one event of the table answers to it, so arrays of states are driven by one dense
-look-up. Events a1 to a14 are the paper's; those named e1 and on are extensions: the paper knows no budget, so it has
-no word for an object that waits for its first class, and no way back from a class that was inherited in error.
+A row says which event leads from which state to which. In each state an event has one row at most, so arrays of
+states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are extensions: the paper has
+no budget, so it has no object that waits for its first class, and no second look at a final class.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 
@@ -18,30 +17,45 @@ from modt.types import NONE, Bool, Int
 
 
 class UndefinedTransitionError(ValueError):
-    """A state met an event or a happening that its machine has no transition for."""
+    """A state met an event that its machine has no row for."""
 
 
-class Happening(IntEnum):
-    """What can befall a proposal or the track that it becomes."""
+class Event(IntEnum):
+    """What can happen to a proposal or to the track that it becomes."""
 
     ASSOCIATED = 0
     """Proposal and track found each other."""
     UNASSOCIATED = 1
     """They did not."""
     EXPIRED = 2
-    """A track went without a proposal for more than N frames."""
-    INHERITS_CLASS = 3
-    """The track that the proposal joined has a certain class."""
-    INHERITS_DOUBT = 4
-    """The track that the proposal joined was classified, without certainty."""
-    INHERITS_NOTHING = 5
-    """The track that the proposal joined still waits for its first classification."""
+    """The track went without a proposal for more than N frames."""
+    JOINS_FINAL = 3
+    """The proposal joins a track whose class is final."""
+    JOINS_UNCERTAIN = 4
+    """The proposal joins a track that was classified without certainty."""
+    JOINS_WAITING = 5
+    """The proposal joins a track that waits for its first classification."""
     CLASSIFIED = 6
-    """The class is certain now."""
+    """Classified: the class is certain."""
     UNDECIDED = 7
-    """Classified, without certainty."""
-    DOUBTED = 8
-    """What was inherited proved not to hold: the class must be asked for."""
+    """Classified without certainty."""
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Where a proposal or track stands.
+
+    Attributes:
+        name: as in the paper's figure.
+        wants_class: the class is asked for.
+        final: the class is final.
+        joining: event that a proposal meets which joins a track in this state.
+    """
+
+    name: str
+    wants_class: bool = False
+    final: bool = False
+    joining: Event = Event.JOINS_WAITING
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,205 +64,177 @@ class Transition:
 
     Attributes:
         source: state it leaves.
-        event: the table's name of it.
+        label: the table's name of it.
         target: state it leads to.
-        happening: what sets it off.
+        event: that fires it.
         meaning: the table's description, in a phrase.
     """
 
     source: str
-    event: str
+    label: str
     target: str
-    happening: Happening
+    event: Event
     meaning: str
 
 
 @dataclass(frozen=True)
 class StateMachine:
-    """A table of transitions over named states; a state's value is its index in names.
+    """A table of transitions over states; a state's value is its index.
 
     Attributes:
         title: which table it is.
-        names: the states; the first is a fresh proposal's, the last is the end.
+        states: the first is a new proposal's, the last is the end.
         transitions: the rows.
-        asking: states in which the class is asked for.
-        certain: states in which it is settled.
-        waiting: states before the first classification.
     """
 
     title: str
-    names: tuple[str, ...]
+    states: tuple[State, ...]
     transitions: tuple[Transition, ...]
-    asking: frozenset[str]
-    certain: frozenset[str]
-    waiting: frozenset[str] = frozenset({"unmatched", "lost_unmatched"})
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return tuple(state.name for state in self.states)
 
     @property
     def proposal(self) -> int:
         """State of a proposal before association."""
         return 0
 
-    @property
-    def deleted(self) -> int:
-        """State that nothing leaves."""
-        return len(self.names) - 1
-
     def index(self, name: str) -> int:
         """Value of a state."""
         return self.names.index(name)
 
     @cached_property
-    def events(self) -> tuple[str, ...]:
-        """Names of the events, in the table's order."""
-        return tuple(dict.fromkeys(t.event for t in self.transitions))
-
-    @cached_property
-    def table(self) -> Int:
-        """(S, E) state that each event leads to, NONE where undefined."""
-        table = np.full((len(self.names), len(self.events)), NONE, np.int64)
-        for t in self.transitions:
-            table[self.index(t.source), self.events.index(t.event)] = self.index(t.target)
-        return table
-
-    @cached_property
-    def answer(self) -> Int:
-        """(S, H) event that answers to each happening, NONE where none does."""
-        answer = np.full((len(self.names), len(Happening)), NONE, np.int64)
-        for t in self.transitions:
-            answer[self.index(t.source), t.happening] = self.events.index(t.event)
-        return answer
-
-    @cached_property
     def after(self) -> Int:
-        """(S, H) state that each happening leads to, NONE where none answers to it."""
-        after = np.full(self.answer.shape, NONE, np.int64)
-        states, happenings = np.nonzero(self.answer != NONE)
-        after[states, happenings] = self.table[states, self.answer[states, happenings]]
+        """(S, E) state that each event leads to, NONE where the table has no row."""
+        after = np.full((len(self.states), len(Event)), NONE, np.int64)
+        for t in self.transitions:
+            after[self.index(t.source), t.event] = self.index(t.target)
         return after
 
     @cached_property
-    def asks(self) -> Bool:
-        """(S,) whether a state asks for a class."""
-        return self._among(self.asking)
+    def wants_class(self) -> Bool:
+        """(S,) whether the class is asked for."""
+        return np.array([state.wants_class for state in self.states])
 
     @cached_property
-    def knows(self) -> Bool:
-        """(S,) whether the class is settled in a state."""
-        return self._among(self.certain)
+    def final(self) -> Bool:
+        """(S,) whether the class is final."""
+        return np.array([state.final for state in self.states])
 
-    def fire(self, states: Int, events: Int) -> Int:
-        """(M,) states after events (M,), by index in the table's events.
+    @cached_property
+    def joining(self) -> Int:
+        """(S,) event that a proposal meets which joins a track in each state."""
+        return np.array([state.joining for state in self.states])
 
-        Raises:
-            UndefinedTransitionError: one of them has no such transition.
-        """
-        after: Int = self.table[states, events]
-        bad = ((after == NONE) | (np.broadcast_to(events, np.shape(after)) == NONE)).nonzero()[0]
-        if len(bad):
-            state, event = states[bad[0]], np.broadcast_to(events, after.shape)[bad[0]]
-            what = self.events[event] if event != NONE else "no event of the table"
-            raise UndefinedTransitionError(f"{self.title}: {what} in state {self.names[state]}")
-        return after
-
-    def meet(self, states: Int, happening: Happening | Int) -> Int:
-        """(M,) states after what befell them, one happening for all or one each.
+    def transition(self, states: Int, events: Event | Int) -> Int:
+        """(M,) states after an event, one for all or one each.
 
         Raises:
-            UndefinedTransitionError: one of them has no answer to it.
+            UndefinedTransitionError: the table has no row for one of them.
         """
-        after: Int = self.after[states, happening]
+        after: Int = self.after[states, events]
         if NONE in after:
-            self.fire(states, self.answer[states, happening])  # says which of them
+            bad = (after == NONE).nonzero()[0][0]
+            event = Event(np.broadcast_to(events, after.shape)[bad])
+            raise UndefinedTransitionError(f"{self.title}: {event.name} in state {self.names[states[bad]]}")
         return after
 
-    def inherits(self, states: Int) -> Int:
-        """(M,) happening that joining a track in each state is to a proposal."""
-        waits = self._among(self.waiting)
-        kinds = np.where(
-            self.knows,
-            Happening.INHERITS_CLASS,
-            np.where(waits, Happening.INHERITS_NOTHING, Happening.INHERITS_DOUBT),
-        )
-        joined: Int = kinds[states]
-        return joined
-
-    def _among(self, names: frozenset[str] | set[str]) -> Bool:
-        return np.array([n in names for n in self.names], np.bool_)
+    def joined(self, states: Int) -> Int:
+        """(M,) states of proposals that were matched with tracks in these states (a1, then what they join)."""
+        matched = self.transition(np.full(len(states), self.proposal), Event.ASSOCIATED)
+        return self.transition(matched, self.joining[states])
 
 
-_H = Happening
+_E = Event
 
-WAITING = (
-    Transition("unmatched", "e1", "unmatched", _H.ASSOCIATED, "followed while it waits to be classified"),
-    Transition("matched", "e2", "unmatched", _H.INHERITS_NOTHING, "joins an object that waits"),
-    Transition("unmatched", "e3", "lost_unmatched", _H.UNASSOCIATED, "no proposal while it waits"),
-    Transition("lost_unmatched", "e4", "unmatched", _H.ASSOCIATED, "re-associated, still waiting"),
-    Transition("lost_unmatched", "e5", "lost_unmatched", _H.UNASSOCIATED, "still no proposal"),
-    Transition("lost_unmatched", "e6", "deleted", _H.EXPIRED, "no proposal for N frames"),
+_WAITING = (
+    Transition("unmatched", "e1", "unmatched", _E.ASSOCIATED, "followed while it waits to be classified"),
+    Transition("matched", "e2", "unmatched", _E.JOINS_WAITING, "joins an object that waits"),
+    Transition("unmatched", "e3", "lost_unmatched", _E.UNASSOCIATED, "no proposal while it waits"),
+    Transition("lost_unmatched", "e4", "unmatched", _E.ASSOCIATED, "re-associated, still waiting"),
+    Transition("lost_unmatched", "e5", "lost_unmatched", _E.UNASSOCIATED, "still no proposal"),
+    Transition("lost_unmatched", "e6", "deleted", _E.EXPIRED, "no proposal for N frames"),
 )
-"""What neither table tells: a track without a class waits for the frame's budget, or for a box like an object's."""
+"""A track without a class waits for the frame's budget, or for a box like an object's."""
 
 EFFICIENT = StateMachine(
     title="Table I",
-    names=("proposal", "matched", "unmatched", "tracked", "lost", "lost_unmatched", "deleted"),
-    asking=frozenset({"unmatched"}),
-    certain=frozenset({"tracked", "lost"}),
+    states=(
+        State("proposal"),
+        State("matched"),
+        State("unmatched", wants_class=True),
+        State("tracked", final=True, joining=_E.JOINS_FINAL),
+        State("lost", final=True, joining=_E.JOINS_FINAL),
+        State("lost_unmatched"),
+        State("deleted"),
+    ),
     transitions=(
-        Transition("proposal", "a1", "matched", _H.ASSOCIATED, "associated with an existing object"),
-        Transition("proposal", "a2", "unmatched", _H.UNASSOCIATED, "associated with none"),
-        Transition("unmatched", "a3", "tracked", _H.CLASSIFIED, "classified"),
-        Transition("tracked", "a4", "tracked", _H.ASSOCIATED, "its proposal updates its location"),
-        Transition("matched", "a5", "tracked", _H.INHERITS_CLASS, "given the object's class"),
-        Transition("tracked", "a6", "lost", _H.UNASSOCIATED, "no proposal"),
-        Transition("lost", "a7", "tracked", _H.ASSOCIATED, "re-associated"),
-        Transition("lost", "a8", "lost", _H.UNASSOCIATED, "still no proposal"),
-        Transition("lost", "a9", "deleted", _H.EXPIRED, "no proposal for N frames"),
-        *WAITING,
-        Transition("tracked", "e7", "unmatched", _H.DOUBTED, "an inherited class did not hold"),
+        Transition("proposal", "a1", "matched", _E.ASSOCIATED, "associated with an existing object"),
+        Transition("proposal", "a2", "unmatched", _E.UNASSOCIATED, "associated with none"),
+        Transition("unmatched", "a3", "tracked", _E.CLASSIFIED, "classified"),
+        Transition("tracked", "a4", "tracked", _E.ASSOCIATED, "its proposal updates its location"),
+        Transition("matched", "a5", "tracked", _E.JOINS_FINAL, "given the object's class"),
+        Transition("tracked", "a6", "lost", _E.UNASSOCIATED, "no proposal"),
+        Transition("lost", "a7", "tracked", _E.ASSOCIATED, "re-associated"),
+        Transition("lost", "a8", "lost", _E.UNASSOCIATED, "still no proposal"),
+        Transition("lost", "a9", "deleted", _E.EXPIRED, "no proposal for N frames"),
+        *_WAITING,
     ),
 )
 """Table I and Fig. 3: classify once, then track."""
 
+CONVENTIONAL = replace(
+    EFFICIENT,
+    title="Table I, every frame classified",
+    states=tuple(replace(state, final=False) for state in EFFICIENT.states),
+    transitions=(
+        *EFFICIENT.transitions,
+        Transition("tracked", "e7", "tracked", _E.CLASSIFIED, "classified in every frame"),
+    ),
+)
+"""Tracking by detection over the same states: no class is final."""
+
 ACCURATE = StateMachine(
     title="Table II",
-    names=(
-        "proposal",
-        "matched",
-        "unmatched",
-        "tracked_unclassified",
-        "tracked_classified",
-        "lost_unclassified",
-        "lost_classified",
-        "lost_unmatched",
-        "deleted",
+    states=(
+        State("proposal"),
+        State("matched"),
+        State("unmatched", wants_class=True),
+        State("tracked_unclassified", wants_class=True, joining=_E.JOINS_UNCERTAIN),
+        State("tracked_classified", final=True, joining=_E.JOINS_FINAL),
+        State("lost_unclassified", joining=_E.JOINS_UNCERTAIN),
+        State("lost_classified", final=True, joining=_E.JOINS_FINAL),
+        State("lost_unmatched"),
+        State("deleted"),
     ),
-    asking=frozenset({"unmatched", "tracked_unclassified"}),
-    certain=frozenset({"tracked_classified", "lost_classified"}),
     transitions=(
-        Transition("proposal", "a1", "matched", _H.ASSOCIATED, "associated with an existing object"),
-        Transition("proposal", "a2", "unmatched", _H.UNASSOCIATED, "associated with none"),
-        Transition("unmatched", "a3", "tracked_unclassified", _H.UNDECIDED, "classified, uncertain"),
-        Transition("unmatched", "a4", "tracked_classified", _H.CLASSIFIED, "classified, distinct"),
-        Transition("matched", "a5", "tracked_unclassified", _H.INHERITS_DOUBT, "joins an unclassified object"),
-        Transition("matched", "a6", "tracked_classified", _H.INHERITS_CLASS, "joins a classified object"),
-        Transition("tracked_classified", "a7", "tracked_classified", _H.ASSOCIATED, "its proposal updates it"),
-        Transition("tracked_unclassified", "a8", "tracked_classified", _H.CLASSIFIED, "fused views are certain"),
-        Transition("tracked_unclassified", "a9", "tracked_unclassified", _H.ASSOCIATED, "its proposal updates it"),
-        Transition("tracked_classified", "a10", "lost_classified", _H.UNASSOCIATED, "no proposal"),
-        Transition("lost_classified", "a11", "tracked_classified", _H.ASSOCIATED, "re-associated"),
-        Transition("tracked_unclassified", "a12", "lost_unclassified", _H.UNASSOCIATED, "no proposal"),
-        Transition("lost_unclassified", "a13", "tracked_unclassified", _H.ASSOCIATED, "re-associated"),
-        Transition("lost_classified", "a14", "deleted", _H.EXPIRED, "no proposal for N frames"),
-        Transition("lost_unclassified", "a14", "deleted", _H.EXPIRED, "no proposal for N frames"),
-        *WAITING,
-        Transition("tracked_classified", "e7", "unmatched", _H.DOUBTED, "an inherited class did not hold"),
-        Transition("lost_classified", "e8", "lost_classified", _H.UNASSOCIATED, "still no proposal"),
-        Transition("lost_unclassified", "e9", "lost_unclassified", _H.UNASSOCIATED, "still no proposal"),
-        Transition("tracked_unclassified", "e10", "tracked_unclassified", _H.UNDECIDED, "fused views leave doubt"),
+        Transition("proposal", "a1", "matched", _E.ASSOCIATED, "associated with an existing object"),
+        Transition("proposal", "a2", "unmatched", _E.UNASSOCIATED, "associated with none"),
+        Transition("unmatched", "a3", "tracked_unclassified", _E.UNDECIDED, "classified, uncertain"),
+        Transition("unmatched", "a4", "tracked_classified", _E.CLASSIFIED, "classified, distinct"),
+        Transition("matched", "a5", "tracked_unclassified", _E.JOINS_UNCERTAIN, "joins an unclassified object"),
+        Transition("matched", "a6", "tracked_classified", _E.JOINS_FINAL, "joins a classified object"),
+        Transition("tracked_classified", "a7", "tracked_classified", _E.ASSOCIATED, "its proposal updates it"),
+        Transition("tracked_unclassified", "a8", "tracked_classified", _E.CLASSIFIED, "fused views are certain"),
+        Transition("tracked_unclassified", "a9", "tracked_unclassified", _E.ASSOCIATED, "its proposal updates it"),
+        Transition("tracked_classified", "a10", "lost_classified", _E.UNASSOCIATED, "no proposal"),
+        Transition("lost_classified", "a11", "tracked_classified", _E.ASSOCIATED, "re-associated"),
+        Transition("tracked_unclassified", "a12", "lost_unclassified", _E.UNASSOCIATED, "no proposal"),
+        Transition("lost_unclassified", "a13", "tracked_unclassified", _E.ASSOCIATED, "re-associated"),
+        Transition("lost_classified", "a14", "deleted", _E.EXPIRED, "no proposal for N frames"),
+        Transition("lost_unclassified", "a14", "deleted", _E.EXPIRED, "no proposal for N frames"),
+        *_WAITING,
+        Transition("tracked_unclassified", "e7", "tracked_unclassified", _E.UNDECIDED, "fused views are uncertain"),
+        Transition("lost_classified", "e8", "lost_classified", _E.UNASSOCIATED, "still no proposal"),
+        Transition("lost_unclassified", "e9", "lost_unclassified", _E.UNASSOCIATED, "still no proposal"),
+        Transition("tracked_classified", "e10", "tracked_classified", _E.CLASSIFIED, "a second look confirms it"),
+        Transition("tracked_classified", "e11", "tracked_unclassified", _E.UNDECIDED, "a second look leaves doubt"),
     ),
 )
 """Table II and Fig. 6: classify until certain.
 
-The paper's a12 repeats the words of a10 ("tracked classified objects are not associated"); Fig. 6 and a13 leave it
-only one sense, that of the unclassified ones, and so it stands here.
+The paper's a12 repeats the words of a10 ("tracked classified objects are not associated"); Fig. 6 and a13 leave only
+one meaning, that of the unclassified ones.
 """

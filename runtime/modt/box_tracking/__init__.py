@@ -1,0 +1,1 @@
+"""Tracking of the boxes of another detector, for `modt track`."""

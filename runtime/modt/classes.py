@@ -1,0 +1,61 @@
+"""The table of object classes: all that the program knows of a class beside what its models learnt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class ObjectClass(IntEnum):
+    """What a proposal can be; the value is its index in every posterior and in CLASSES."""
+
+    BACKGROUND = 0
+    CAR = 1
+    PEDESTRIAN = 2
+    CYCLIST = 3
+
+
+@dataclass(frozen=True, slots=True)
+class ClassSpec:
+    """One class.
+
+    Attributes:
+        kitti: KITTI object types that count as the class; results are written as the first.
+        semantic_kitti: SemanticKITTI labels that count as the class.
+        max_length_m, max_width_m: greatest size of one object, with room for the noise of its outline [m].
+        person: is or carries a person: never part of a larger object.
+        prior: frequency among proposals.
+        point_change: relative change of the number of points that makes a view independent (alpha of Equation 4).
+        colour: in pictures and pages.
+    """
+
+    kitti: tuple[str, ...]
+    semantic_kitti: tuple[int, ...]
+    max_length_m: float
+    max_width_m: float
+    person: bool
+    prior: float
+    point_change: float
+    colour: str
+
+
+CLASSES: dict[ObjectClass, ClassSpec] = {
+    # What counts as background may be a car that is not recognised yet: its size is that of a car.
+    ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, False, 0.88, 0.5, "#8a8f98"),
+    ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 0.08, 0.2, "#2f6fde"),
+    ObjectClass.PEDESTRIAN: ClassSpec(
+        ("Pedestrian", "Person", "Person_sitting"), (30, 254), 1.1, 1.1, True, 0.02, 0.16, "#d9480f"
+    ),
+    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 0.02, 0.22, "#2b8a3e"),
+}
+"""The classes in the order of their values."""
+
+CLASS_NAMES = tuple(c.name.lower() for c in CLASSES)
+N_CLASSES = len(CLASSES)
+OBJECTS = tuple(CLASSES)[1:]
+"""Every class but background."""
+
+
+def class_of_kitti(kind: str) -> ObjectClass:
+    """Class of a KITTI object type, background where no class claims it."""
+    return next((c for c, spec in CLASSES.items() if kind in spec.kitti), ObjectClass.BACKGROUND)

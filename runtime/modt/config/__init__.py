@@ -1,0 +1,43 @@
+"""Configuration: one frozen dataclass a stage, one nested in it a mechanism; every value is checked as it is made."""
+
+from modt.config.base import StageConfig, ValueRangeError
+from modt.config.box_tracking import BoxTrackingConfig
+from modt.config.classification import ClassificationConfig, FusionConfig, SchedulerConfig
+from modt.config.energy import EnergyConfig
+from modt.config.odometry import OdometryConfig
+from modt.config.profile import ProfileConfig
+from modt.config.registration import LandmarkConfig, RegistrationConfig
+from modt.config.segmentation import SegmentationConfig
+from modt.config.sensor import SensorConfig
+from modt.config.tracking import (
+    FilterConfig,
+    FragmentConfig,
+    KdopAssociationConfig,
+    MergeConfig,
+    PaperAssociationConfig,
+    SplitConfig,
+    TrackingConfig,
+)
+
+__all__ = [
+    "BoxTrackingConfig",
+    "ClassificationConfig",
+    "EnergyConfig",
+    "FilterConfig",
+    "FragmentConfig",
+    "FusionConfig",
+    "KdopAssociationConfig",
+    "LandmarkConfig",
+    "MergeConfig",
+    "OdometryConfig",
+    "PaperAssociationConfig",
+    "ProfileConfig",
+    "RegistrationConfig",
+    "SchedulerConfig",
+    "SegmentationConfig",
+    "SensorConfig",
+    "SplitConfig",
+    "StageConfig",
+    "TrackingConfig",
+    "ValueRangeError",
+]

@@ -1,0 +1,88 @@
+"""Configuration: one frozen dataclass a stage, every value bounded and checked as it is made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from modt.classes import CLASS_NAMES, CLASSES, OBJECTS
+from modt.errors import MisuseError
+
+
+class ValueRangeError(MisuseError):
+    """A configuration value of the wrong type or out of its range; key says which."""
+
+    def __init__(self, key: str, cause: str, remedy: str) -> None:
+        super().__init__(key, cause, remedy)
+        self.key = key
+
+
+def number(default: float | None, low: float, high: float, unit: str, meaning: str) -> Any:
+    """Field of a number within bounds, and where its default comes from, if the meaning says so."""
+    return field(default=default, metadata={"low": low, "high": high, "unit": unit, "meaning": meaning})
+
+
+def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
+    """Field of one of some names."""
+    return field(default=default, metadata={"options": options, "meaning": meaning})
+
+
+def per_class(column: str, low: float, high: float, meaning: str) -> Any:
+    """Field of a number for each class but background; the defaults are that column of the class table."""
+    values = tuple(getattr(CLASSES[c], column) for c in OBJECTS)
+    meaning = f"{meaning}: {', '.join(CLASS_NAMES[1:])}"
+    return field(default=values, metadata={"low": low, "high": high, "length": len(OBJECTS), "meaning": meaning})
+
+
+def mechanism(config: type[StageConfig]) -> Any:
+    """Field of a mechanism's own configuration, a mapping in a profile."""
+    return field(default_factory=config)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageConfig:
+    """Base of every stage's configuration: checks each value against its declared bounds.
+
+    Raises:
+        ValueRangeError: a value is not of its kind or out of range.
+    """
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            if isinstance(f.default_factory, type) and issubclass(f.default_factory, StageConfig):
+                continue  # checked as it was made
+            _check(f.name, getattr(self, f.name), f.type, dict(f.metadata))
+
+
+def _check(key: str, value: object, kind: object, bounds: dict[str, Any]) -> None:
+    optional = "None" in str(kind)
+    if value is None and optional:
+        return
+    if "options" in bounds:
+        if value not in bounds["options"]:
+            raise ValueRangeError(key, f"{value!r} is unknown", f"use one of {', '.join(bounds['options'])}")
+        return
+    if str(kind) == "bool":
+        if not isinstance(value, bool):
+            raise ValueRangeError(key, f"{value!r} is no truth value", "use true or false")
+        return
+    if str(kind) == "str":
+        if not isinstance(value, str):
+            raise ValueRangeError(key, f"{value!r} is no text", "write a name")
+        return
+    numbers = value if "length" in bounds and isinstance(value, tuple) else (value,)
+    whole = str(kind).startswith("int")
+    span = f"{'a whole number' if whole else 'a number'} from {bounds['low']:g} to {bounds['high']:g}"
+    if "length" in bounds:
+        span = f"{bounds['length']} values, each {span}"
+        if len(numbers) != bounds["length"]:
+            raise ValueRangeError(key, f"{value!r} does not fit", f"give {span}")
+    unit = f" {bounds['unit']}" if bounds.get("unit") else ""
+    for number in numbers:
+        numeric = isinstance(number, int) if whole else isinstance(number, int | float)
+        if isinstance(number, bool) or not numeric:
+            raise ValueRangeError(
+                key, f"{value!r} is not {'a whole number' if whole else 'a number'}", f"give {span}{unit}"
+            )
+        if not bounds["low"] <= number <= bounds["high"]:
+            raise ValueRangeError(key, f"{number!r} is out of range", f"give {span}{unit}")

@@ -1,0 +1,69 @@
+"""The field of view, and the camera that bounds it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modt.types import Bool, Float64
+
+Real = TypeVar("Real", np.float32, np.float64)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera beside the sensor.
+
+    Attributes:
+        P_image_sensor: (3, 4) projection of sensor coordinates into the rectified image.
+        T_camera_sensor: (4, 4) sensor to rectified camera coordinates (x right, y down, z forward).
+        width_px, height_px: size of the image.
+    """
+
+    P_image_sensor: Float64
+    T_camera_sensor: Float64
+    width_px: float
+    height_px: float
+
+
+@dataclass(frozen=True)
+class FieldOfView:
+    """The part of space that is looked at: where every plane's signed distance is positive.
+
+    Attributes:
+        planes: (F, 4) unit normal and offset of each bounding plane, sensor frame; none for the full circle.
+    """
+
+    planes: Float64 = field(default_factory=lambda: np.zeros((0, 4)))
+
+    @classmethod
+    def of_camera(cls, camera: Camera) -> FieldOfView:
+        """What lies between the left and the right edge of a camera's image."""
+        u, w = camera.P_image_sensor[0], camera.P_image_sensor[2]
+        planes = np.stack([u, camera.width_px * w - u])
+        return cls(planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True))
+
+    @property
+    def full(self) -> bool:
+        """Whether nothing is cut off."""
+        return len(self.planes) == 0
+
+    def depth(self, points: NDArray[Real]) -> NDArray[Real]:
+        """(n,) distance of (n, 3 or more) points to the nearest bounding plane [m], negative outside.
+
+        It is infinite everywhere for the full circle.
+        """
+        nearest = np.full(len(points), np.inf, points.dtype)
+        normals = np.zeros((len(self.planes), points.shape[1]), points.dtype)
+        normals[:, :3] = self.planes[:, :3]
+        for normal, offset in zip(normals, self.planes[:, 3].tolist(), strict=True):  # two planes, not points
+            np.minimum(nearest, points @ normal + points.dtype.type(offset), out=nearest)
+        return nearest
+
+    def contains(self, points: NDArray[Real]) -> Bool:
+        """(n,) whether each of (n, 3 or more) points lies inside."""
+        inside: Bool = self.depth(points) > 0
+        return inside

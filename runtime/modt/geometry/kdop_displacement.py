@@ -1,0 +1,85 @@
+"""Displacement between k-DOPs, and how certain it is.
+
+An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the end that
+moved less is the object's own. The disagreement of the two ends is a variance of the position along that axis, which
+lasts: the next k-DOP is compared with one that was already in doubt.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.geometry.kdop import AXES, widths
+from modt.types import Float64
+
+_AGREE_M = 0.6
+"""Ends whose displacements differ by less agree, of a k-DOP up to a metre long; the limit falls with the length."""
+_DISAGREEMENT = 0.3
+"""Standard deviation of a displacement by ends that disagree, relative to the disagreement or the width, if less."""
+_DECAY = 0.97
+"""Share of that variance that is left a frame later."""
+_SOFT_M = 0.3
+"""Added to widths that are compared: a difference of a few returns is noise."""
+_PRODUCTS = np.stack([AXES[0] * AXES[0], AXES[1] * AXES[1], AXES[0] * AXES[1]])
+"""(3, 4) xx, yy and xy of the axes."""
+
+
+def least(a: Float64, b: Float64) -> Float64:
+    """(4, K) displacement along each axis of the end that moved less, from k-DOPs a to b (8, K) [m]."""
+    gain = b - a
+    ahead, behind = gain[:4], -gain[4:]
+    return np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
+
+
+def shift_between(a: Float64, b: Float64) -> Float64:
+    """(K, 2) displacement from k-DOPs a to b [m], all axes weighted alike."""
+    shift: Float64 = (AXES @ least(a, b)).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    return shift
+
+
+def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tuple[Float64, Float64, Float64]:
+    """Displacement between k-DOPs with its covariance.
+
+    Args:
+        a: (8, K) k-DOPs before [m].
+        b: (8, K) and after [m].
+        variance: (K,) of the displacement if the ends agree [m2].
+        before: (4, K) variance along each axis by ends that disagreed, a frame ago [m2].
+
+    Returns:
+        shift: (K, 2) from a to b [m].
+        covariance: (K, 2, 2) of it [m2].
+        end_variance: (4, K) variance along each axis by ends that disagree, or did [m2].
+    """
+    width, gain = widths(b), b - a
+    apart = gain[:4] + gain[4:]
+    longest = np.maximum(width, width - apart).max(axis=0)
+    unlike = 1 - np.square(np.maximum(1 - np.square(apart * (np.maximum(longest, 1.0) / _AGREE_M)), 0.0))
+    end_variance = np.maximum(_DISAGREEMENT**2 * unlike * np.square(apart), _DECAY * before)
+    np.minimum(end_variance, np.square(_DISAGREEMENT * width.max(axis=0)), out=end_variance)
+    # The four axes together weigh as much as one measurement in each direction.
+    weight = 0.5 / (variance + end_variance)
+    (xx, yy, xy), (x, y) = _PRODUCTS @ weight, AXES @ (weight * least(a, b))
+    scale = 1.0 / (xx * yy - xy * xy)
+    xx, yy, xy = scale * yy, scale * xx, -scale * xy  # the inverse
+    shift, covariance = np.empty((len(x), 2)), np.empty((len(x), 2, 2))
+    shift[:, 0], shift[:, 1] = xx * x + xy * y, xy * x + yy * y
+    covariance[:, 0, 0], covariance[:, 1, 1] = xx, yy
+    covariance[:, 0, 1] = covariance[:, 1, 0] = xy
+    return shift, covariance, end_variance
+
+
+def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64]:
+    """Similarity of k-DOPs a and b (8, K), one by one.
+
+    Returns:
+        size: (K,) mean difference of the logarithms of their widths.
+        overlap: (K,) intersection over union.
+    """
+    width_a, width_b = widths(a), widths(b)
+    size = np.abs(np.log((width_b + _SOFT_M) / (width_a + _SOFT_M))).sum(axis=0) / 4
+    pad = _SOFT_M / 3
+    common = np.maximum(widths(np.minimum(a, b)) + pad, 0.0)
+    areas = [side[:2] * side[2:] for side in (width_a + pad, width_b + pad)]
+    shared = common[:2] * common[2:]  # of the upright rectangles, and of those at 45 degrees
+    return size, np.minimum(*(shared / (areas[0] + areas[1] - shared)))

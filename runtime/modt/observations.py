@@ -1,0 +1,125 @@
+"""Observations: the proposals of a frame in the world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from modt.geometry import transform, transform_boxes
+from modt.geometry.kdop import DIRECTIONS, centres, kdops
+from modt.placement import Placement
+from modt.types import Bool, Float64, Int, Proposals
+
+
+@dataclass(frozen=True, slots=True)
+class Observations:
+    """The proposals of a frame in the world; P rows.
+
+    Attributes:
+        box: (P, 7) world frame.
+        centroid: (P, 2) mean of the points [m].
+        kdop: (8, P) of the points, see geometry/kdop.py [m].
+        bottom, top: (P,) heights of the lowest and the highest point [m].
+        count: (P,) points.
+        range_m: (P,) distance from the sensor.
+        partial: (P,) cut by the field of view, or hidden in part by something nearer.
+        sensor_xy: (2,) position of the sensor [m].
+    """
+
+    box: Float64
+    centroid: Float64
+    kdop: Float64
+    bottom: Float64
+    top: Float64
+    count: Int
+    range_m: Float64
+    partial: Bool
+    sensor_xy: Float64
+
+    def __len__(self) -> int:
+        return len(self.box)
+
+    @property
+    def position(self) -> Float64:
+        """(P, 2) centre of the k-DOP along x and y [m]."""
+        return centres(self.kdop)[::2].T
+
+    def moved(self, step: Float64) -> Observations:
+        """The same, each displaced by a step (P, 2) [m, world]."""
+        box = self.box.copy()
+        box[:, :2] += step
+        return replace(self, box=box, centroid=self.centroid + step, kdop=self.kdop + DIRECTIONS.T @ step.T)
+
+    def take(self, rows: Int) -> Observations:
+        """A copy of the rows given."""
+        return Observations(
+            box=self.box.take(rows, axis=0),
+            centroid=self.centroid.take(rows, axis=0),
+            kdop=self.kdop.take(rows, axis=1),
+            bottom=self.bottom[rows],
+            top=self.top[rows],
+            count=self.count[rows],
+            range_m=self.range_m[rows],
+            partial=self.partial[rows],
+            sensor_xy=self.sensor_xy,
+        )
+
+    def put(self, rows: Int, few: Observations) -> None:
+        """Overwrite the rows given."""
+        self.box[rows], self.centroid[rows], self.kdop[:, rows] = few.box, few.centroid, few.kdop
+        self.bottom[rows], self.top[rows], self.count[rows] = few.bottom, few.top, few.count
+        self.range_m[rows], self.partial[rows] = few.range_m, few.partial
+
+
+def observe(proposals: Proposals, T_world_sensor: Float64) -> Observations:
+    """Proposals of a frame taken to the world by T_world_sensor (4, 4)."""
+    box = transform_boxes(T_world_sensor, proposals.box)
+    return Observations(
+        box=box,
+        centroid=transform(T_world_sensor, proposals.centroid)[:, :2],
+        kdop=kdops(proposals, T_world_sensor),
+        bottom=box[:, 2] - box[:, 5] / 2,
+        top=box[:, 2] + box[:, 5] / 2,
+        count=proposals.count,
+        range_m=np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]),
+        partial=proposals.truncated | proposals.occluded,
+        sensor_xy=T_world_sensor[:2, 3],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class StaticTracks:
+    """What the odometry needs to know of the tracks after a frame; M rows in the order of their ids.
+
+    Attributes:
+        id: (M,) ascending.
+        observed: (M,) seen in the last frame.
+        stationary: (M,) at rest.
+        candidate: (M,) a landmark, or young enough to be one, and not lost for long.
+        kdop: (M, 8) last observed [m, world].
+        predicted_kdop: (8, M) where the filter expects it [m, world].
+    """
+
+    id: Int
+    observed: Bool
+    stationary: Bool
+    candidate: Bool
+    kdop: Float64
+    predicted_kdop: Float64
+
+
+@dataclass(frozen=True, slots=True)
+class Located:
+    """A frame in the world.
+
+    Attributes:
+        placement: pose and motion of the sensor.
+        observations: the proposals, where they are at the stamp.
+    """
+
+    placement: Placement
+    observations: Observations
+
+    def __len__(self) -> int:
+        return len(self.observations)

@@ -1,0 +1,1 @@
+"""Where the sensor is: deskew, and registration against what stands still."""

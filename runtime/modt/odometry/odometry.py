@@ -1,0 +1,91 @@
+"""The odometry stage: the pose of every sweep, and its proposals in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from modt.config import OdometryConfig
+from modt.geometry import inverse, se3
+from modt.observations import Located, Observations, StaticTracks, observe
+from modt.odometry.deskew import SweepSkew, skews_alike
+from modt.odometry.landmarks import LandmarkMap
+from modt.odometry.registration import Registration
+from modt.placement import Placement, PlanarMotion
+from modt.types import Float64, Frame, Proposals
+
+_RANGE_M, _TOLERANCE_M = 20.0, 0.05
+"""A second registration is worth its cost if the first one moves something within this range by more than this."""
+
+
+class Odometry:
+    """Places sweeps by their poses, or, where a sweep has none, by registration against stationary tracks.
+
+    Args:
+        config: of the registration and its landmarks.
+    """
+
+    def __init__(self, config: OdometryConfig) -> None:
+        self._registration = Registration(config.registration)
+        self._landmarks = LandmarkMap(config.landmarks)
+        self._stamp_s: float | None = None
+        self._before = self._last = Placement(np.eye(4))
+        self._T_world_odometry: Float64 | None = None
+        self._restarts = 0
+
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+        """Placement of a frame, and its proposals in the world.
+
+        Args:
+            frame: its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
+            proposals: of the frame.
+            static_tracks: after the frame before; called where there is no pose.
+        """
+        given, first = frame.T_world_sensor, self._stamp_s is None
+        if frame.restarts != self._restarts:
+            self._restarts, self._T_world_odometry = frame.restarts, None
+        if first and given is not None:
+            self._last = Placement(given)
+            self._T_world_odometry = np.eye(4)
+        skew = SweepSkew.of(proposals, frame.turn_s)
+        dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
+        if 2 * dt_s < abs(frame.turn_s):  # errors of the poses would be extrapolated: assume no motion
+            dt_s = np.inf
+        before = self._last.T_world_sensor
+
+        def placed(T_world_sensor: Float64) -> Placement:
+            return Placement(T_world_sensor, PlanarMotion.between(before, T_world_sensor, dt_s), frame.turn_s)
+
+        def observed(placement: Placement) -> Observations:
+            observations = observe(proposals, placement.T_world_sensor)
+            if skew is None or first:
+                return observations
+            return observations.moved(skew.step(placement.motion, placement.T_world_sensor))
+
+        if given is not None and self._T_world_odometry is not None:
+            self._landmarks.clear()
+            placement = placed(self._T_world_odometry @ given)
+        else:
+            landmarks = self._landmarks.update(static_tracks())
+            share = 1.0 if skew is None else skew.share(dt_s)
+
+            def registered(placement: Placement) -> Placement:
+                correction = self._registration.correct(landmarks, observed(placement), share)
+                return placed(_rigid(correction @ placement.T_world_sensor))
+
+            predicted = placed(before @ (inverse(self._before.T_world_sensor) @ before))  # as it moved last
+            placement = registered(predicted)
+            moved = not skews_alike(placement.motion, predicted.motion, frame.turn_s, _RANGE_M, _TOLERANCE_M)
+            if skew is not None and moved:
+                placement = registered(placement)
+            if given is not None:  # an odometry that begins late, or anew, is brought to the world of the tracks
+                self._T_world_odometry = placement.T_world_sensor @ inverse(given)
+        self._before, self._last, self._stamp_s = self._last, placement, frame.stamp_s
+        return Located(placement, observed(placement))
+
+
+def _rigid(T: Float64) -> Float64:
+    """(4, 4) nearest rigid transform: products of transforms drift from being rigid."""
+    U, _, Vt = np.linalg.svd(T[:3, :3])
+    return se3(U @ Vt, T[:3, 3])

@@ -1,0 +1,223 @@
+"""Ego-motion from the proposals, where the robot has no odometry.
+
+Most proposals are static background: the planar motion that brings most of them onto their landmarks is the sensor's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.config import RegistrationConfig
+from modt.geometry import rotation_zyx, se3
+from modt.geometry.kdop import DIRECTIONS, centres, overlapping_pairs
+from modt.geometry.kdop_displacement import shape_similarity, shift_between
+from modt.observations import Observations
+from modt.odometry.landmarks import Landmarks
+from modt.types import Float64, Int
+
+_SCALES = (8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+"""Factors to the scale of the errors in the iterations of a fit: coarse to fine, against local minima."""
+_ROUNDS = 4
+"""Choices of pairs where the prediction may be far off, each with as many of the scales."""
+_MIN_LANDMARKS = 3
+"""A planar motion needs two; one more is a check."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A motion and its support.
+
+    Attributes:
+        motion: (3,) x, y [m] and turn [rad].
+        inliers: pairs that agree with it.
+        pairs: that it was fitted to.
+    """
+
+    motion: Float64
+    inliers: int
+    pairs: int
+
+    def supported(self, share: float) -> bool:
+        """Whether more than this share of the pairs are inliers."""
+        return self.inliers >= _MIN_LANDMARKS and self.inliers > share * self.pairs
+
+
+class Registration:
+    """Corrects a predicted pose by stationary objects.
+
+    Args:
+        config: reach, scales of the errors and thresholds of support.
+    """
+
+    def __init__(self, config: RegistrationConfig) -> None:
+        self.config = config
+        self._initialised = self._motion_known = False
+        self._inliers = self._attempts = 0
+
+    def correct(self, landmarks: Landmarks, observations: Observations, share: Float64 | float = 1.0) -> Float64:
+        """Motion in the world that brings the observations onto the landmarks.
+
+        Args:
+            landmarks: of the frames before.
+            observations: of the frame, placed by the predicted pose.
+            share: of the motion that applies to each of them (P,), as SweepSkew.share.
+
+        Returns:
+            (4, 4) motion of the pose; identity where nothing supports another.
+        """
+        limit = self.config
+        jacobian = _jacobian(observations) * share
+        rest = np.zeros(3)
+        fit = None
+        if self._motion_known:
+            fit = self._solve(landmarks, observations, jacobian, rest, limit.gate_m, _SCALES, choices=1)
+        enough = limit.inlier_drop * self._inliers
+        if fit is None or not fit.supported(limit.inlier_ratio) or fit.inliers < enough:  # look farther
+            far = self._search(landmarks, observations, jacobian, rest)
+            if self._initialised and far is not None and not far.supported(limit.min_agreement):
+                again = self._search(landmarks, observations, jacobian, far.motion)
+                far = again if again is not None and again.inliers > far.inliers else far
+            if fit is None or (far is not None and far.inliers > fit.inliers):
+                fit = far
+        self._inliers = 0 if fit is None else fit.inliers
+        self._motion_known = fit is not None and fit.supported(limit.min_agreement)
+        self._initialised |= self._motion_known
+        if fit is None:
+            return np.eye(4)
+        if np.hypot(*fit.motion[:2]) > limit.reach_m or abs(fit.motion[2]) > limit.max_turn_rad:
+            self._motion_known = False
+            return np.eye(4)
+        return _about(fit.motion, observations.sensor_xy)
+
+    def _search(
+        self, landmarks: Landmarks, observations: Observations, jacobian: Float64, motion: Float64
+    ) -> Fit | None:
+        """Best supported motion near another one, or near several turns while none is known."""
+        initial = not self._initialised and self._attempts < self.config.initial_frames
+        self._attempts += initial and len(landmarks) > 0
+        step = self.config.initial_turn_rad
+        starts = [[0.0, 0.0, k * step] for k in (0, 1, -1, 2, -2, 3, -3)] if initial else [motion]
+        fits = (
+            self._solve(
+                landmarks,
+                observations,
+                jacobian,
+                np.asarray(start),
+                self.config.reach_m,
+                _SCALES[:_ROUNDS],
+                choices=_ROUNDS,
+            )
+            for start in starts
+        )
+        return max((fit for fit in fits if fit is not None), key=lambda fit: fit.inliers, default=None)
+
+    def _solve(
+        self,
+        landmarks: Landmarks,
+        observations: Observations,
+        jacobian: Float64,
+        motion: Float64,
+        reach_m: float,
+        scales: tuple[float, ...],
+        choices: int,
+    ) -> Fit | None:
+        """Motion fitted to pairs within reach of a first one, after a number of choices of the pairs."""
+        limit = self.config
+        near = observations.kdop + np.tensordot(motion, jacobian, 1)
+        i, j = _pairs(landmarks.kdop, near, reach_m)
+        if len(i) < _MIN_LANDMARKS:
+            return None
+        if not self._initialised:
+            a, b = landmarks.kdop[:, i], near[:, j]
+            shift, (size, _) = shift_between(a, b), shape_similarity(a, b)
+            vote = _vote(shift[size < limit.max_size_difference], limit.reach_m, limit.vote_cell_m)
+            motion = motion + np.append(-vote, 0.0)
+        a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
+        gain, young = b - a, np.where(landmarks.established, 0.0, limit.young_sigma_m)
+        sigma = limit.end_sigma_m + limit.end_sigma_per_m * observations.range_m[j]
+        variance = young[i] ** 2 + sigma**2
+        for _ in range(choices):
+            moved = b + np.tensordot(motion, jacobian, 1)
+            shift = shift_between(a, moved)
+            size, overlap = shape_similarity(a, moved)
+            best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
+            motion = _fit(gain.take(best, axis=1), jacobian.take(best, axis=2), variance[best], motion, scales)
+        a, b, jacobian = a.take(best, axis=1), b.take(best, axis=1), jacobian.take(best, axis=2)
+        shift = shift_between(a, b + np.tensordot(motion, jacobian, 1))
+        inliers = int((np.hypot(shift[:, 0], shift[:, 1]) < limit.inlier_m).sum())
+        return Fit(motion, inliers, len(best))
+
+
+def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
+    """Indices of k-DOPs a and b whose centres are within reach of one another, along x and along y."""
+    middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (centres(a), centres(b)))
+    return overlapping_pairs(middle_a + reach, middle_b)
+
+
+def _jacobian(observations: Observations) -> Float64:
+    """(3, 8, P) outward displacement of each end of the k-DOPs, per metre of x and y and per radian."""
+    x, y = (observations.position - observations.sensor_xy).T
+    jacobian = np.empty((3, 8, len(x)))
+    jacobian[:2] = DIRECTIONS[:, :, None]
+    jacobian[2] = DIRECTIONS.T @ np.stack([-y, x])
+    return jacobian
+
+
+def _vote(shift: Float64, reach_m: float, cell_m: float) -> Float64:
+    """(2,) displacement that most pairs agree on, in whole cells; zero where there are no pairs."""
+    if not len(shift):
+        return np.zeros(2)
+    side = int(2 * reach_m / cell_m) + 3
+    cell = np.clip(np.rint(shift / cell_m).astype(np.int64) + side // 2, 1, side - 2)
+    counts = np.bincount(cell[:, 0] * side + cell[:, 1], minlength=side * side).reshape(side, side)
+    around = np.sum([np.roll(counts, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1)], axis=0)
+    row, column = divmod(int(np.argmax(around)), side)
+    return np.array([row - side // 2, column - side // 2]) * cell_m
+
+
+def _mutual(i: Int, j: Int, cost: Float64) -> Int:
+    """Indices of the pairs that are the best of their row and of their column."""
+    worst_first = np.argsort(cost, kind="stable")[::-1]
+    best_of_i, best_of_j = (np.empty(int(index.max(initial=0)) + 1, np.int64) for index in (i, j))
+    best_of_i[i[worst_first]] = best_of_j[j[worst_first]] = worst_first  # the last written is the best
+    k = np.arange(len(cost))
+    return np.flatnonzero((best_of_i[i] == k) & (best_of_j[j] == k))
+
+
+def _fit(gain: Float64, jacobian: Float64, variance: Float64, motion: Float64, scales: tuple[float, ...]) -> Float64:
+    """Motion that undoes the displacement of the ends of k-DOPs, by iteratively reweighted least squares.
+
+    An end that comes into view moves while the other stays: each end has its own weight, of a Cauchy distribution. A
+    millionth of the weights pulls towards no motion, so that the normal equations are never singular.
+
+    Args:
+        gain: (8, K) displacement outward [m].
+        jacobian: (3, 8, K), as of _jacobian.
+        variance: (K,) square of the scale of each pair's errors [m2].
+        motion: (3,) first guess.
+        scales: factors to these scales, an iteration each.
+
+    Returns:
+        (3,) x, y [m] and turn [rad].
+    """
+    J, g, variance = jacobian.reshape(3, -1), gain.ravel(), np.tile(variance, 8)
+    products = np.concatenate([J[0] * J, J[1] * J[1:], J[2:] * J[2], g * J])
+    for scale in scales:
+        left = motion @ J
+        left += g
+        left *= left
+        left += scale**2 * variance
+        xx, xy, xt, yy, yt, tt, x, y, t = (products @ (1.0 / left)).tolist()
+        little = 1e-6 * (xx + yy + tt)
+        normal = np.array([[xx + little, xy, xt], [xy, yy + little, yt], [xt, yt, tt + little]])
+        motion = -np.linalg.solve(normal, np.array([x, y, t]))
+    return motion
+
+
+def _about(motion: Float64, sensor_xy: Float64) -> Float64:
+    """(4, 4) turn about the position of the sensor, then shift."""
+    R = rotation_zyx(0.0, 0.0, motion[2])
+    position = np.array([sensor_xy[0], sensor_xy[1], 0.0])
+    return se3(R, position - R @ position + np.array([motion[0], motion[1], 0.0]))

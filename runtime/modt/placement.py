@@ -1,0 +1,66 @@
+"""The placement of a sweep in the world: the pose at its stamp, and the motion of the sensor during it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.geometry import yaw_of
+from modt.types import Float64
+
+
+@dataclass(frozen=True, slots=True)
+class PlanarMotion:
+    """Steady motion of the sensor in the ground plane.
+
+    Attributes:
+        velocity_mps: along the sensor's x and y, as a complex number.
+        yaw_rate_radps: counter-clockwise.
+    """
+
+    velocity_mps: complex = 0j
+    yaw_rate_radps: float = 0.0
+
+    @classmethod
+    def between(cls, T_world_before: Float64, T_world_after: Float64, dt_s: float) -> PlanarMotion:
+        """Motion from one pose to the next; none where no time passed."""
+        if dt_s <= 0.0:
+            return cls()
+        T = T_world_before[:3, :3].T @ T_world_after[:3]
+        x, y, _ = T[:, 3] - T_world_before[:3, 3] @ T_world_before[:3, :3]
+        yaw = yaw_of(T)
+        # The path is an arc: its chord points half the turn away from the initial heading.
+        velocity = complex(x, y) * np.exp(-0.5j * yaw) / dt_s
+        return cls(velocity, yaw / dt_s)
+
+    def displacement(self, position_m: Float64, delay_s: Float64) -> Float64:
+        """(P, 2) from positions (P, 2) seen delay_s (P,) after the stamp to where the sensor sees them at it [m]."""
+        position = position_m[:, 0] + 1j * position_m[:, 1]
+        half = np.exp(0.5j * self.yaw_rate_radps * delay_s)
+        step = position * (half * half - 1.0) + self.velocity_mps * delay_s * half
+        xy: Float64 = step.view(np.float64).reshape(-1, 2)
+        return xy
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where a sweep was taken.
+
+    Attributes:
+        T_world_sensor: (4, 4) pose at the stamp.
+        motion: of the sensor up to it.
+        turn_s: as in Frame.
+    """
+
+    T_world_sensor: Float64
+    motion: PlanarMotion = PlanarMotion()
+    turn_s: float = 0.0
+
+    def deskew(self, position: Float64) -> Float64:
+        """(P, 2) correction of positions (P, 2) that the pose at the stamp alone yields [m, world]."""
+        R, t = self.T_world_sensor[:2, :2], self.T_world_sensor[:2, 3]
+        local = (position - t) @ R
+        delay_s = np.arctan2(local[:, 1], local[:, 0]) * (-self.turn_s / (2 * np.pi))
+        step: Float64 = self.motion.displacement(local, delay_s) @ R.T
+        return step

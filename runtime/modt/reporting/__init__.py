@@ -1,0 +1,1 @@
+"""Summaries, energy reports and comparisons: as text, JSON and pages."""

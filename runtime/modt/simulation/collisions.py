@@ -1,0 +1,71 @@
+"""Keeps bodies out of one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from modt.geometry import corners
+from modt.simulation.motion import Path
+from modt.types import Bool, Float64, Int
+
+STEP_S = 0.25
+
+
+class Occupant(Protocol):
+    """Something that takes up room."""
+
+    @property
+    def path(self) -> Path: ...  # noqa: D102
+
+    @property
+    def footprint(self) -> tuple[float, float]: ...  # noqa: D102
+
+
+def keep_apart(occupants: Sequence[Occupant], seconds: float, margin_m: float = 0.1) -> Bool:
+    """(n,) which may stay: of two that meet at any time, the one listed later goes.
+
+    Those without a footprint meet nothing; two that never move are compared once.
+    """
+    n = len(occupants)
+    kept = np.array([min(o.footprint) > 0 for o in occupants])
+    free = ~kept
+    boxes = np.zeros((n, 7))
+    boxes[:, 3:5] = np.array([o.footprint for o in occupants]).reshape(-1, 2) + 2 * margin_m
+    moving = np.array([len(o.path.xy) > 1 for o in occupants], np.bool_)
+    for row, o in enumerate(occupants):
+        boxes[row, [0, 1, 6]] = o.path.at(0.0)
+    for step in range(int(seconds / STEP_S) + 2):
+        for row in np.flatnonzero(moving & kept).tolist():
+            boxes[row, [0, 1, 6]] = occupants[row].path.at(step * STEP_S)
+        first = np.flatnonzero(kept & moving) if step else np.flatnonzero(kept)
+        pairs = _close(boxes, first, np.flatnonzero(kept))
+        met = pairs[overlapping(boxes[pairs[:, 0]], boxes[pairs[:, 1]])]
+        for a, b in met[np.argsort(met[:, 0], kind="stable")].tolist():
+            if kept[a]:
+                kept[b] = False
+    stay: Bool = kept | free
+    return stay
+
+
+def overlapping(a: Float64, b: Float64) -> Bool:
+    """(n,) whether boxes (n, 7) and (n, 7) overlap seen from above: no side of either parts them."""
+    ca, cb = corners(a), corners(b)
+    apart = np.zeros(len(a), np.bool_)
+    for yaw in (a[:, 6], b[:, 6], a[:, 6] + np.pi / 2, b[:, 6] + np.pi / 2):
+        axis = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+        pa, pb = np.einsum("nkd,nd->nk", ca, axis), np.einsum("nkd,nd->nk", cb, axis)
+        apart |= (pa.max(axis=1) < pb.min(axis=1)) | (pb.max(axis=1) < pa.min(axis=1))
+    return ~apart
+
+
+def _close(boxes: Float64, some: Int, others: Int) -> Int:
+    """(p, 2) pairs, the earlier first, whose circles meet."""
+    radius = np.hypot(boxes[:, 3], boxes[:, 4]) / 2
+    gap = np.hypot(*(boxes[some, None, :2] - boxes[None, others, :2]).transpose(2, 0, 1))
+    i, j = np.nonzero(gap < radius[some, None] + radius[others])
+    pairs = np.sort(np.stack([some[i], others[j]], axis=1), axis=1)
+    distinct: Int = np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
+    return distinct

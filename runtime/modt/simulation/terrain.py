@@ -1,0 +1,84 @@
+"""The ground: a map of heights and surfaces, and where the rays meet it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modt.simulation.raycast import RayCaster
+from modt.types import Float32, Float64, Int
+
+UInt8 = NDArray[np.uint8]
+
+STEPS = 3
+"""Fixed-point steps from a ray to the ground it meets."""
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """Heights and surfaces on a square grid; beyond its edge the border goes on.
+
+    Attributes:
+        corner: (2,) world coordinates of the first cell [m].
+        cell_m: side of a cell.
+        height: (X, Y) height of the ground [m, world].
+        surface: (X, Y) its material.
+    """
+
+    corner: Float64
+    cell_m: float
+    height: Float32
+    surface: UInt8
+
+    def cells(self, x: Float32, y: Float32) -> Int:
+        """Flat index of the cell under each point."""
+        scale = np.float32(1 / self.cell_m)
+        i = ((x - np.float32(self.corner[0])) * scale).astype(np.int32)
+        j = ((y - np.float32(self.corner[1])) * scale).astype(np.int32)
+        np.minimum(np.maximum(i, 0, out=i), self.height.shape[0] - 1, out=i)
+        np.minimum(np.maximum(j, 0, out=j), self.height.shape[1] - 1, out=j)
+        flat: Int = i * self.height.shape[1] + j
+        return flat
+
+    def heights(self, x: Float64, y: Float64) -> Float64:
+        """(n,) height of the ground under each point [m, world]."""
+        at: Float64 = self.height.ravel()[self.cells(x.astype(np.float32), y.astype(np.float32))].astype(np.float64)
+        return at
+
+    def height_at(self, x: float, y: float) -> float:
+        """Height of the ground [m, world]."""
+        cell = self.cells(np.array([x], np.float32), np.array([y], np.float32))
+        return float(self.height.ravel()[cell[0]])
+
+    def cast(self, caster: RayCaster, T_world_sensor: Float64) -> tuple[Float32, UInt8]:
+        """(B, A) horizontal distance to the ground [m], infinite where a ray misses it, and the surface met.
+
+        Raised ground beside the road is reached by stepping each ray to the height last found beneath its end.
+        """
+        sensor = caster.sensor
+        distance = np.full(sensor.shape, np.inf, np.float32)
+        surface = np.zeros(sensor.shape, np.uint8)
+        R, t = T_world_sensor[:3, :3].astype(np.float32), T_world_sensor[:3, 3]
+        low = np.flatnonzero(caster.tangent[:, 0] < 0.05)
+        if not len(low):
+            return distance, surface
+        rows = slice(int(low[0]), int(low[-1]) + 1)
+        tangent, origin = caster.tangent[rows], caster.origin[rows]
+        d = [(R[i, 0] * caster.cos + R[i, 1] * caster.sin) + R[i, 2] * tangent for i in range(3)]
+        start = [np.float32(t[i]) + R[i, 2] * origin for i in range(3)]
+        fall = np.minimum(d[2], np.float32(-1e-4))
+        height = np.float32(self.height_at(float(t[0]), float(t[1])))
+        reach = np.float32(sensor.max_range_m)
+        inverse = 1 / fall
+        s = (height - start[2]) * inverse
+        flat = self.height.ravel()
+        for _ in range(STEPS):
+            s = np.minimum(s, reach)
+            cell = self.cells(start[0] + s * d[0], start[1] + s * d[1])
+            s = (flat[cell] - start[2]) * inverse
+        met = (s > 0) & (s < reach)
+        distance[rows] = np.where(met, s, np.inf)
+        surface[rows] = self.surface.ravel()[cell]
+        return distance, surface

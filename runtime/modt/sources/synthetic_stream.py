@@ -1,0 +1,97 @@
+"""The synthetic world as a source of frames."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.geometry import Camera
+from modt.simulation.placement import placed, read_placements
+from modt.simulation.scenes import SCENES
+from modt.simulation.sensors import sensor as sensor_model
+from modt.simulation.simulator import Simulator, Truth
+from modt.sources.stream import Faults, StreamInfo
+from modt.types import Frame
+
+FOCAL_PX, CENTRE_PX = 721.5, (609.5, 172.9)
+
+
+def nominal_camera() -> Camera:
+    """A camera beside the sensor as KITTI's left colour camera: 0.27 m ahead, 0.08 m below, level."""
+    T_camera_sensor = np.array(
+        [[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, -0.08], [1.0, 0.0, 0.0, -0.27], [0.0, 0.0, 0.0, 1.0]]
+    )
+    K = np.array([[FOCAL_PX, 0.0, CENTRE_PX[0], 0.0], [0.0, FOCAL_PX, CENTRE_PX[1], 0.0], [0.0, 0.0, 1.0, 0.0]])
+    return Camera(K @ T_camera_sensor, T_camera_sensor, 1242.0, 375.0)
+
+
+class SyntheticStream:
+    """A drive through a synthetic scene; the same bytes for the same arguments.
+
+    Args:
+        scene: name of the scene, or a KITTI label file (.txt) whose objects are placed as they stood.
+        sensor: name of the sensor model.
+        seconds: how long it takes.
+        seed: of the scene, what happens in it and the noise.
+        distort: leave the motion of a turning head in the scans.
+
+    Raises:
+        MisuseError: an unknown scene or sensor, or a duration that is none.
+    """
+
+    def __init__(
+        self,
+        scene: str = "street",
+        sensor: str = "hdl-64e",
+        seconds: float = 10.0,
+        seed: int = 0,
+        *,
+        distort: bool = False,
+    ) -> None:
+        if scene not in SCENES and not scene.endswith(".txt"):
+            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}, or a KITTI label file")
+        if not 0 < seconds <= 3600:
+            raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
+        if seed < 0:
+            raise MisuseError(seed, "no seed", "give a whole number from 0 on")
+        model = sensor_model(sensor)
+        rng = np.random.default_rng([seed, 0])
+        if scene in SCENES:
+            world = SCENES[scene](rng, seconds, model.height_m)
+        else:
+            world = placed(read_placements(Path(scene)), rng, seconds, model.height_m)
+        self.simulator = Simulator(world, model, seed, distort=distort)
+        self._indices = range(max(1, round(seconds / model.period_s)))
+        self.faults = Faults()
+        self.info = StreamInfo(
+            name=f"{scene}, {sensor}, seed {seed}",
+            layout="synthetic",
+            sequence=0,
+            n_frames=len(self._indices),
+            period_s=model.period_s,
+            camera=nominal_camera(),
+            has_poses=True,
+            end=self._indices.stop,
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        """The frames."""
+        return (frame for frame, _ in self.sweeps())
+
+    def sweeps(self) -> Iterator[tuple[Frame, Truth]]:
+        """The frames, each with the truth about it."""
+        return (self.simulator.sweep(i) for i in self._indices)
+
+    def between(self, first: int, last: int | None) -> Self:
+        """The frames with first <= index < last; the others are not rendered."""
+        part, whole = copy.copy(self), self._indices
+        part.faults = Faults()
+        part._indices = range(max(first, whole.start), whole.stop if last is None else min(last, whole.stop))
+        part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
+        return part

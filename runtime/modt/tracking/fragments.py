@@ -1,0 +1,136 @@
+"""Fragments: parts of one object that were segmented apart, and the one track that goes on with it.
+
+A pole before a car, or the edge of a bush, splits it; each part has a track, and the larger part changes between
+frames. Two tracks of one class whose boxes fit together into one object of that class, one of them within the
+known extent of the other or around it, are one object: the older track takes the larger part, and the whole when only
+one is visible. A part that may be a person, and has an established track, stays with it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.classes import CLASSES, ObjectClass
+from modt.config import FragmentConfig
+from modt.geometry.kdop import coverage, overlapping_pairs, width_sum
+from modt.observations import Observations
+from modt.tracking.association import Matches
+from modt.tracking.track_table import TrackTable
+from modt.types import NONE, Bool, Float64, Int
+
+_MAX_SIZE_M = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
+_PERSON = np.array([spec.person for spec in CLASSES.values()])
+_PERSON_M = CLASSES[ObjectClass.PEDESTRIAN].max_length_m
+
+
+class Reunion:
+    """Gives the larger part of an object to its oldest track.
+
+    Args:
+        config: what counts as a part.
+        min_hits: of an established track.
+    """
+
+    def __init__(self, config: FragmentConfig, min_hits: int) -> None:
+        self.config, self.min_hits = config, min_hits
+
+    def reunite(self, tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
+        """The matches, with the parts of objects reassigned."""
+        if not len(observations):
+            return matches
+        proposal = np.full(len(tracks), NONE, np.int64)
+        owner = np.full(len(observations), NONE, np.int64)
+        proposal[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
+        incomplete = self._incomplete(tracks, observations, proposal)
+        older, parts = self._parts(tracks, observations, incomplete, proposal, owner)
+        rows, proposals = swap_proposals(older, parts, proposal, owner)
+        return matches.reassigned(tracks, rows, proposals) if len(rows) else matches
+
+    def _incomplete(self, tracks: TrackTable, observations: Observations, proposal: Int) -> Int:
+        """Rows, oldest first, of what was seen more than once and is now lost, or smaller than its known extent."""
+        now, known = width_sum(observations.kdop)[proposal], width_sum(tracks.envelope.T.copy())
+        less = (proposal == NONE) | (known > self.config.shrink * now)
+        rows: Int = ((tracks.hits > 1) & less).nonzero()[0]  # tracks are in the order of their birth
+        return rows
+
+    def _parts(
+        self, tracks: TrackTable, observations: Observations, rows: Int, proposal: Int, owner: Int
+    ) -> tuple[Int, Int]:
+        """Pairs of a row and a proposal: a track, and a larger part of its object that it is not matched with."""
+        if not len(rows):
+            return rows, rows
+        known = tracks.known_kdops(rows)
+        i, part = overlapping_pairs(known, observations.kdop)
+        older, other = rows[i], owner[part]
+        size = np.where(proposal == NONE, 0, observations.count[proposal])
+        younger = (other == NONE) | (tracks.id[other] > tracks.id[older])
+        larger = (younger & (other != older) & (observations.count[part] > size[older])).nonzero()[0]
+        bulky = (observations.box[part[larger], 3] > _PERSON_M) & (tracks.box[older[larger], 3] > _PERSON_M)
+        larger = larger[bulky | self._gives_way(tracks, older[larger], other[larger])]
+        i, older, part = i[larger], older[larger], part[larger]
+        box = tracks.box.take(older, axis=0)
+        box[:, :2] += tracks.x.take(older, axis=0)[:, :2] - tracks.anchor.take(older, axis=0)
+        related = _fit(box, observations.box.take(part, axis=0), _MAX_SIZE_M[tracks.last_class[older]])
+        kdop = observations.kdop.take(part, axis=1)
+        within = coverage(kdop, known.take(i, axis=1)) > self.config.min_coverage
+        around = coverage(tracks.predicted_kdops(older), kdop) > self.config.min_coverage
+        related &= (within | around) & _one_class(tracks, older, owner[part])
+        return older[related], part[related]
+
+    def _gives_way(self, tracks: TrackTable, older: Int, other: Int) -> Bool:
+        """(k,) whether a part that may be a person goes to the older track."""
+        car = tracks.final[older] & (tracks.last_class[older] == ObjectClass.CAR.value)
+        way: Bool = (other == NONE) | (tracks.hits[other] < self.min_hits) | car
+        return way
+
+
+def swap_proposals(older: Int, parts: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
+    """Reassignment in which older tracks take parts and leave their own proposals to the former owners, once each.
+
+    Args:
+        older: (K,) rows that may take a part, the first in order served first.
+        parts: (K,) proposal that each may take.
+        proposal: (M,) of each track, NONE for none.
+        owner: (P,) track of each proposal, NONE for none.
+
+    Returns:
+        (R,) rows, ascending, and the proposal of each now, NONE for none.
+    """
+    has: dict[int, int] = {}
+    taken: set[int] = set()
+    for row, part in zip(older.tolist(), parts.tolist(), strict=True):
+        former = int(owner[part])
+        if part in taken or row in has or former in has:
+            continue
+        has[row] = part
+        if former != NONE:
+            has[former] = int(proposal[row])
+        taken.add(part)
+    rows = sorted(has)
+    return np.array(rows, np.int64), np.array([has[row] for row in rows], np.int64)
+
+
+def _one_class(tracks: TrackTable, older: Int, other: Int) -> Bool:
+    """(k,) whether two tracks (other NONE: no track) may be of one class: background and cars are easily confused."""
+    a, b = tracks.last_class[older], tracks.last_class[other]
+    alike: Bool = (other == NONE) | ~tracks.final[other] | (a == b) | ~(_PERSON[a] | _PERSON[b])
+    return alike
+
+
+def _fit(a: Float64, b: Float64, size: Float64) -> Bool:
+    """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer."""
+    yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
+    c, s = np.cos(yaw), np.sin(yaw)
+    x, y = (b[:, :2] - a[:, :2]).T
+    offset = np.array((x * c + y * s, y * c - x * s))
+    half_a, half_b = (_half_widths(box, yaw) for box in (a, b))
+    span = np.maximum(half_a, offset + half_b) - np.minimum(-half_a, offset - half_b)
+    fit: Bool = (np.maximum(*span) < size[:, 0]) & (np.minimum(*span) < size[:, 1])
+    return fit
+
+
+def _half_widths(boxes: Float64, yaw: Float64) -> Float64:
+    """(2, k) half extent of each box (k, 7) along a heading yaw and across it [m]."""
+    (length, width), turn = boxes[:, 3:5].T / 2, yaw - boxes[:, 6]
+    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    return np.array((length * c + width * s, length * s + width * c))

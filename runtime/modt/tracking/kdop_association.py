@@ -1,0 +1,72 @@
+"""The default association: k-DOPs instead of centroids, gated by the filter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.config import KdopAssociationConfig
+from modt.geometry.kdop import AXES, overlapping_pairs, width_sum
+from modt.geometry.kdop_displacement import least, measured, shape_similarity
+from modt.observations import Observations
+from modt.tracking import kalman
+from modt.tracking.assignment import assign
+from modt.tracking.association import Matches
+from modt.tracking.track_table import TrackTable
+from modt.types import Float64
+
+
+class KdopAssociation:
+    """Matches k-DOPs.
+
+    The visible part of an object changes with the view: its far side appears, a pole hides its rear, the field of
+    view cuts it. Along each of four axes a k-DOP has two ends, of which one usually stays: the smaller of their
+    displacements from where the filter expects them is the object's own, and pairs are gated by it alone.
+
+    Args:
+        config: gate, weights of the cost and noise of the positions.
+    """
+
+    def __init__(self, config: KdopAssociationConfig) -> None:
+        self.config = config
+
+    def match(self, tracks: TrackTable, observations: Observations) -> Matches:
+        """Pairs of least cost within the gate."""
+        weight = self.config
+        expected = tracks.predicted_kdops()
+        variance = self.noise(observations)
+        reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
+        rows, columns = overlapping_pairs(expected + reach, observations.kdop)
+        a, b = expected.take(rows, axis=1), observations.kdop.take(columns, axis=1)
+        size, overlap = shape_similarity(a, b)
+        S = tracks.P[:, :2, :2].transpose(1, 2, 0).copy().take(rows, axis=2)
+        noise = variance[columns] + weight.jump_sigma_m**2
+        for k in (0, 1):
+            S[k, k] += noise
+        distance = kalman.mahalanobis_squared(AXES @ least(a, b) / 2, S)
+        height = np.abs(tracks.top[rows] - observations.top[columns])
+        bottom = np.abs(tracks.bottom[rows] - observations.bottom[columns])
+        count = np.abs(np.log(tracks.points[rows] / observations.count[columns]))
+        shape = weight.size_weight * size + weight.overlap_weight * (1 - overlap)
+        shape += weight.height_weight * (height + bottom) / 2 + weight.count_weight * count
+        cost = distance / 2 + shape
+        near = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
+        kept = near[assign(rows[near], columns[near], cost[near], weight.max_cost)]
+        rows, columns = rows[kept], columns[kept]
+        before = tracks.end_variance.T.take(rows, axis=1)
+        shift, covariance, end_variance = measured(
+            a.take(kept, axis=1), b.take(kept, axis=1), variance[columns], before
+        )
+        return Matches(rows, columns, tracks.x.take(rows, axis=0)[:, :2] + shift, covariance, end_variance.T)
+
+    def initial_position(self, observations: Observations) -> Float64:
+        """Centre of the k-DOP."""
+        return observations.position
+
+    def noise(self, observations: Observations) -> Float64:
+        """(P,) variance of a position [m2]: k-DOPs jitter by the spacing of returns, and more where partial."""
+        noise = self.config
+        extent = np.minimum(width_sum(observations.kdop) / 4, 3.0)
+        sigma = noise.sigma_m + noise.sigma_per_range * observations.range_m + noise.sigma_per_extent * extent
+        sigma = np.where(observations.partial, noise.partial_factor * sigma, sigma)
+        variance: Float64 = np.square(sigma)
+        return variance

@@ -1,0 +1,96 @@
+"""Parts of a car that were segmented apart, merged where its track knows the car as a whole.
+
+A pole before a car, or the edge of a bush, splits it in frame after frame, and neither part looks like a car. What
+lies within the known extent of a classified car, beside the proposal matched with it, is merged with that proposal,
+unless a classified person or cyclist is matched with it, or an older classified car, or both together exceed the
+known extent.
+
+The risk: a person who steps close to a parked car, and is not classified yet, becomes a part of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.classes import CLASSES, ObjectClass
+from modt.config import MergeConfig
+from modt.geometry import yaw_of
+from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
+from modt.placement import Placement
+from modt.tracking.regrouping import Associated, Grouping, contiguous_runs
+from modt.tracking.track_table import TrackTable
+from modt.types import NONE, Bool, Int
+
+_PERSON = np.array([spec.person for spec in CLASSES.values()])
+
+
+class CarMerging:
+    """Merges the parts of cars that are known as such.
+
+    Args:
+        config: what fits into a car.
+        min_hits: of a track that merges.
+    """
+
+    def __init__(self, config: MergeConfig, min_hits: int) -> None:
+        self.config, self.min_hits = config, min_hits
+
+    def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
+        """The frame with one proposal in place of the parts of each car."""
+        rows, hosts, parts = self._parts(tracks, frame)
+        if not len(parts):
+            return frame
+        n = len(frame.proposals)
+        into, yaw, kept = np.arange(n), np.zeros(n), np.ones(n, np.bool_)
+        into[parts], kept[parts] = hosts, False
+        yaw[hosts] = tracks.box[rows, 6] - yaw_of(placement.T_world_sensor)  # a part may lie across the car
+        source = kept.nonzero()[0]
+        number = np.full(n, NONE)
+        number[source] = np.arange(len(source))
+        count = np.bincount(number[into], frame.proposals.count, len(source)).astype(np.int64)
+        runs = contiguous_runs(into.argsort(kind="stable"), frame.proposals.offsets)
+        changed = number[np.unique(hosts)]
+        grouping = Grouping(runs, count, source, changed, yaw[source[changed]], partial=changed)
+        proposals, observations = grouping.apply(frame, placement)
+        matched = number[frame.matches.proposals]
+        of_kept = (matched != NONE).nonzero()[0]
+        return Associated(proposals, observations, frame.matches.take(of_kept, matched[of_kept]))
+
+    def _parts(self, tracks: TrackTable, frame: Associated) -> tuple[Int, Int, Int]:
+        """Rows of cars, the proposal of each, and a further part of it; every part once."""
+        matches, kdops = frame.matches, frame.observations.kdop
+        cars = (_classified_cars(tracks, matches.rows) & (tracks.hits[matches.rows] >= self.min_hits)).nonzero()[0]
+        cars = cars[matches.rows[cars].argsort()]  # the oldest first: tracks are in the order of their birth
+        rows, hosts = matches.rows[cars], matches.proposals[cars]
+        if not len(rows):
+            return rows, hosts, hosts
+        known = tracks.envelope.take(rows, axis=0).T + DIRECTIONS.T @ matches.position.take(cars, axis=0).T
+        k, parts = overlapping_pairs(known, kdops)
+        other = (parts != hosts[k]).nonzero()[0]
+        k, parts = k[other], parts[other]
+        part, whole = kdops.take(parts, axis=1), known.take(k, axis=1)
+        both = np.maximum(part, kdops.take(hosts[k], axis=1))
+        owner = np.full(kdops.shape[1], NONE)
+        owner[matches.proposals] = matches.rows
+        fits = (widths(both) < widths(whole) + self.config.longer_m).all(axis=0)
+        fits &= (coverage(part, whole) > self.config.min_coverage) & _may_take(tracks, rows[k], owner[parts])
+        taker = np.full(len(owner), NONE)
+        taker[parts[fits][::-1]] = k[fits][::-1]  # the oldest is written last
+        taker[hosts[taker[taker != NONE]]] = NONE  # a proposal that gains a part is no part itself
+        parts = (taker != NONE).nonzero()[0]
+        k = taker[parts]
+        return rows[k], hosts[k], parts
+
+
+def _classified_cars(tracks: TrackTable, rows: Int) -> Bool:
+    """(k,) which rows are."""
+    cars: Bool = tracks.final[rows] & (tracks.last_class[rows] == ObjectClass.CAR.value)
+    return cars
+
+
+def _may_take(tracks: TrackTable, rows: Int, owner: Int) -> Bool:
+    """(k,) whether cars may take what the owners (NONE: no track) are matched with."""
+    person = tracks.final[owner] & _PERSON[tracks.last_class[owner]]
+    older_car = _classified_cars(tracks, owner) & (owner < rows)
+    free: Bool = (owner == NONE) | ~(person | older_car)
+    return free

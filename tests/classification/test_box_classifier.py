@@ -1,0 +1,92 @@
+"""What a box says is learnt from crops and asked of proposals: both must describe it alike."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from modt.classification.box_classifier import N_FEATURES, beam_sr, features
+from modt.classification.crops import Crops, gather
+from modt.config import SegmentationConfig, SensorConfig
+from modt.geometry import FieldOfView
+from modt.segmentation.segmenter import Segmenter
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.types import N_REFLECTANCE, Float64, Int
+from tests.tools.train.datasets import data_of
+from tools.train.box_features import all_described, described
+from tools.train.dataset import SENSOR_HEIGHT_M, Dataset
+
+
+def test_crops_say_of_their_boxes_what_proposals_do() -> None:
+    sensor = SensorConfig(height_m=SENSOR_HEIGHT_M)
+    frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
+    proposals = Segmenter(SegmentationConfig(), sensor, FieldOfView()).segment(frame.points)
+    crops = gather(frame.points, proposals, np.arange(len(proposals)), 100_000)
+    step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
+    expected = features(proposals.count, proposals.box, SENSOR_HEIGHT_M, step_sr)
+    assert len(crops) > 50
+    off = np.abs(described(crops) - expected)
+    assert off[:, 4:].max() < 1e-3  # height, foot and top
+    assert np.quantile(off[:, :4], 0.9, axis=0).max() < 0.15  # at run time headings are fitted to fewer points
+
+
+def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
+    """Cubes of these sides, ten metres ahead, in four drives."""
+    n = len(sides_m)
+    xyz = (rng.uniform(-0.5, 0.5, (n, 60, 3)) * sides_m[:, None, None] + [10.0, 0.0, -1.0]).reshape(-1, 3)
+    crops = Crops(xyz.astype(np.float32), np.arange(n + 1) * 60)
+    drive = np.arange(n) % 4
+    return data_of(crops, label, drive=drive, truth_label=label, truth_drive=drive)
+
+
+def test_training_finds_what_sizes_tell() -> None:
+    pytest.importorskip("torch", reason="extra [train] is not installed")
+    from modt.classification.mlp import logits
+    from tools.train.train_boxes import cross_validate, train
+
+    rng = np.random.default_rng(0)
+    label = np.arange(80) // 2 % 4
+    data = cubes(0.1 * 4.0**label, label, rng)
+    layers = train(data, np.arange(80), 150, seed=1)
+    again = train(data, np.arange(80), 150, seed=1)
+    feature = all_described(data, np.arange(80))
+    assert feature.shape == (80, N_FEATURES)
+    assert np.mean(logits(layers, feature).argmax(axis=1) == label) > 0.9
+    assert all(
+        (a == b).all() for one, other in zip(layers, again, strict=True) for a, b in zip(one, other, strict=True)
+    )
+    _, report = cross_validate(data, 2, 150, seed=1)
+    assert min(report["average_precision"].values()) > 0.8
+    shares = [row["share"]["background"] for row in report["ruled_out"]]
+    assert shares == sorted(shares)
+
+
+def test_training_finds_what_reflectance_tells_beyond_the_box() -> None:
+    pytest.importorskip("torch", reason="extra [train] is not installed")
+    from modt.classification.mlp import logits
+    from tools.train.train_reflectance import Described, cross_validate, train, weigh
+
+    rng = np.random.default_rng(0)
+    label = np.arange(160) // 2 % 4
+    alike = cubes(np.ones(160), label, rng)
+    told = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
+    told[::20] = np.nan  # of another sensor
+    data = dataclasses.replace(alike, reflectance=told)
+    seen = Described(data)
+    dumb = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
+    layers = train(data, seen, np.arange(160), dumb, 200, seed=1)
+    known = np.isfinite(told).all(axis=1)
+    assert np.mean(logits(layers, seen.whole[known]).argmax(axis=1) == label[known]) > 0.9
+
+    data = dataclasses.replace(alike, reflectance=np.nan_to_num(told, nan=0.3))
+    network = np.full((160, 4), 0.25)
+    _, report = cross_validate(data, Described(data), network, 2, 200, seed=1)
+    assert report["weight"] > 0.9  # a network that knows nothing leaves all of it
+    assert min(report["network"]["average_precision"].values()) > 0.7
+    assert report["network"]["log_loss"] < 0.5 * report["network"]["log_loss_without"]
+    sure = np.log(np.eye(4)[label] * 0.96 + 0.01)
+    assert max(weigh(sure, -sure, -sure, label)) < 0.05  # what contradicts a network that is right is left out
+    share, _ = weigh(np.zeros((160, 4)), sure, np.zeros((160, 4)), label)
+    assert share > 0.95  # a box that knows goes before a network that does not

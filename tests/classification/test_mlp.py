@@ -1,0 +1,52 @@
+"""Small networks in the metadata of a model."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from modt.classification.mlp import as_lists, logits, of_lists
+from modt.types import Float64
+
+RNG = np.random.default_rng(5)
+FEATURES = 7
+LAYERS = [(RNG.normal(size=(FEATURES, 5)), RNG.normal(size=5)), (RNG.normal(size=(5, 4)), RNG.normal(size=4))]
+
+
+@given(arrays(np.float64, (6, FEATURES), elements=st.floats(-5, 5)))
+def test_the_network_is_what_its_layers_say(feature: Float64) -> None:
+    (w0, b0), (w1, b1) = LAYERS
+    for row, found in zip(feature, logits(LAYERS, feature), strict=True):
+        hidden = [np.tanh(sum(row[i] * w0[i, j] for i in range(FEATURES)) + b0[j]) for j in range(5)]
+        expected = [sum(hidden[j] * w1[j, k] for j in range(5)) + b1[k] for k in range(4)]
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+def test_layers_survive_json() -> None:
+    held = of_lists(json.loads(json.dumps(as_lists(LAYERS))), FEATURES)
+    for (weight, bias), (held_weight, held_bias) in zip(LAYERS, held, strict=True):
+        np.testing.assert_array_equal(weight, held_weight)
+        np.testing.assert_array_equal(bias, held_bias)
+
+
+@pytest.mark.parametrize(
+    "lists",
+    [
+        [],
+        [[[[1]], [1]]],
+        [[[[float("nan"), 0, 0, 0]], [0, 0, 0, 0]]],
+        [[[[0.0] * 4] * 6, [0.0] * 4]],
+        [[[[0.0] * 3] * 7, [0.0] * 3]],
+        {},
+        3,
+    ],
+)
+def test_what_is_no_such_network_is_refused(lists: Any) -> None:
+    with pytest.raises((TypeError, ValueError)):
+        of_lists(lists, FEATURES)

@@ -1,0 +1,181 @@
+import re
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from modt.energy.conditions import Conditions
+from modt.energy.ledger import Ledger
+from modt.energy.meters.meter import Facts, Kind, Quantity, Scope
+from modt.energy.windows import Clocks, Windows
+from modt.reporting.compare_page import compare_page
+from modt.reporting.compare_report import Basis, compare_tree
+from modt.reporting.compare_text import compare_text
+from modt.reporting.comparison import Contender, Watched, interleave
+from modt.reporting.quantity import plain
+from modt.reporting.repetitions import Trial
+from modt.types import UNLIMITED, Frame
+from tests.results import CAR, result
+
+from .test_run_report import KINDS, figures
+
+MODES = ("conventional", "efficient", "accurate")
+FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(40)]
+EVERY = {"conventional": 1, "efficient": 20, "accurate": 5, "varied": 2}
+"""A contender classifies both proposals every so many frames."""
+BUSY_W = 5.0
+
+
+class Board:
+    """Clocks and a counter that advance with the work."""
+
+    def __init__(self):
+        self.now_ns = self.cpu_ns = 0
+        self.energy_J = 0.0
+        self.facts = Facts("board", Quantity.ENERGY, "J", 1e-6, 0.0, None, 100.0, Scope.CPU, Kind.MEASURED, "none")
+
+    def read(self):
+        return self.energy_J
+
+    def work(self, ms, value=None):
+        self.now_ns += round(ms * 1e6)
+        self.cpu_ns += round(ms * 1e6)
+        self.energy_J += BUSY_W * ms / 1e3
+        return value
+
+    def clocks(self):
+        return Clocks(lambda: self.now_ns, lambda: self.now_ns, lambda: self.now_ns, lambda: self.cpu_ns)
+
+
+class Steps:
+    """Segments in 10 ms, tracks in 2, classifies in 1 and 1 a proposal."""
+
+    def __init__(self, board, ledger, watched, every):
+        self.board, self.ledger, self.watched, self.every = board, ledger, watched, every
+
+    def step(self, frame, budget=UNLIMITED):
+        run, asked = self.ledger.run, frame.index % self.every == 0
+        found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}, classified=2 * asked)
+        run("segmentation", self.board.work, 10.0 + frame.index % 3)
+        run("tracking", self.board.work, 2.0)
+        if asked:
+            run("classification", self.watched.classify, frame.points, found.proposals, np.arange(2))
+        return found
+
+
+class Network:
+    def __init__(self, board):
+        self.board = board
+
+    def classify(self, points, proposals, which):
+        return self.board.work(1.0 + len(which), np.tile(CAR, (len(which), 1)))
+
+    def facts(self):
+        return {"file": "none"}
+
+
+def contender(name, metered):
+    board = Board()
+    ledger, watched = Ledger(lambda: board.now_ns, lambda: board.cpu_ns), Watched(Network(board))
+    windows = Windows([board], board.clocks(), Conditions(), least_s=0.1) if metered else None
+    steps = Steps(board, ledger, watched, EVERY[name])
+    return Contender(name, steps, ledger, watched, lambda index: UNLIMITED, windows)
+
+
+def tree_of(metered, coefficients=None):
+    made = [contender(name, metered) for name in EVERY]
+    interleave(FRAMES, made, 10**9 if metered else 1)
+    kind = Kind.MEASURED if metered else Kind.ESTIMATED
+    basis = Basis(idle_W=1.0, busy_W=4.0, period_s=0.1, meter="board", kind=kind, coefficients=coefficients)
+    about = {
+        "stream": "street", "frames": len(FRAMES), "fov": "full", "repeat": 1, "turn": 1, "basis": "at 10 Hz",
+        "board": "test", "conditions": {"governor": None, "frequency_MHz": None, "core": 0},
+    }  # fmt: skip
+    return compare_tree([Trial(made)], MODES, "varied", basis, about)
+
+
+@pytest.fixture(scope="module")
+def estimated():
+    return tree_of(metered=False)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return tree_of(metered=True)
+
+
+MEAN_MS = {"conventional": 10.975 + 2 + 3, "efficient": 10.975 + 2 + 3 / 20, "accurate": 10.975 + 2 + 3 / 5}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_estimated_energy_is_watts_times_cpu_time(estimated, mode):
+    found = estimated["modes"][mode]
+    assert found["cpu_ms"].value == pytest.approx(MEAN_MS[mode])
+    assert found["net_J"].value == pytest.approx(3.0 * MEAN_MS[mode] / 1e3)
+    assert found["gross_J"].value == pytest.approx(0.1 + 3.0 * MEAN_MS[mode] / 1e3)
+    assert found["net_J"].kind is Kind.ESTIMATED
+    assert sum(s["energy_J"].value for s in found["stages"].values()) == pytest.approx(found["net_J"].value)
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_measured_energy_is_the_meters_and_nobody_elses(measured, mode):
+    found = measured["modes"][mode]
+    assert found["gross_J"].value == pytest.approx(BUSY_W * MEAN_MS[mode] / 1e3)
+    assert found["net_J"].value == pytest.approx((BUSY_W - 1.0) * MEAN_MS[mode] / 1e3)
+    assert found["gross_J"].kind is Kind.MEASURED
+    assert found["gross_J"].low <= found["gross_J"].value <= found["gross_J"].high
+
+
+@pytest.mark.parametrize("mode", MODES[1:])
+def test_known_costs_are_predicted(estimated, mode):
+    saving = estimated["savings"][mode]
+    assert saving["gamma_measured_cpu"].value == pytest.approx(MEAN_MS["conventional"] / MEAN_MS[mode])
+    assert saving["deviation"].value == pytest.approx(0.0, abs=1e-6)
+    assert saving["gamma_net"].value == pytest.approx(saving["gamma_measured_cpu"].value)
+    assert 1.0 < saving["gamma_gross"].value < saving["gamma_net"].value
+
+
+def said(tree):
+    """The report's words, however its lines are broken."""
+    return " ".join(compare_text(tree).split())
+
+
+def test_calibrated_joules_predict_too():
+    seg_J = 3.0 * 10.975e-3
+    tree = tree_of(False, coefficients=(seg_J, 3.0 * 1.5e-3, 0.0))
+    for mode, saving in tree["savings"].items():
+        assert saving["gamma_calibrated"].value == pytest.approx(MEAN_MS["conventional"] / MEAN_MS[mode])
+    assert "by calibrated joules" in said(tree)
+
+
+def test_without_a_calibration_there_is_nothing_to_predict_by(estimated):
+    assert estimated["savings"]["efficient"]["gamma_calibrated"].kind is Kind.UNAVAILABLE
+    assert "calibrated" not in said(estimated)
+
+
+def test_the_report_says_what_it_tests(estimated, measured):
+    assert "not the physics" in said(estimated)
+    assert "not the physics" not in said(measured)
+    assert "against the meter" in said(measured)
+    assert "against the meter" not in said(estimated)
+    assert said(estimated).count("prediction holds") == 2
+
+
+def test_every_figure_carries_its_kind(measured):
+    found = [f for f in figures(plain(measured)) if f.get("bare") is None]
+    assert len(found) > 100
+    assert all(f["kind"] in KINDS for f in found)
+
+
+def test_text_fits_a_terminal(estimated):
+    assert max(map(len, compare_text(estimated).splitlines())) <= 100
+
+
+def test_page_holds_its_plots(estimated):
+    page = compare_page(estimated)
+    plots = re.findall(r"<svg.*?</svg>", page, re.S)
+    assert len(plots) == 8
+    for plot in plots:
+        assert ElementTree.fromstring(plot).attrib["role"] == "img"
+        assert not re.search(r"nan|inf\b", plot)
+    assert not re.search(r"(src|href)=|url\(|https?://", page)

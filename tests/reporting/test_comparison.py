@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+
+from modt.energy.conditions import Conditions
+from modt.energy.ledger import Ledger
+from modt.energy.meters.model import ModelMeter
+from modt.energy.windows import Clocks, Windows
+from modt.reporting.comparison import COUNTS, Contender, Watched, interleave, total
+from modt.types import UNLIMITED, Budget, Frame
+from tests.results import CAR, result
+
+FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(6)]
+
+SCRIPT = [
+    result(0, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}, classified=2),
+    result(1, [3], {0: 7}, {7: CAR}, lost=(8,), classified=1),
+    result(2, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}, classified=1),
+    result(3, [5], {0: 9}),
+    result(4, [], {}),
+    result(5, [5], {0: 9}, {9: CAR}, classified=1),
+]
+ASKED = [[0, 1], [0], [1], [], [], [0]]
+
+
+class Scripted:
+    """A pipeline that classifies what the script says."""
+
+    def __init__(self, name, ledger, watched, log):
+        self.name, self.ledger, self.watched, self.log, self.budgets = name, ledger, watched, log, []
+
+    def step(self, frame, budget=UNLIMITED):
+        self.log.append((self.name, frame.index))
+        self.budgets.append(budget)
+        found = SCRIPT[frame.index]
+        if ASKED[frame.index]:
+            which = np.array(ASKED[frame.index])
+            self.ledger.run("classification", self.watched.classify, frame.points, found.proposals, which)
+        return found
+
+
+class Network:
+    def classify(self, points, proposals, which):
+        return np.tile(CAR, (len(which), 1))
+
+    def facts(self):
+        return {"file": "none"}
+
+
+def contender(name, log, budget=lambda index: UNLIMITED, windows=None):
+    ledger, watched = Ledger(), Watched(Network())
+    return Contender(name, Scripted(name, ledger, watched, log), ledger, watched, budget, windows)
+
+
+def column(made, name):
+    return made.counts()[:, COUNTS.index(name)].tolist()
+
+
+@pytest.fixture
+def one():
+    made = contender("one", [])
+    interleave(FRAMES, [made], turn=1)
+    return made
+
+
+def test_counts_tell_first_views_from_further_ones_and_from_those_after_a_loss(one):
+    assert column(one, "proposals") == [2, 1, 2, 1, 0, 1]
+    assert column(one, "tracks") == [2, 0, 0, 1, 0, 1]
+    assert column(one, "classified_tracks") == [2, 0, 0, 0, 0, 1]
+    assert column(one, "classified") == [2, 1, 1, 0, 0, 1]
+    assert column(one, "refound") == [0, 0, 1, 0, 0, 0]
+    assert column(one, "calls") == [1, 1, 1, 0, 0, 1]
+    assert column(one, "foreground") == [2, 1, 2, 0, 0, 1]
+
+
+def test_lives_are_the_frames_in_which_a_track_was_seen(one):
+    assert sorted(one.lives) == [1, 1, 2, 3]
+    counts = total(one.counts())
+    assert counts.tracks == len(one.lives)
+    assert counts.n_go == pytest.approx(sum(one.lives) / len(one.lives))
+
+
+def test_cpu_time_has_a_column_a_stage(one):
+    assert one.cpu_s().shape == (6, 5)
+    assert (one.cpu_s() >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("turn", "order"), [(1, "ab ba ab ba ab ba"), (2, "aabb bbaa aabb"), (10**9, "aaaaaabbbbbb")]
+)
+def test_everyone_works_on_everything_and_begins_equally_often(turn, order):
+    log = []
+    interleave(iter(FRAMES), [contender("a", log), contender("b", log)], turn)
+    assert "".join(name for name, _ in log) == order.replace(" ", "")
+    for name in "ab":
+        assert [index for who, index in log if who == name] == list(range(6))
+
+
+def test_each_frame_has_the_budget_of_its_index():
+    made = contender("a", [], budget=lambda index: Budget(calls=index))
+    interleave(FRAMES, [made], turn=2)
+    assert [b.calls for b in made.pipeline.budgets] == list(range(6))
+
+
+def test_meters_are_read_at_the_edges_of_turns_alone():
+    now = [0]
+
+    def tick():
+        now[0] += 1_000_000
+        return now[0]
+
+    clocks = Clocks(tick, tick, tick, tick)
+    made = [
+        contender(name, [], windows=Windows([ModelMeter(1.0, 2.0, tick, tick)], clocks, Conditions(), least_s=1e9))
+        for name in "ab"
+    ]
+    interleave(FRAMES, made, turn=3)
+    for each in made:
+        assert [line["frames"][2] for line in each.energy_lines] == [3, 3]
+        assert all(line["energy_J"] > 0 for line in each.energy_lines)

@@ -1,0 +1,106 @@
+import numpy as np
+import pytest
+
+from modt.energy.meters.meter import Kind
+from modt.energy.savings import UnitCosts
+from modt.pipeline import STAGES
+from modt.reporting.comparison import COUNTS
+from modt.reporting.gamma import Evidence, mean_interval, saving, unit_costs
+from modt.reporting.quantity import Figure, brief, figure, plain
+
+TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
+FRAMES, N = 120, 50
+
+
+def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> Evidence:
+    """A run of known costs: so many of the 50 proposals classified in each frame."""
+    random = np.random.default_rng(seed)
+    counts = np.zeros((len(classified), len(COUNTS)), np.int64)
+    counts[:, COUNTS.index("proposals")] = N
+    counts[:, COUNTS.index("tracks")] = 2
+    counts[:, COUNTS.index("classified_tracks")] = 2
+    counts[:, COUNTS.index("classified")] = classified
+    counts[:, COUNTS.index("points")] = classified * random.integers(50, 200, len(classified))
+    counts[:, COUNTS.index("calls")] = classified > 0
+    cost = np.zeros((len(classified), len(STAGES)))
+    for stage, value in (
+        ("segmentation", TRUE.seg),
+        ("tracking", TRUE.track),
+        ("scheduling", 1e-4),
+        ("fusion", 2e-4),
+    ):
+        cost[:, STAGES.index(stage)] = value
+    used = counts[:, [COUNTS.index(name) for name in ("calls", "classified", "points")]]
+    cost[:, STAGES.index("classification")] = used @ [TRUE.class_call, TRUE.class_item, TRUE.class_point]
+    return Evidence(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
+
+
+def varied(noise: float = 0.0, passes: int = 2) -> Evidence:
+    return run(np.random.default_rng(7).integers(0, N, passes * FRAMES), noise, seed=9)
+
+
+EVERY = np.full(FRAMES, N)
+FEW = np.full(FRAMES, 2)
+
+
+def test_unit_costs_are_found_from_varied_load() -> None:
+    found = unit_costs(varied())
+    for name in ("seg", "track", "class_call", "class_item", "class_point"):
+        assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
+
+
+def test_prediction_meets_the_measurement_where_costs_are_what_they_seem() -> None:
+    found = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
+    assert found.predicted == pytest.approx(found.measured)
+    assert found.deviation == pytest.approx(0.0, abs=1e-9)
+    assert found.prediction.explain(found.measured)[-1].change == pytest.approx(0.0, abs=1e-6)
+
+
+def test_intervals_hold_the_truth_through_noise() -> None:
+    truth = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured
+    found = saving(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
+    assert found.measured_interval[0] < truth < found.measured_interval[1]
+    assert found.predicted_interval[0] < truth < found.predicted_interval[1]
+    assert found.deviation_interval[0] < 0 < found.deviation_interval[1]
+
+
+def test_a_cost_that_nobody_counted_is_left_unexplained() -> None:
+    dear = run(FEW)
+    dear.cost[:, STAGES.index("segmentation")] *= 2
+    found = saving(run(EVERY), dear, varied(), np.random.default_rng(0))
+    terms = found.prediction.explain(found.measured)
+    assert terms[-1].change == pytest.approx(found.measured - found.predicted)
+    assert terms[-1].change < -0.1
+    assert found.deviation > 0.05
+
+
+def test_nothing_classified_costs_nothing_to_classify() -> None:
+    found = unit_costs(run(np.zeros(20, np.int64)))
+    assert (found.class_call, found.class_item, found.class_point) == (0.0, 0.0, 0.0)
+
+
+def test_interval_of_a_constant_is_a_point() -> None:
+    assert mean_interval(np.full(30, 2.5), np.random.default_rng(0)) == (2.5, 2.5)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0, "0"), (12345.6, "12346"), (0.01234, "0.0123"), (1.5e-7, "1.50e-07"), (None, "-")]
+)
+def test_numbers_are_brief(value: float | None, text: str) -> None:
+    assert brief(value) == text
+
+
+def test_a_figure_without_a_value_is_unavailable() -> None:
+    assert figure(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
+    assert figure(float("nan")).value is None
+    assert figure(float("inf")).text() == "unavailable"
+    assert figure(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00 J (0.500 to 1.50)"
+
+
+def test_trees_of_figures_become_plain_data() -> None:
+    tree = {"a": [figure(1.0)], "b": {"c": Figure(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
+    assert plain(tree) == {
+        "a": [{"value": 1.0, "unit": "", "kind": "measured"}],
+        "b": {"c": {"value": 2.0, "unit": "J", "kind": "integrated", "low": 1.0, "high": 3.0}},
+        "d": "text",
+    }

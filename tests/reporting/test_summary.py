@@ -1,0 +1,109 @@
+"""The summary's figures from hand-made records."""
+
+from array import array
+
+import pytest
+
+from modt.reporting.histogram import EXACT
+from modt.reporting.summary import Summary, TrackLives, summarise
+from modt.reporting.summary_text import summary_table
+from modt.sinks.records import JsonLines
+from modt.sinks.tracks import frame_record
+from tests.results import CAR, result
+
+
+def ledger_line(frame, ms):
+    stages = {
+        "segmentation": {"calls": 1, "items": 2, "wall_ns": ms * 10**6, "cpu_ns": ms * 10**6},
+        "classification": {"calls": 1, "items": 1, "wall_ns": 10**6, "cpu_ns": 10**6},
+    }
+    return {"schema": "modt.ledger/1", "frame": frame, "stages": stages}
+
+
+FRAMES = [
+    result(0, [5, 5], {0: 1, 1: 2}, {1: CAR}, classified=2),
+    result(1, [5, 5], {0: 1, 1: 2}, {1: CAR}, classified=0),
+    result(2, [5, 5], {0: 1, 1: 3}, {1: CAR}, lost=(2,), classified=1),
+    result(3, [5], {0: 1}, {1: CAR}),
+]
+
+
+def whole():
+    summary = Summary()
+    for r in FRAMES:
+        summary.add_result(r)
+        summary.add_ledger(ledger_line(r.frame.index, 1 + r.frame.index))
+    return summary.result()
+
+
+def test_figures():
+    figures = whole()
+    assert (figures["frames"], figures["proposals"], figures["classifications"]) == (4, 7, 3)
+    assert figures["beta"] == pytest.approx(3 / 7)
+    # Track 1 is seen 4 times, 2 twice (lost frames do not count), 3 once.
+    assert figures["tracks"] == {"count": 3, "N_go": pytest.approx(7 / 3)}
+    assert figures["foreground_tracks"] == {"count": 1, "N_go": 4.0}
+    assert figures["energy_counts"] == {"E_seg": 4, "E_class": 4}
+    assert figures["stages"]["segmentation"]["cpu_ms"]["mean"] == pytest.approx(2.5)
+    assert figures["stages"]["segmentation"]["wall_ms"]["max"] == pytest.approx(4.0)
+
+
+def test_files_give_the_same_figures_as_the_live_run(tmp_path):
+    tracks, ledger = JsonLines(tmp_path / "tracks.jsonl"), JsonLines(tmp_path / "ledger.jsonl")
+    for r in FRAMES:
+        tracks.write(frame_record(r))
+        ledger.write(ledger_line(r.frame.index, 1 + r.frame.index))
+    tracks.close()
+    ledger.close()
+    assert summarise(tmp_path) == whole()
+
+
+def test_nothing_gives_no_ratio():
+    figures = Summary().result()
+    assert figures["beta"] is None
+    assert figures["tracks"] == {"count": 0, "N_go": None}
+    assert "0 frames" in summary_table(figures)
+
+
+def test_only_the_living_are_remembered():
+    lives = TrackLives()
+    for i in range(50):
+        lives.add([(i, True, False)])
+    assert len(lives._alive) == 1
+    assert lives.totals(foreground_only=False) == (50, 50)
+
+
+def test_a_long_run_holds_no_more_than_a_short_one():
+    """Held: the entries of every container in the summary, however deep."""
+    summary, held = Summary(), []
+    for frame in range(3 * EXACT):
+        r = result(frame, [5, 5], {0: frame, 1: frame + 1}, {})
+        summary.add_result(r)
+        summary.add_ledger(ledger_line(frame, 1 + frame))  # no two frames take as long
+        if frame in (EXACT - 1, 3 * EXACT - 1):
+            held.append(entries(summary))
+    assert held[0] > 2 * EXACT  # exact so far, wall and CPU time of a stage
+    assert held[1] < held[0]
+
+
+def entries(thing):
+    """Entries of all containers in a thing."""
+    if isinstance(thing, dict):
+        return len(thing) + sum(map(entries, thing.values()))
+    if isinstance(thing, list | tuple | set | array):
+        return len(thing) + sum(map(entries, thing))
+    return entries(vars(thing)) if hasattr(thing, "__dict__") else 0
+
+
+def test_the_table_names_what_it_prints():
+    text = summary_table(whole())
+    for word in ("proposals", "N_go", "beta", "42.9 %", "segmentation", "classification"):
+        assert word in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
+@pytest.mark.parametrize("missed", [0, 22])
+def test_missed_deadlines_are_told_where_there_were_any(missed):
+    paced = {"rate_hz": 10.0, "missed_deadlines": missed, "max_lateness_ms": 1965.7}
+    text = summary_table(whole() | {"run": paced})
+    assert ("missed 22 deadlines at 10 frames/s, the latest frame began 1966 ms late" in text) is (missed > 0)

@@ -1,0 +1,147 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modt.config import SegmentationConfig, SensorConfig
+from modt.geometry import FieldOfView
+from modt.segmentation.columns import Columns
+from modt.segmentation.person_splitting import Silhouettes
+from modt.segmentation.segmenter import Segmenter
+from tests.segmentation import reference, scans
+
+STEP_DEG = 0.17
+PERSON = (0.35, 0.5, 0.0, 1.75)
+CAR = (4.2, 1.8, 0.2, 1.5)
+
+
+def silhouettes(**config):
+    return Silhouettes(SensorConfig(), SegmentationConfig(**config))
+
+
+def crowd(rng, n):
+    """Points of up to four things side by side, people or not, in groups about the sensor, and their groups."""
+    points, group = [], []
+    for i in range(n):
+        bearing, away = rng.uniform(-np.pi, np.pi), rng.uniform(5.0, 40.0)
+        aside = 0.0
+        for _ in range(rng.integers(1, 5)):
+            breadth, tall = rng.uniform(0.1, 0.9), rng.uniform(0.8, 2.4)
+            k = rng.integers(1, 250)
+            along = away + rng.uniform(-0.5, 0.5) + rng.uniform(0, rng.choice([0.3, 1.5]), k)
+            across = aside + rng.uniform(0, breadth, k)
+            c, s = np.cos(bearing), np.sin(bearing)
+            points.append(
+                np.stack([along * c - across * s, along * s + across * c, rng.uniform(0.25, tall, k)], axis=1)
+            )
+            group.append(np.full(k, i))
+            aside += breadth + rng.uniform(0.0, 0.4)
+    order = rng.permutation(sum(len(p) for p in points))
+    return np.concatenate(points)[order].astype(np.float32), np.concatenate(group)[order]
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 6))
+@settings(max_examples=60)
+def test_groups_are_cut_as_one_by_one(seed, n):
+    points, group = crowd(np.random.default_rng(seed), n)
+    stage = silhouettes()
+    company = np.ones(n, np.bool_)
+    cloud = Columns.of(points)
+    cell = np.arange(len(points))  # a cell for each point
+    fast, clusters = stage.parted(cloud, points[:, 2], cell, group, company)
+    total = 0
+    for i in range(n):
+        own = np.flatnonzero(group == i)
+        column, cuts = reference.people_cuts(
+            cloud.x[own], cloud.y[own], points[own, 2], stage.step_rad, stage.beam_rad, stage.points
+        )
+        total += len(cuts)
+        assert reference.same_partition(fast[own], np.searchsorted(cuts, column, side="right"))
+    assert clusters == n + total
+    assert len(np.unique(fast)) == clusters
+
+
+def test_it_cuts_something_somewhere():
+    """Or the test above would compare nothing with nothing."""
+    cut = 0
+    for seed in range(10):
+        points, group = crowd(np.random.default_rng(seed), 6)
+        n = silhouettes().parted(Columns.of(points), points[:, 2], np.arange(len(points)), group, np.ones(6, bool))[1]
+        cut += n - 6
+    assert cut > 10
+
+
+def test_nothing_to_look_at_changes_nothing():
+    points, group = crowd(np.random.default_rng(3), 4)
+    new, n = silhouettes().parted(
+        Columns.of(points), points[:, 2], np.arange(len(points)), group, np.zeros(4, np.bool_)
+    )
+    assert n == 4
+    assert np.array_equal(new, group)
+
+
+def owners(boxes, step_deg=STEP_DEG, seed=0, parting=True):
+    """Of each proposal of a scene, how many points it has of each box."""
+    points, on = scans.scan(boxes, step_deg=step_deg, azimuth_deg=(-40, 40), seed=seed)
+    stage = Segmenter(SegmentationConfig(), SensorConfig(azimuth_step_deg=step_deg), FieldOfView())
+    if not parting:
+        stage.clusterer.silhouettes.range_m = 0.0
+    found = stage.segment(points)
+    ends = zip(found.offsets, found.offsets[1:], strict=False)
+    return [np.bincount(on[found.members[a:b]], minlength=len(boxes) + 1)[1:] for a, b in ends]
+
+
+@pytest.mark.parametrize(("range_m", "gap_m"), [(8.0, 0.2), (12.0, 0.22), (16.0, 0.24), (22.0, 0.28)])
+def test_two_people_close_together_are_two_at_every_moment(range_m, gap_m):
+    for seed, aside in enumerate(np.linspace(-1.0, 1.0, 12)):
+        pair = [(range_m, aside, *PERSON), (range_m, aside + 0.5 + gap_m, *PERSON)]
+        found = owners(pair, seed=seed)
+        assert len(found) == 2
+        assert all(min(own) == 0 for own in found)
+
+
+def test_hands_that_touch_join_nobody():
+    pair = [(10.0, 0.0, *PERSON), (10.0, 0.7, *PERSON), (10.0, 0.35, 0.08, 0.3, 0.8, 0.9)]
+    assert len(owners(pair, parting=False)) == 1
+    found = owners(pair)
+    assert len(found) == 2
+    assert all(min(own[:2]) == 0 for own in found)
+
+
+def test_someone_a_step_before_a_bush_stands_alone():
+    found = owners([(12.0, 0.0, *PERSON), (12.75, 0.9, 0.6, 1.4, 0.0, 1.6)])
+    assert len(found) == 2
+    mine = max(found, key=lambda own: own[0])
+    assert mine[1] == 0
+    assert mine[0] > 100
+
+
+@pytest.mark.parametrize(
+    "thing",
+    [
+        (12.0, 0.0, *CAR),
+        (25.0, 2.0, *CAR),
+        (38.0, -3.0, *CAR),
+        (10.0, 0.0, 1.0, 2.4, 0.0, 1.7),  # a hedge
+        (8.0, 1.0, 0.15, 0.15, 0.0, 2.4),  # a pole
+        (14.0, 0.0, 0.4, 1.7, 0.0, 1.6),  # a cyclist from the side
+        (9.0, 0.0, *PERSON),
+    ],
+)
+def test_one_thing_is_not_parted(thing):
+    for seed in range(4):
+        x, y, *rest = thing
+        moved = [(x, y + 0.03 * seed, *rest)]
+        assert len(owners(moved, seed=seed)) == len(owners(moved, seed=seed, parting=False))
+
+
+def test_a_coarse_sensor_takes_no_missing_step_for_a_gap():
+    for seed in range(8):
+        assert len(owners([(20.0, 0.02 * seed, 0.4, 1.2, 0.0, 1.7)], step_deg=0.35, seed=seed)) == 1
+
+
+def test_what_stands_around_the_sensor_is_left_alone():
+    turn = np.linspace(0, 2 * np.pi, 600, endpoint=False)
+    points = np.stack([1.2 * np.cos(turn), 1.2 * np.sin(turn), np.tile([-0.9, -0.3, 0.0], 200)], axis=1)
+    stage = Segmenter(SegmentationConfig(), SensorConfig(min_range_m=0.2), FieldOfView())
+    assert len(stage.segment(points.astype(np.float32))) == 1

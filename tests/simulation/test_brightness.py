@@ -1,0 +1,125 @@
+"""The fourth column: read as a real HDL-64E reads it, and nothing else depends on it."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.simulation.materials import GLOSS, LEVEL, LOSS, REFLECTIVITY, SEMANTIC, SHADE, TEXTURE, Material
+from modt.simulation.raycast import RayCaster
+from modt.simulation.returns import Receiver
+from modt.simulation.sensors import sensor
+from modt.simulation.solids import box
+from modt.simulation.vehicles import car, car_size, van, van_size
+from modt.sources.synthetic_stream import SyntheticStream
+
+HDL = sensor("hdl-64e")
+
+
+def read(piece, shade=0.0):
+    """Brightness of the returns of one piece before nothing else, by an HDL-64E."""
+    sky = np.full(HDL.shape, np.inf, np.float32)
+    image = RayCaster(HDL).cast(piece, sky, np.ones_like(sky))
+    material = np.full(HDL.shape, piece.material[0], np.uint8)
+    receiver = Receiver(HDL, np.random.default_rng(0))
+    shades = np.array([shade, 0], np.float32)
+    return receiver.receive(image.distance, material, image.piece, shades, np.random.default_rng(1))
+
+
+def test_every_material_has_a_row_in_every_table():
+    for table in (REFLECTIVITY, LOSS, SEMANTIC, LEVEL, SHADE, TEXTURE, GLOSS):
+        assert table.shape == (len(Material),)
+
+
+@given(
+    st.lists(st.floats(-1, 3, width=32), min_size=2, max_size=20),
+    st.floats(1, 120, width=32),
+    st.sampled_from(["hdl-64e", "vlp-16"]),
+)
+def test_what_is_read_is_a_step_of_the_scale_and_grows_with_strength(strength, slant_m, name):
+    response = sensor(name).response
+    got = response.report(np.sort(np.array(strength, np.float32)), np.full(len(strength), slant_m, np.float32))
+    assert 0 <= got.min() <= got.max() <= np.float32(response.most)
+    np.testing.assert_allclose(got, np.rint(got * response.steps) / response.steps, atol=1e-6)
+    assert (np.diff(got) >= 0).all()
+
+
+@given(st.floats(0, 1.25, width=32), st.floats(17, 80, width=32), st.floats(0, 40, width=32))
+def test_an_hdl_64e_reads_the_same_surface_darker_beyond_its_focus(strength, slant_m, farther_m):
+    slant = np.array([slant_m, slant_m + farther_m], np.float32)
+    near, far = HDL.response.report(np.full(2, strength, np.float32), slant)
+    assert far <= near
+
+
+def test_a_sweep_reads_0_to_99_hundredths_and_more_zeros_the_farther():
+    frame, truth = next(SyntheticStream(seconds=0.1, seed=3).sweeps())
+    value, away = frame.points[:, 3], np.linalg.norm(frame.points[:, :3], axis=1)
+    assert value.min() == 0
+    assert value.max() == np.float32(0.99)
+    np.testing.assert_allclose(100 * value, np.rint(100 * value), atol=1e-4)
+    scenery = np.isin(truth.semantic, (50, 70))
+    dark = [
+        (value[scenery & (away > a) & (away < b)] == 0).mean() for a, b in ((12, 20), (25, 35), (40, 50), (55, 70))
+    ]
+    assert dark == sorted(dark)
+    assert dark[0] < 0.15 < 0.3 < dark[2] < 0.7 < dark[3]
+
+
+def test_the_shade_of_a_surface_changes_its_brightness_alone():
+    wall = box((15.0, 0.0, 0.0), (0.2, 6.0, 3.0), Material.WALL)
+    (distance, plain, ray), (same_distance, bright, same_ray) = read(wall), read(wall, 0.2)
+    np.testing.assert_array_equal(distance, same_distance)
+    np.testing.assert_array_equal(ray, same_ray)
+    assert np.mean(bright - plain) == pytest.approx(0.2, abs=0.02)
+
+
+def test_paint_is_darker_the_less_it_faces_the_sensor():
+    turned = [read(box((14.0, 0.0, 0.0), (0.1, 3.0, 1.0), Material.CAR_PAINT, yaw))[1] for yaw in (0.0, 0.8, 1.3)]
+    c, s = np.cos(1.2), np.sin(1.2)
+    lean = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    centre = np.array([14.0, 0.0, 0.0])
+    upright = box((0.0, 0.0, 0.0), (0.1, 3.0, 1.0), Material.CAR_PAINT)
+    leant = read(upright.moved(lean, centre))[1]
+    means = [v.mean() for v in turned]
+    assert means == sorted(means, reverse=True)
+    assert means[2] < 0.6 * means[0]
+    assert leant.mean() < 0.6 * means[0]
+    assert (leant == 0).mean() > 0.1 > (turned[0] == 0).mean()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_number_plates_saturate(tmp_path, seed):
+    path = tmp_path / "000000.txt"
+    path.write_text("Car 0 0 0 0 0 9 9 1.5 1.6 4.0 0.0 1.7 13.0 -1.57\n")
+    frame, truth = SyntheticStream(str(path), "hdl-64e", 0.1, seed=seed).simulator.sweep(0)
+    own = frame.points[truth.instance == truth.bodies[0]]
+    bright = own[own[:, 3] > 0.9]
+    assert 3 <= len(bright) < 0.1 * len(own)
+    plate = bright[np.abs(bright[:, 1]) < 0.35]
+    assert len(plate) >= 0.5 * len(bright)
+    assert np.abs(plate[:, 0] - (13.27 - 2.0)).max() < 0.3
+
+
+@pytest.mark.parametrize(("make", "size"), [(car, car_size), (van, van_size)])
+def test_plates_and_lamps_sit_on_the_ends_of_a_vehicle_and_inside_its_box(make, size):
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        length, width, height = size(rng)
+        made = make(rng, (length, width, height))
+        part = made.take(np.isin(made.material, (Material.RETRO, Material.LAMP)))
+        assert len(part) == 4
+        assert (np.abs(part.centre) + part.half <= np.array([length, width, 2 * height]) / [2, 2, 2] + 0.01).all()
+        assert (np.abs(part.centre[:, 0]) > 0.4 * length).all()
+
+
+def test_a_body_keeps_its_shade():
+    stream = SyntheticStream(seconds=1.0, seed=3)
+    seen = [stream.simulator.sweep(i) for i in (0, 3)]
+    mean = []
+    for frame, truth in seen:
+        named = {b: frame.points[truth.instance == b, 3] for b in truth.bodies[truth.points > 300].tolist()}
+        mean.append({b: v.mean() for b, v in named.items()})
+    both = sorted(mean[0].keys() & mean[1].keys())
+    a, b = (np.array([m[k] for k in both]) for m in mean)
+    assert len(both) >= 4
+    assert np.abs(a - b).mean() < 0.5 * a.std()

@@ -1,0 +1,74 @@
+"""The files around the code agree with one another."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+import modt
+
+ROOT = Path(__file__).resolve().parents[1]
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+YAML = [*sorted((ROOT / ".github").rglob("*.yml")), ROOT / ".pre-commit-config.yaml", ROOT / "CITATION.cff"]
+
+
+def commands(target: str) -> set[str]:
+    """What the Makefile runs for a target and for the phony targets that it needs."""
+    text = (ROOT / "Makefile").read_text()
+    rule = re.search(rf"^{target}:(.*)\n((?:\t.*\n)*)", text, re.MULTILINE)
+    assert rule, f"no target '{target}'"
+    needed = [name for name in rule[1].split() if "$" not in name]
+    return {line.strip() for line in rule[2].splitlines()}.union(*map(commands, needed))
+
+
+def parsed(path: Path):
+    return yaml.safe_load(path.read_text())
+
+
+@pytest.mark.parametrize("path", YAML, ids=lambda p: p.name)
+def test_yaml_is_a_mapping(path):
+    assert isinstance(parsed(path), dict)
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.name)
+def test_workflows_run_the_two_commands_from_the_lowest_python_on(path):
+    lowest = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"].removeprefix(">=")
+    for job in parsed(path)["jobs"].values():
+        pythons = [tuple(map(int, version.split("."))) for version in job["strategy"]["matrix"]["python"]]
+        assert min(pythons) == tuple(map(int, lowest.split(".")))
+        assert [step["run"] for step in job["steps"] if "run" in step] == ["make replay", "make test"]
+
+
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.name)
+def test_workflows_may_only_read_and_pin_what_they_use(path):
+    workflow = parsed(path)
+    assert workflow["permissions"] == {"contents": "read"}
+    used = [step["uses"] for job in workflow["jobs"].values() for step in job["steps"] if "uses" in step]
+    assert used
+    assert [action for action in used if not re.fullmatch(r"[\w-]+/[\w-]+@v\d+", action)] == []
+
+
+def test_hooks_run_what_make_test_runs_before_pytest():
+    hooks = [hook for repo in parsed(ROOT / ".pre-commit-config.yaml")["repos"] for hook in repo["hooks"]]
+    run = set().union(*(commands(hook["entry"].removeprefix("make ")) for hook in hooks))
+    assert commands("test") - run == {"$(BIN)/python -m pytest"}
+    assert run <= commands("test")
+
+
+def test_citation_names_this_version_and_the_paper():
+    citation = parsed(ROOT / "CITATION.cff")
+    assert citation["version"] == modt.__version__
+    (paper,) = citation["references"]
+    assert paper["title"] in " ".join((ROOT / "README.md").read_text().split())
+    assert [author["family-names"] for author in paper["authors"]] == ["Li", "Guivant"]
+
+
+def test_changelog_begins_with_this_version():
+    text = (ROOT / "CHANGELOG.md").read_text()
+    heading = re.search(r"^## \[(.+)\] - (unreleased|\d{4}-\d\d-\d\d)$", text, re.MULTILINE)
+    assert heading
+    assert heading[1] == modt.__version__

@@ -1,0 +1,112 @@
+"""Does int8 pay? Quantise a model (static, per channel, QDQ) and compare scores and CPU time on real crops.
+
+    python -m tools.study.int8 MODEL.onnx CROPS.npz [--points N]
+
+Prints one JSON object. The calibration sees every other crop, the comparison the rest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
+
+from modt.classes import N_CLASSES
+from modt.classification.crops import Crops, canonical
+from modt.classification.pointnet import PointNet
+from modt.config import ClassificationConfig, SensorConfig
+from modt.evaluation.class_score import average_precision
+from modt.types import Float32, Float64, Int
+from tools.train.dataset import SHIPPED, Dataset, load
+
+BATCH = 8
+
+
+def batches(data: Dataset, rows: Int, most: int) -> Iterator[tuple[Int, Float32]]:
+    """Batches of like sizes, as the classifier makes them."""
+    crops = canonical(thinned(data.take(rows), most), SensorConfig().height_m or 0.0)
+    order = np.argsort(crops.count, kind="stable")
+    for first in range(0, len(order), BATCH):
+        chosen = order[first : first + BATCH]
+        yield chosen, crops.padded(chosen)
+
+
+def thinned(crops: Crops, most: int) -> Crops:
+    """At most so many points of each crop, evenly."""
+    kept = np.minimum(crops.count, most)
+    offsets = np.append(0, np.cumsum(kept))
+    step = np.arange(offsets[-1]) - np.repeat(offsets[:-1], kept)
+    inside = step * np.repeat(crops.count, kept) // np.repeat(kept, kept)
+    return Crops(crops.xyz[np.repeat(crops.offsets[:-1], kept) + inside], offsets)
+
+
+class Reader(CalibrationDataReader):  # type: ignore[misc]
+    """Batches for the calibration."""
+
+    def __init__(self, data: Dataset, rows: Int, most: int) -> None:
+        self._batches = batches(data, rows, most)
+
+    def get_next(self) -> dict[str, Float32] | None:
+        """The next batch, None after the last."""
+        following = next(self._batches, None)
+        return None if following is None else {"points": following[1]}
+
+
+def run(net: PointNet, data: Dataset, rows: Int, most: int) -> tuple[Float64, float]:
+    """(R, 4) probabilities, and CPU time of a crop [ms]."""
+    out = np.zeros((len(rows), N_CLASSES))
+    prepared = list(batches(data, rows, most))
+    times = []
+    for _ in range(3):
+        before = time.thread_time_ns()
+        for chosen, batch in prepared:
+            out[chosen] = net.infer(batch)
+        times.append((time.thread_time_ns() - before) / 1e6 / len(rows))
+    return out, min(times)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("model", type=Path)
+    parser.add_argument("crops", type=Path)
+    parser.add_argument("--points", type=int, default=ClassificationConfig().max_points)
+    args = parser.parse_args()
+    data = load(args.crops)
+    shipped = np.flatnonzero((data.variant == SHIPPED) & data.clear)
+    report: dict[str, object] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        small = Path(folder) / "int8.onnx"
+        quantize_static(
+            args.model,
+            small,
+            Reader(data, shipped[::2], args.points),
+            quant_format=QuantFormat.QDQ,
+            per_channel=True,
+            activation_type=QuantType.QUInt8,
+            weight_type=QuantType.QInt8,
+        )
+        outputs = {}
+        for name, path in {"float32": args.model, "int8": small}.items():
+            net = PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+            rows = shipped[1::2]
+            outputs[name], cost = run(net, data, rows, args.points)
+            label = data.label[rows]
+            report[name] = {
+                "cpu_ms_a_crop": round(cost, 4),
+                "bytes": path.stat().st_size,
+                "average_precision": average_precision(outputs[name], label, np.bincount(label, minlength=N_CLASSES)),
+            }
+        same = outputs["float32"].argmax(axis=1) == outputs["int8"].argmax(axis=1)
+        report["same_class"] = round(float(same.mean()), 4)
+        report["largest_difference"] = round(float(np.abs(outputs["float32"] - outputs["int8"]).max()), 3)
+    print(json.dumps(report, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,30 @@
+"""What the boxes of crops say, as those of the proposals that they are cut from do at run time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.classification.box_classifier import beam_sr, features
+from modt.classification.crops import Crops
+from modt.segmentation.box_fitting import headings, upright_boxes
+from modt.segmentation.groups import Groups
+from modt.types import Float64, Int
+from tools.train.augment import Beams
+from tools.train.dataset import SENSOR_HEIGHT_M, Dataset
+
+CHUNK = 2000
+"""Crops described at a time."""
+
+
+def described(crops: Crops) -> Float64:
+    """(R, 7) features of the boxes about crops."""
+    x, y, z = crops.xyz.astype(np.float32).T
+    groups = Groups(np.arange(len(x)), crops.offsets)
+    box = upright_boxes(x, y, z, groups, headings(x, y, groups))
+    beams = Beams()
+    return features(crops.count, box, SENSOR_HEIGHT_M, beam_sr(beams.azimuth_deg, beams.elevation_deg))
+
+
+def all_described(data: Dataset, rows: Int) -> Float64:
+    """(R, 7) features of these rows as they are."""
+    return np.concatenate([described(data.take(rows[i : i + CHUNK])) for i in range(0, len(rows), CHUNK)])

@@ -1,0 +1,64 @@
+"""Training of the small networks that a model's metadata holds, modt.classification.mlp."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import torch
+from torch import nn
+
+from modt.classes import N_CLASSES
+from modt.classification.mlp import Layers
+from modt.types import Float64, Int
+
+HIDDEN = (32, 32)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What one step learns from.
+
+    Attributes:
+        feature: (R, F) of crops.
+        label: (R,) their classes.
+        base: (R, 4) logits that those of the network are added to.
+    """
+
+    feature: Float64
+    label: Int
+    base: Float64 | None = None
+
+
+def trained(batch: Callable[[], Batch], sample: Float64, steps: int, rate: float, decay: float) -> Layers:
+    """Layers trained on so many batches, uncalibrated; they take features as they are.
+
+    Args:
+        batch: the next one.
+        sample: (S, F) features as they are spread.
+        steps: batches.
+        rate: of learning, at most.
+        decay: of weights.
+    """
+    mean, scale = sample.mean(axis=0), sample.std(axis=0)
+    linear = [nn.Linear(a, b) for a, b in pairwise((sample.shape[1], *HIDDEN, N_CLASSES))]
+    net = nn.Sequential(*[part for layer in linear for part in (layer, nn.Tanh())][:-1])
+    optimiser = torch.optim.AdamW(net.parameters(), weight_decay=decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, rate, total_steps=steps)
+    criterion = nn.CrossEntropyLoss()
+    for _ in range(steps):
+        shown = batch()
+        score = net(torch.from_numpy(((shown.feature - mean) / scale).astype(np.float32)))
+        if shown.base is not None:
+            score = score + torch.from_numpy(shown.base.astype(np.float32))
+        loss = criterion(score, torch.from_numpy(shown.label))
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+    layers = [(p.weight.detach().double().numpy().T, p.bias.detach().double().numpy()) for p in linear]
+    weight, bias = layers[0]
+    weight = weight / scale[:, None]
+    return [(weight, bias - mean @ weight), *layers[1:]]
