@@ -5,8 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt import profile
-from modt.cli import assemble
+from modt import assembly, profile
 from modt.energy.ledger import NullLedger
 from modt.evaluation.evaluation import score
 from modt.evaluation.frame import JudgedFrame
@@ -23,9 +22,9 @@ ALL_COUNTS = dataclasses.replace(KITTI_RULES, ignored=frozenset({"parked"}))
 
 def judged(frames, truth_of, fov=None, name="hdl-64e"):
     fov = fov or FieldOfView()
-    mode = assemble.MODES["accurate"]
+    mode = assembly.MODES["accurate"]
     settings = profile.load(name)
-    pipeline = assemble.pipeline(mode, settings, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, settings, fov, NullLedger())
     for frame in frames:
         truth = truth_of(frame.index)
         yield JudgedFrame.of_result(pipeline.step(frame, mode.budget(settings)), truth, fov)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from modt import assembly
 from modt.classes import CLASS_NAMES
-from modt.cli import assemble
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
@@ -21,14 +21,14 @@ from modt.sources.synthetic_stream import SyntheticStream
 FOLDER = Path(__file__).parent
 SCENES = {"street-vlp-16": ("street", "vlp-16", "vlp-16"), "street-hdl-64e": ("street", "hdl-64e", "hdl-64e")}
 SECONDS = 1.2
-CASES = [(scene, mode) for scene in SCENES for mode in assemble.MODES]
+CASES = [(scene, mode) for scene in SCENES for mode in assembly.MODES]
 
 
 def behaviour(scene: str, mode_name: str) -> list[dict[str, object]]:
     """What a replay did, frame by frame: counts, births, and the classes given; no coordinate, no probability."""
     world, sensor, profile_name = SCENES[scene]
-    profile, mode = load(profile_name), assemble.MODES[mode_name]
-    pipeline = assemble.pipeline(mode, profile, FieldOfView(), NullLedger())
+    profile, mode = load(profile_name), assembly.MODES[mode_name]
+    pipeline = assembly.pipeline(mode, profile, FieldOfView(), NullLedger())
     lines = []
     for frame in SyntheticStream(world, sensor, SECONDS, seed=7):
         record = frame_record(pipeline.step(frame, mode.budget(profile)))

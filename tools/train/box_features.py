@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classification.box_classifier import beam_sr, features
+from modt.classification.box_classifier import beam_solid_angle_sr, box_features
 from modt.classification.crops import Crops
 from modt.segmentation.box_fitting import headings, upright_boxes
 from modt.segmentation.groups import Groups
@@ -22,7 +22,8 @@ def described(crops: Crops) -> Float64:
     groups = Groups(np.arange(len(x)), crops.offsets)
     box = upright_boxes(x, y, z, groups, headings(x, y, groups))
     beams = Beams()
-    return features(crops.count, box, SENSOR_HEIGHT_M, beam_sr(beams.azimuth_deg, beams.elevation_deg))
+    beam_sr = beam_solid_angle_sr(beams.azimuth_deg, beams.elevation_deg)
+    return box_features(crops.count, box, SENSOR_HEIGHT_M, beam_sr)
 
 
 def all_described(data: Dataset, rows: Int) -> Float64:

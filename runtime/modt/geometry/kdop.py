@@ -1,7 +1,7 @@
 """k-DOPs: extents of point sets in eight directions of the ground plane (discrete oriented polytopes, k = 8).
 
 A k-DOP is eight numbers: the greatest coordinate of its points along each of DIRECTIONS. Opposite directions are
-four apart: the ends along axis k are at kdop[k] and at -kdop[k + 4]. The k-DOP of a union is the maximum of the k-DOPs.
+four apart: the ends along axis k are at kdop[k] and at -kdop[k + 4]. The k-DOP of a union is the maximum of both.
 Many are an (8, n) array, a contiguous row a direction.
 """
 
