@@ -4,11 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.car_merging import CarMerger
 from modt.segmentation.cells import connect, occupied_cells
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.grids import SqrtRangeGrid
-from modt.segmentation.person_splitting import PersonSplitter
 from modt.segmentation.point_columns import PointColumns
 from modt.types import NONE
 from tests.segmentation import reference
@@ -28,8 +26,7 @@ def cloud(seed, n, sigma):
 
 
 def clusterer(**config):
-    sensor, settings = SensorConfig(), SegmentationConfig(**config)
-    return Clusterer(sensor, settings, PersonSplitter(sensor, settings), CarMerger(sensor, settings))
+    return Clusterer(SensorConfig(), SegmentationConfig(**config))
 
 
 def cells_of(grid, points, height):

@@ -8,7 +8,7 @@ from modt.config.segmentation import GroundConfig
 from modt.segmentation.grids import SECTORS, PolarGrid, pseudo_angle
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.point_columns import PointColumns
-from modt.segmentation.sensor_height import HeightEstimator, sensor_height
+from modt.segmentation.sensor_height import HeightEstimator
 from tests.segmentation import reference, scans
 
 HEIGHT_M = 1.73
@@ -171,10 +171,6 @@ def test_a_floor_mostly_hidden_by_walls_is_found():
 
 
 def test_no_floor_gives_the_default_height():
-    height = sensor_height(SensorConfig(height_m=None), CONFIG)
+    height = HeightEstimator(SensorConfig(height_m=None), CONFIG)
     assert height.height_m(NO_POINTS) == CONFIG.sensor_height.default_m
     assert height.height_m(PointColumns.from_array(np.float32([[5, 0, -1, 0]]))) == CONFIG.sensor_height.default_m
-
-
-def test_a_given_height_is_not_estimated():
-    assert sensor_height(SensorConfig(height_m=0.5), CONFIG).height_m(NO_POINTS) == 0.5

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.person_splitting import NoPersonSplitter, PersonSplitter
+from modt.segmentation.clusters import Clusters
+from modt.segmentation.person_splitting import PersonSplitter
 from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from tests.segmentation import reference, scans
@@ -15,8 +16,13 @@ PERSON = (0.35, 0.5, 0.0, 1.75)
 CAR = (4.2, 1.8, 0.2, 1.5)
 
 
-def splitter():
-    return PersonSplitter(SensorConfig(), SegmentationConfig())
+def split(points, group, candidate=None):
+    """(K,) cluster of each point after splitting, and their number; each point is a cell."""
+    cloud, cell = PointColumns.from_array(points), np.arange(len(points))
+    n = int(group.max()) + 1
+    clusters = Clusters(cloud, points[:, 2], cell, None, cell, group, n)
+    candidate = np.ones(n, np.bool_) if candidate is None else candidate
+    return PersonSplitter(SensorConfig(), SegmentationConfig()).split(clusters, candidate)
 
 
 def crowd(rng, n):
@@ -44,16 +50,13 @@ def crowd(rng, n):
 @settings(max_examples=60)
 def test_splits_equal_those_of_each_cluster_alone(seed, n):
     points, group = crowd(np.random.default_rng(seed), n)
-    stage = splitter()
-    candidate = np.ones(n, np.bool_)
     cloud = PointColumns.from_array(points)
-    cell = np.arange(len(points))  # a cell for each point
-    fast, clusters = stage.separate(cloud, points[:, 2], cell, group, candidate)
+    fast, clusters = split(points, group)
     total = 0
     for i in range(n):
         own = np.flatnonzero(group == i)
         column, boundaries = reference.person_boundaries(
-            cloud.x[own], cloud.y[own], points[own, 2], SensorConfig(), stage.config
+            cloud.x[own], cloud.y[own], points[own, 2], SensorConfig(), SegmentationConfig().person_splitting
         )
         total += len(boundaries)
         assert reference.same_partition(fast[own], np.searchsorted(boundaries, column, side="right"))
@@ -66,26 +69,23 @@ def test_random_crowds_are_split():
     cut = 0
     for seed in range(10):
         points, group = crowd(np.random.default_rng(seed), 6)
-        n = splitter().separate(
-            PointColumns.from_array(points), points[:, 2], np.arange(len(points)), group, np.ones(6, bool)
-        )[1]
-        cut += n - 6
+        cut += split(points, group)[1] - 6
     assert cut > 10
 
 
 def test_without_candidates_nothing_changes():
     points, group = crowd(np.random.default_rng(3), 4)
-    new, n = splitter().separate(
-        PointColumns.from_array(points), points[:, 2], np.arange(len(points)), group, np.zeros(4, np.bool_)
-    )
+    new, n = split(points, group, np.zeros(4, np.bool_))
     assert n == 4
     assert np.array_equal(new, group)
 
 
-def owners(boxes, step_deg=STEP_DEG, seed=0, part=None):
+def owners(boxes, step_deg=STEP_DEG, seed=0, split=True):
     """Points of each proposal of a scene by the box that they lie on."""
     points, on = scans.scan(boxes, step_deg=step_deg, azimuth_deg=(-40, 40), seed=seed)
-    stage = Segmenter(SegmentationConfig(), SensorConfig(azimuth_step_deg=step_deg), FieldOfView(), splitter=part)
+    stage = Segmenter(SegmentationConfig(), SensorConfig(azimuth_step_deg=step_deg), FieldOfView())
+    if not split:
+        stage.clusterer.splitter.candidates = lambda sizes: np.zeros(len(sizes), np.bool_)
     found = stage.segment(points)
     ends = zip(found.offsets, found.offsets[1:], strict=False)
     return [np.bincount(on[found.members[a:b]], minlength=len(boxes) + 1)[1:] for a, b in ends]
@@ -102,7 +102,7 @@ def test_two_people_close_together_are_two(range_m, gap_m):
 
 def test_two_people_holding_hands_are_two():
     pair = [(10.0, 0.0, *PERSON), (10.0, 0.7, *PERSON), (10.0, 0.35, 0.08, 0.3, 0.8, 0.9)]
-    assert len(owners(pair, part=NoPersonSplitter())) == 1
+    assert len(owners(pair, split=False)) == 1
     found = owners(pair)
     assert len(found) == 2
     assert all(min(own[:2]) == 0 for own in found)
@@ -132,7 +132,7 @@ def test_one_object_is_not_split(thing):
     for seed in range(4):
         x, y, *rest = thing
         moved = [(x, y + 0.03 * seed, *rest)]
-        assert len(owners(moved, seed=seed)) == len(owners(moved, seed=seed, part=NoPersonSplitter()))
+        assert len(owners(moved, seed=seed)) == len(owners(moved, seed=seed, split=False))
 
 
 def test_empty_columns_of_a_coarse_sensor_are_no_gap():

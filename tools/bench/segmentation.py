@@ -83,7 +83,7 @@ def tree_components(xyz: Float32) -> object:
 def above_ground(stage: Segmenter, points: Float32) -> Float32:
     """(n, 3) points above ground that the stage clusters."""
     sweep = PointColumns.from_array(points)
-    height = stage.ground.height_above(sweep, stage.sensor_height.height_m(sweep))
+    height = stage.ground.height_above(sweep, stage.sensor_height_m(sweep))
     return points[stage.above_ground(sweep, height), :3]
 
 

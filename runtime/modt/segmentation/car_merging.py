@@ -14,16 +14,8 @@ from modt.segmentation.view_bounds import DIRECTION, ELEVATION, HEIGHT, RANGE, V
 from modt.types import Bool, Float32, Int
 
 
-class NoCarMerger:
-    """Merges nothing."""
-
-    def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
-        """(G,) each cluster itself."""
-        return np.arange(clusters.n)
-
-
 class CarMerger:
-    """Merges the strips of one car (`clustering.Merger`).
+    """Merges the strips of one car.
 
     Clusters across the direction straight to the right, where pseudo-angles begin anew, are not merged.
 
@@ -40,7 +32,7 @@ class CarMerger:
         self.min_sqrt_range = np.float32(np.sqrt(c.visible_m / (c.max_beams * beam)))
 
     def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
-        """(G,) cluster into which each one is merged, itself where it is not merged."""
+        """(G,) cluster into which each of the (G,) valid ones is merged, itself where it is not merged."""
         target, candidate = np.arange(clusters.n), valid & self.candidates(sizes)
         rows = np.flatnonzero(candidate)
         if len(rows):

@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
+from modt.segmentation.car_merging import CarMerger
 from modt.segmentation.cells import Cells, connect, occupied_cells
 from modt.segmentation.clusters import Clusters, ClusterSizes, diagonals
 from modt.segmentation.grids import SqrtRangeGrid
 from modt.segmentation.groups import consecutive, label_max, label_min
+from modt.segmentation.person_splitting import PersonSplitter
 from modt.segmentation.point_columns import PointColumns
 from modt.types import Bool, Float32, Int
-
-
-class Splitter(Protocol):
-    """Splits clusters of several objects."""
-
-    def split(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> tuple[Int, int]:
-        """(C,) cluster of each cell after splitting some of the (G,) valid ones; their number, new ones from G."""
-        ...
-
-
-class Merger(Protocol):
-    """Merges clusters of one object."""
-
-    def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
-        """(G,) cluster into which each of the (G,) valid ones is merged, itself for the others."""
-        ...
 
 
 class Clusterer:
@@ -41,11 +26,9 @@ class Clusterer:
     Args:
         sensor: range and beam spacing.
         config: clustering distance, sizes of objects, and the keys of `clusters`.
-        splitter: splits clusters of several objects.
-        merger: merges clusters of one object.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig, splitter: Splitter, merger: Merger) -> None:
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
         step = config.cell_m / np.sqrt(10.0)
         beam_rad = float(np.deg2rad(sensor.elevation_step_deg))
         self.config = config
@@ -53,7 +36,7 @@ class Clusterer:
         self.gap_per_range = np.float32(config.clusters.max_gap_beams * beam_rad)
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
-        self.splitter, self.merger = splitter, merger
+        self.splitter, self.merger = PersonSplitter(sensor, config), CarMerger(sensor, config)
 
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
@@ -62,7 +45,7 @@ class Clusterer:
         cluster, sizes = self._connect(cells, points.take(sample), np.bincount(cell))
         n, valid = len(sizes), self._valid(sizes)
         clusters = Clusters(points, height, cell, cells, sample, cluster, n)
-        split, total = self.splitter.split(clusters, sizes, valid)
+        split, total = self.splitter.split(clusters, valid & self.splitter.candidates(sizes))
         mergeable = valid | ~sizes.is_part
         mergeable[cluster[split >= n]] = False
         target = self.merger.merge(clusters, sizes, mergeable)

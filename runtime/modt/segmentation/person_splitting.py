@@ -13,7 +13,6 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.clusters import Clusters, ClusterSizes
 from modt.segmentation.groups import consecutive
-from modt.segmentation.point_columns import PointColumns
 from modt.types import Bool, Float32, Float64, Int
 
 MIN_DEPTH_M = np.float32(0.1)
@@ -42,16 +41,8 @@ class AzimuthColumns:
     top_m: Float32
 
 
-class NoPersonSplitter:
-    """Splits nothing."""
-
-    def split(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> tuple[Int, int]:
-        """(C,) clusters as they are, and their number."""
-        return clusters.of_cell, clusters.n
-
-
 class PersonSplitter:
-    """Splits people from neighbouring people and objects (`clustering.Splitter`).
+    """Splits people from neighbouring people and objects.
 
     Args:
         sensor: angles between returns.
@@ -73,22 +64,15 @@ class PersonSplitter:
         candidate &= np.square(sizes.sqrt_range) > c.min_range_extents * extent
         return candidate
 
-    def split(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> tuple[Int, int]:
-        """(C,) cluster of each cell after splitting, and the number of clusters."""
-        candidate = valid & self.candidates(sizes)
-        return self.separate(clusters.points, clusters.height, clusters.cell, clusters.of_cell, candidate)
-
-    def separate(
-        self, points: PointColumns, height: Float32, cell: Int, cluster: Int, candidate: Bool
-    ) -> tuple[Int, int]:
-        """The same for (G,) candidates, given (K,) points, their height above ground [m] and their (K,) cell."""
-        n = len(candidate)
-        rows = np.flatnonzero(candidate[cluster].take(cell))
+    def split(self, clusters: Clusters, candidate: Bool) -> tuple[Int, int]:
+        """(C,) cluster of each cell after splitting the (n,) candidates; number of clusters, new ones from n."""
+        cluster, n = clusters.of_cell, clusters.n
+        rows = np.flatnonzero(candidate[cluster].take(clusters.cell))
         if not len(rows):
             return cluster, n
-        cell = cell[rows]
+        cell, points = clusters.cell[rows], clusters.points
         group = consecutive(candidate)[cluster[cell]]
-        column, columns = self.project(points.x[rows], points.y[rows], height[rows], group)
+        column, columns = self.project(points.x[rows], points.y[rows], clusters.height[rows], group)
         boundaries = self.boundaries(columns)
         if not len(boundaries):
             return cluster, n

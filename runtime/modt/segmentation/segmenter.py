@@ -9,15 +9,13 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.box_fitting import fit_headings, upright_boxes
-from modt.segmentation.car_merging import CarMerger
-from modt.segmentation.clustering import Clusterer, Merger, Splitter
+from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups
-from modt.segmentation.person_splitting import PersonSplitter
 from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.reflectance_statistics import has_reflectance, reflectance_statistics
-from modt.segmentation.sensor_height import sensor_height
+from modt.segmentation.sensor_height import HeightEstimator
 from modt.types import NONE, Bool, Float32, Int, Proposals
 
 
@@ -28,34 +26,23 @@ class Segmenter:
         config: of the stage.
         sensor: mount, range and resolution.
         fov: part of space to segment.
-        splitter: PersonSplitter by default.
-        merger: CarMerger by default.
     """
 
-    def __init__(
-        self,
-        config: SegmentationConfig,
-        sensor: SensorConfig,
-        fov: FieldOfView,
-        *,
-        splitter: Splitter | None = None,
-        merger: Merger | None = None,
-    ) -> None:
+    def __init__(self, config: SegmentationConfig, sensor: SensorConfig, fov: FieldOfView) -> None:
         self.config, self.sensor, self.fov = config, sensor, fov
         self.margin_m = config.view_margin.margin_m
         self.truncated_m = config.view_margin.truncation_m - self.margin_m
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
         self.max_sqrt_range = np.float32(np.sqrt(sensor.max_range_m))
-        self.sensor_height = sensor_height(sensor, config)
+        self.height_estimator = HeightEstimator(sensor, config)
         self.ground = GroundEstimator(sensor, config)
-        splitter, merger = splitter or PersonSplitter(sensor, config), merger or CarMerger(sensor, config)
-        self.clusterer = Clusterer(sensor, config, splitter, merger)
+        self.clusterer = Clusterer(sensor, config)
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""
         region = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -self.margin_m)
         sweep = PointColumns.from_array(points if region is None else points[region])
-        sensor_height_m = self.sensor_height.height_m(sweep)
+        sensor_height_m = self.sensor_height_m(sweep)
         height = self.ground.height_above(sweep, sensor_height_m)
         rows = np.flatnonzero(self.above_ground(sweep, height))
         if not len(rows):
@@ -65,6 +52,11 @@ class Segmenter:
         reflectance = points[index, 3] if measured else None
         proposals = self._proposals(sweep.take(rows), height[rows], index, reflectance)
         return replace(proposals, sensor_height_m=sensor_height_m)
+
+    def sensor_height_m(self, sweep: PointColumns) -> float:
+        """Height of the sensor [m]: of the profile, or estimated where the profile has none."""
+        known = self.sensor.height_m
+        return self.height_estimator.height_m(sweep) if known is None else known
 
     def above_ground(self, sweep: PointColumns, height: Float32) -> Bool:
         """(N,) points within range, and between `clearance_m` and `max_height_m` above ground."""

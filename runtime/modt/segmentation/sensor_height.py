@@ -1,4 +1,4 @@
-"""Height of the sensor above the ground, given or estimated."""
+"""Estimation of the height of the sensor above the ground."""
 
 from __future__ import annotations
 
@@ -8,17 +8,6 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import RING_STEP, SECTORS, PolarGrid
 from modt.segmentation.groups import label_max, label_min
 from modt.segmentation.point_columns import PointColumns
-
-
-class FixedHeight:
-    """Height of the mount [m]."""
-
-    def __init__(self, height_m: float) -> None:
-        self.fixed_m = height_m
-
-    def height_m(self, points: PointColumns) -> float:
-        """The height of the mount [m]."""
-        return self.fixed_m
 
 
 class HeightEstimator:
@@ -61,8 +50,3 @@ class HeightEstimator:
             return None
         mode = (int(np.argmax(in_three_bins)) + 0.5) * bin_m
         return float(depth[np.abs(depth - mode) < 1.5 * bin_m].mean())
-
-
-def sensor_height(sensor: SensorConfig, config: SegmentationConfig) -> FixedHeight | HeightEstimator:
-    """The height of the profile, or its estimator where the profile has none."""
-    return HeightEstimator(sensor, config) if sensor.height_m is None else FixedHeight(sensor.height_m)
