@@ -116,7 +116,7 @@ def joined(proposals, groups):
 
 def tracks_at(boxes, *classes, points=60, **columns):
     """A table of tracks last observed at boxes (M, 7) of the world, classified as given, by default as background."""
-    observations = observe(frame_of(boxes, points=points)[1], EYE)
+    observations = observe(frame_of(boxes, points=2000)[1], EYE)  # dense: k-DOPs reach the corners
     n = len(observations)
     t = TrackTable.blank(n)
     t.id[:], t.age[:], t.hits[:], t.points[:] = np.arange(n), 10, 10, points
