@@ -124,7 +124,11 @@ def test_observations_are_those_of_the_new_proposals_deskewed_as_their_sources(s
 
 @given(scenes())
 def test_the_frame_before_is_left_as_it_was(scene):
-    before = scene.frame.proposals.box.copy(), scene.frame.proposals.occluded.copy(), scene.frame.observations.box.copy()
+    before = (
+        scene.frame.proposals.box.copy(),
+        scene.frame.proposals.occluded.copy(),
+        scene.frame.observations.box.copy(),
+    )
     scene.grouping.apply(scene.frame, scene.placement)
     after = scene.frame.proposals.box, scene.frame.proposals.occluded, scene.frame.observations.box
     for a, b in zip(before, after, strict=True):
