@@ -2,8 +2,9 @@
 
     python -m tests.golden.replay
 
-writes them anew. Every changed number is a change of behaviour: look at the difference before you commit it. A line is
-a frame. Its lists by track hold first the track of every proposal, in the order of the proposals, then the lost ones.
+writes them anew. Every changed number is a change of behaviour: look at the difference before you commit it.
+
+A line is a frame. Lists by track hold the track of every proposal, in the order of the proposals, then the lost ones.
 """
 
 from __future__ import annotations
