@@ -1,6 +1,7 @@
 """One way to regroup proposals: every member stays, boxes and observations follow the points."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 from hypothesis import given
@@ -124,15 +125,14 @@ def test_observations_are_those_of_the_new_proposals_deskewed_as_their_sources(s
 
 @given(scenes())
 def test_the_frame_before_is_left_as_it_was(scene):
-    before = (
-        scene.frame.proposals.box.copy(),
-        scene.frame.proposals.occluded.copy(),
-        scene.frame.observations.box.copy(),
-    )
+    def columns():
+        proposals, observations = scene.frame.proposals, scene.frame.observations
+        return [proposals.box, proposals.centroid, observations.box, observations.kdop]
+
+    before = [column.copy() for column in columns()]
     scene.grouping.apply(scene.frame, scene.placement)
-    after = scene.frame.proposals.box, scene.frame.proposals.occluded, scene.frame.observations.box
-    for a, b in zip(before, after, strict=True):
-        np.testing.assert_array_equal(a, b)
+    for was, column in zip(before, columns(), strict=True):
+        np.testing.assert_array_equal(column, was)
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=7), st.data())
@@ -141,7 +141,7 @@ def test_contiguous_runs_are_the_members_in_order_in_few_slices(counts, data):
     runs = contiguous_runs(order, offsets)
     rows = [row for run in runs for row in range(run.start, run.stop)]
     assert rows == [row for k in order for row in range(*offsets[k : k + 2])]
-    assert all(a.stop != b.start for a, b in zip(runs, runs[1:], strict=False))
+    assert all(a.stop != b.start for a, b in itertools.pairwise(runs))
 
 
 def test_corners_of_a_regrouped_box_enclose_both_parts():
