@@ -30,8 +30,10 @@ def test_an_empty_profile_is_the_default():
 
 
 def test_dump_and_parse_are_inverse():
-    config = profile.parse("fusion: {threshold: 0.9, alpha: [0.1, 0.2, 0.3]}\nsensor: {height_m: null}\n")
-    assert config.fusion.alpha == (0.1, 0.2, 0.3)
+    config = profile.parse(
+        "fusion: {object_threshold: 0.9, point_change: [0.1, 0.2, 0.3, 0.4]}\nsensor: {height_m: null}\n"
+    )
+    assert config.fusion.point_change == (0.1, 0.2, 0.3, 0.4)
     assert config.sensor.height_m is None
     assert profile.parse(profile.to_yaml(profile.dump(config))) == config
 
@@ -45,8 +47,8 @@ def test_dump_and_parse_are_inverse():
         ("segmentation:\n  min_points: 2.5\n", ["p.yaml:2", "min_points", "whole number"]),
         ("segmentation:\n  min_points: true\n", ["p.yaml:2", "min_points"]),
         ("tracking:\n  association: magic\n", ["p.yaml:2", "'magic'", "paper"]),
-        ("fusion:\n  alpha: [1, 2]\n", ["p.yaml:2", "alpha", "3 values"]),
-        ("fusion:\n  threshold: high\n", ["p.yaml:2", "threshold"]),
+        ("fusion:\n  point_change: [1, 2]\n", ["p.yaml:2", "point_change", "4 values"]),
+        ("fusion:\n  object_threshold: high\n", ["p.yaml:2", "object_threshold"]),
         ("fusion: 3\n", ["p.yaml:1", "no mapping"]),
         ("a: [1\n", ["p.yaml:", "no YAML"]),
         ("sensor: {}\nsensor: {}\n", ["p.yaml:2", "twice"]),
@@ -88,9 +90,13 @@ def test_an_unreadable_profile_is_one_clear_error(tmp_path):
 
 
 def test_every_value_declares_bounds_and_meaning():
-    for stage in dataclasses.fields(ProfileConfig):
-        for f in dataclasses.fields(stage.default_factory):
-            assert f.metadata.get("meaning"), f"{stage.name}.{f.name}"
+    configs = [(stage.name, stage.default_factory) for stage in dataclasses.fields(ProfileConfig)]
+    for name, config in configs:
+        for f in dataclasses.fields(config):
+            if isinstance(f.default_factory, type):
+                configs.append((f"{name}.{f.name}", f.default_factory))
+            else:
+                assert f.metadata.get("meaning"), f"{name}.{f.name}"
 
 
 def test_configuration_made_in_code_is_checked_too():

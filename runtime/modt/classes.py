@@ -23,7 +23,6 @@ class ClassSpec:
         kitti: KITTI object types that count as the class; results are written as the first.
         semantic_kitti: SemanticKITTI labels that count as the class.
         max_length_m, max_width_m: greatest size of one object, with room for the noise of its outline [m].
-        agility: process noise relative to that of a track of unknown class.
         person: is or carries a person: never part of a larger object.
         prior: frequency among proposals.
         point_change: relative change of the number of points that makes a view independent (alpha of Equation 4).
@@ -34,7 +33,6 @@ class ClassSpec:
     semantic_kitti: tuple[int, ...]
     max_length_m: float
     max_width_m: float
-    agility: float
     person: bool
     prior: float
     point_change: float
@@ -43,12 +41,12 @@ class ClassSpec:
 
 CLASSES: dict[ObjectClass, ClassSpec] = {
     # What counts as background may be a car that is not recognised yet: its size is that of a car.
-    ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, 0.25, False, 0.88, 0.5, "#8a8f98"),
-    ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, 1.5, False, 0.08, 0.2, "#2f6fde"),
+    ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, False, 0.88, 0.5, "#8a8f98"),
+    ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 0.08, 0.2, "#2f6fde"),
     ObjectClass.PEDESTRIAN: ClassSpec(
-        ("Pedestrian", "Person_sitting"), (30, 254), 1.1, 1.1, 0.75, True, 0.02, 0.16, "#d9480f"
+        ("Pedestrian", "Person_sitting"), (30, 254), 1.1, 1.1, True, 0.02, 0.16, "#d9480f"
     ),
-    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, 1.0, True, 0.02, 0.22, "#2b8a3e"),
+    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 0.02, 0.22, "#2b8a3e"),
 }
 """The classes in the order of their values."""
 

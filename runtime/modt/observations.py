@@ -1,8 +1,8 @@
-"""What a frame's proposals show, in the world."""
+"""Observations: the proposals of a frame in the world."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,12 +19,12 @@ class Observations:
     Attributes:
         box: (P, 7) world frame.
         centroid: (P, 2) mean of the points [m].
-        outline: (8, P) of the points, see outlines.py [m].
-        foot, top: (P,) heights of the lowest and the highest point [m].
+        kdop: (8, P) of the points, see geometry/kdop.py [m].
+        bottom, top: (P,) heights of the lowest and the highest point [m].
         count: (P,) points.
         range_m: (P,) distance from the sensor.
-        cut: (P,) the outline is cut short by the field of view or by something in front.
-        eye: (2,) where the sensor stands [m].
+        partial: (P,) cut by the field of view, or regrouped.
+        sensor_xy: (2,) position of the sensor [m].
     """
 
     box: Float64
@@ -42,24 +42,14 @@ class Observations:
 
     @property
     def position(self) -> Float64:
-        """(P, 2) middle of the outline along x and y [m]."""
+        """(P, 2) centre of the k-DOP along x and y [m]."""
         return centres(self.kdop)[::2].T
 
     def moved(self, step: Float64) -> Observations:
-        """Each of them where it is after a step (P, 2) [m, world]."""
+        """The same, each displaced by a step (P, 2) [m, world]."""
         box = self.box.copy()
         box[:, :2] += step
-        return Observations(
-            box=box,
-            centroid=self.centroid + step,
-            kdop=self.kdop + DIRECTIONS.T @ step.T,
-            bottom=self.bottom,
-            top=self.top,
-            count=self.count,
-            range_m=self.range_m,
-            partial=self.partial,
-            sensor_xy=self.sensor_xy,
-        )
+        return replace(self, box=box, centroid=self.centroid + step, kdop=self.kdop + DIRECTIONS.T @ step.T)
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""
@@ -76,14 +66,14 @@ class Observations:
         )
 
     def put(self, rows: Int, few: Observations) -> None:
-        """Write others over the rows given."""
+        """Overwrite the rows given."""
         self.box[rows], self.centroid[rows], self.kdop[:, rows] = few.box, few.centroid, few.kdop
         self.bottom[rows], self.top[rows], self.count[rows] = few.bottom, few.top, few.count
         self.range_m[rows], self.partial[rows] = few.range_m, few.partial
 
 
 def observe(proposals: Proposals, T_world_sensor: Float64) -> Observations:
-    """A frame's proposals, taken to the world by T_world_sensor (4, 4)."""
+    """Proposals of a frame taken to the world by T_world_sensor (4, 4)."""
     box = transform_boxes(T_world_sensor, proposals.box)
     return Observations(
         box=box,
@@ -93,7 +83,7 @@ def observe(proposals: Proposals, T_world_sensor: Float64) -> Observations:
         top=box[:, 2] + box[:, 5] / 2,
         count=proposals.count,
         range_m=np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]),
-        partial=proposals.truncated | proposals.occluded,
+        partial=proposals.truncated.copy(),
         sensor_xy=T_world_sensor[:2, 3],
     )
 

@@ -1,4 +1,4 @@
-"""Proposals and tracks made up for tests."""
+"""Synthetic proposals and tracks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from modt.types import Float32, Proposals, Tracks
 
 
 def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposals]:
-    """A frame of blobs with so many points each, 5 to 50 m away, between points that belong to nothing."""
+    """Frame of blobs of the given numbers of points, 5 to 50 m away, among as many points outside any proposal."""
     n = len(counts)
     bearing, distance = rng.uniform(-3, 3, n), rng.uniform(5, 50, n)
     centre = np.c_[distance * np.cos(bearing), distance * np.sin(bearing), np.full(n, -1.0)]
@@ -20,10 +20,10 @@ def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposa
     box = np.c_[centre, np.full((n, 3), 1.5), np.zeros(n)].reshape(n, 7)
     none = np.zeros(n, np.bool_)
     offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
-    return points, Proposals(members, offsets, points[members, :3].T, centre, box, none, none)
+    return points, Proposals(members, offsets, points[members, :3].T, centre, box, none)
 
 
-def seen(proposals: Proposals) -> Tracks:
+def new_tracks(proposals: Proposals) -> Tracks:
     """A new track for each proposal; the world frame is the sensor frame."""
     n = len(proposals)
     tracks = Tracks.blank(n)

@@ -1,4 +1,4 @@
-"""What a box says is learnt from crops and asked of proposals: both must describe it alike."""
+"""Box features of crops (training) and of proposals (run time) agree; training of box and reflectance classifiers."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt.classification.box_classifier import N_FEATURES, beam_sr, features
+from modt.classification.box_classifier import N_FEATURES, beam_solid_angle_sr, box_features
 from modt.classification.crops import Crops, gather
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
@@ -19,13 +19,13 @@ from tools.train.box_features import all_described, described
 from tools.train.dataset import SENSOR_HEIGHT_M, Dataset
 
 
-def test_crops_say_of_their_boxes_what_proposals_do() -> None:
+def test_features_of_crops_and_proposals_agree() -> None:
     sensor = SensorConfig(height_m=SENSOR_HEIGHT_M)
     frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
     proposals = Segmenter(SegmentationConfig(), sensor, FieldOfView()).segment(frame.points)
     crops = gather(frame.points, proposals, np.arange(len(proposals)), 100_000)
-    step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
-    expected = features(proposals.count, proposals.box, SENSOR_HEIGHT_M, step_sr)
+    beam_sr = beam_solid_angle_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
+    expected = box_features(proposals.count, proposals.box, SENSOR_HEIGHT_M, beam_sr)
     assert len(crops) > 50
     off = np.abs(described(crops) - expected)
     assert off[:, 4:].max() < 1e-3  # height, foot and top
@@ -33,7 +33,7 @@ def test_crops_say_of_their_boxes_what_proposals_do() -> None:
 
 
 def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
-    """Cubes of these sides, ten metres ahead, in four drives."""
+    """Cubes of the given sides, ten metres ahead, in four drives."""
     n = len(sides_m)
     xyz = (rng.uniform(-0.5, 0.5, (n, 60, 3)) * sides_m[:, None, None] + [10.0, 0.0, -1.0]).reshape(-1, 3)
     crops = Crops(xyz.astype(np.float32), np.arange(n + 1) * 60)
@@ -41,7 +41,7 @@ def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
     return data_of(crops, label, drive=drive, truth_label=label, truth_drive=drive)
 
 
-def test_training_finds_what_sizes_tell() -> None:
+def test_training_separates_classes_by_size() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.mlp import logits
     from tools.train.train_boxes import cross_validate, train
@@ -63,7 +63,7 @@ def test_training_finds_what_sizes_tell() -> None:
     assert shares == sorted(shares)
 
 
-def test_training_finds_what_reflectance_tells_beyond_the_box() -> None:
+def test_training_separates_classes_by_reflectance() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.mlp import logits
     from tools.train.train_reflectance import Described, cross_validate, train, weigh

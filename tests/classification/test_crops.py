@@ -1,4 +1,4 @@
-"""The network's input."""
+"""Gathering and canonical frame of crops."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_canonical_agrees_with_the_reference(counts: list[int], seed: int) -> No
 
 
 @given(angle=st.floats(-3.1, 3.1), seed=st.integers(0, 100))
-def test_a_crop_looks_alike_from_anywhere_in_the_sweep(angle: float, seed: int) -> None:
+def test_canonical_crops_are_independent_of_azimuth(angle: float, seed: int) -> None:
     points, proposals = blobs([30, 5], np.random.default_rng(seed))
     c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
     turned = points.copy()
@@ -51,17 +51,17 @@ def test_a_crop_looks_alike_from_anywhere_in_the_sweep(angle: float, seed: int) 
 
 
 @pytest.mark.parametrize(("distance_m", "rise_m", "lowest_m"), [(40.0, 0.8, 0.3), (40.0, -0.8, 0.3), (5.0, 1.0, 1.1)])
-def test_a_slope_lifts_what_is_far_and_what_hangs_near_by_hangs(
+def test_ground_follows_a_far_crop_and_not_a_near_one_above_it(
     distance_m: float, rise_m: float, lowest_m: float
 ) -> None:
     xyz = np.random.default_rng(0).uniform(0.0, 1.5, (40, 3)).astype(np.float32)
     xyz[0, 2] = 0.0
     xyz += np.array([distance_m - 0.75, -0.75, rise_m - 1.73 + 0.3], np.float32)
-    seen = canonical(Crops(xyz, np.array([0, 40])), 1.73)
-    assert seen.xyz[:, 2].min() == pytest.approx(lowest_m, abs=0.02)
+    crop = canonical(Crops(xyz, np.array([0, 40])), 1.73)
+    assert crop.xyz[:, 2].min() == pytest.approx(lowest_m, abs=0.02)
 
 
-def test_gather_keeps_the_order_asked_for() -> None:
+def test_gather_keeps_the_order_of_its_argument() -> None:
     points, proposals = blobs([3, 4, 5], np.random.default_rng(0))
     crops = gather(points, proposals, np.array([2, 0]), 100)
     assert crops.count.tolist() == [5, 3]
@@ -69,7 +69,7 @@ def test_gather_keeps_the_order_asked_for() -> None:
 
 
 @given(own=st.integers(1, 500), most=st.integers(1, 100))
-def test_a_large_proposal_is_thinned_evenly_and_always_alike(own: int, most: int) -> None:
+def test_a_large_proposal_is_subsampled_evenly(own: int, most: int) -> None:
     points, proposals = blobs([own], np.random.default_rng(own))
     crops = gather(points, proposals, np.array([0]), most)
     kept = [int(np.flatnonzero((points[proposals.members, :3] == p).all(axis=1))[0]) for p in crops.xyz]
@@ -80,7 +80,7 @@ def test_a_large_proposal_is_thinned_evenly_and_always_alike(own: int, most: int
 
 
 @given(counts=COUNTS)
-def test_padding_repeats_own_points_and_nothing_else(counts: list[int]) -> None:
+def test_padding_repeats_own_points(counts: list[int]) -> None:
     points, proposals = blobs(counts, np.random.default_rng(1))
     crops = gather(points, proposals, np.arange(len(counts)), 100)
     batch = crops.padded(np.arange(len(counts)))
@@ -91,7 +91,7 @@ def test_padding_repeats_own_points_and_nothing_else(counts: list[int]) -> None:
 
 
 @pytest.mark.parametrize("height_m", [0.5, 1.73])
-def test_no_proposals_make_no_crops(height_m: float) -> None:
+def test_no_proposals_give_no_crops(height_m: float) -> None:
     empty = gather(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64), 100)
     assert len(canonical(empty, height_m)) == 0
     assert isinstance(empty, Crops)

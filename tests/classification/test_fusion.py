@@ -1,4 +1,4 @@
-"""Which views are asked for, and what they add up to."""
+"""Selection and fusion of views."""
 
 from __future__ import annotations
 
@@ -12,33 +12,37 @@ from hypothesis.extra.numpy import arrays
 
 from modt.classes import ObjectClass
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
-from modt.classification.prior import at_least
+from modt.classification.prior import object_probability_reaches
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
-from modt.types import NONE, Bool, Float64, Proposals, Tracks
-from tests.classification.scenes import blobs, seen
+from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
+from tests.classification.scenes import blobs, new_tracks
 
 PAPER = FusionConfig(
     prior=(0.25, 0.25, 0.25),
     start_frame=1,
-    view_weight=1.0,
-    reopen_ratio=None,
-    bearing_deg=20.0,
-    range_ratio=0.2,
-    extent_ratio=0.3,
-    box_weight=0.0,
-    slip=0.0,
+    review_point_ratio=None,
+    extent_change=0.3,
+    box_update_weight=0.0,
+    mismatch_probability=0.0,
 )
 ALL = (EveryFrame(), FirstView(FusionConfig()), KeyViews(FusionConfig()), KeyViews(PAPER))
 
 
 def scene(counts: tuple[int, ...] = (50, 50)) -> tuple[Proposals, Tracks]:
     _, proposals = blobs(list(counts), np.random.default_rng(3))
-    return proposals, seen(proposals)
+    return proposals, new_tracks(proposals)
 
 
 def moved(proposals: Proposals, **columns: np.ndarray) -> Proposals:
     return dataclasses.replace(proposals, **columns)
+
+
+def fuse(fusion: Fusion, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+    """Fuse, and make final what is certain, as the state machine does."""
+    certain = fusion.fuse(tracks, proposals, rows, likelihood)
+    tracks.final[rows] = certain
+    return certain
 
 
 @pytest.mark.parametrize("fusion", ALL)
@@ -47,7 +51,7 @@ def moved(proposals: Proposals, **columns: np.ndarray) -> Proposals:
         arrays(np.float64, (2, 4), elements=st.floats(allow_nan=True, allow_infinity=True)), min_size=1, max_size=8
     )
 )
-def test_whatever_the_network_says_the_posterior_stays_one(fusion: Fusion, views: list[Float64]) -> None:
+def test_posterior_stays_a_distribution_for_any_likelihood(fusion: Fusion, views: list[Float64]) -> None:
     proposals, tracks = scene()
     rows = np.arange(2)
     for view in views:
@@ -62,9 +66,9 @@ def test_whatever_the_network_says_the_posterior_stays_one(fusion: Fusion, views
     arrays(np.float64, (5, 4), elements=st.floats(0.05, 1.0)),
     arrays(np.float64, (3,), elements=st.floats(0.02, 0.3)),
 )
-def test_key_views_multiply_as_equation_6_says(views: Float64, prior: Float64) -> None:
+def test_key_views_are_fused_by_equation_6(views: Float64, prior: Float64) -> None:
     views = views / views.sum(axis=1, keepdims=True)
-    config = dataclasses.replace(PAPER, prior=(prior[0], prior[1], prior[2]), threshold=1.0)
+    config = dataclasses.replace(PAPER, prior=(prior[0], prior[1], prior[2]), object_threshold=1.0)
     proposals, tracks = scene((50,))
     fusion = KeyViews(config)
     full = np.append(1 - prior.sum(), prior)
@@ -74,12 +78,12 @@ def test_key_views_multiply_as_equation_6_says(views: Float64, prior: Float64) -
         expected = expected * view / full  # slow reference: P(X) times each P(X|Y) / P(X)
         expected /= expected.sum()
         if expected.min() < 1e-3:
-            return  # the floor has a word from here on
+            return  # the floor applies from here on
         np.testing.assert_allclose(tracks.posterior[0], expected, rtol=1e-6)
     assert tracks.views[0] == len(views)
 
 
-def test_no_class_is_ruled_out_for_good() -> None:
+def test_no_class_is_excluded_for_good() -> None:
     proposals, tracks = scene((50,))
     fusion = KeyViews(PAPER)
     for _ in range(50):
@@ -89,35 +93,34 @@ def test_no_class_is_ruled_out_for_good() -> None:
     assert tracks.posterior[0].argmax() == 1
 
 
-def test_every_frame_asks_for_whatever_is_seen() -> None:
+def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     proposals, tracks = scene()
     tracks.final[:] = True
     tracks.proposal[1] = NONE
     assert EveryFrame().asks(tracks, proposals, np.zeros(2, np.bool_)).tolist() == [True, False]
 
 
-def test_first_view_is_final() -> None:
+def test_efficient_requests_one_view() -> None:
     proposals, tracks = scene()
-    fusion = FirstView(FusionConfig(once_from=3))
+    fusion = FirstView(FusionConfig(first_view_min_hits=3))
     asking, tracks.hits[:] = np.array([True, True]), 3
     assert fusion.asks(tracks, proposals, asking).all()
-    certain = fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
+    certain = fuse(fusion, tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
     assert certain.all()
     assert fusion.asks(tracks, proposals, asking).tolist() == [False, True]
-    tracks.hits[1] = 2  # it may be a flicker
+    tracks.hits[1] = 2  # too few
     assert not fusion.asks(tracks, proposals, asking).any()
 
 
-def test_a_distinct_first_view_settles_the_class_at_once() -> None:
+def test_a_distinct_first_view_is_certain() -> None:
     proposals, tracks = scene()
     fusion = KeyViews(FusionConfig())
     view = np.array([[0.98, 0.01, 0.005, 0.005], [0.5, 0.3, 0.1, 0.1]])
     assert fusion.fuse(tracks, proposals, np.arange(2), view).tolist() == [True, False]
-    assert tracks.final.tolist() == [True, False]
     assert tracks.views.tolist() == [1, 0]
 
 
-def test_an_early_view_is_forgotten_at_the_starting_frame() -> None:
+def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
     proposals, tracks = scene((50,))
     fusion, asking = KeyViews(FusionConfig(start_frame=3)), np.array([True])
     misled, clear = np.array([[0.1, 0.1, 0.7, 0.1]]), np.array([[0.2, 0.6, 0.1, 0.1]])
@@ -131,41 +134,29 @@ def test_an_early_view_is_forgotten_at_the_starting_frame() -> None:
     np.testing.assert_allclose(tracks.posterior[0], clear[0], rtol=1e-6)
 
 
-def test_a_class_settled_from_afar_is_looked_at_again_from_near() -> None:
+def test_a_final_class_of_few_points_is_reviewed_with_more() -> None:
     _, proposals = blobs([10, 10, 100], np.random.default_rng(0))
-    tracks = seen(proposals)
-    config = FusionConfig(reopen_ratio=4.0, reopen_points=60)
+    tracks = new_tracks(proposals)
+    config = FusionConfig(review_point_ratio=4.0, review_max_points=60)
     fusion = KeyViews(config)
     sure = np.tile([0.99, 0.005, 0.0025, 0.0025], (3, 1))
-    assert fusion.fuse(tracks, proposals, np.arange(3), sure).all()
+    assert fuse(fusion, tracks, proposals, np.arange(3), sure).all()
     tracks.proposal[1] = NONE
     near = moved(proposals, offsets=np.array([0, 50, 100, 600]))
-    settled = np.zeros(3, np.bool_)
-    assert fusion.asks(tracks, near, settled).tolist() == [True, False, False]
-    doubt = np.array([[0.3, 0.5, 0.1, 0.1]])
-    assert not fusion.fuse(tracks, near, np.array([0]), doubt).any()
+    asking = np.zeros(3, np.bool_)
+    assert fusion.asks(tracks, near, asking).tolist() == [True, False, False]
+    uncertain = np.array([[0.3, 0.5, 0.1, 0.1]])
+    assert not fuse(fusion, tracks, near, np.array([0]), uncertain).any()
     prior = np.append(1 - sum(config.prior), config.prior)
-    expected = (sure[0] / prior) ** (10 / 50) * doubt[0]  # what was known counts by its share of the points
+    expected = (sure[0] / prior) ** (10 / 50) * uncertain[0]  # previous evidence weighted by the ratio of points
     np.testing.assert_allclose(tracks.posterior[0], expected / expected.sum(), rtol=1e-6)
     nearer = moved(proposals, offsets=np.array([0, 200, 210, 310]))
     tracks.age[:] = 9
-    assert fusion.asks(tracks, nearer, settled)[0]
+    wants_class = np.array([True, False, False])  # the state machine asks again for a class in doubt
+    assert fusion.asks(tracks, nearer, wants_class)[0]
     tracks.final[0] = True
-    never = KeyViews(FusionConfig(reopen_ratio=None))
-    assert not never.asks(tracks, near, settled).any()
-
-
-def test_a_further_view_counts_by_its_weight() -> None:
-    views = np.array([[0.4, 0.3, 0.2, 0.1], [0.1, 0.6, 0.2, 0.1]])
-    posterior = []
-    for weight in (0.0, 0.5, 1.0):
-        proposals, tracks = scene((50,))
-        fusion = KeyViews(dataclasses.replace(PAPER, view_weight=weight))
-        for view in views:
-            fusion.fuse(tracks, proposals, np.array([0]), view[None])
-        posterior.append(tracks.posterior[0, 1])
-    assert posterior[0] == pytest.approx(0.3)
-    assert posterior[0] < posterior[1] < posterior[2]
+    never = KeyViews(FusionConfig(review_point_ratio=None))
+    assert not never.asks(tracks, near, asking).any()
 
 
 def after_a_view(config: FusionConfig) -> tuple[KeyViews, Proposals, Tracks]:
@@ -181,19 +172,19 @@ def asks(fusion: KeyViews, tracks: Tracks, proposals: Proposals) -> bool:
     return bool(fusion.asks(tracks, proposals, np.array([True]))[0])
 
 
-def test_the_same_view_is_no_new_observation() -> None:
+def test_an_unchanged_view_is_not_independent() -> None:
     fusion, proposals, tracks = after_a_view(PAPER)
     assert not asks(fusion, tracks, proposals)
 
 
 @pytest.mark.parametrize(("points", "independent"), [(50, False), (59, False), (62, True), (38, True)])
-def test_a_change_of_points_beyond_alpha_is_one(points: int, independent: bool) -> None:
+def test_independence_by_change_of_points(points: int, independent: bool) -> None:
     fusion, proposals, tracks = after_a_view(PAPER)
     assert asks(fusion, tracks, moved(proposals, offsets=np.array([0, points]))) == independent
 
 
-def test_alpha_is_that_of_the_likeliest_class() -> None:
-    config = dataclasses.replace(PAPER, alpha=(0.9, 0.1, 0.9))
+def test_point_change_is_that_of_the_most_probable_class() -> None:
+    config = dataclasses.replace(PAPER, point_change=(0.5, 0.9, 0.1, 0.9))
     fusion, proposals, tracks = after_a_view(config)
     more = moved(proposals, offsets=np.array([0, 60]))
     assert not asks(fusion, tracks, more)
@@ -201,170 +192,151 @@ def test_alpha_is_that_of_the_likeliest_class() -> None:
     assert asks(fusion, tracks, more)
 
 
-@pytest.mark.parametrize(("degrees", "independent"), [(10, False), (30, True), (-30, True), (355, False)])
-def test_a_change_of_bearing_is_one(degrees: float, independent: bool) -> None:
-    fusion, proposals, tracks = after_a_view(PAPER)
-    box = proposals.box.copy()
-    angle = np.deg2rad(degrees)
-    c, s = np.cos(angle), np.sin(angle)
-    box[:, :2] = box[:, :2] @ np.array([[c, s], [-s, c]])
-    assert asks(fusion, tracks, moved(proposals, box=box)) == independent
-
-
-def test_a_turning_sensor_does_not_change_the_view() -> None:
+def test_rotation_of_the_sensor_does_not_change_the_view() -> None:
     fusion, proposals, tracks = after_a_view(PAPER)
     box = proposals.box.copy()
     angle = np.deg2rad(60)
     c, s = np.cos(angle), np.sin(angle)
     box[:, :2] = box[:, :2] @ np.array([[c, s], [-s, c]])
-    box[:, 6] += angle  # the object turns with its bearing in the sensor frame, and stays put in the world
+    box[:, 6] += angle  # rotates in the sensor frame, static in the world
     assert not fusion.asks(tracks, moved(proposals, box=box), np.array([True]))[0]
 
 
-@pytest.mark.parametrize(("factor", "independent"), [(1.1, False), (1.3, True), (0.7, True)])
-def test_a_change_of_range_is_one(factor: float, independent: bool) -> None:
-    fusion, proposals, tracks = after_a_view(PAPER)
-    box = proposals.box * ([factor] * 2 + [1.0] * 5)
-    assert asks(fusion, tracks, moved(proposals, box=box)) == independent
-
-
 @pytest.mark.parametrize(("factor", "independent"), [(1.2, False), (1.5, True), (0.5, True)])
-def test_a_change_of_extent_is_one(factor: float, independent: bool) -> None:
+def test_independence_by_change_of_extent(factor: float, independent: bool) -> None:
     fusion, proposals, tracks = after_a_view(PAPER)
     box = proposals.box * np.array([1, 1, 1, 1, 1, factor, 1])
     assert asks(fusion, tracks, moved(proposals, box=box)) == independent
 
 
 @pytest.mark.parametrize("fusion", ALL)
-def test_no_tracks_are_no_trouble(fusion: Fusion) -> None:
+def test_no_tracks(fusion: Fusion) -> None:
     proposals = Proposals.empty()
-    tracks = seen(proposals)
+    tracks = new_tracks(proposals)
     assert len(fusion.asks(tracks, proposals, np.zeros(0, np.bool_))) == 0
     assert len(fusion.fuse(tracks, proposals, np.zeros(0, np.int64), np.zeros((0, 4)))) == 0
 
 
-class Told:
-    """A prior that says what a test tells it."""
+class FixedPrior:
+    """Prior given by a test."""
 
-    def __init__(self, *rows: list[float], share: float = 0.0) -> None:
+    def __init__(self, *rows: list[float], pool_weight: float = 0.0) -> None:
         self.rows = np.array(rows)
-        self.share = share
+        self.pool_weight = pool_weight
 
-    def of(self, proposals: Proposals) -> Float64:
+    def probability(self, proposals: Proposals) -> Float64:
         return self.rows
 
-    def likely(self, said: Float64, least: float) -> Bool:
-        return at_least(said, least)
+    def may_be_object(self, probability: Float64, threshold: float) -> Bool:
+        return object_probability_reaches(probability, threshold)
 
 
-WALL, DOUBTFUL, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
+WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
 
 
 @pytest.mark.parametrize(
     ("fusion", "asked"),
     [
-        (KeyViews(FusionConfig(), Told(WALL, DOUBTFUL, CAR)), [False, True, True]),
-        (FirstView(FusionConfig(), Told(WALL, DOUBTFUL, CAR)), [False, False, True]),  # its only view can wait
+        (KeyViews(FusionConfig(), FixedPrior(WALL, UNCERTAIN, CAR)), [False, True, True]),
+        (FirstView(FusionConfig(), FixedPrior(WALL, UNCERTAIN, CAR)), [False, False, True]),  # a higher threshold
     ],
 )
-def test_before_it_is_classified_a_track_is_what_its_box_makes_it(
-    fusion: KeyViews | FirstView, asked: list[bool]
-) -> None:
+def test_posterior_is_the_box_prior_before_the_first_view(fusion: KeyViews | FirstView, asked: list[bool]) -> None:
     proposals, tracks = scene((50, 50, 50))
     tracks.hits[:] = 1
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
-    np.testing.assert_allclose(tracks.posterior, [WALL, DOUBTFUL, CAR])
+    np.testing.assert_allclose(tracks.posterior, [WALL, UNCERTAIN, CAR])
     assert not tracks.viewed.any()
 
 
-def test_what_by_its_box_is_no_object_is_not_doubted() -> None:
+def test_no_review_where_the_box_excludes_an_object() -> None:
     proposals, tracks = scene((20, 20))
-    prior = Told(CAR, CAR)
-    fusion = KeyViews(FusionConfig(reopen_ratio=2.0), prior)
+    prior = FixedPrior(CAR, CAR)
+    fusion = KeyViews(FusionConfig(review_point_ratio=2.0), prior)
     fusion.asks(tracks, proposals, np.ones(2, np.bool_))
-    assert fusion.fuse(tracks, proposals, np.arange(2), np.array([[0.991, 0.003, 0.003, 0.003]] * 2)).all()
+    assert fuse(fusion, tracks, proposals, np.arange(2), np.array([[0.991, 0.003, 0.003, 0.003]] * 2)).all()
     prior.rows = np.array([WALL, CAR])
     nearer = moved(proposals, offsets=np.array([0, 100, 200]))
     assert fusion.asks(tracks, nearer, np.zeros(2, np.bool_)).tolist() == [False, True]
 
 
-def test_a_class_goes_with_what_the_box_says_since_the_view() -> None:
+def test_posterior_follows_the_change_of_the_box_prior() -> None:
     proposals, tracks = scene((50,))
-    prior = Told(DOUBTFUL)
-    fusion, view = KeyViews(FusionConfig(box_weight=1.0, slip=0.0), prior), np.array([[0.5, 0.3, 0.1, 0.1]])
-    asking = np.array([True])
+    prior = FixedPrior(UNCERTAIN)
+    fusion = KeyViews(FusionConfig(box_update_weight=1.0, mismatch_probability=0.0), prior)
+    view, asking = np.array([[0.5, 0.3, 0.1, 0.1]]), np.array([True])
     fusion.asks(tracks, proposals, asking)
     fusion.fuse(tracks, proposals, np.array([0]), view)
     prior.rows = np.array([CAR])
     fusion.asks(tracks, proposals, asking)
-    expected = view[0] * np.array(CAR) / np.array(DOUBTFUL)
+    expected = view[0] * np.array(CAR) / np.array(UNCERTAIN)
     np.testing.assert_allclose(tracks.posterior[0], expected / expected.sum(), rtol=1e-6)
-    prior.rows = np.array([DOUBTFUL])
+    prior.rows = np.array([UNCERTAIN])
     fusion.asks(tracks, proposals, asking)
     np.testing.assert_allclose(tracks.posterior[0], view[0], rtol=1e-6)
 
 
-def test_a_proposal_may_be_something_else_than_its_track() -> None:
+def test_posterior_mixes_in_the_box_prior_by_mismatch_probability() -> None:
     proposals, tracks = scene((50, 50))
-    prior = Told(CAR, CAR)
-    fusion = KeyViews(FusionConfig(slip=0.2), prior)
+    prior = FixedPrior(CAR, CAR)
+    fusion = KeyViews(FusionConfig(mismatch_probability=0.2), prior)
     fusion.asks(tracks, proposals, np.ones(2, np.bool_))
     view = np.array([[0.001, 0.997, 0.001, 0.001]] * 2)
-    assert fusion.fuse(tracks, proposals, np.arange(2), view).all()
-    np.testing.assert_allclose(tracks.posterior, view, rtol=1e-6)  # who was looked at is what was seen
+    assert fuse(fusion, tracks, proposals, np.arange(2), view).all()
+    np.testing.assert_allclose(tracks.posterior, view, rtol=1e-6)  # no mismatch in the frame of the view
     fusion.asks(tracks, proposals, np.zeros(2, np.bool_))
     np.testing.assert_allclose(tracks.posterior, 0.8 * view + 0.2 * np.array(CAR), rtol=1e-6)
 
 
 @pytest.mark.parametrize("make", [FirstView, KeyViews])
-def test_a_settled_class_stays_and_how_sure_it_is_goes_with_the_box(make: type[FirstView | KeyViews]) -> None:
+def test_a_final_class_stays_while_its_posterior_follows_the_box(make: type[FirstView | KeyViews]) -> None:
     proposals, tracks = scene((50,))
-    prior = Told(CAR)
-    fusion, unasked = make(FusionConfig(box_weight=1.0), prior), np.array([False])
+    prior = FixedPrior(CAR)
+    fusion, asking = make(FusionConfig(box_update_weight=1.0), prior), np.array([False])
     fusion.asks(tracks, proposals, np.array([True]))
-    assert fusion.fuse(tracks, proposals, np.array([0]), np.array([[0.04, 0.92, 0.02, 0.02]])).all()
+    assert fuse(fusion, tracks, proposals, np.array([0]), np.array([[0.04, 0.92, 0.02, 0.02]])).all()
     prior.rows = np.array([WALL])
-    assert not fusion.asks(tracks, proposals, unasked).any()
+    assert not fusion.asks(tracks, proposals, asking).any()
     assert tracks.posterior[0].argmax() == ObjectClass.BACKGROUND
     assert tracks.object_class.tolist() == [ObjectClass.CAR]
     tracks.final[:] = False
     assert tracks.object_class.tolist() == [ObjectClass.BACKGROUND]
 
 
-def test_a_further_view_takes_the_place_of_what_the_box_said_since_the_last() -> None:
+def test_a_further_view_replaces_updates_by_the_box_since_the_last() -> None:
     views = np.array([[0.5, 0.3, 0.1, 0.1], [0.4, 0.4, 0.1, 0.1]])
     fused = []
-    for between in (DOUBTFUL, CAR):
+    for between in (UNCERTAIN, CAR):
         proposals, tracks = scene((50,))
-        prior = Told(DOUBTFUL)
-        fusion = KeyViews(dataclasses.replace(PAPER, box_weight=1.0), prior)
-        for said, view in zip((DOUBTFUL, between), views, strict=True):
-            prior.rows = np.array([said])
+        prior = FixedPrior(UNCERTAIN)
+        fusion = KeyViews(dataclasses.replace(PAPER, box_update_weight=1.0), prior)
+        for box_prior, view in zip((UNCERTAIN, between), views, strict=True):
+            prior.rows = np.array([box_prior])
             fusion.asks(tracks, proposals, np.array([True]))
             fusion.fuse(tracks, proposals, np.array([0]), view[None])
         fused.append(tracks.posterior[0].copy())
     np.testing.assert_allclose(fused[0], fused[1])
 
 
-@pytest.mark.parametrize("share", [0.0, 0.4])
-def test_a_further_view_that_says_what_is_known_without_it_adds_nothing(share: float) -> None:
+@pytest.mark.parametrize("pool_weight", [0.0, 0.4])
+def test_a_further_view_equal_to_the_prior_changes_nothing(pool_weight: float) -> None:
     proposals, tracks = scene((50,))
     config = dataclasses.replace(PAPER, prior=(0.08, 0.02, 0.02))
-    fusion, row = KeyViews(config, Told(DOUBTFUL, share=share)), np.array([0])
+    fusion, row = KeyViews(config, FixedPrior(UNCERTAIN, pool_weight=pool_weight)), np.array([0])
     fusion.asks(tracks, proposals, np.array([True]))
     first = np.array([[0.5, 0.3, 0.1, 0.1]])
     fusion.fuse(tracks, proposals, row, first)
-    known = np.array([0.88, 0.08, 0.02, 0.02]) ** (1 - share) * np.array(DOUBTFUL) ** share
-    fusion.fuse(tracks, proposals, row, known[None] / known.sum())
+    pooled_prior = np.array([0.88, 0.08, 0.02, 0.02]) ** (1 - pool_weight) * np.array(UNCERTAIN) ** pool_weight
+    fusion.fuse(tracks, proposals, row, pooled_prior[None] / pooled_prior.sum())
     np.testing.assert_allclose(tracks.posterior, first, rtol=1e-6)
     assert tracks.views.tolist() == [2]
 
 
-def test_what_took_its_class_over_is_looked_at_where_its_box_may_be_an_objects() -> None:
+def test_an_inherited_class_is_reviewed_where_the_box_may_be_an_object() -> None:
     proposals, tracks = scene((50, 50))
     tracks.final[:] = True
     tracks.posterior[:] = [1.0, 0.0, 0.0, 0.0]
-    settled = np.zeros(2, np.bool_)
-    assert KeyViews(FusionConfig(), Told(WALL, CAR)).asks(tracks, proposals, settled).tolist() == [False, True]
-    assert tracks.posterior[:, 0].tolist() == [1.0, 1.0]  # until it is classified, the class taken over stands
-    assert not FirstView(FusionConfig(), Told(WALL, CAR)).asks(tracks, proposals, settled).any()
+    asking = np.zeros(2, np.bool_)
+    assert KeyViews(FusionConfig(), FixedPrior(WALL, CAR)).asks(tracks, proposals, asking).tolist() == [False, True]
+    assert tracks.posterior[:, 0].tolist() == [1.0, 1.0]  # the inherited class holds until then
+    assert not FirstView(FusionConfig(), FixedPrior(WALL, CAR)).asks(tracks, proposals, asking).any()

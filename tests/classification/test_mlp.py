@@ -1,4 +1,4 @@
-"""Small networks in the metadata of a model."""
+"""The perceptron and its JSON form."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.classification.mlp import as_lists, logits, of_lists
+from modt.classification.mlp import from_lists, logits, to_lists
 from modt.types import Float64
 
 RNG = np.random.default_rng(5)
@@ -20,7 +20,7 @@ LAYERS = [(RNG.normal(size=(FEATURES, 5)), RNG.normal(size=5)), (RNG.normal(size
 
 
 @given(arrays(np.float64, (6, FEATURES), elements=st.floats(-5, 5)))
-def test_the_network_is_what_its_layers_say(feature: Float64) -> None:
+def test_logits_agree_with_the_reference(feature: Float64) -> None:
     (w0, b0), (w1, b1) = LAYERS
     for row, found in zip(feature, logits(LAYERS, feature), strict=True):
         hidden = [np.tanh(sum(row[i] * w0[i, j] for i in range(FEATURES)) + b0[j]) for j in range(5)]
@@ -28,11 +28,11 @@ def test_the_network_is_what_its_layers_say(feature: Float64) -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-def test_layers_survive_json() -> None:
-    held = of_lists(json.loads(json.dumps(as_lists(LAYERS))), FEATURES)
-    for (weight, bias), (held_weight, held_bias) in zip(LAYERS, held, strict=True):
-        np.testing.assert_array_equal(weight, held_weight)
-        np.testing.assert_array_equal(bias, held_bias)
+def test_layers_round_trip_through_json() -> None:
+    loaded = from_lists(json.loads(json.dumps(to_lists(LAYERS))), FEATURES)
+    for (weight, bias), (loaded_weight, loaded_bias) in zip(LAYERS, loaded, strict=True):
+        np.testing.assert_array_equal(weight, loaded_weight)
+        np.testing.assert_array_equal(bias, loaded_bias)
 
 
 @pytest.mark.parametrize(
@@ -47,6 +47,6 @@ def test_layers_survive_json() -> None:
         3,
     ],
 )
-def test_what_is_no_such_network_is_refused(lists: Any) -> None:
+def test_malformed_layers_are_rejected(lists: Any) -> None:
     with pytest.raises((TypeError, ValueError)):
-        of_lists(lists, FEATURES)
+        from_lists(lists, FEATURES)

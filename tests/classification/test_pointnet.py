@@ -1,4 +1,4 @@
-"""The network: exact whatever the batch, and particular about its model file."""
+"""The network: independent of batching, strict about its model file."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_the_exported_graph_agrees_with_the_textbook(tmp_path: Path, pool_first:
         np.testing.assert_allclose(net.infer(batch), expected, atol=1e-4)
 
 
-def test_company_and_order_change_nothing(shipped: PointNet) -> None:
+def test_result_is_independent_of_batch_and_order(shipped: PointNet) -> None:
     points, proposals = blobs([5, 300, 17, 17, 90, 1, 450, 33, 60, 8, 12], np.random.default_rng(0))
     rows = np.arange(len(proposals))
     together = shipped.classify(points, proposals, rows)
@@ -85,25 +85,25 @@ def test_company_and_order_change_nothing(shipped: PointNet) -> None:
     np.testing.assert_allclose(shipped.classify(points, proposals, rows[::-1]), together[::-1], atol=1e-5)
 
 
-def test_two_calls_give_the_same_bytes(shipped: PointNet) -> None:
+def test_calls_are_deterministic(shipped: PointNet) -> None:
     points, proposals = blobs([40, 7, 200], np.random.default_rng(0))
     first = shipped.classify(points, proposals, np.arange(3))
     assert first.tobytes() == shipped.classify(points, proposals, np.arange(3)).tobytes()
 
 
-def test_a_height_that_the_proposals_know_is_believed(tmp_path: Path) -> None:
+def test_sensor_height_of_the_proposals_overrides_the_profile(tmp_path: Path) -> None:
     model = str(save(tmp_path, random_layers(3)))
     low = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=0.4))
     unknown = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=None))
     points, proposals = blobs([40, 7, 200], np.random.default_rng(5))
     rows = np.arange(3)
-    told = dataclasses.replace(proposals, sensor_height_m=0.4)
+    measured = dataclasses.replace(proposals, sensor_height_m=0.4)
     expected = low.classify(points, proposals, rows)
-    assert np.array_equal(unknown.classify(points, told, rows), expected)
+    assert np.array_equal(unknown.classify(points, measured, rows), expected)
     assert not np.allclose(unknown.classify(points, proposals, rows), expected, atol=1e-3)
 
 
-def test_rows_are_distributions(shipped: PointNet) -> None:
+def test_rows_are_probability_distributions(shipped: PointNet) -> None:
     points, proposals = blobs([40, 7, 200, 5], np.random.default_rng(4))
     out = shipped.classify(points, proposals, np.arange(4))
     assert out.shape == (4, 4)
@@ -117,31 +117,31 @@ def test_no_proposals_give_no_rows(shipped: PointNet) -> None:
 
 
 @pytest.mark.parametrize("name", [path.stem for path in sorted(assets.folder("models").glob("*.onnx"))])
-def test_every_model_has_a_card_that_names_its_hash_and_licence(name: str) -> None:
+def test_every_model_has_a_card_with_its_hash_and_licence(name: str) -> None:
     net = network(name)
     card = net.path.with_suffix(".md").read_text(encoding="utf-8")
     assert net.sha256 in card
     assert "licence:" in card
 
 
-def test_an_unknown_model_is_misuse() -> None:
+def test_unknown_model_is_misuse() -> None:
     with pytest.raises(MisuseError, match="pointnet-kitti"):
         network("no-such-model")
 
 
-def test_another_file_than_the_card_describes_is_misuse(tmp_path: Path, shipped: PointNet) -> None:
+def test_model_that_differs_from_its_card_is_misuse(tmp_path: Path, shipped: PointNet) -> None:
     model = save(tmp_path, random_layers(0))
     shutil.copy(shipped.path.with_suffix(".md"), model.with_suffix(".md"))
     with pytest.raises(MisuseError, match=r"net\.onnx: is not the model of net\.md"):
         network(model)
 
 
-def test_a_model_without_a_card_is_taken_at_its_word(tmp_path: Path) -> None:
+def test_model_without_card_is_accepted(tmp_path: Path) -> None:
     assert len(network(save(tmp_path, random_layers(0))).sha256) == 64
 
 
 @pytest.mark.parametrize("content", [b"", b"no model", b"\x08\x07\x12\x00"])
-def test_a_file_that_is_no_model_is_misuse(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_not_a_model_is_misuse(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "net.onnx"
     path.write_bytes(content)
     with pytest.raises(MisuseError, match=r"net\.onnx") as caught:
@@ -150,7 +150,7 @@ def test_a_file_that_is_no_model_is_misuse(tmp_path: Path, content: bytes) -> No
 
 
 @pytest.mark.parametrize("width", [(4, 4), (3, 5)])
-def test_a_model_of_other_shapes_is_misuse(tmp_path: Path, width: tuple[int, int]) -> None:
+def test_model_of_other_shapes_is_misuse(tmp_path: Path, width: tuple[int, int]) -> None:
     model = graph(random_layers(0))
     model.graph.input[0].type.tensor_type.shape.dim[2].dim_value = width[0]
     model.graph.output[0].type.tensor_type.shape.dim[1].dim_value = width[1]
@@ -161,5 +161,5 @@ def test_a_model_of_other_shapes_is_misuse(tmp_path: Path, width: tuple[int, int
     model.graph.node.extend([flat, onnx.helper.make_node("MatMul", ["pooled", "w"], ["probability"])])
     path = tmp_path / "net.onnx"
     path.write_bytes(model.SerializeToString())
-    with pytest.raises(MisuseError, match="takes and gives"):
+    with pytest.raises(MisuseError, match="inputs and outputs"):
         network(path)

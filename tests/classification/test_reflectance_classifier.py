@@ -1,4 +1,4 @@
-"""What the brightness of returns adds to what is thought of a proposal."""
+"""The reflectance classifier, in the prior and in the pool with the network."""
 
 from __future__ import annotations
 
@@ -11,13 +11,18 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
-from modt.classification.box_classifier import METADATA as BOX_PRIOR
-from modt.classification.box_classifier import N_FEATURES, KnownBoxes, described
-from modt.classification.box_classifier import encode as encode_boxes
+from modt.classification import box_classifier
+from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, proposal_features
 from modt.classification.mlp import logits
 from modt.classification.pointnet import PointNet
-from modt.classification.prior import BoxPrior, prior_of
-from modt.classification.reflectance_classifier import METADATA, NoEvidence, Reflectance, encode, evidence_of
+from modt.classification.prior import BoxPrior, make_prior
+from modt.classification.reflectance_classifier import (
+    METADATA_KEY,
+    MlpReflectanceClassifier,
+    NoReflectanceClassifier,
+    from_metadata,
+    to_metadata,
+)
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import N_REFLECTANCE, Proposals
@@ -25,62 +30,63 @@ from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)
 BOX_LAYERS = [(RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4))]
-BOXES = KnownBoxes(BOX_LAYERS, 0.0)
+BOXES = MlpBoxClassifier(BOX_LAYERS, 0.0)
 LAYERS = [(RNG.normal(size=(N_FEATURES + N_REFLECTANCE, 4)), RNG.normal(size=4))]
-BRIGHTNESS = RNG.uniform(0, 1, (3, N_REFLECTANCE))
+REFLECTANCE = RNG.uniform(0, 1, (3, N_REFLECTANCE))
 SENSOR = SensorConfig(reflectance="hdl-64e")
-HELD = {METADATA: encode(LAYERS, 0.0, 0.5, "hdl-64e")}
+WITHOUT = BoxPrior(BOXES, NoReflectanceClassifier(), SENSOR)
+"""The prior without reflectance."""
+METADATA = {METADATA_KEY: to_metadata(LAYERS, 0.0, 0.5, "hdl-64e")}
 
 
-def lit() -> Proposals:
-    """Three proposals whose returns were measured."""
+def measured() -> Proposals:
+    """Three proposals with reflectance."""
     _, proposals = blobs([10, 30, 60], np.random.default_rng(0))
-    return dataclasses.replace(proposals, reflectance=BRIGHTNESS)
+    return dataclasses.replace(proposals, reflectance=REFLECTANCE)
 
 
-def test_the_prior_takes_all_of_it() -> None:
-    proposals = lit()
-    boxes = described(proposals, slice(None), SENSOR)
-    score = logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, BRIGHTNESS])
+def test_prior_is_box_probability_times_reflectance_likelihood() -> None:
+    proposals = measured()
+    boxes = proposal_features(proposals, slice(None), SENSOR)
+    score = logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE])
     expected = np.exp(score) / np.exp(score).sum(axis=1, keepdims=True)
-    evidence = evidence_of(HELD, N_FEATURES, SENSOR)
-    prior = prior_of(BOXES, (0.1, 0.1, 0.1), SENSOR, evidence)
-    np.testing.assert_allclose(prior.of(proposals), expected)
+    reflectance = from_metadata(METADATA, SENSOR)
+    prior = make_prior(BOXES, reflectance, (0.1, 0.1, 0.1), SENSOR)
+    np.testing.assert_allclose(prior.probability(proposals), expected)
 
 
-def test_a_sensor_on_another_scale_and_a_model_without_it_go_by_shape() -> None:
-    for metadata, sensor in ((HELD, SensorConfig()), ({}, SENSOR)):
-        evidence = evidence_of(metadata, N_FEATURES, sensor)
-        assert isinstance(evidence, NoEvidence)
-        assert evidence.weight == 0
-        assert not evidence.of(np.ones((3, N_FEATURES)), BRIGHTNESS).any()
+def test_another_sensor_or_a_model_without_classifier_adds_nothing() -> None:
+    for metadata, sensor in ((METADATA, SensorConfig()), ({}, SENSOR)):
+        reflectance = from_metadata(metadata, sensor)
+        assert isinstance(reflectance, NoReflectanceClassifier)
+        assert reflectance.weight == 0
+        assert not reflectance.log_likelihood(np.ones((3, N_FEATURES)), REFLECTANCE).any()
 
 
-def test_a_sweep_without_reflectance_goes_by_shape_and_says_so_once(caplog: pytest.LogCaptureFixture) -> None:
-    evidence = evidence_of(HELD, N_FEATURES, SENSOR)
-    bare = dataclasses.replace(lit(), reflectance=None)
+def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.LogCaptureFixture) -> None:
+    reflectance = from_metadata(METADATA, SENSOR)
+    bare = dataclasses.replace(measured(), reflectance=None)
     with caplog.at_level(logging.WARNING):
         for _ in range(3):
-            np.testing.assert_array_equal(
-                BoxPrior(BOXES, SENSOR, evidence).of(bare), BoxPrior(BOXES, SENSOR, NoEvidence()).of(bare)
-            )
+            probability = BoxPrior(BOXES, reflectance, SENSOR).probability(bare)
+            np.testing.assert_array_equal(probability, WITHOUT.probability(bare))
     assert len(caplog.records) == 1
     assert "sensor.reflectance" in caplog.text
 
 
-def test_a_proposal_without_reflectance_goes_by_shape_and_the_others_do_not_mind() -> None:
-    evidence = evidence_of(HELD, N_FEATURES, SENSOR)
-    prior, whole = BoxPrior(BOXES, SENSOR, evidence), lit()
-    told = BRIGHTNESS.copy()
-    told[1] = np.nan
-    found = prior.of(dataclasses.replace(whole, reflectance=told))
-    np.testing.assert_array_equal(found[1], BoxPrior(BOXES, SENSOR, NoEvidence()).of(whole)[1])
-    np.testing.assert_array_equal(found[[0, 2]], prior.of(whole)[[0, 2]])
+def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
+    reflectance = from_metadata(METADATA, SENSOR)
+    prior, whole = BoxPrior(BOXES, reflectance, SENSOR), measured()
+    statistics = REFLECTANCE.copy()
+    statistics[1] = np.nan
+    probability = prior.probability(dataclasses.replace(whole, reflectance=statistics))
+    np.testing.assert_array_equal(probability[1], WITHOUT.probability(whole)[1])
+    np.testing.assert_array_equal(probability[[0, 2]], prior.probability(whole)[[0, 2]])
 
 
-def test_an_empty_frame_is_no_lack_of_reflectance(caplog: pytest.LogCaptureFixture) -> None:
-    evidence = evidence_of(HELD, N_FEATURES, SENSOR)
-    assert BoxPrior(BOXES, SENSOR, evidence).of(Proposals.empty()).shape == (0, 4)
+def test_no_warning_for_an_empty_frame(caplog: pytest.LogCaptureFixture) -> None:
+    reflectance = from_metadata(METADATA, SENSOR)
+    assert BoxPrior(BOXES, reflectance, SENSOR).probability(Proposals.empty()).shape == (0, 4)
     assert not caplog.records
 
 
@@ -95,13 +101,13 @@ def test_an_empty_frame_is_no_lack_of_reflectance(caplog: pytest.LogCaptureFixtu
         json.dumps({"sensor": "hdl-64e", "share": 0.5, "weight": 0.5, "layers": []}),
     ],
 )
-def test_evidence_that_cannot_be_used_is_refused(text: str) -> None:
+def test_malformed_metadata_is_rejected(text: str) -> None:
     with pytest.raises((KeyError, TypeError, ValueError)):
-        evidence_of({METADATA: text}, N_FEATURES, SENSOR)
+        from_metadata({METADATA_KEY: text}, SENSOR)
 
 
 def _with_metadata(path: Path, metadata: dict[str, str]) -> ClassificationConfig:
-    """The model that ships with another metadata."""
+    """The shipped model with other metadata."""
     onnx = pytest.importorskip("onnx", reason="extra [train] is not installed")
     model = onnx.load(PointNet(ClassificationConfig(), SensorConfig()).path)
     onnx.helper.set_model_props(model, metadata)
@@ -109,49 +115,59 @@ def _with_metadata(path: Path, metadata: dict[str, str]) -> ClassificationConfig
     return ClassificationConfig(model=str(path))
 
 
-def test_the_network_takes_its_share_by_bayes_rule(tmp_path: Path) -> None:
+def test_network_and_weighted_reflectance_likelihood_are_multiplied(tmp_path: Path) -> None:
     points, _ = blobs([10, 30, 60], np.random.default_rng(0))
-    proposals, which = lit(), np.array([2, 0])
-    dark, seen = (PointNet(_with_metadata(tmp_path / f"{i}.onnx", held), SENSOR) for i, held in enumerate(({}, HELD)))
-    shape, both = (network.classify(points, proposals, which) for network in (dark, seen))
-    added = logits(LAYERS, np.c_[described(proposals, which, SENSOR), BRIGHTNESS[which]])
+    proposals, which = measured(), np.array([2, 0])
+    shape_only = PointNet(_with_metadata(tmp_path / "shape_only.onnx", {}), SENSOR)
+    with_reflectance = PointNet(_with_metadata(tmp_path / "with_reflectance.onnx", METADATA), SENSOR)
+    shape, both = (network.classify(points, proposals, which) for network in (shape_only, with_reflectance))
+    added = logits(LAYERS, np.c_[proposal_features(proposals, which, SENSOR), REFLECTANCE[which]])
     expected = shape * np.exp(0.5 * added)
     np.testing.assert_allclose(both, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
     bare = dataclasses.replace(proposals, reflectance=None)
-    np.testing.assert_allclose(seen.classify(points, bare, which), shape, rtol=1e-5)
+    np.testing.assert_allclose(with_reflectance.classify(points, bare, which), shape, rtol=1e-5)
 
 
 def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     points, _ = blobs([10, 30, 60], np.random.default_rng(0))
-    proposals, which = lit(), np.array([2, 0])
-    held = {BOX_PRIOR: encode_boxes(BOX_LAYERS, 0.2), METADATA: encode(LAYERS, 0.3, 0.5, "hdl-64e")}
+    proposals, which = measured(), np.array([2, 0])
+    metadata = {
+        box_classifier.METADATA_KEY: box_classifier.to_metadata(BOX_LAYERS, 0.2),
+        METADATA_KEY: to_metadata(LAYERS, 0.3, 0.5, "hdl-64e"),
+    }
     alone = PointNet(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
-    model = _with_metadata(tmp_path / "held.onnx", held)
-    shape, feature = alone.classify(points, proposals, which), described(proposals, which, SENSOR)
-    box, told = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, BRIGHTNESS[which]]))
-    for sensor, expected in ((SENSOR, shape**0.7 * box**0.3 * told**0.5), (SensorConfig(), shape**0.8 * box**0.2)):
+    model = _with_metadata(tmp_path / "pooled.onnx", metadata)
+    shape, feature = alone.classify(points, proposals, which), proposal_features(proposals, which, SENSOR)
+    box, likelihood = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
+    for sensor, expected in (
+        (SENSOR, shape**0.7 * box**0.3 * likelihood**0.5),
+        (SensorConfig(), shape**0.8 * box**0.2),
+    ):
         network = PointNet(model, sensor)
-        word = network.classify(points, proposals, which)
-        np.testing.assert_allclose(word, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
-        prior = prior_of(network.boxes, (0.1, 0.1, 0.1), sensor, network.evidence)
-        assert prior.share == (0.3 if sensor is SENSOR else 0.2)
+        probability = network.classify(points, proposals, which)
+        np.testing.assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
+        prior = make_prior(network.boxes, network.reflectance, (0.1, 0.1, 0.1), sensor)
+        assert prior.pool_weight == (0.3 if sensor is SENSOR else 0.2)
 
 
-@pytest.mark.parametrize("key", [METADATA, BOX_PRIOR])
-def test_a_model_that_holds_nonsense_is_misuse(tmp_path: Path, key: str) -> None:
-    with pytest.raises(MisuseError, match="boxes and reflectance"):
+@pytest.mark.parametrize("key", [METADATA_KEY, box_classifier.METADATA_KEY])
+def test_model_with_malformed_metadata_is_misuse(tmp_path: Path, key: str) -> None:
+    with pytest.raises(MisuseError, match="reflectance classifier"):
         PointNet(_with_metadata(tmp_path / "model.onnx", {key: "{}"}), SENSOR)
 
 
-def test_the_model_that_ships_knows_number_plates_from_leaves() -> None:
+def test_shipped_model_separates_number_plates_from_leaves() -> None:
     model = PointNet(ClassificationConfig(), SENSOR)
-    evidence = model.evidence
-    assert isinstance(evidence, Reflectance)
+    reflectance = model.reflectance
+    assert isinstance(reflectance, MlpReflectanceClassifier)
     _, proposals = blobs([150], np.random.default_rng(0))
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
-    seen = dataclasses.replace(proposals, box=box)
+    proposals = dataclasses.replace(proposals, box=box)
     plates, leaves = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]]), np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
-    prior = prior_of(model.boxes, (0.08, 0.02, 0.02), SENSOR, evidence)
-    car, bush = (prior.of(dataclasses.replace(seen, reflectance=told))[0] for told in (plates, leaves))
+    prior = make_prior(model.boxes, reflectance, (0.08, 0.02, 0.02), SENSOR)
+    car, bush = (
+        prior.probability(dataclasses.replace(proposals, reflectance=statistics))[0]
+        for statistics in (plates, leaves)
+    )
     assert car[ObjectClass.CAR] > 0.9
     assert bush[ObjectClass.CAR] < 0.3

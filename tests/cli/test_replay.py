@@ -220,7 +220,7 @@ def test_frames_without_reflectance_are_counted_where_the_sensor_has_it(tmp_path
         faults = json.loads((tmp_path / "run" / "summary.json").read_text())["faults"]
         assert faults == {"count": 0, "skipped": 0, "first": None, "frames_without_reflectance": unlit}
         assert ("without reflectance: 2 frames" in done.stdout) is (unlit > 0)
-        assert done.stderr.count("carries no reflectance") == (unlit > 0)
+        assert done.stderr.count("has no reflectance") == (unlit > 0)
 
 
 def test_a_stream_of_bad_scans_fails(tmp_path):

@@ -5,11 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modt.geometry.kdop import DIRECTIONS, PAD_M, centres, coverage, kdops, overlapping_pairs, width_sum, widths
+from modt.geometry.kdop import DIRECTIONS, centres, coverage, kdops, overlapping_pairs, width_sum, widths
 from tests.tracking.tracking_scenes import box, frame_of
 
-SIZES = {"compared": (15, 15), "compared in cells": (90, 70), "swept": (640, 650)}
-"""Numbers of k-DOPs for which overlapping_pairs takes each of its three ways."""
+SIZES = {"exact": (15, 15), "in cells": (90, 70)}
+"""Numbers of k-DOPs for which overlapping_pairs takes each of its two ways."""
+PAD_M = 0.15
 at_each_size = pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
 
 

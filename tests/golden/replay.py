@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from modt import assembly
 from modt.classes import CLASSES
-from modt.cli import assemble
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
@@ -28,14 +28,14 @@ FOLDER = Path(__file__).parent
 SCENES = {"street-vlp-16": ("street", "vlp-16", "vlp-16"), "street-hdl-64e": ("street", "hdl-64e", "hdl-64e")}
 SECONDS = 1.2
 _INITIALS = "bcpyBCPY"
-CASES = [(scene, mode) for scene in SCENES for mode in assemble.MODES]
+CASES = [(scene, mode) for scene in SCENES for mode in assembly.MODES]
 
 
 def replay(scene: str, mode_name: str) -> Iterator[FrameResult]:
     """Results of a mode on a scene."""
     world, sensor, profile_name = SCENES[scene]
-    profile, mode = load(profile_name), assemble.MODES[mode_name]
-    pipeline = assemble.pipeline(mode, profile, FieldOfView(), NullLedger())
+    profile, mode = load(profile_name), assembly.MODES[mode_name]
+    pipeline = assembly.pipeline(mode, profile, FieldOfView(), NullLedger())
     for frame in SyntheticStream(world, sensor, SECONDS, seed=7):
         yield pipeline.step(frame, mode.budget(profile))
 

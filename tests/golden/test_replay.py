@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from modt.cli import assemble
+from modt import assembly
 
 from . import replay
 
@@ -29,7 +29,7 @@ def test_behaviour_is_golden(scene, mode):
 
 @each_case
 def test_what_is_final_is_what_the_state_machine_says(scene, mode):
-    machine = assemble.MODES[mode].machine
+    machine = assembly.MODES[mode].machine
     for result in results(scene, mode):
         np.testing.assert_array_equal(result.tracks.final, machine.final[result.tracks.state])
         assert result.state_names == machine.names

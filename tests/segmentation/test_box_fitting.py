@@ -3,14 +3,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.config import SegmentationConfig
 from modt.geometry import upright_box
-from modt.segmentation.box_fitting import HEADINGS, headings, upright_boxes
+from modt.segmentation.box_fitting import HEADINGS, fit_headings, upright_boxes
 from modt.segmentation.groups import Groups
 from tests.segmentation import reference
 
+NOISE_M = SegmentationConfig().boxes.noise_m
+
 
 def groups_of(sizes):
-    return Groups.of(np.repeat(np.arange(len(sizes)), sizes), len(sizes))
+    return Groups.from_labels(np.repeat(np.arange(len(sizes)), sizes), len(sizes))
 
 
 def l_shape(length, width, yaw, centre, n=60):
@@ -24,21 +27,21 @@ def l_shape(length, width, yaw, centre, n=60):
 
 
 @given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 40), min_size=1, max_size=6))
-def test_headings_are_those_of_each_cluster_alone(seed, sizes):
+def test_headings_equal_those_of_each_cluster_alone(seed, sizes):
     x, y = np.random.default_rng(seed).normal(0, 2, (2, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    found = headings(x, y, groups)
+    found = fit_headings(x, y, groups, NOISE_M)
     for i, (start, end) in enumerate(zip(groups.offsets[:-1], groups.offsets[1:], strict=True)):
-        closeness = reference.heading(x[start:end].astype(float), y[start:end].astype(float))
+        closeness = reference.closeness(x[start:end].astype(float), y[start:end].astype(float), NOISE_M)
         chosen = np.argmin(np.abs(HEADINGS - found[i]))
         assert closeness[chosen] >= closeness.max() * 0.999
 
 
 @given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 40), min_size=1, max_size=6))
-def test_a_box_holds_its_points_and_touches_them_on_every_side(seed, sizes):
+def test_a_box_contains_its_points_and_touches_them_on_every_side(seed, sizes):
     x, y, z = np.random.default_rng(seed).normal(0, 2, (3, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    box = upright_boxes(x, y, z, groups, headings(x, y, groups))
+    box = upright_boxes(x, y, z, groups, fit_headings(x, y, groups, NOISE_M))
     assert (box[:, 3] >= box[:, 4]).all()
     own = np.repeat(box, sizes, axis=0)
     c, s = np.cos(own[:, 6]), np.sin(own[:, 6])
@@ -50,7 +53,7 @@ def test_a_box_holds_its_points_and_touches_them_on_every_side(seed, sizes):
 
 
 @given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 40), min_size=1, max_size=6))
-def test_a_box_of_many_is_that_of_each_cluster_alone(seed, sizes):
+def test_boxes_equal_those_of_each_cluster_alone(seed, sizes):
     rng = np.random.default_rng(seed)
     (x, y, z), yaw = rng.normal(0, 2, (3, sum(sizes))).astype(np.float32), rng.uniform(-3, 3, len(sizes))
     groups = groups_of(sizes)
@@ -61,27 +64,27 @@ def test_a_box_of_many_is_that_of_each_cluster_alone(seed, sizes):
 
 
 @pytest.mark.parametrize("yaw_deg", [-80, -35, 0, 20, 65])
-def test_an_l_of_points_gives_the_heading_and_the_size_of_the_car(yaw_deg):
+def test_heading_and_size_of_an_l_of_points(yaw_deg):
     xy = l_shape(4.2, 1.7, np.deg2rad(yaw_deg), [12.0, 5.0]) + np.random.default_rng(0).normal(0, 0.02, (120, 2))
     x, y = xy.T.astype(np.float32)
     groups = groups_of([120])
-    box = upright_boxes(x, y, np.zeros(120, np.float32), groups, headings(x, y, groups))[0]
+    box = upright_boxes(x, y, np.zeros(120, np.float32), groups, fit_headings(x, y, groups, NOISE_M))[0]
     error = (box[6] - np.deg2rad(yaw_deg) + np.pi / 2) % np.pi - np.pi / 2
     assert abs(error) < np.deg2rad(2.6)
     assert box[:2] == pytest.approx([12.0, 5.0], abs=0.15)
     assert box[3:5] == pytest.approx([4.2, 1.7], abs=0.25)
 
 
-def test_groups_leave_out_what_belongs_to_none():
-    groups = Groups.of(np.array([1, -1, 0, 1, 0, -1]), 2)
+def test_groups_leave_out_rows_without_a_label():
+    groups = Groups.from_labels(np.array([1, -1, 0, 1, 0, -1]), 2)
     assert groups.rows.tolist() == [2, 4, 0, 3]
     assert groups.offsets.tolist() == [0, 2, 4]
 
 
-@given(sizes=st.lists(st.integers(1, 300), min_size=1, max_size=5), most=st.integers(1, 64))
-def test_thinned_groups_are_no_larger_than_asked_and_never_empty(sizes, most):
-    thin = groups_of(sizes).thinned(most)
-    assert (thin.count <= most).all()
-    assert (thin.count >= 1).all()
+@given(sizes=st.lists(st.integers(1, 300), min_size=1, max_size=5), limit=st.integers(1, 64))
+def test_subsampled_groups_have_between_one_row_and_the_limit(sizes, limit):
+    few = groups_of(sizes).subsample(limit)
+    assert (few.count <= limit).all()
+    assert (few.count >= 1).all()
     own = np.repeat(np.arange(len(sizes)), sizes)
-    assert np.array_equal(own[thin.rows], np.repeat(np.arange(len(sizes)), thin.count))
+    assert np.array_equal(own[few.rows], np.repeat(np.arange(len(sizes)), few.count))

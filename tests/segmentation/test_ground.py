@@ -4,13 +4,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.columns import Columns
+from modt.config.segmentation import GroundConfig
 from modt.segmentation.grids import SECTORS, PolarGrid, pseudo_angle
-from modt.segmentation.ground import Ground
-from modt.segmentation.sensor_height import USUAL_M, EstimatedHeight, sensor_height
+from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.point_columns import PointColumns
+from modt.segmentation.sensor_height import HeightEstimator, sensor_height
 from tests.segmentation import reference, scans
 
 HEIGHT_M = 1.73
+CONFIG = SegmentationConfig()
+NO_POINTS = PointColumns.from_array(np.zeros((0, 4), np.float32))
 PROFILES = {
     "flat": lambda x, y: np.full_like(x, -HEIGHT_M),
     "tilted sensor": lambda x, y: -HEIGHT_M + 0.1 * x,
@@ -22,31 +25,31 @@ PROFILES = {
 
 
 def ground(**sensor):
-    return Ground(SensorConfig(**sensor), SegmentationConfig())
+    return GroundEstimator(SensorConfig(**sensor), CONFIG)
 
 
 @pytest.mark.parametrize("name", PROFILES)
-def test_ground_is_followed_over(name):
+def test_ground_of_each_profile_is_found(name):
     direction = scans.rays(step_deg=1.0)
     hit = scans.floor_ranges(direction, PROFILES[name])
     seen = np.isfinite(hit)
     points = (direction[seen] * hit[seen, None]).astype(np.float32)
-    height = ground().height(Columns.of(points), HEIGHT_M)
+    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
     assert (np.abs(height) < 0.25).mean() > 0.97
 
 
-def test_a_kerb_belongs_to_the_ground_and_a_wall_does_not():
+def test_a_kerb_is_ground_and_a_wall_is_not():
     points, on = scans.scan([(20.0, 8.0, 50.0, 4.0, 0.0, 0.12), (20.0, 12.0, 50.0, 1.0, 0.0, 2.0)], step_deg=0.5)
-    height = ground().height(Columns.of(points), HEIGHT_M)
+    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
     assert (height[on == 0] < 0.15).mean() > 0.99
     assert (height[on == 1] < 0.25).mean() > 0.95
     wall = (on == 2) & (points[:, 2] > -HEIGHT_M + 0.5)
     assert (height[wall] > 0.25).mean() > 0.97
 
 
-def test_objects_stand_at_their_height():
+def test_heights_of_points_on_objects():
     points, on = scans.scan([(15.0, 0.0, 4.0, 1.8, 0.0, 1.5), (25.0, 6.0, 0.5, 0.5, 0.0, 1.7)])
-    height = ground().height(Columns.of(points), HEIGHT_M)
+    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
     assert np.allclose(height[on > 0], points[on > 0, 2] + HEIGHT_M, atol=0.15)
 
 
@@ -56,34 +59,46 @@ def test_reflections_below_the_ground_do_not_lower_it():
     row = rng.choice(len(points), 300, replace=False)
     points[row, 2] -= rng.uniform(0.5, 3.0, 300).astype(np.float32)
     kept = np.setdiff1d(np.arange(len(points)), row)
-    height = ground().height(Columns.of(points), HEIGHT_M)
+    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
     assert (np.abs(height[kept]) < 0.15).mean() > 0.99
 
 
-def test_a_road_that_climbs_goes_on_beyond_the_last_return_of_it():
+def test_a_climbing_road_is_extrapolated():
     direction = scans.rays(step_deg=1.0)
     hit = scans.floor_ranges(direction, PROFILES["ramp up"])
     near = hit < 24.0
     road = (direction[near] * hit[near, None]).astype(np.float32)
     far = np.array([[44.0, y, z - HEIGHT_M + 0.12 * 25] for y in np.arange(-3.0, 3.1, 0.5) for z in (0.5, 1.5)])
-    height = ground().height(Columns.of(np.concatenate([road, far.astype(np.float32)])), HEIGHT_M)
+    height = ground().height_above(PointColumns.from_array(np.concatenate([road, far.astype(np.float32)])), HEIGHT_M)
     assert np.allclose(height[: len(road)], 0.0, atol=0.3)
     assert np.allclose(height[len(road) :], far[:, 2] + HEIGHT_M - 0.12 * 25, atol=0.7)
 
 
-@pytest.mark.parametrize(("x", "y", "broad"), [(53.0, 1.0, 3.0), (50.0, 12.0, 3.0), (47.0, 20.0, 4.6)])
-def test_the_flank_of_a_far_car_is_no_ground(x, y, broad):
-    points, on = scans.scan([(x, y, 1.8, broad, 0.3, 1.6)], step_deg=0.17, azimuth_deg=(-60, 60))
-    height = ground().height(Columns.of(points), HEIGHT_M)
+def test_without_a_share_of_the_slope_the_surface_ends_level():
+    direction = scans.rays(step_deg=1.0)
+    hit = scans.floor_ranges(direction, PROFILES["ramp up"])
+    near = hit < 24.0
+    road = (direction[near] * hit[near, None]).astype(np.float32)
+    far = np.float32([[44.0, 0.0, 0.5]])
+    config = SegmentationConfig(ground=GroundConfig(extrapolation_share=0.0))
+    sweep = PointColumns.from_array(np.concatenate([road, far]))
+    level = GroundEstimator(SensorConfig(), config).height_above(sweep, HEIGHT_M)
+    assert level[-1] > ground().height_above(sweep, HEIGHT_M)[-1] + 0.5
+
+
+@pytest.mark.parametrize(("x", "y", "width"), [(53.0, 1.0, 3.0), (50.0, 12.0, 3.0), (47.0, 20.0, 4.6)])
+def test_the_side_of_a_far_car_is_not_ground(x, y, width):
+    points, on = scans.scan([(x, y, 1.8, width, 0.3, 1.6)], step_deg=0.17, azimuth_deg=(-60, 60))
+    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
     assert np.allclose(height[on == 1], points[on == 1, 2] + HEIGHT_M, atol=0.1)
 
 
-def test_a_small_robot_sees_its_floor():
+def test_floor_of_a_small_robot():
     points, on = scans.scan(
         [(3.0, 0.0, 0.4, 0.4, 0.0, 1.7), (0.0, 4.0, 8.0, 0.2, 0.0, 2.5)], 0.3, np.deg2rad(np.linspace(-25, 15, 32))
     )
     near = SensorConfig(height_m=0.3, min_range_m=0.3, max_range_m=30.0)
-    height = Ground(near, SegmentationConfig()).height(Columns.of(points), 0.3)
+    height = GroundEstimator(near, CONFIG).height_above(PointColumns.from_array(points), 0.3)
     assert (np.abs(height[on == 0]) < 0.1).mean() > 0.98
     assert np.allclose(height[on > 0], points[on > 0, 2] + 0.3, atol=0.1)
 
@@ -91,26 +106,26 @@ def test_a_small_robot_sees_its_floor():
 def test_the_order_of_the_points_does_not_matter():
     points, _ = scans.scan([(15.0, 0.0, 4.0, 1.8, 0.0, 1.5)])
     order = np.random.default_rng(1).permutation(len(points))
-    straight = ground().height(Columns.of(points), HEIGHT_M)
-    assert np.array_equal(ground().height(Columns.of(points[order]), HEIGHT_M), straight[order])
+    straight = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
+    assert np.array_equal(ground().height_above(PointColumns.from_array(points[order]), HEIGHT_M), straight[order])
 
 
 @given(seed=st.integers(0, 1000))
 @settings(max_examples=8)
-def test_rays_are_followed_as_a_loop_would(seed):
+def test_tracing_equals_a_loop_over_rays_and_rings(seed):
     rng = np.random.default_rng(seed)
     fast = ground()
     lowest = rng.normal(-HEIGHT_M, 0.25, (fast.grid.rings, SECTORS)).astype(np.float32)
     lowest[rng.random(lowest.shape) < 0.3] = np.inf
-    slow, slow_slope = reference.supported(lowest, fast.grid.range_m.astype(float), HEIGHT_M, fast.max_slope)
-    supported, slope = fast._follow(lowest, HEIGHT_M)
-    assert (supported == slow).mean() > 0.999  # float32 against float64 at the bound
-    alike = (supported == slow).all(axis=0)
-    assert slope[0, alike] == pytest.approx(slow_slope[0, alike], abs=1e-4)
+    expected, expected_slope = reference.trace(lowest, fast.grid.range_m.astype(float), HEIGHT_M, CONFIG)
+    is_ground, slope = fast.trace(lowest, HEIGHT_M)
+    assert (is_ground == expected).mean() > 0.999  # float32 against float64 at the bound
+    alike = (is_ground == expected).all(axis=0)
+    assert slope[0, alike] == pytest.approx(expected_slope[0, alike], abs=1e-4)
 
 
 @given(angle=st.floats(-3.14, 3.14), other=st.floats(-3.14, 3.14))
-def test_the_pseudo_angle_grows_with_the_angle(angle, other):
+def test_the_pseudo_angle_is_monotonic(angle, other):
     a, b = np.sort(np.array([angle, other])) % (2 * np.pi)
     low, high = min(a, b), max(a, b)
     values = pseudo_angle(*(f(np.array([low, high]) - np.pi / 2).astype(np.float32) for f in (np.cos, np.sin)))
@@ -121,7 +136,7 @@ def test_the_pseudo_angle_grows_with_the_angle(angle, other):
 
 def test_cells_of_the_polar_grid_are_inside_it():
     rng = np.random.default_rng(0)
-    points = Columns.of(rng.normal(0, 60, (5000, 4)).astype(np.float32))
+    points = PointColumns.from_array(rng.normal(0, 60, (5000, 4)).astype(np.float32))
     grid = PolarGrid(80.0)
     cell = grid.cell(points)
     assert cell.min() >= 0
@@ -129,37 +144,37 @@ def test_cells_of_the_polar_grid_are_inside_it():
 
 
 @pytest.mark.parametrize("true_m", [0.3, 0.8, 1.73, 2.5])
-def test_the_height_of_the_sensor_is_found(true_m):
+def test_the_sensor_height_is_estimated(true_m):
     points, _ = scans.scan([(6.0, 3.0, 4.0, 1.8, 0.0, 1.5), (0.0, -8.0, 30.0, 0.5, 0.0, 3.0)], true_m, step_deg=1.0)
-    height = EstimatedHeight(SensorConfig(height_m=None, min_range_m=0.5))
-    assert height.of(Columns.of(points)) == pytest.approx(true_m, abs=0.05)
+    height = HeightEstimator(SensorConfig(height_m=None, min_range_m=0.5), CONFIG)
+    assert height.height_m(PointColumns.from_array(points)) == pytest.approx(true_m, abs=0.05)
 
 
-def test_walls_alone_are_no_floor():
+def test_walls_alone_give_the_default_height():
     walls = [
         (x, y, *((3.0, 0.2) if y else (0.2, 3.0)), -1.0, 3.0) for x, y in [(1.2, 0), (-1.4, 0), (0, 1.3), (0, -1.5)]
     ]
     points, on = scans.scan(walls, 0.8, scans.VLP_16, step_deg=0.2)
     assert (on > 0).all()
     sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
-    assert EstimatedHeight(sensor).of(Columns.of(points)) == USUAL_M
+    assert HeightEstimator(sensor, CONFIG).height_m(PointColumns.from_array(points)) == CONFIG.sensor_height.default_m
 
 
-def test_a_floor_is_found_between_walls_that_hide_most_of_it():
+def test_a_floor_mostly_hidden_by_walls_is_found():
     walls = [
         (x, y, *((4.0, 0.2) if y else (0.2, 4.0)), 0.0, 3.0) for x, y in [(1.9, 0), (-1.7, 0), (0, 1.8), (0, -2.0)]
     ]
     points, on = scans.scan(walls, 0.36, scans.VLP_16, step_deg=0.2)
     assert 0.05 < (on == 0).mean() < 0.2
     sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
-    assert EstimatedHeight(sensor).of(Columns.of(points)) == pytest.approx(0.36, abs=0.03)
+    assert HeightEstimator(sensor, CONFIG).height_m(PointColumns.from_array(points)) == pytest.approx(0.36, abs=0.03)
 
 
-def test_no_floor_leaves_the_usual_height():
-    height = sensor_height(SensorConfig(height_m=None))
-    assert height.of(Columns.of(np.zeros((0, 4), np.float32))) == USUAL_M
-    assert height.of(Columns.of(np.float32([[5, 0, -1, 0]]))) == USUAL_M
+def test_no_floor_gives_the_default_height():
+    height = sensor_height(SensorConfig(height_m=None), CONFIG)
+    assert height.height_m(NO_POINTS) == CONFIG.sensor_height.default_m
+    assert height.height_m(PointColumns.from_array(np.float32([[5, 0, -1, 0]]))) == CONFIG.sensor_height.default_m
 
 
-def test_a_given_height_is_kept():
-    assert sensor_height(SensorConfig(height_m=0.5)).of(Columns.of(np.zeros((0, 4), np.float32))) == 0.5
+def test_a_given_height_is_not_estimated():
+    assert sensor_height(SensorConfig(height_m=0.5), CONFIG).height_m(NO_POINTS) == 0.5

@@ -1,12 +1,12 @@
-"""What must hold on real scans; the numbers are lower bounds, the measured ones stand in docs/segmentation.md."""
+"""Lower bounds on real scans; docs/segmentation.md has the measured values."""
 
 import numpy as np
 import pytest
 
 from modt import profile
 from modt.geometry import Camera, FieldOfView, inverse, se3, transform
-from modt.segmentation.columns import Columns
-from modt.segmentation.ground import Ground
+from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 
 pytestmark = pytest.mark.kitti
@@ -40,7 +40,7 @@ def object_frames(folder):
 
 
 def found(label, inside):
-    """Whether one proposal holds an object's points at an IoU over a half."""
+    """Whether one proposal has an IoU above 0.5 with the points of an object."""
     shared = np.bincount(label[inside] + 1, minlength=1)
     shared[0] = 0
     best = int(shared.argmax())
@@ -48,6 +48,7 @@ def found(label, inside):
     return bool(shared[best] > 0.5 * union)
 
 
+@pytest.mark.slow
 def test_labelled_objects_are_found(kitti_root):
     settings = profile.load("hdl-64e")
     hits = {kind: [] for kind in ("Car", "Van", "Pedestrian", "Cyclist")}
@@ -64,15 +65,15 @@ def test_labelled_objects_are_found(kitti_root):
     assert recall["Cyclist"] > 0.95
 
 
-def test_ground_is_that_of_the_semantic_labels(kitti_root):
+def test_ground_agrees_with_the_semantic_labels(kitti_root):
     settings = profile.load("hdl-64e")
-    ground = Ground(settings.sensor, settings.segmentation)
+    ground = GroundEstimator(settings.sensor, settings.segmentation)
     for path in sorted((kitti_root / "odometry" / "00" / "labels").glob("*.label")):
         kind = np.fromfile(path, np.uint32) & 0xFFFF
         points = np.fromfile(kitti_root / "odometry" / "00" / "velodyne" / f"{path.stem}.bin", np.float32).reshape(
             -1, 4
         )
-        low = ground.height(Columns.of(points), 1.73) < GROUND_TOLERANCE_M
+        low = ground.height_above(PointColumns.from_array(points), 1.73) < GROUND_TOLERANCE_M
         known, true = ~np.isin(kind, UNKNOWN), np.isin(kind, GROUND)
         both = (low & true & known).sum()
         assert 2 * both / ((low & known).sum() + (true & known).sum()) > 0.96

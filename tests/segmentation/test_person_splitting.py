@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.columns import Columns
-from modt.segmentation.person_splitting import Silhouettes
+from modt.segmentation.person_splitting import NoPersonSplitter, PersonSplitter
+from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from tests.segmentation import reference, scans
 
@@ -15,8 +15,8 @@ PERSON = (0.35, 0.5, 0.0, 1.75)
 CAR = (4.2, 1.8, 0.2, 1.5)
 
 
-def silhouettes(**config):
-    return Silhouettes(SensorConfig(), SegmentationConfig(**config))
+def splitter():
+    return PersonSplitter(SensorConfig(), SegmentationConfig())
 
 
 def crowd(rng, n):
@@ -42,57 +42,57 @@ def crowd(rng, n):
 
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 6))
 @settings(max_examples=60)
-def test_groups_are_cut_as_one_by_one(seed, n):
+def test_splits_equal_those_of_each_cluster_alone(seed, n):
     points, group = crowd(np.random.default_rng(seed), n)
-    stage = silhouettes()
-    company = np.ones(n, np.bool_)
-    cloud = Columns.of(points)
+    stage = splitter()
+    candidate = np.ones(n, np.bool_)
+    cloud = PointColumns.from_array(points)
     cell = np.arange(len(points))  # a cell for each point
-    fast, clusters = stage.parted(cloud, points[:, 2], cell, group, company)
+    fast, clusters = stage.separate(cloud, points[:, 2], cell, group, candidate)
     total = 0
     for i in range(n):
         own = np.flatnonzero(group == i)
-        column, cuts = reference.people_cuts(
-            cloud.x[own], cloud.y[own], points[own, 2], stage.step_rad, stage.beam_rad, stage.points
+        column, boundaries = reference.person_boundaries(
+            cloud.x[own], cloud.y[own], points[own, 2], SensorConfig(), stage.config
         )
-        total += len(cuts)
-        assert reference.same_partition(fast[own], np.searchsorted(cuts, column, side="right"))
+        total += len(boundaries)
+        assert reference.same_partition(fast[own], np.searchsorted(boundaries, column, side="right"))
     assert clusters == n + total
     assert len(np.unique(fast)) == clusters
 
 
-def test_it_cuts_something_somewhere():
-    """Or the test above would compare nothing with nothing."""
+def test_random_crowds_are_split():
+    """The comparison above covers clusters that are split."""
     cut = 0
     for seed in range(10):
         points, group = crowd(np.random.default_rng(seed), 6)
-        n = silhouettes().parted(Columns.of(points), points[:, 2], np.arange(len(points)), group, np.ones(6, bool))[1]
+        n = splitter().separate(
+            PointColumns.from_array(points), points[:, 2], np.arange(len(points)), group, np.ones(6, bool)
+        )[1]
         cut += n - 6
     assert cut > 10
 
 
-def test_nothing_to_look_at_changes_nothing():
+def test_without_candidates_nothing_changes():
     points, group = crowd(np.random.default_rng(3), 4)
-    new, n = silhouettes().parted(
-        Columns.of(points), points[:, 2], np.arange(len(points)), group, np.zeros(4, np.bool_)
+    new, n = splitter().separate(
+        PointColumns.from_array(points), points[:, 2], np.arange(len(points)), group, np.zeros(4, np.bool_)
     )
     assert n == 4
     assert np.array_equal(new, group)
 
 
-def owners(boxes, step_deg=STEP_DEG, seed=0, parting=True):
-    """Of each proposal of a scene, how many points it has of each box."""
+def owners(boxes, step_deg=STEP_DEG, seed=0, part=None):
+    """Points of each proposal of a scene by the box that they lie on."""
     points, on = scans.scan(boxes, step_deg=step_deg, azimuth_deg=(-40, 40), seed=seed)
-    stage = Segmenter(SegmentationConfig(), SensorConfig(azimuth_step_deg=step_deg), FieldOfView())
-    if not parting:
-        stage.clusterer.silhouettes.range_m = 0.0
+    stage = Segmenter(SegmentationConfig(), SensorConfig(azimuth_step_deg=step_deg), FieldOfView(), splitter=part)
     found = stage.segment(points)
     ends = zip(found.offsets, found.offsets[1:], strict=False)
     return [np.bincount(on[found.members[a:b]], minlength=len(boxes) + 1)[1:] for a, b in ends]
 
 
 @pytest.mark.parametrize(("range_m", "gap_m"), [(8.0, 0.2), (12.0, 0.22), (16.0, 0.24), (22.0, 0.28)])
-def test_two_people_close_together_are_two_at_every_moment(range_m, gap_m):
+def test_two_people_close_together_are_two(range_m, gap_m):
     for seed, aside in enumerate(np.linspace(-1.0, 1.0, 12)):
         pair = [(range_m, aside, *PERSON), (range_m, aside + 0.5 + gap_m, *PERSON)]
         found = owners(pair, seed=seed)
@@ -100,15 +100,15 @@ def test_two_people_close_together_are_two_at_every_moment(range_m, gap_m):
         assert all(min(own) == 0 for own in found)
 
 
-def test_hands_that_touch_join_nobody():
+def test_two_people_holding_hands_are_two():
     pair = [(10.0, 0.0, *PERSON), (10.0, 0.7, *PERSON), (10.0, 0.35, 0.08, 0.3, 0.8, 0.9)]
-    assert len(owners(pair, parting=False)) == 1
+    assert len(owners(pair, part=NoPersonSplitter())) == 1
     found = owners(pair)
     assert len(found) == 2
     assert all(min(own[:2]) == 0 for own in found)
 
 
-def test_someone_a_step_before_a_bush_stands_alone():
+def test_a_person_in_front_of_a_bush_is_split_from_it():
     found = owners([(12.0, 0.0, *PERSON), (12.75, 0.9, 0.6, 1.4, 0.0, 1.6)])
     assert len(found) == 2
     mine = max(found, key=lambda own: own[0])
@@ -128,19 +128,19 @@ def test_someone_a_step_before_a_bush_stands_alone():
         (9.0, 0.0, *PERSON),
     ],
 )
-def test_one_thing_is_not_parted(thing):
+def test_one_object_is_not_split(thing):
     for seed in range(4):
         x, y, *rest = thing
         moved = [(x, y + 0.03 * seed, *rest)]
-        assert len(owners(moved, seed=seed)) == len(owners(moved, seed=seed, parting=False))
+        assert len(owners(moved, seed=seed)) == len(owners(moved, seed=seed, part=NoPersonSplitter()))
 
 
-def test_a_coarse_sensor_takes_no_missing_step_for_a_gap():
+def test_empty_columns_of_a_coarse_sensor_are_no_gap():
     for seed in range(8):
         assert len(owners([(20.0, 0.02 * seed, 0.4, 1.2, 0.0, 1.7)], step_deg=0.35, seed=seed)) == 1
 
 
-def test_what_stands_around_the_sensor_is_left_alone():
+def test_a_cluster_around_the_sensor_is_not_split():
     turn = np.linspace(0, 2 * np.pi, 600, endpoint=False)
     points = np.stack([1.2 * np.cos(turn), 1.2 * np.sin(turn), np.tile([-0.9, -0.3, 0.0], 200)], axis=1)
     stage = Segmenter(SegmentationConfig(), SensorConfig(min_range_m=0.2), FieldOfView())

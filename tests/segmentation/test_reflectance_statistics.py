@@ -1,4 +1,4 @@
-"""How brightly clusters send light back."""
+"""Statistics of the reflectance of clusters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.reflectance_statistics import BRIGHT, DARK, brightness, recorded
+from modt.segmentation.reflectance_statistics import BRIGHT, DARK, has_reflectance, reflectance_statistics
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import scans
@@ -20,30 +20,32 @@ SOME = st.lists(st.lists(ONE | st.just(UNRECORDED), min_size=1, max_size=9), min
 
 
 @given(VALUES)
-def test_each_group_is_told_by_its_own_returns(groups: list[list[float]]) -> None:
+def test_statistics_of_each_group(groups: list[list[float]]) -> None:
     values = np.array([v for group in groups for v in group], np.float32)
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
-    told = brightness(values, offsets)
-    assert told.shape == (len(groups), N_REFLECTANCE)
-    for row, group in zip(told, groups, strict=True):
+    found = reflectance_statistics(values, offsets)
+    assert found.shape == (len(groups), N_REFLECTANCE)
+    for row, group in zip(found, groups, strict=True):
         own = np.array(group, np.float32)
         expected = [own.mean(), own.std(), own.max(), (own > BRIGHT).mean(), (own < DARK).mean()]
         np.testing.assert_allclose(row, expected, atol=2e-3)
 
 
 @given(SOME)
-def test_each_group_is_told_by_those_of_its_returns_that_were_recorded(groups: list[list[float]]) -> None:
+def test_returns_without_reflectance_are_ignored(groups: list[list[float]]) -> None:
     values = np.array([v for group in groups for v in group], np.float32)
-    told = brightness(values, np.append(0, np.cumsum([len(group) for group in groups])))
-    assert told.shape == (len(groups), N_REFLECTANCE)
-    for row, group in zip(told, groups, strict=True):
+    found = reflectance_statistics(values, np.append(0, np.cumsum([len(group) for group in groups])))
+    assert found.shape == (len(groups), N_REFLECTANCE)
+    for row, group in zip(found, groups, strict=True):
         own = np.array([v for v in group if v != UNRECORDED], np.float32)
-        expected = brightness(own, np.array([0, len(own)]))[0] if len(own) else np.full(N_REFLECTANCE, np.nan)
+        expected = np.full(N_REFLECTANCE, np.nan)
+        if len(own):
+            expected = reflectance_statistics(own, np.array([0, len(own)]))[0]
         np.testing.assert_allclose(row, expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("fov", [FieldOfView(), FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))], ids=["full", "left"])
-def test_points_without_reflectance_are_points_like_any_other(fov: FieldOfView) -> None:
+def test_points_without_reflectance_are_segmented(fov: FieldOfView) -> None:
     points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8), (9.0, 8.0, 0.5, 0.5, 0.0, 1.75)])
     points[:, 3] = np.linspace(0.1, 0.7, len(points))
     stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), fov)
@@ -62,7 +64,7 @@ def test_points_without_reflectance_are_points_like_any_other(fov: FieldOfView) 
     assert stage.segment(points).reflectance is None
 
 
-def test_proposals_tell_their_brightness_where_it_is_looked_at() -> None:
+def test_proposals_have_statistics_where_the_profile_names_a_scale() -> None:
     points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8), (-9.0, 4.0, 0.5, 0.5, 0.0, 1.75)])
     points[:, 3] = np.where(on == 1, 0.25, 0.5)
     stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), FieldOfView())
@@ -75,18 +77,18 @@ def test_proposals_tell_their_brightness_where_it_is_looked_at() -> None:
     assert stage.segment(points).reflectance is None
 
 
-def test_dark_things_in_a_bright_sweep_are_no_lack_of_reflectance() -> None:
+def test_dark_objects_in_a_bright_sweep_have_statistics() -> None:
     points, on = scans.scan([(12.0, 3.0, 4.2, 1.8, 0.2, 1.8)])
     points[:, 3] = np.where(on == 1, 0.0, 0.3)
     stage = Segmenter(SegmentationConfig(), SensorConfig(reflectance="hdl-64e"), FieldOfView())
-    told = stage.segment(points).reflectance
-    assert told is not None
-    np.testing.assert_array_equal(told[0], [0, 0, 0, 0, 1])
+    found = stage.segment(points).reflectance
+    assert found is not None
+    np.testing.assert_array_equal(found[0], [0, 0, 0, 0, 1])
 
 
 @given(st.integers(1, 5000), st.floats(0, 1, width=32))
-def test_a_sweep_whose_returns_are_all_alike_carries_no_reflectance(n: int, value: float) -> None:
+def test_a_sweep_of_equal_values_has_no_reflectance(n: int, value: float) -> None:
     alike = np.full(n, value, np.float32)
-    assert not recorded(alike)
-    assert not recorded(np.concatenate([alike, np.full(n, UNRECORDED, np.float32)]))
-    assert recorded(np.concatenate([alike, alike + np.float32(0.25)]))
+    assert not has_reflectance(alike)
+    assert not has_reflectance(np.concatenate([alike, np.full(n, UNRECORDED, np.float32)]))
+    assert has_reflectance(np.concatenate([alike, alike + np.float32(0.25)]))

@@ -78,7 +78,7 @@ def frame_of(boxes, index=0, T_world_sensor=None, points=60, seed=0, period_s=0.
     frame = Frame(index, index * period_s, points, T_world_sensor)
     flags = np.zeros(len(boxes), np.bool_)
     centroid = np.array([c.mean(axis=0) for c in clouds]).reshape(-1, 3)
-    return frame, Proposals(np.arange(len(xyz)), offsets, points[:, :3].T.copy(), centroid, boxes, flags, flags)
+    return frame, Proposals(np.arange(len(xyz)), offsets, points[:, :3].T.copy(), centroid, boxes, flags)
 
 
 def cloud(box, n, rng):
@@ -109,7 +109,6 @@ def joined(proposals, groups):
         centroid=np.array([p.mean(axis=0) for p in xyz]),
         box=np.array(boxes),
         truncated=np.zeros(len(rows), np.bool_),
-        occluded=np.zeros(len(rows), np.bool_),
         reflectance=None if proposals.reflectance is None else proposals.reflectance[[g[0] for g in groups]],
     )
 
@@ -124,7 +123,7 @@ def tracks_at(boxes, *classes, points=60, **columns):
     t.P[:] = 0.01 * np.eye(4)
     t.box[:], t.kdop[:] = observations.box, observations.kdop.T
     t.bottom[:], t.top[:] = observations.bottom, observations.top
-    t.envelope[:] = t.mean_kdop[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
+    t.envelope[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
     t.final[:] = True
     t.last_class[:] = [*classes, *[ObjectClass.BACKGROUND] * (n - len(classes))]
     for row in range(n):

@@ -20,7 +20,7 @@ import onnx
 from onnx import numpy_helper
 
 from modt import profile
-from modt.classification.crops import canonical, gather, height_of
+from modt.classification.crops import canonical, gather, sensor_height_m
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
 from modt.geometry import FieldOfView
@@ -43,7 +43,7 @@ def layers_of(model: Path) -> list[Layer]:
 def textbook(net: PointNet, points: Float32, proposals: Proposals, batch: int, sensor: SensorConfig) -> Float64:
     """Each proposal resampled to 400 points, in batches."""
     crops = gather(points, proposals, np.arange(len(proposals)), TEXTBOOK_POINTS)
-    crops = canonical(crops, height_of(proposals, sensor))
+    crops = canonical(crops, sensor_height_m(proposals, sensor))
     step = np.arange(TEXTBOOK_POINTS) % crops.count[:, None]
     full = crops.xyz[crops.offsets[:-1, None] + step]
     parts = [net.infer(full[i : i + batch]) for i in range(0, len(full), batch)]

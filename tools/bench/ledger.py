@@ -18,6 +18,7 @@ def main() -> None:
     parser.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
     arguments = parser.parse_args()
     host.confine(host.last_core())
+    from modt import assembly
     from modt.cli import assemble
     from modt.energy.ledger import STAGES, Ledger, NullLedger
 
@@ -35,9 +36,9 @@ def main() -> None:
     print(f"a frame of {len(STAGES)} empty stages: {cost_us:.1f} us more than without a ledger")
     request = assemble.Request(path=arguments.path, fov=arguments.fov, frames=arguments.frames)
     stream = assemble.stream(request)
-    for mode in assemble.MODES:
-        chosen, loaded = assemble.MODES[mode], profile.load()
-        whole = assemble.pipeline(chosen, loaded, assemble.field_of_view(request, stream), ledger)
+    for mode in assembly.MODES:
+        chosen, loaded = assembly.MODES[mode], profile.load()
+        whole = assembly.pipeline(chosen, loaded, assemble.field_of_view(request, stream), ledger)
         count = cpu_ns = 0
         budget = chosen.budget(loaded)
         for frame in stream:

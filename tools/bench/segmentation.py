@@ -1,12 +1,12 @@
-"""What segmentation costs, beside what one would otherwise install: same scans, same thread, turn by turn.
+"""Cost of segmentation beside that of published packages: same scans, same thread, interleaved.
 
     python -m tools.bench.segmentation PATH [PATH ...] [--rounds N] [--slow]
     python -m tools.bench.segmentation --beams
 
-Each PATH is a .bin scan or a folder of them. Ours is the whole stage (ground, clusters, boxes) on the full circle.
-Patchwork++ is ground alone. With --slow, the clusterings one can install run on the points that our ground leaves:
-scikit-learn's and Open3D's DBSCAN and a cKDTree's pairs. What is not installed is left out (extra "bench").
---beams measures how the cost grows with the points, on synthetic sweeps of 16 to 128 beams.
+Each PATH is a .bin scan or a folder of them. modt is the whole stage (ground, clusters, boxes) on the full circle,
+Patchwork++ is ground only. With --slow, scikit-learn's and Open3D's DBSCAN and a cKDTree's pairs cluster the points
+above modt's ground. Packages that are not installed (extra "bench") are left out.
+--beams measures the cost by number of points, on simulated sweeps of 16 to 128 beams.
 Times are CPU time of the thread; ratios are of medians and of minima in one run.
 """
 
@@ -27,14 +27,14 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from modt import profile
+from modt import host, profile
 from modt.geometry import FieldOfView
-from modt.segmentation.columns import Columns
+from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Float32
 
-OURS, YARDSTICK = "modt: ground + clusters + boxes", "Patchwork++: ground"
+OURS, BASELINE = "modt: ground + clusters + boxes", "Patchwork++: ground"
 RADIUS_M, MIN_POINTS = 0.5, 5
 BEAMS = ("vlp-16", "os1-32", "hdl-32e", "os1-64", "hdl-64e", "os1-128")
 
@@ -48,18 +48,18 @@ def optional(name: str) -> ModuleType | None:
     return None
 
 
-def quick(stage: Segmenter) -> Iterator[tuple[str, Contender]]:
-    """The stage and its yardstick."""
+def stages(stage: Segmenter) -> Iterator[tuple[str, Contender]]:
+    """The stage and the baseline."""
     yield OURS, stage.segment
     patchwork = optional("pypatchworkpp")
     if patchwork is not None:
         parameters = patchwork.Parameters()
         parameters.verbose = False
-        yield YARDSTICK, patchwork.patchworkpp(parameters).estimateGround
+        yield BASELINE, patchwork.patchworkpp(parameters).estimateGround
 
 
-def slow(stage: Segmenter) -> Iterator[tuple[str, Contender]]:
-    """Clusterings of the points above our ground, which is found beforehand and not timed."""
+def clusterings(stage: Segmenter) -> Iterator[tuple[str, Contender]]:
+    """Clusterings of the points above the estimated ground, whose estimation is not timed."""
     yield f"SciPy: cKDTree pairs + components, {RADIUS_M} m", tree_components
     sklearn, open3d = optional("sklearn.cluster"), optional("open3d")
     if sklearn is not None:
@@ -74,17 +74,17 @@ def slow(stage: Segmenter) -> Iterator[tuple[str, Contender]]:
 
 
 def tree_components(xyz: Float32) -> object:
-    """Euclidean clusters by the book."""
+    """Euclidean clusters by radius search."""
     pairs = cKDTree(xyz).query_pairs(RADIUS_M, output_type="ndarray")
     graph = coo_array((np.ones(len(pairs), np.int8), pairs.T), shape=(len(xyz), len(xyz)))
     return connected_components(graph, directed=False)
 
 
-def raised(stage: Segmenter, points: Float32) -> Float32:
-    """(n, 3) points that the stage makes objects of."""
-    sweep = Columns.of(points)
-    height = stage.ground.height(sweep, stage.sensor_height.of(sweep))
-    return points[stage.raised(sweep, height), :3]
+def above_ground(stage: Segmenter, points: Float32) -> Float32:
+    """(n, 3) points above ground that the stage clusters."""
+    sweep = PointColumns.from_array(points)
+    height = stage.ground.height_above(sweep, stage.sensor_height.height_m(sweep))
+    return points[stage.above_ground(sweep, height), :3]
 
 
 def cpu_ms(work: Contender, points: Float32) -> float:
@@ -94,19 +94,19 @@ def cpu_ms(work: Contender, points: Float32) -> float:
 
 
 def measure(contenders: dict[str, Contender], scans: list[Float32], rounds: int) -> dict[str, list[float]]:
-    """CPU times of every contender, turn by turn, after one round that does not count."""
+    """CPU times of every contender, interleaved, after one round of warm-up."""
     times: dict[str, list[float]] = {name: [] for name in contenders}
-    for turn in range(rounds + 1):
+    for round_ in range(rounds + 1):
         for scan in scans:
             for name, work in contenders.items():
                 ms = cpu_ms(work, scan)
-                if turn:
+                if round_:
                     times[name].append(ms)
     return times
 
 
 def peak_mb(stage: Segmenter, points: Float32) -> float:
-    """Most memory that one call holds at a time."""
+    """Peak memory of one call."""
     stage.segment(points)
     tracemalloc.start()
     stage.segment(points)
@@ -116,7 +116,7 @@ def peak_mb(stage: Segmenter, points: Float32) -> float:
 
 
 def summary(times: dict[str, list[float]], base: list[float]) -> dict[str, dict[str, float]]:
-    """Median and minimum of each [ms], and their ratios to a base, if there is one."""
+    """Median and minimum of each [ms], and their ratios to those of the base, if any."""
     rows = {}
     for name, ms in times.items():
         rows[name] = {"median_ms": round(float(np.median(ms)), 2), "min_ms": round(min(ms), 2)}
@@ -127,7 +127,7 @@ def summary(times: dict[str, list[float]], base: list[float]) -> dict[str, dict[
 
 
 def beams(rounds: int) -> dict[str, dict[str, float]]:
-    """The stage on synthetic sweeps of one street, seen by different sensors."""
+    """The stage on simulated sweeps of one street, by sensor."""
     rows = {}
     for sensor in BEAMS:
         stream = SyntheticStream("street", sensor, 2.0, 0)
@@ -150,9 +150,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("paths", type=Path, nargs="*")
     parser.add_argument("--rounds", type=int, default=20)
-    parser.add_argument("--slow", action="store_true", help="also the clusterings that take seconds")
-    parser.add_argument("--beams", action="store_true", help="cost by number of beams, on synthetic sweeps")
+    parser.add_argument("--slow", action="store_true", help="also the clusterings, which take seconds")
+    parser.add_argument("--beams", action="store_true", help="cost by number of beams, on simulated sweeps")
     args = parser.parse_args()
+    host.keep_freed_pages()
     found: dict[str, object] = {}
     if args.beams:
         found["beams"] = beams(args.rounds)
@@ -162,12 +163,12 @@ def main() -> None:
         settings = profile.load()
         stage = Segmenter(settings.segmentation, settings.sensor, FieldOfView())
         found["scans"], found["peak_mb"] = len(scans), round(max(peak_mb(stage, scan) for scan in scans), 1)
-        times = measure(dict(quick(stage)), scans, args.rounds)
-        base = times.get(YARDSTICK, [])
+        times = measure(dict(stages(stage)), scans, args.rounds)
+        base = times.get(BASELINE, [])
         found["quick"] = summary(times, base)
         if args.slow:
-            above = [raised(stage, scan) for scan in scans]
-            found["slow"] = summary(measure(dict(slow(stage)), above, 1), base)
+            above = [above_ground(stage, scan) for scan in scans]
+            found["slow"] = summary(measure(dict(clusterings(stage)), above, 1), base)
     if not found:
         parser.error("give scans, or --beams")
     print(json.dumps(found, indent=2))

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.cli import assemble
+from modt import assembly
 from modt.cli.replay import frames as frame_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
@@ -60,10 +60,10 @@ def drift(estimate: Float64, reference: Float64) -> dict[str, float]:
 
 def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     """(n, 4, 4) poses that the tracker finds without odometry."""
-    profile, mode = load(), assemble.MODES["efficient"]
+    profile, mode = load(), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
     poses = []
     for frame in PosedStream(stream, NoOdometry()):
         pipeline.step(frame, mode.budget(profile))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modt.classification.prior import Prior, at_least
+from modt.classification.prior import Prior, object_probability_reaches
 from modt.config import ProfileConfig
 from modt.geometry import transform_boxes
 from modt.pipeline import Classifier
@@ -55,13 +55,13 @@ class Recording:
         name: of it.
         moments: frame by frame.
         n_tracks: how many tracks they show.
-        share: of the box in what the network said.
+        pool_weight: of the box in what the network said.
     """
 
     name: str
     moments: tuple[Moment, ...]
     n_tracks: int
-    share: float = 0.0
+    pool_weight: float = 0.0
 
     @property
     def n_proposals(self) -> int:
@@ -110,13 +110,13 @@ def record(
                 proposals=proposals,
                 box=transform_boxes(tracker.T_world_sensor, proposals.box),
                 track=np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64),
-                prior=prior.of(proposals),
+                prior=prior.probability(proposals),
                 likelihood=network.classify(frame.points, proposals, np.arange(len(proposals))),
                 kind=labels.kind,
                 judged=~labels.unknown & ~(labels.partial & ideal),
             )
         )
-    return Recording(name, tuple(moments), len(rows), prior.share)
+    return Recording(name, tuple(moments), len(rows), prior.pool_weight)
 
 
 def owners(scan: Scan, proposals: Proposals) -> Int:
@@ -147,7 +147,7 @@ class Player:
     def __init__(self, recording: Recording, ask_from: int) -> None:
         self._moments = iter(recording.moments)
         self._ask_from = ask_from
-        self.share = recording.share
+        self.pool_weight = recording.pool_weight
         self._tracks = Tracks.blank(recording.n_tracks)
         self._tracks.id[:] = np.arange(recording.n_tracks)
 
@@ -185,13 +185,13 @@ class Player:
         """(R, 4) what the network said when the drive was recorded."""
         return self._moment.likelihood[which]
 
-    def of(self, proposals: Proposals) -> Float64:
+    def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) what was thought of them then."""
         return self._moment.prior
 
-    def likely(self, said: Float64, least: float) -> Bool:
+    def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) which may be objects by what was thought of them."""
-        return at_least(said, least)
+        return object_probability_reaches(probability, threshold)
 
     def facts(self) -> dict[str, str]:
         """No model runs."""

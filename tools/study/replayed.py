@@ -9,7 +9,8 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.prior import Prior
-from modt.classification.scheduler import Scheduler
+from modt.classification.scheduler import LinearCost, Scheduler
+from modt.config import SchedulerConfig
 from modt.energy.ledger import NullLedger
 from modt.pipeline import Fusion, Pipeline
 from modt.types import Bool, Float64, Frame, Int, Proposals, Tracks
@@ -95,7 +96,9 @@ def replay(
 
 def _played(recording: Recording, player: Player, fusion: Fusion, judged_from: int) -> tuple[Float64, Int]:
     """(R, 4) what is said of the judged proposals, and (R,) what they are."""
-    pipeline = Pipeline(player, player, fusion, Scheduler(), player, NullLedger())
+    config = SchedulerConfig()
+    scheduler = Scheduler(config.worth, LinearCost(128, config.cost))
+    pipeline = Pipeline(player, player, fusion, scheduler, player, NullLedger())
     nothing = np.zeros((0, 4), np.float32)
     said, true = [np.zeros((0, N_CLASSES))], [np.zeros(0, np.int64)]
     for index, moment in enumerate(recording.moments):

@@ -24,7 +24,7 @@ import numpy as np
 from modt import profile
 from modt.config import ProfileConfig
 from modt.geometry import FieldOfView, inverse, transform
-from modt.segmentation.columns import Columns
+from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.simulation.scenes import SCENES
 from modt.sources.synthetic_stream import SyntheticStream
@@ -163,13 +163,13 @@ def cpu_ms(work: Callable[[], object]) -> float:
 
 def stage_times(stage: Segmenter, points: Float32) -> dict[str, float]:
     """CPU time of each part of the stage on a whole sweep [ms]."""
-    sweep = Columns.of(points)
-    above = stage.sensor_height.of(sweep)
-    height = stage.ground.height(sweep, above)
-    rows = np.flatnonzero(stage.raised(sweep, height))
+    sweep = PointColumns.from_array(points)
+    above = stage.sensor_height.height_m(sweep)
+    height = stage.ground.height_above(sweep, above)
+    rows = np.flatnonzero(stage.above_ground(sweep, height))
     raised, tall = sweep.take(rows), height[rows]
-    whole = {"all": cpu_ms(lambda: stage.segment(points)), "columns": cpu_ms(lambda: Columns.of(points))}
-    whole["ground"] = cpu_ms(lambda: stage.ground.height(sweep, above))
+    whole = {"all": cpu_ms(lambda: stage.segment(points)), "columns": cpu_ms(lambda: PointColumns.from_array(points))}
+    whole["ground"] = cpu_ms(lambda: stage.ground.height_above(sweep, above))
     whole["clusters"] = cpu_ms(lambda: stage.clusterer.cluster(raised, tall)) if len(rows) else 0.0
     whole["boxes"] = max(0.0, whole["all"] - whole["columns"] - whole["ground"] - whole["clusters"])
     return whole
@@ -184,8 +184,8 @@ def report(scenes: Iterator[Scene], settings: ProfileConfig, whole: bool, pictur
         found = stage.segment(scene.points)
         proposals.append(len(found))
         tally.count(found.label(len(scene.points)), scene.objects)
-        sweep = Columns.of(scene.points)
-        height = around.ground.height(sweep, around.sensor_height.of(sweep))
+        sweep = PointColumns.from_array(scene.points)
+        height = around.ground.height_above(sweep, around.sensor_height.height_m(sweep))
         if scene.ground is not None and scene.known is not None:
             low = (height < GROUND_TOLERANCE_M) & scene.known
             ground["both"] += int((low & scene.ground).sum())

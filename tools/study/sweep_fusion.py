@@ -37,7 +37,7 @@ from modt import profile
 from modt.classes import CLASS_NAMES
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.pointnet import PointNet
-from modt.classification.prior import Prior, prior_of
+from modt.classification.prior import Prior, make_prior
 from modt.config import FusionConfig, ProfileConfig
 from modt.pipeline import Fusion
 from modt.reporting import page, svg
@@ -55,22 +55,20 @@ PERIOD_S = 0.1
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "classification.md"
 BEGIN, END = "<!-- tools/study/sweep_fusion.py -->\n", "<!-- end of tools/study/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
-ALPHAS = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
-ONCE = "likely_once"
+POINT_CHANGES = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
+ONCE = "first_view_min_object_probability"
 """The one that is mode efficient's."""
 SWEEPS: dict[str, tuple[float | None, ...]] = {
-    "background_alpha": (0.2, 0.5, 1.0, 2.0, 4.0),
     "start_frame": (1, 2, 3, 4, 5, 6, 7, 8),
-    "threshold": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98),
+    "object_threshold": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98),
     "background_threshold": (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
-    "view_weight": (0.25, 0.5, 0.75, 1.0),
-    "reopen_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
-    "reopen_points": (30, 50, 100, 200, 400, 800),
-    "likely": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
+    "review_point_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
+    "review_max_points": (30, 50, 100, 200, 400, 800),
+    "min_object_probability": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
     ONCE: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
-    "likely_again": (0.0, 0.02, 0.05, 0.1, 0.2),
-    "box_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
-    "slip": (0.0, 0.03, 0.1, 0.2, 0.3),
+    "review_min_object_probability": (0.0, 0.02, 0.05, 0.1, 0.2),
+    "box_update_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
+    "mismatch_probability": (0.0, 0.03, 0.1, 0.2, 0.3),
 }
 NO_BETTER = "No setting is better on both sets at no more calls."
 DOUBTS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
@@ -109,7 +107,7 @@ class Tried:
 def variants(config: FusionConfig) -> list[Setting]:
     """The ways of the method, and the defaults without one of their parts each."""
     uniform = dataclasses.replace(config, prior=(0.25, 0.25, 0.25))
-    never = dataclasses.replace(config, reopen_ratio=None)
+    never = dataclasses.replace(config, review_point_ratio=None)
     title = "what makes the difference"
     return [
         Setting(title, "conventional", lambda prior: EveryFrame()),
@@ -124,16 +122,17 @@ def variants(config: FusionConfig) -> list[Setting]:
 
 def sweeps(config: FusionConfig) -> Iterator[Setting]:
     """One value at a time, the others as configured; of doubt both that there are."""
-    for k, name in enumerate(OBJECTS):
-        for value in sorted({*ALPHAS, config.alpha[k]}):
-            alpha = (*config.alpha[:k], value, *config.alpha[k + 1 :])
-            yield _moved(config, f"alpha of {name}", _text(value), alpha=alpha)
+    default = config.point_change
+    for k, name in enumerate(CLASS_NAMES):
+        for value in sorted({*POINT_CHANGES, default[k]}):
+            changes = {"point_change": (*default[:k], value, *default[k + 1 :])}
+            yield _moved(config, f"point_change of {name}", _text(value), **changes)
     for key, values in SWEEPS.items():
         for moved in values:
             yield _moved(config, key, _text(moved), **{key: moved})
-    for ratio, points in DOUBTS if config.reopen_ratio is not None else ():
-        changes = {"reopen_ratio": ratio, "reopen_points": points}
-        yield _moved(config, "reopen_ratio, reopen_points", f"{ratio:g}, {points}", **changes)
+    for ratio, points in DOUBTS if config.review_point_ratio is not None else ():
+        changes = {"review_point_ratio": ratio, "review_max_points": points}
+        yield _moved(config, "review_point_ratio, review_max_points", f"{ratio:g}, {points}", **changes)
 
 
 def _moved(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
@@ -147,9 +146,14 @@ def _text(value: float | None) -> str:
 
 
 def papers(config: ProfileConfig) -> ProfileConfig:
-    """Alpha alone makes a view independent, from the first frame on; nothing is doubted, boxes say nothing."""
-    off = {"bearing_deg": 180.0, "range_ratio": 10.0, "extent_ratio": 10.0, "reopen_ratio": None}
-    off |= {"likely": 0.0, "likely_once": 0.0, "box_weight": 0.0, "slip": 0.0}
+    """Views independent by their points alone, from the first frame on; no review, no box prior."""
+    off = {"extent_change": 10.0, "review_point_ratio": None}
+    off |= {
+        "min_object_probability": 0.0,
+        "first_view_min_object_probability": 0.0,
+        "box_update_weight": 0.0,
+        "mismatch_probability": 0.0,
+    }
     return dataclasses.replace(
         config,
         fusion=dataclasses.replace(config.fusion, **off),
@@ -172,7 +176,7 @@ def real(path: Path, config: ProfileConfig, network: PointNet, *, ideal: bool, c
 
 
 def _prior(config: ProfileConfig, network: PointNet) -> Prior:
-    return prior_of(network.boxes, config.fusion.prior, config.sensor, network.evidence)
+    return make_prior(network.boxes, network.reflectance, config.fusion.prior, config.sensor)
 
 
 def tried(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording], *when: int) -> Tried:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
 
-from modt.cli import assemble
+from modt import assembly
 from modt.cli.replay import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
@@ -57,10 +57,10 @@ def replay(
     background_map: NoBackgroundMap | BackgroundMap | None = None,
 ) -> Iterator[Seen]:
     """Every frame; the profile is that of the sensor, the memory the tracker's own where none is given."""
-    profile, mode = load(profile_name), assemble.MODES[mode_name]
+    profile, mode = load(profile_name), assembly.MODES[mode_name]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assemble.pipeline(mode, profile, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
     tracker = Tracker(profile.tracking, mode.machine, background_map=background_map)
     pipeline = replace(pipeline, tracker=tracker)
     for frame, truth in stream.sweeps():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classification.box_classifier import beam_sr, features
+from modt.classification.box_classifier import beam_solid_angle_sr, box_features
 from modt.classification.crops import Crops
-from modt.segmentation.box_fitting import headings, upright_boxes
+from modt.config.segmentation import BoxConfig
+from modt.segmentation.box_fitting import fit_headings, upright_boxes
 from modt.segmentation.groups import Groups
 from modt.types import Float64, Int
 from tools.train.augment import Beams
@@ -20,9 +21,10 @@ def described(crops: Crops) -> Float64:
     """(R, 7) features of the boxes about crops."""
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
-    box = upright_boxes(x, y, z, groups, headings(x, y, groups))
+    box = upright_boxes(x, y, z, groups, fit_headings(x, y, groups, BoxConfig().noise_m))
     beams = Beams()
-    return features(crops.count, box, SENSOR_HEIGHT_M, beam_sr(beams.azimuth_deg, beams.elevation_deg))
+    beam_sr = beam_solid_angle_sr(beams.azimuth_deg, beams.elevation_deg)
+    return box_features(crops.count, box, SENSOR_HEIGHT_M, beam_sr)
 
 
 def all_described(data: Dataset, rows: Int) -> Float64:

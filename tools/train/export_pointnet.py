@@ -182,11 +182,11 @@ def main() -> None:
         told = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
         report["reflectance"] = told
         layers = load_layers(args.trained / "reflectance.npz")
-        held[reflectance_classifier.METADATA] = reflectance_classifier.encode(
+        held[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
             layers, told["share"], told["weight"], told["sensor"]
         )
         share = told["share_without"]
-    held[box_classifier.METADATA] = box_classifier.encode(load_layers(args.trained / "boxes.npz"), share)
+    held[box_classifier.METADATA_KEY] = box_classifier.to_metadata(load_layers(args.trained / "boxes.npz"), share)
     helper.set_model_props(network, held)
     model = network.SerializeToString(deterministic=True)
     args.out.write_bytes(model)

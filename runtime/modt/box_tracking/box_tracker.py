@@ -167,7 +167,7 @@ class BoxTracker:
 
 
 def assign_all(cost: Float64, limit: float) -> tuple[Int, Int]:
-    """Rows and columns of a least-cost assignment of few to few; cost (n, k), pairs of limit and more are excluded."""
+    """Rows and columns of a least-cost assignment of few to few; cost (n, k), not those of limit or more."""
     rows, columns = linear_sum_assignment(np.minimum(cost, limit))
     chosen = cost[rows, columns] < limit
     return rows[chosen], columns[chosen]

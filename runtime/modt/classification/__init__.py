@@ -1,1 +1,1 @@
-"""What a proposal is: network, scheduler, fusion."""
+"""Classification of proposals, its budget, and the fusion of views."""

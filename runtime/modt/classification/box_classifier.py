@@ -1,96 +1,90 @@
-"""What the box of a proposal says of its class: a small network over its size and where it stands.
+"""Classification of a proposal by its box and its number of points.
 
-A wall of twelve metres, a canopy, a pole: most background is known by its size.
+Most background differs from every object in size: walls, canopies, poles.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.classification.crops import height_of
-from modt.classification.mlp import Layers, as_lists, logits, of_lists, part_of
+from modt.classification.crops import sensor_height_m
+from modt.classification.mlp import Layers, fraction, from_lists, logits, to_lists
 from modt.config import SensorConfig
 from modt.types import Float64, Int, Proposals
 
-METADATA = "box_prior"
-"""Key of an ONNX model's metadata under which what it knows of boxes is found."""
+METADATA_KEY = "box_prior"
+"""Key of the box classifier in the metadata of an ONNX model."""
 N_FEATURES = 7
-MOST_POINTS = 1000
-"""What shows more points than this is large; how large, its box says."""
-SMALL_M = 0.05
-"""Added to lengths, so that those of thin things have logarithms that mean something."""
+# Definition of the features: fixed when a model is trained.
+_MAX_COUNT = 1000
+_LENGTH_OFFSET_M = 0.05  # keeps the logarithm of a length finite
 
 
-class Boxes(Protocol):
-    """What boxes say."""
+class BoxClassifier(Protocol):
+    """Log probabilities of the classes by box features."""
 
     @property
-    def share(self) -> float:
-        """Of the box in the word of the network, which sees the points, where no evidence helps (0 to 1)."""
+    def pool_weight(self) -> float:
+        """Exponent of P(class | box) in the log-linear pool with the network, without reflectance (0 to 1)."""
         ...
 
-    def of(self, feature: Float64) -> Float64:
-        """(R, 4) log probability of each class, up to a constant, by features (R, 7) as features() tells them."""
+    def log_probability(self, features: Float64) -> Float64:
+        """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features`."""
         ...
 
 
-class NoBoxes:
-    """Boxes say nothing."""
+class NoBoxClassifier:
+    """No information from boxes."""
 
-    share = 0.0
+    pool_weight = 0.0
 
-    def of(self, feature: Float64) -> Float64:
+    def log_probability(self, features: Float64) -> Float64:
         """(R, 4) zeros."""
-        return np.zeros((len(feature), N_CLASSES))
+        return np.zeros((len(features), N_CLASSES))
 
 
-class KnownBoxes:
-    """log P(class | box), up to a constant: a network of 1,444 weights.
+@dataclass(frozen=True, slots=True)
+class MlpBoxClassifier:
+    """Multilayer perceptron of 1,444 weights."""
 
-    Args:
-        layers: of features of boxes.
-        share: see Boxes.
-    """
+    layers: Layers
+    pool_weight: float
 
-    def __init__(self, layers: Layers, share: float) -> None:
-        self._layers = layers
-        self.share = share
-
-    def of(self, feature: Float64) -> Float64:
-        """(R, 4) log probability of each class, up to a constant."""
-        return logits(self._layers, feature)
+    def log_probability(self, features: Float64) -> Float64:
+        """(R, 4) log P(class | box) up to a constant."""
+        return logits(self.layers, features)
 
 
-def beam_sr(azimuth_step_deg: float, elevation_step_deg: float) -> float:
+def beam_solid_angle_sr(azimuth_step_deg: float, elevation_step_deg: float) -> float:
     """Solid angle between neighbouring beams [sr]."""
     return float(np.deg2rad(azimuth_step_deg) * np.deg2rad(elevation_step_deg))
 
 
-def features(count: Int, box: Float64, sensor_height_m: float, step_sr: float) -> Float64:
-    """(P, 7) what is known of proposals without their points.
+def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: float) -> Float64:
+    """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
 
-    The points count by the area that they cover, so that sensors of different resolution see alike: logarithms of
-    that area [m2], of the distance, the length and the width [m]; height, foot and top above the ground [m].
+    The area in place of the number of points makes the features independent of the sensor's resolution.
 
     Args:
         count: (P,) points.
         box: (P, 7) sensor frame.
         sensor_height_m: of the sensor above the ground.
-        step_sr: solid angle that a point stands for [sr].
+        beam_sr: solid angle of one point [sr].
     """
     distance = np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
     foot = box[:, 2] - box[:, 5] / 2 + sensor_height_m
     return np.stack(
         [
-            np.log(np.clip(count, 1, MOST_POINTS) * distance**2 * step_sr),
+            np.log(np.clip(count, 1, _MAX_COUNT) * distance**2 * beam_sr),
             np.log(distance),
-            np.log(box[:, 3] + SMALL_M),
-            np.log(box[:, 4] + SMALL_M),
+            np.log(box[:, 3] + _LENGTH_OFFSET_M),
+            np.log(box[:, 4] + _LENGTH_OFFSET_M),
             box[:, 5],
             foot,
             foot + box[:, 5],
@@ -99,25 +93,26 @@ def features(count: Int, box: Float64, sensor_height_m: float, step_sr: float) -
     )
 
 
-def described(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
-    """(R, 7) features of the proposals given, as the sensor shows them."""
-    step_sr = beam_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
-    return features(proposals.count[which], proposals.box[which], height_of(proposals, sensor), step_sr)
+def proposal_features(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
+    """(R, 7) box features of the given proposals."""
+    beam_sr = beam_solid_angle_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
+    height_m = sensor_height_m(proposals, sensor)
+    return box_features(proposals.count[which], proposals.box[which], height_m, beam_sr)
 
 
-def encode(layers: Layers, share: float) -> str:
-    """What is known of boxes as a model's metadata holds it."""
-    return json.dumps({"share": share, "layers": as_lists(layers)})
+def to_metadata(layers: Layers, pool_weight: float) -> str:
+    """Metadata entry of a box classifier."""
+    return json.dumps({"share": pool_weight, "layers": to_lists(layers)})
 
 
-def boxes_of(metadata: Mapping[str, str]) -> Boxes:
-    """What a model brings along about boxes; nothing where it brings nothing.
+def from_metadata(metadata: Mapping[str, str]) -> BoxClassifier:
+    """Box classifier of a model; NoBoxClassifier where its metadata has none.
 
     Raises:
-        KeyError, TypeError, ValueError: it brings something that cannot be used.
+        KeyError, TypeError, ValueError: malformed entry.
     """
-    text = metadata.get(METADATA)
+    text = metadata.get(METADATA_KEY)
     if text is None:
-        return NoBoxes()
-    held = json.loads(text)
-    return KnownBoxes(of_lists(held["layers"], N_FEATURES), part_of(held, "share"))
+        return NoBoxClassifier()
+    content = json.loads(text)
+    return MlpBoxClassifier(from_lists(content["layers"], N_FEATURES), fraction(content, "share"))

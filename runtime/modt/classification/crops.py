@@ -1,4 +1,4 @@
-"""The network's input: a proposal's own points in a frame of their own."""
+"""Input of the network: the points of each proposal in a canonical frame."""
 
 from __future__ import annotations
 
@@ -9,19 +9,18 @@ import numpy as np
 from modt.config import SensorConfig
 from modt.types import Float32, Int, Proposals
 
-FOOT_M = 0.3
-"""What stands on the ground shows itself from this height on; what is lower went with the ground."""
-LEVEL_M, SLOPE = 0.1, 0.02
-"""The ground beneath a crop is taken to be within this of the plane the sensor stands on, near by and per range."""
+# Definition of the canonical frame: fixed when a model is trained.
+_LOWEST_M = 0.3  # height of a standing object's lowest point: what is lower was removed with the ground
+_GROUND_OFFSET_M, _GROUND_SLOPE = 0.1, 0.02  # bound on the ground's height beneath a crop: constant, and per range
 
 
 @dataclass(frozen=True, slots=True)
 class Crops:
-    """Points of some proposals, one after another.
+    """Points of R proposals, one after another.
 
     Attributes:
         xyz: (K, 3) points grouped by proposal [m].
-        offsets: (R + 1,) crop i owns xyz[offsets[i]:offsets[i + 1]], never nothing.
+        offsets: (R + 1,) crop i owns xyz[offsets[i]:offsets[i + 1]], at least one point.
     """
 
     xyz: Float32
@@ -36,30 +35,30 @@ class Crops:
         return np.diff(self.offsets)
 
     def padded(self, rows: Int) -> Float32:
-        """(len(rows), n, 3) crops of these rows, each filled to the longest by repeating its own points.
+        """(len(rows), n, 3) crops of these rows, each padded to the largest with repetitions of its own points.
 
-        A repeated point changes nothing: the network takes the maximum over points, and max is idempotent.
+        Repeated points leave the output unchanged: the network takes the maximum over points.
         """
         count = self.count[rows, None]
         batch: Float32 = self.xyz[self.offsets[rows, None] + np.arange(count.max(initial=1)) % count]
         return batch
 
 
-def height_of(proposals: Proposals, sensor: SensorConfig) -> float:
-    """Of the sensor above the ground [m]: as the proposals say, else as the profile does, else a car's."""
+def sensor_height_m(proposals: Proposals, sensor: SensorConfig) -> float:
+    """Height of the sensor above the ground [m]: of the proposals, else of the profile, else the default."""
     if proposals.sensor_height_m is not None:
         return proposals.sensor_height_m
     return sensor.height_m or SensorConfig().height_m or 0.0
 
 
 def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -> Crops:
-    """Points of the proposals given, sensor frame; of a large one every so many-th, the same ones each time.
+    """Points of the given proposals, sensor frame; larger ones evenly subsampled, deterministically.
 
     Args:
         points: (N, 4) of the frame.
-        proposals: its segments.
-        which: (R,) those wanted.
-        max_points: of one crop.
+        proposals: of the frame.
+        which: (R,) proposals to gather.
+        max_points: per crop.
     """
     own = proposals.count[which]
     kept = np.minimum(own, max_points)
@@ -71,12 +70,12 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
 
 
 def canonical(crops: Crops, sensor_height_m: float) -> Crops:
-    """Crops as the network sees them: along and across the line of sight from their middle, and above the ground.
+    """Crops in the canonical frame: x along the line of sight, y to its left, z above the ground.
 
-    The sensor sees the near side of everything, so a crop turned to the line of sight looks alike from wherever in
-    the sweep it comes. The middle is that of its extent, which unlike the mean does not move with the density. The
-    ground is where the crop's lowest point says, as far as a gentle slope could have brought it there: near by what
-    hangs is seen to hang, far away a rise of the road lifts no car.
+    The sensor sees the near side of an object, so in this frame a crop looks the same at every azimuth. The origin is
+    the middle of the extent, which unlike the mean does not depend on the point density. The ground is estimated from
+    the lowest point, within a bound that grows with range: a near object above the ground keeps its height, a far
+    one on a slope is moved to the ground.
 
     Args:
         crops: points in the sensor frame.
@@ -86,20 +85,14 @@ def canonical(crops: Crops, sensor_height_m: float) -> Crops:
         return crops
     x, y, z = crops.xyz.astype(np.float32).T
     starts, count = crops.offsets[:-1], crops.count
-    ahead, left = np.add.reduceat(x, starts) / count, np.add.reduceat(y, starts) / count
-    bearing, slack = np.arctan2(left, ahead), LEVEL_M + SLOPE * np.hypot(ahead, left)
-    rise = np.clip(np.minimum.reduceat(z, starts) + sensor_height_m - FOOT_M, -slack, slack)
+    mean_x, mean_y = np.add.reduceat(x, starts) / count, np.add.reduceat(y, starts) / count
+    azimuth, bound = np.arctan2(mean_y, mean_x), _GROUND_OFFSET_M + _GROUND_SLOPE * np.hypot(mean_x, mean_y)
+    rise = np.clip(np.minimum.reduceat(z, starts) + sensor_height_m - _LOWEST_M, -bound, bound)
     ground = np.repeat(rise - sensor_height_m, count)
-    c, s = np.repeat(np.cos(bearing), count), np.repeat(np.sin(bearing), count)
+    c, s = np.repeat(np.cos(azimuth), count), np.repeat(np.sin(azimuth), count)
     along, across = c * x + s * y, c * y - s * x
-    return Crops(
-        np.stack(
-            [along - _middle(along, starts, count), across - _middle(across, starts, count), z - ground],
-            axis=1,
-            dtype=np.float32,
-        ),
-        crops.offsets,
-    )
+    xyz = [along - _middle(along, starts, count), across - _middle(across, starts, count), z - ground]
+    return Crops(np.stack(xyz, axis=1, dtype=np.float32), crops.offsets)
 
 
 def _middle(value: Float32, starts: Int, count: Int) -> Float32:

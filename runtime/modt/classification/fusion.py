@@ -1,183 +1,160 @@
-"""Which views are classified, and what is made of them (section V-C): three objects, each a `pipeline.Fusion`.
+"""Selection of views to classify and fusion of their likelihoods (section V-C): one `pipeline.Fusion` a mode.
 
-`asks` says which of the tracks that want a class show a view worth classifying, `fuse` takes what the network said
-and tells which tracks are now certain. Both work on the table of tracks in place.
+`asks` selects the tracks whose view is worth a classification; `fuse` takes the classifier's likelihoods and returns
+which tracks are certain, upon which the state machine makes a class final or reopens it. Both write their columns of
+the track table in place.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from modt.classification.posterior import FLOOR, expect, normal, sane
-from modt.classification.prior import Frequency, Prior, shares
+from modt.classification.posterior import MIN_PROBABILITY, from_log_weights, normalise, update_from_boxes
+from modt.classification.prior import FrequencyPrior, Prior, with_background
 from modt.config import FusionConfig
-from modt.geometry import wrap
 from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
-
-CHANCE = 5
-"""Points that come and go by chance: so many more are no closer look."""
 
 
 class EveryFrame:
-    """Tracking by detection: whatever is seen is classified, and this frame's word is the class (Fig. 2a)."""
+    """Tracking by detection: every proposal is classified, its likelihood is the posterior (Fig. 2a)."""
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
-        """Every track with a proposal."""
-        seen: Bool = tracks.proposal != NONE
-        return seen
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks with a proposal."""
+        observed: Bool = tracks.proposal != NONE
+        return observed
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Takes this view for all there is."""
-        tracks.posterior[rows] = sane(likelihood)
+        """Replace the posterior; every row is certain."""
+        tracks.posterior[rows] = normalise(likelihood)
         tracks.views[rows] = 1
-        _remember(tracks, proposals, rows)
+        _record_key_view(tracks, proposals, rows)
         return np.ones(len(rows), np.bool_)
 
 
 class FirstView:
-    """Efficient: the first classification is final (Table I), so it waits for a box that may well be an object's.
+    """Mode efficient: the first classification is final (Table I).
 
-    And for what was seen before: first views are often far and partial (Fig. 11), and what flickers has no second.
+    First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
+    minimum number of observations, since spurious proposals do not last.
 
     Args:
-        config: from when on it may, and what a box has to say.
-        prior: what is thought of a proposal unseen; by default as common as the classes are.
+        config: conditions of the first view.
+        prior: of a proposal before its view; the class frequency by default.
     """
 
     def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         self.config = config
-        self.prior = prior or Frequency(config.prior)
+        self.prior = prior or FrequencyPrior(config.prior)
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
-        """The tracks that have no class."""
-        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
-        asks: Bool = asking & ~tracks.final & (tracks.proposal != NONE) & (tracks.hits >= self.config.once_from)
-        return asks & self.prior.likely(tracks.prior, self.config.likely_once)
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks without a final class that meet the conditions."""
+        config = self.config
+        update_from_boxes(tracks, proposals, self.prior, config)
+        observed = tracks.proposal != NONE
+        asks: Bool = wants_class & ~tracks.final & observed & (tracks.hits >= config.first_view_min_hits)
+        return asks & self.prior.may_be_object(tracks.prior, config.first_view_min_object_probability)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Settles the class."""
-        tracks.posterior[rows] = sane(likelihood)
+        """Replace the posterior; every row is certain."""
+        tracks.posterior[rows] = normalise(likelihood)
         tracks.views[rows] = 1
-        _remember(tracks, proposals, rows)
+        _record_key_view(tracks, proposals, rows)
         return np.ones(len(rows), np.bool_)
 
 
 class KeyViews:
-    """Accurate: the views that are independent of the last one are multiplied (Equations 4 to 6, Table II).
+    """Mode accurate: the likelihoods of independent views are multiplied (Equations 4 to 6, Table II).
 
-    A view counts as independent by its number of points, by the direction and the distance from which it is taken or
-    by its extent. A new track is classified at first sight; what that says settles its class if it is distinct, and
-    is else forgotten at the starting frame, since far and partial first views mislead (Fig. 11).
+    A view is independent of the last key view by its number of points or its extent. A new track is classified at
+    once: a certain class is final, any other is replaced by the first view at or after `start_frame`, since first
+    views are often far and partial (Fig. 11).
 
-    The network's word is a posterior under the frequency of the classes among proposals and, by its share, under
-    what the box says; Equation 6 multiplies likelihoods, so each further view is divided by these, lest they be
-    counted once a view. Views of one object are never wholly independent: a further one may be given less than its
-    full weight. And a class that was settled from afar is looked at again when the object shows clearly more points,
-    and what was known counts only by its share of these; so is what took its class over from its place. What by its
-    box is no object is neither classified nor looked at again.
+    The classifier returns a posterior under the class frequency and, by its pool weight, the box prior, so the
+    prior is divided out of every further view. A final class of few points is reviewed when the object shows clearly
+    more of them; the previous evidence is then weighted by the ratio of points. Tracks whose box excludes an object
+    are neither classified nor reviewed.
 
     Args:
         config: thresholds of independence and certainty.
-        prior: what is thought of a proposal unseen; by default as common as the classes are.
+        prior: of a proposal before its view; the class frequency by default.
     """
 
     def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         self.config = config
-        self.prior = prior or Frequency(config.prior)
-        self._alpha = np.array([config.background_alpha, *config.alpha])
-        share = np.maximum(shares(config.prior), FLOOR)
-        self._log_prior = np.log(share / share.sum())
+        self.prior = prior or FrequencyPrior(config.prior)
+        self._point_change = np.array(config.point_change)
+        frequency = np.maximum(with_background(config.prior), MIN_PROBABILITY)
+        self._log_frequency = np.log(frequency / frequency.sum())
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
-        """Those asking that were never classified or show an independent view, and the settled that came close."""
-        expect(tracks, proposals, self.prior, self.config.box_weight, self.config.slip)
-        seen = tracks.proposal != NONE
-        asks: Bool = (asking | tracks.viewed) & ~tracks.final & seen
-        rows = np.flatnonzero(asks)
-        started = tracks.age[rows] >= self.config.start_frame
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks at their first or an independent view, and final ones to review."""
+        config = self.config
+        update_from_boxes(tracks, proposals, self.prior, config)
+        asks, rows = wants_class.copy(), np.flatnonzero(wants_class)
+        started = tracks.age[rows] >= config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
-        first = ~tracks.viewed[rows]
-        asks[rows] = np.where(first, self.prior.likely(tracks.prior[rows], self.config.likely), started & fresh)
-        return asks | self._reopened(tracks, proposals, np.flatnonzero(seen & tracks.final))
+        may_be_object = self.prior.may_be_object(tracks.prior[rows], config.min_object_probability)
+        asks[rows] = np.where(tracks.viewed[rows], started & fresh, may_be_object)
+        return asks | self._reviewed(tracks, proposals, np.flatnonzero(tracks.final & (tracks.proposal != NONE)))
 
-    def _reopened(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
-        """(M,) which of these rows, settled as they are, show so much more that they are worth another look."""
-        again = np.zeros(len(tracks), np.bool_)
-        if self.config.reopen_ratio is not None:
-            many = self.config.reopen_ratio * tracks.key_points[rows] + CHANCE
-            again[rows] = proposals.count[tracks.proposal[rows]] > many
-            again &= tracks.key_points < self.config.reopen_points
-            again &= self.prior.likely(tracks.prior, self.config.likely_again)
-        return again
+    def _reviewed(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
+        """(M,) tracks of these rows, all final, whose number of points has grown enough for another view."""
+        config, review = self.config, np.zeros(len(tracks), np.bool_)
+        if config.review_point_ratio is not None:
+            least = config.review_point_ratio * tracks.key_points[rows] + config.review_extra_points
+            review[rows] = proposals.count[tracks.proposal[rows]] > least
+            review &= tracks.key_points < config.review_max_points
+            review &= self.prior.may_be_object(tracks.prior, config.review_min_object_probability)
+        return review
 
     def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
-        """(R,) whether the view of each track differs enough from its last key observation (Equation 4)."""
-        limit, own = self.config, tracks.proposal[rows]
-        box = proposals.box[own]
-        likely = np.argmax(tracks.posterior[rows], axis=1)
-        bearing, distance = _view(tracks, proposals, rows)
-        change = _relative(proposals.count[own], tracks.key_points[rows])
-        nearer = _relative(distance, tracks.key_range[rows])
-        grown = _relative(box[:, 3:6], tracks.key_extent[rows]).max(axis=1, initial=0.0)
-        turned = np.abs(wrap(bearing - tracks.key_bearing[rows]))
-        independent: Bool = (
-            (change > self._alpha[likely])
-            | (turned > np.deg2rad(limit.bearing_deg))
-            | (nearer > limit.range_ratio)
-            | (grown > limit.extent_ratio)
-        )
+        """(R,) whether the view of each track differs enough from its last key view (Equation 4)."""
+        config, own = self.config, tracks.proposal[rows]
+        points = _relative_change(proposals.count[own], tracks.key_points[rows])
+        extent = _relative_change(proposals.box[own, 3:6], tracks.key_extent[rows]).max(axis=1, initial=0.0)
+        independent: Bool = points > self._point_change[np.argmax(tracks.posterior[rows], axis=1)]
+        independent |= extent > config.extent_change
         return independent
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Multiplies the view into the posterior, in logarithms (Equation 6), and fixes what is certain."""
-        view, before = np.log(sane(likelihood)), self._unseen(tracks.prior[rows])
-        evidence = self.config.view_weight * (view - before)
+        """Multiply the view into the posterior (Equation 6); (R,) which rows are certain now."""
+        view, prior = np.log(normalise(likelihood)), self._log_pooled_prior(tracks.prior[rows])
+        past = np.log(normalise(tracks.key_posterior[rows])) - self._log_pooled_prior(tracks.key_prior[rows])
+        ratio = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
+        past *= np.where(tracks.final[rows], np.minimum(ratio, 1.0), 1.0)[:, None]
         fused = (tracks.views[rows] > 0)[:, None]
-        past = np.log(sane(tracks.key_posterior[rows])) - self._unseen(tracks.key_prior[rows])
-        share = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
-        past *= np.where(tracks.final[rows], np.minimum(share, 1.0), 1.0)[:, None]
-        posterior = normal(np.where(fused, before + past + evidence, view))
+        posterior = from_log_weights(np.where(fused, prior + past + (view - prior), view))
         certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
         tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
-        _remember(tracks, proposals, rows)
+        _record_key_view(tracks, proposals, rows)
         return certain
 
-    def _unseen(self, boxes: Float64) -> Float64:
-        """(R, 4) logarithm of what a view's word holds without the view, given (R, 4) what the boxes say."""
-        share = self.prior.share
-        unseen: Float64 = (1.0 - share) * self._log_prior + share * np.log(np.maximum(boxes, FLOOR))
-        return unseen
+    def _log_pooled_prior(self, box_prior: Float64) -> Float64:
+        """(R, 4) logarithm of the prior that a likelihood contains: pool of class frequency and box prior (R, 4)."""
+        weight = self.prior.pool_weight
+        box = np.log(np.maximum(box_prior, MIN_PROBABILITY))
+        pooled: Float64 = (1.0 - weight) * self._log_frequency + weight * box
+        return pooled
 
     def _certain(self, posterior: Float64) -> Bool:
-        """(R,) whether an object's posterior, or the evidence for background, reaches its threshold.
+        """(R,) whether the posterior of an object, or the evidence for background, reaches its threshold.
 
-        Most proposals are background before anyone looks, so its posterior is high for nothing. What counts for it is
-        what it would be if all classes were equally common.
+        Background is the most frequent class and has a high posterior before any view, so its threshold applies to
+        the posterior under equal class frequencies.
         """
-        objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self.config.threshold
-        evidence = normal(np.log(posterior) - self._log_prior)[:, 0]
+        objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self.config.object_threshold
+        evidence = from_log_weights(np.log(posterior) - self._log_frequency)[:, 0]
         return objects | (evidence >= self.config.background_threshold)
 
 
-def _relative(now: Float64 | Int, before: Float64 | Int) -> Float64:
+def _relative_change(now: Float64 | Int, before: Float64 | Int) -> Float64:
     change: Float64 = np.abs(now - before) / np.maximum(before, 1e-3)
     return change
 
 
-def _view(tracks: Tracks, proposals: Proposals, rows: Int) -> tuple[Float64, Float64]:
-    """(R,) direction of the line of sight in the world [rad], and distance [m].
-
-    The tracks hold their proposals' boxes in the world frame, so the two yaws of a box differ by the sensor's own.
-    """
-    box = proposals.box[tracks.proposal[rows]]
-    sensor_yaw = wrap(tracks.box[rows, 6] - box[:, 6])
-    return wrap(np.arctan2(box[:, 1], box[:, 0]) + sensor_yaw), np.hypot(box[:, 0], box[:, 1])
-
-
-def _remember(tracks: Tracks, proposals: Proposals, rows: Int) -> None:
+def _record_key_view(tracks: Tracks, proposals: Proposals, rows: Int) -> None:
     own = tracks.proposal[rows]
     tracks.key_prior[rows], tracks.key_posterior[rows] = tracks.prior[rows], tracks.posterior[rows]
-    tracks.key_bearing[rows], tracks.key_range[rows] = _view(tracks, proposals, rows)
     tracks.key_points[rows] = proposals.count[own]
     tracks.key_extent[rows] = proposals.box[own, 3:6]

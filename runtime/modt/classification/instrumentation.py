@@ -1,33 +1,33 @@
-"""A classifier that teaches the cost model what it costs on this machine."""
+"""Measurement of the classifier's cost."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from modt.classification.pointnet import PointNet
-from modt.classification.scheduler import CostModel
+from modt.classification.scheduler import LinearCost
 from modt.types import Float32, Float64, Int, Proposals
 
 
-class CostedClassifier:
-    """Passes every call on and reports its CPU time to the cost model.
+class TimedClassifier:
+    """Classifier that reports the CPU time of every call to the cost model.
 
     Args:
-        classifier: that does the work.
-        cost: that learns.
+        classifier: that is timed.
+        cost: model to update.
         cpu_ns: CPU time of the calling thread [ns].
     """
 
-    def __init__(self, classifier: PointNet, cost: CostModel, cpu_ns: Callable[[], int]) -> None:
+    def __init__(self, classifier: PointNet, cost: LinearCost, cpu_ns: Callable[[], int]) -> None:
         self._classifier, self._cost, self._cpu_ns = classifier, cost, cpu_ns
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) probability of each class for each of the proposals given, in their order."""
-        before = self._cpu_ns()
+        """(R, 4) class probabilities of the given proposals, in their order."""
+        start_ns = self._cpu_ns()
         likelihood = self._classifier.classify(points, proposals, which)
-        self._cost.learn(proposals.count[which], (self._cpu_ns() - before) / 1e6)
+        self._cost.update(proposals.count[which], (self._cpu_ns() - start_ns) / 1e6)
         return likelihood
 
     def facts(self) -> dict[str, str]:
-        """The model's file and hash."""
+        """File and hash of the model."""
         return self._classifier.facts()

@@ -1,4 +1,4 @@
-"""A small network, hyperbolic tangents between its layers, as the metadata of a model holds it."""
+"""Multilayer perceptron with tanh activations, stored as JSON in the metadata of a model."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from modt.classes import N_CLASSES
 from modt.types import Float64
 
 Layers = Sequence[tuple[Float64, Float64]]
-"""(in, out) weight and (out,) bias of each."""
+"""(in, out) weight and (out,) bias of each layer."""
 
 
-def logits(layers: Layers, feature: Float64) -> Float64:
-    """(R, 4) of features (R, F)."""
+def logits(layers: Layers, features: Float64) -> Float64:
+    """(R, 4) of (R, F) features."""
     *hidden, (weight, bias) = layers
-    value = feature
+    value = features
     for hidden_weight, hidden_bias in hidden:
         value = np.tanh(value @ hidden_weight + hidden_bias)
-    score: Float64 = value @ weight + bias
-    return score
+    output: Float64 = value @ weight + bias
+    return output
 
 
-def as_lists(layers: Layers) -> list[list[Any]]:
-    """The layers as JSON has them."""
+def to_lists(layers: Layers) -> list[list[Any]]:
+    """Layers for JSON."""
     return [[weight.tolist(), bias.tolist()] for weight, bias in layers]
 
 
-def of_lists(lists: Any, n_features: int) -> Layers:
+def from_lists(lists: Any, n_features: int) -> Layers:
     """Layers from JSON.
 
     Raises:
-        TypeError, ValueError: they are none, or not of so many features and the classes.
+        TypeError, ValueError: not layers, not finite, or not from n_features inputs to the classes.
     """
     layers = [(np.array(weight, np.float64), np.array(bias, np.float64)) for weight, bias in lists]
     if not all(np.isfinite(weight).all() and np.isfinite(bias).all() for weight, bias in layers):
@@ -45,13 +45,13 @@ def of_lists(lists: Any, n_features: int) -> Layers:
     return layers
 
 
-def part_of(held: Mapping[str, Any], name: str) -> float:
-    """A number from 0 to 1 that stands beside layers.
+def fraction(content: Mapping[str, Any], key: str) -> float:
+    """Number from 0 to 1 under a key.
 
     Raises:
-        KeyError, TypeError, ValueError: there is none of the name, or it is none.
+        KeyError, TypeError, ValueError: missing, not a number, or out of range.
     """
-    part = float(held[name])
-    if not 0.0 <= part <= 1.0:
-        raise ValueError(f"a {name} of {part}, wanted 0 to 1")
-    return part
+    value = float(content[key])
+    if not 0.0 <= value <= 1.0:
+        raise ValueError(f"{key} of {value}, wanted 0 to 1")
+    return value

@@ -13,15 +13,14 @@ from scipy.special import softmax
 
 from modt import assets
 from modt.classes import N_CLASSES
-from modt.classification.box_classifier import N_FEATURES, Boxes, boxes_of, described
-from modt.classification.crops import canonical, gather, height_of
-from modt.classification.prior import share_of
-from modt.classification.reflectance_classifier import Evidence, evidence_of
+from modt.classification import box_classifier, reflectance_classifier
+from modt.classification.crops import canonical, gather, sensor_height_m
+from modt.classification.prior import box_pool_weight
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Int, Proposals
 
-_UNUSABLE = (
+_MODEL_ERRORS = (
     ort_errors.Fail,
     ort_errors.InvalidArgument,
     ort_errors.InvalidGraph,
@@ -30,30 +29,28 @@ _UNUSABLE = (
     ort_errors.NotImplemented,
     ort_errors.RuntimeException,
 )
-
-
-_LEAST_PROBABILITY = 1e-12
+_MIN_PROBABILITY = 1e-12  # keeps logarithms finite
 
 
 class PointNet:
-    """P(class | points, box, reflectance) of proposals: a pool of the network and of what the model knows besides.
+    """P(class | points, box, reflectance): log-linear pool of the network and the classifiers in its metadata.
 
-    A proposal costs what its own points cost: crops of like size share a call, so that little is padded, and a
-    call is small enough for its features to stay in the cache.
+    The cost of a proposal follows its number of points: crops of similar size share a batch, so that padding is
+    small, and a batch is small enough for its features to stay in the cache.
 
     Args:
-        config: the model and the sizes of a call.
-        sensor: how high it stands, for proposals that do not say.
+        config: model and batch size.
+        sensor: for the height, where the proposals have none, and the scale of the reflectance.
 
     Attributes:
-        path: the model file.
-        sha256: its hash, which its card (the file beside it that ends in .md) must name.
-        boxes: what the model knows of boxes.
-        evidence: what it makes of the returns' reflectance.
+        path: model file.
+        sha256: its hash, equal to that in its card (the file beside it that ends in .md).
+        boxes: box classifier of the model.
+        reflectance: reflectance classifier of the model for this sensor.
 
     Raises:
-        MisuseError: no such model, not the one that its card describes, no ONNX, not (batch, points, 3) to
-            (batch, 4), or with knowledge of boxes or reflectance that cannot be used.
+        MisuseError: no such model, a hash that differs from the card's, not ONNX, not (batch, points, 3) to
+            (batch, 4), or malformed metadata.
     """
 
     def __init__(self, config: ClassificationConfig, sensor: SensorConfig) -> None:
@@ -63,18 +60,24 @@ class PointNet:
         self.sha256 = _checked_hash(self.path)
         self._session = _session(self.path)
         self._input = self._session.get_inputs()[0].name
-        self.boxes, self.evidence = self._brought_along()
+        metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
+        try:
+            self.boxes = box_classifier.from_metadata(metadata)
+            self.reflectance = reflectance_classifier.from_metadata(metadata, sensor)
+        except (KeyError, TypeError, ValueError) as error:
+            cause = f"malformed box or reflectance classifier ({error})"
+            raise MisuseError(self.path, cause, "export the model again") from None
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) probability of each class for each of the proposals given, in their order.
+        """(R, 4) class probabilities of the given proposals, in their order.
 
         Args:
             points: (N, 4) of the frame.
-            proposals: its segments.
-            which: (R,) those to classify.
+            proposals: of the frame.
+            which: (R,) proposals to classify.
         """
         crops = gather(points, proposals, which, self.config.max_points)
-        crops = canonical(crops, height_of(proposals, self._sensor))
+        crops = canonical(crops, sensor_height_m(proposals, self._sensor))
         out = np.empty((len(crops), N_CLASSES))
         by_size = np.argsort(crops.count, kind="stable")
         for first in range(0, len(crops), self.config.batch):
@@ -82,28 +85,21 @@ class PointNet:
             out[rows] = self.infer(crops.padded(rows))
         return self._pooled(out, proposals, which)
 
-    def _pooled(self, said: Float64, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) log-linear pool of what the network says of the shape, the box says, and the reflectance adds."""
-        share, weight = share_of(self.boxes, self.evidence), self.evidence.weight
-        if not share and not weight:
-            return said
-        feature = described(proposals, which, self._sensor)
-        told = None if proposals.reflectance is None else proposals.reflectance[which]
-        score = (1.0 - share) * np.log(np.maximum(said, _LEAST_PROBABILITY))
-        score += share * self.boxes.of(feature) + weight * self.evidence.of(feature, told)
+    def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:
+        """(R, 4) P(class | points)^(1 - w) P(class | box)^w P(reflectance | class, box)^v, normalised."""
+        box_weight, weight = box_pool_weight(self.boxes, self.reflectance), self.reflectance.weight
+        if not box_weight and not weight:
+            return network
+        features = box_classifier.proposal_features(proposals, which, self._sensor)
+        returns = None if proposals.reflectance is None else proposals.reflectance[which]
+        score = (1.0 - box_weight) * np.log(np.maximum(network, _MIN_PROBABILITY))
+        score += box_weight * self.boxes.log_probability(features)
+        score += weight * self.reflectance.log_likelihood(features, returns)
         probability: Float64 = softmax(score, axis=1)
         return probability
 
-    def _brought_along(self) -> tuple[Boxes, Evidence]:
-        metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
-        try:
-            return boxes_of(metadata), evidence_of(metadata, N_FEATURES, self._sensor)
-        except (KeyError, TypeError, ValueError) as error:
-            cause = f"what it knows of boxes and reflectance cannot be used ({error})"
-            raise MisuseError(self.path, cause, "export the model again") from None
-
     def facts(self) -> dict[str, str]:
-        """The model's file and hash, for the record of a run."""
+        """File and hash of the model, for the record of a run."""
         return {"file": self.path.name, "sha256": self.sha256}
 
     def infer(self, batch: Float32) -> Float32:
@@ -114,7 +110,7 @@ class PointNet:
 
 
 def _session(path: Path) -> ort.InferenceSession:
-    """A session that uses the calling thread alone: a waiting thread pool would burn the core between frames."""
+    """Session on the calling thread alone: an idle thread pool would spin on the core between frames."""
     options = ort.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.execution_mode = ort.ExecutionMode.ORT_SEQUENTIAL
@@ -123,25 +119,19 @@ def _session(path: Path) -> ort.InferenceSession:
     options.log_severity_level = 4
     try:
         session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-    except _UNUSABLE as error:
-        cause = str(error).splitlines()[0]
-        raise MisuseError(
-            path, f"no ONNX model ({cause})", "give one made by tools/train/export_pointnet.py"
-        ) from None
+    except _MODEL_ERRORS as error:
+        cause = f"not an ONNX model ({str(error).splitlines()[0]})"
+        raise MisuseError(path, cause, "use a model of tools/train/export_pointnet.py") from None
     shapes = [tuple(end.shape) for end in (*session.get_inputs(), *session.get_outputs())]
     if len(shapes) != 2 or not _fits(shapes[0], (None, None, 3)) or not _fits(shapes[1], (None, N_CLASSES)):
-        raise MisuseError(
-            path,
-            f"takes and gives {' and '.join(map(str, shapes))}",
-            f"give a model of (batch, points, 3) to (batch, {N_CLASSES})",
-        )
+        cause = f"inputs and outputs of shape {' and '.join(map(str, shapes))}"
+        raise MisuseError(path, cause, f"use a model of (batch, points, 3) to (batch, {N_CLASSES})")
     return session
 
 
 def _fits(shape: tuple[int | str | None, ...], wanted: tuple[int | None, ...]) -> bool:
-    return len(shape) == len(wanted) and all(
-        a == b if b is not None else not isinstance(a, int) for a, b in zip(shape, wanted, strict=True)
-    )
+    """Whether the fixed dimensions agree and the others (None) are dynamic."""
+    return tuple(n if isinstance(n, int) else None for n in shape) == wanted
 
 
 def _checked_hash(path: Path) -> str:

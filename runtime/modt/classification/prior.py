@@ -1,7 +1,4 @@
-"""What is thought of a proposal before its points are looked at: by what is common, or by its box and brightness.
-
-A few numbers a proposal tell most background apart for next to nothing, and the network need not be asked.
-"""
+"""Class prior of a proposal before the network sees its points: by class frequency, or by its box and reflectance."""
 
 from __future__ import annotations
 
@@ -12,100 +9,88 @@ import numpy as np
 from scipy.special import softmax
 
 from modt.classes import ObjectClass
-from modt.classification.box_classifier import Boxes, NoBoxes, described
-from modt.classification.reflectance_classifier import Evidence
+from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, proposal_features
+from modt.classification.reflectance_classifier import ReflectanceClassifier
 from modt.config import SensorConfig
 from modt.types import Bool, Float64, Proposals
 
 
 class Prior(Protocol):
-    """P(class) of proposals that nobody has looked at."""
+    """P(class) of proposals that are not classified yet."""
 
     @property
-    def share(self) -> float:
-        """What part of it the word of the network holds already (0 to 1)."""
+    def pool_weight(self) -> float:
+        """Exponent of the prior in the classifier's log-linear pool (0 to 1)."""
         ...
 
-    def of(self, proposals: Proposals) -> Float64:
-        """(P, 4) for each proposal of a frame."""
+    def probability(self, proposals: Proposals) -> Float64:
+        """(P, 4) of each proposal of a frame."""
         ...
 
-    def likely(self, said: Float64, least: float) -> Bool:
-        """(M,) which may be objects, said (M, 4) being what it says of them: with this probability at least."""
+    def may_be_object(self, probability: Float64, threshold: float) -> Bool:
+        """(M,) rows of priors (M, 4) worth a classification: objects with at least this probability."""
         ...
 
 
-class Frequency:
-    """As common as the classes are among proposals, whatever the proposal: it rules nothing out.
+class FrequencyPrior:
+    """The frequency of the classes among proposals, the same for each: it excludes none.
 
     Args:
-        objects: share of car, pedestrian and cyclist.
+        objects: frequency of every class but background.
     """
 
-    share = 0.0
+    pool_weight = 0.0
 
     def __init__(self, objects: Sequence[float]) -> None:
-        self._share = shares(objects)
+        self._frequency = with_background(objects)
 
-    def of(self, proposals: Proposals) -> Float64:
-        """(P, 4), the same for each."""
-        return np.tile(self._share, (len(proposals), 1))
+    def probability(self, proposals: Proposals) -> Float64:
+        """(P, 4) equal rows."""
+        return np.tile(self._frequency, (len(proposals), 1))
 
-    def likely(self, said: Float64, least: float) -> Bool:
-        """(M,) all of them: it does not tell them apart."""
-        return np.ones(len(said), np.bool_)
-
-
-def shares(objects: Sequence[float]) -> Float64:
-    """(4,) of background, car, pedestrian and cyclist, the objects' being given."""
-    return np.append(1.0 - np.sum(objects), objects)
+    def may_be_object(self, probability: Float64, threshold: float) -> Bool:
+        """(M,) True."""
+        return np.ones(len(probability), np.bool_)
 
 
 class BoxPrior:
-    """P(class | box, reflectance).
+    """P(class | box, reflectance)."""
 
-    Args:
-        boxes: what they say.
-        sensor: its resolution, and how high it stands, for proposals that do not say.
-        evidence: what the reflectance adds.
-    """
+    def __init__(self, boxes: BoxClassifier, reflectance: ReflectanceClassifier, sensor: SensorConfig) -> None:
+        self.pool_weight = box_pool_weight(boxes, reflectance)
+        self._boxes, self._reflectance, self._sensor = boxes, reflectance, sensor
 
-    def __init__(self, boxes: Boxes, sensor: SensorConfig, evidence: Evidence) -> None:
-        self.share = share_of(boxes, evidence)
-        self._boxes = boxes
-        self._sensor = sensor
-        self._evidence = evidence
-
-    def of(self, proposals: Proposals) -> Float64:
-        """(P, 4) for each proposal of a frame."""
-        feature = described(proposals, slice(None), self._sensor)
-        score = self._boxes.of(feature) + self._evidence.of(feature, proposals.reflectance)
+    def probability(self, proposals: Proposals) -> Float64:
+        """(P, 4) of each proposal of a frame."""
+        features = proposal_features(proposals, slice(None), self._sensor)
+        score = self._boxes.log_probability(features)
+        score += self._reflectance.log_likelihood(features, proposals.reflectance)
         probability: Float64 = softmax(score, axis=1)
         return probability
 
-    def likely(self, said: Float64, least: float) -> Bool:
-        """(M,) which are objects with this probability at least, said (M, 4) being what it says of them."""
-        return at_least(said, least)
+    def may_be_object(self, probability: Float64, threshold: float) -> Bool:
+        """(M,) rows of priors (M, 4) that give the objects together at least this probability."""
+        return object_probability_reaches(probability, threshold)
 
 
-def share_of(boxes: Boxes, evidence: Evidence) -> float:
-    """Part of what boxes say in the word of a network, given the evidence besides."""
-    return boxes.share if evidence.share is None else evidence.share
+def with_background(objects: Sequence[float]) -> Float64:
+    """(4,) frequency of every class, background having the rest of the objects'."""
+    return np.append(1.0 - np.sum(objects), objects)
 
 
-def at_least(said: Float64, least: float) -> Bool:
-    """(M,) which rows (M, 4) give the objects together this probability."""
-    likely: Bool = 1.0 - said[:, ObjectClass.BACKGROUND] >= least
-    return likely
+def object_probability_reaches(probability: Float64, threshold: float) -> Bool:
+    """(M,) rows (M, 4) that give the objects together at least this probability."""
+    reaches: Bool = 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
+    return reaches
 
 
-def prior_of(boxes: Boxes, frequency: Sequence[float], sensor: SensorConfig, evidence: Evidence) -> Prior:
-    """The prior by what a model knows of boxes; the frequency of the classes where it knows nothing of them.
+def box_pool_weight(boxes: BoxClassifier, reflectance: ReflectanceClassifier) -> float:
+    """Exponent of P(class | box) in the classifier's log-linear pool."""
+    return boxes.pool_weight if reflectance.pool_weight is None else reflectance.pool_weight
 
-    Args:
-        boxes: what they say.
-        frequency: share of car, pedestrian and cyclist.
-        sensor: whose proposals are seen.
-        evidence: what their reflectance adds.
-    """
-    return Frequency(frequency) if isinstance(boxes, NoBoxes) else BoxPrior(boxes, sensor, evidence)
+
+def make_prior(
+    boxes: BoxClassifier, reflectance: ReflectanceClassifier, frequency: Sequence[float], sensor: SensorConfig
+) -> Prior:
+    """BoxPrior; FrequencyPrior where the model has no box classifier."""
+    return FrequencyPrior(frequency) if isinstance(boxes, NoBoxClassifier) else BoxPrior(boxes, reflectance, sensor)

@@ -1,8 +1,8 @@
-"""How brightly proposals send light back, as evidence of what they are.
+"""Likelihood of a proposal's reflectance statistics under each class.
 
-Number plates and lamps dazzle, car paint seen aslant sends nothing back, cloth and leaves lie in between: that says
-what shape alone does not. It means something on the scale of the sensor that it was learnt from only. So a model
-names that sensor, a profile its own; where the two differ, or a sweep carries no reflectance, shape decides alone.
+Number plates and lamps are bright, car paint at a grazing angle returns nothing, cloth and leaves lie between. The
+values hold on the scale of one sensor, named by the model and by `sensor.reflectance` of the profile: where the two
+differ, or a sweep has no reflectance, the classifier adds nothing.
 """
 
 from __future__ import annotations
@@ -15,100 +15,89 @@ from typing import Protocol
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.classification.mlp import Layers, as_lists, logits, of_lists, part_of
+from modt.classification.box_classifier import N_FEATURES
+from modt.classification.mlp import Layers, fraction, from_lists, logits, to_lists
 from modt.config import SensorConfig
 from modt.types import N_REFLECTANCE, Float64
 
 log = logging.getLogger(__name__)
 
-METADATA = "reflectance"
-"""Key of an ONNX model's metadata under which its evidence is found."""
+METADATA_KEY = "reflectance"
+"""Key of the reflectance classifier in the metadata of an ONNX model."""
 
 
-class Evidence(Protocol):
-    """What its returns say of a proposal beyond its box."""
+class ReflectanceClassifier(Protocol):
+    """Log likelihoods of reflectance statistics given class and box."""
 
     @property
-    def share(self) -> float | None:
-        """Of the box in the word of the network where there is evidence; None: as without."""
+    def pool_weight(self) -> float | None:
+        """Exponent of P(class | box) in the log-linear pool with reflectance; None: the box classifier's own."""
         ...
 
     @property
     def weight(self) -> float:
-        """Share of it that the network, which knows the shape, does not know yet."""
+        """Exponent of the likelihood in that pool: the part of it that the shape does not imply (0 to 1)."""
         ...
 
-    def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) log likelihood of each class.
+    def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
+        """(R, 4) log P(reflectance | class, box) up to a constant.
 
         Args:
-            box_features: (R, 7) as prior.features tells them.
-            reflectance: (R, 5) of the proposals, NaN where one has none; None where the sweep carries none.
+            box_features: (R, 7) as `box_classifier.box_features`.
+            reflectance: (R, 5) statistics, NaN where a proposal has none; None where the sweep has none.
         """
         ...
 
 
-class NoEvidence:
-    """Reflectance is not looked at."""
+class NoReflectanceClassifier:
+    """No information from reflectance."""
 
-    share = None
+    pool_weight = None
     weight = 0.0
 
-    def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
+    def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
         """(R, 4) zeros."""
         return np.zeros((len(box_features), N_CLASSES))
 
 
-class Reflectance:
-    """log P(reflectance | class, box), up to a constant: a network of 1,604 weights.
+class MlpReflectanceClassifier:
+    """Multilayer perceptron of 1,604 weights over box features and reflectance statistics, side by side."""
 
-    Args:
-        layers: of features of boxes and of reflectance, side by side.
-        share, weight: see Evidence.
-    """
+    def __init__(self, layers: Layers, pool_weight: float, weight: float) -> None:
+        self._layers, self.pool_weight, self.weight = layers, pool_weight, weight
+        self._warned = False
 
-    def __init__(self, layers: Layers, share: float, weight: float) -> None:
-        self._layers = layers
-        self.share = share
-        self.weight = weight
-        self._missed = False
-
-    def of(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) log likelihood of each class; zeros where there is no reflectance."""
+    def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
+        """(R, 4) log P(reflectance | class, box) up to a constant; zeros without reflectance."""
         if reflectance is not None:
-            told = logits(self._layers, np.hstack([box_features, reflectance]))
-            told[np.isnan(reflectance[:, 0])] = 0.0
-            return told
-        if len(box_features) and not self._missed:
+            likelihood = logits(self._layers, np.hstack([box_features, reflectance]))
+            likelihood[np.isnan(reflectance[:, 0])] = 0.0
+            return likelihood
+        if len(box_features) and not self._warned:
             log.warning(
-                "a sweep carries no reflectance: shape alone decides, wherever that is so; have the sensor's driver "
-                "write it, or set sensor.reflectance to none"
+                "a sweep has no reflectance: such sweeps are classified by shape alone; enable reflectance in the "
+                "sensor's driver, or set sensor.reflectance to none"
             )
-            self._missed = True
+            self._warned = True
         return np.zeros((len(box_features), N_CLASSES))
 
 
-def encode(layers: Layers, share: float, weight: float, sensor: str) -> str:
-    """The evidence as a model's metadata holds it."""
-    return json.dumps({"sensor": sensor, "share": share, "weight": weight, "layers": as_lists(layers)})
+def to_metadata(layers: Layers, pool_weight: float, weight: float, sensor: str) -> str:
+    """Metadata entry of a reflectance classifier."""
+    return json.dumps({"sensor": sensor, "share": pool_weight, "weight": weight, "layers": to_lists(layers)})
 
 
-def evidence_of(metadata: Mapping[str, str], n_box: int, sensor: SensorConfig) -> Evidence:
-    """The evidence that a model brings along for a sensor; none where it brings none for this one.
-
-    Args:
-        metadata: of the model.
-        n_box: features of a box.
-        sensor: whose returns are seen.
+def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> ReflectanceClassifier:
+    """Reflectance classifier of a model; NoReflectanceClassifier where its metadata has none for this sensor.
 
     Raises:
-        KeyError, TypeError, ValueError: it brings one that cannot be used.
+        KeyError, TypeError, ValueError: malformed entry.
     """
-    text = metadata.get(METADATA)
+    text = metadata.get(METADATA_KEY)
     if text is None:
-        return NoEvidence()
-    held = json.loads(text)
-    if held["sensor"] != sensor.reflectance:
-        return NoEvidence()
-    layers = of_lists(held["layers"], n_box + N_REFLECTANCE)
-    return Reflectance(layers, part_of(held, "share"), part_of(held, "weight"))
+        return NoReflectanceClassifier()
+    content = json.loads(text)
+    if content["sensor"] != sensor.reflectance:
+        return NoReflectanceClassifier()
+    layers = from_lists(content["layers"], N_FEATURES + N_REFLECTANCE)
+    return MlpReflectanceClassifier(layers, fraction(content, "share"), fraction(content, "weight"))

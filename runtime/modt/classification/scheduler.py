@@ -1,85 +1,68 @@
-"""Who is classified in this frame: the worthiest calls that its budget pays for."""
+"""Selection of the tracks to classify in a frame: the calls of greatest worth that the budget pays for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from modt.classes import N_CLASSES
+from modt.config import CallWorthConfig, CostModelConfig
 from modt.types import NONE, Bool, Budget, Float64, Int, Proposals, Tracks
 
-WAITING_WORTH = 0.1
-"""What a frame of waiting adds to the worth of a call, itself at most 1: a track that has waited for 1 / this many
-frames goes before whatever asks for the first time, so that none starves."""
-NEAR_M = 30.0
-"""At this distance closeness is worth 1/e of what it is at the sensor."""
-
-
-class CostModel(Protocol):
-    """What classifying a proposal costs."""
-
-    def cost_ms(self, points: Int) -> Float64:
-        """(R,) CPU time of proposals of so many points [ms]."""
-        ...
-
-    def learn(self, points: Int, cpu_ms: float) -> None:
-        """Take in what classifying proposals of so many points together did cost."""
-        ...
+_POINTS_UNIT = 100.0  # points counted in hundreds, which conditions the fit
 
 
 class LinearCost:
-    """So much a proposal and so much a point, learnt on the machine it runs on.
+    """CPU time of a classification, linear in its number of points, estimated on the machine that runs it.
 
-    Recursive least squares with forgetting finds the two; a margin that follows the worst recent underestimate, and
-    decays slowly, keeps a frame from overshooting its budget. Until it has learnt it assumes the textbook's cost.
+    Recursive least squares with forgetting estimates time per call and per point. A margin that follows the largest
+    recent underestimate and decays slowly keeps a frame within its budget.
 
     Args:
-        max_points: more points than this are not handed to the network.
-        per_call_ms, per_point_ms: cost assumed at first.
-        forget: weight of the past against the next frame.
+        max_points: limit of the points of a proposal handed to the network.
+        config: initial values and rates.
     """
 
-    def __init__(
-        self, max_points: int = 400, per_call_ms: float = 0.1, per_point_ms: float = 0.001, forget: float = 0.98
-    ) -> None:
-        self.max_points, self.forget = max_points, forget
+    def __init__(self, max_points: int, config: CostModelConfig) -> None:
+        self._max_points, self._config = max_points, config
         self.margin = 1.0
-        self._theta = np.array([per_call_ms, per_point_ms])
-        self._unit = np.array([1.0, 100.0])  # a call, a hundred points: of like weight in the fit
-        self._covariance = np.eye(2) * 10.0
+        self._theta = np.array([config.call_ms, config.point_ms])
+        self._unit = np.array([1.0, _POINTS_UNIT])
+        self._covariance = np.eye(2) * config.initial_variance
 
     def cost_ms(self, points: Int) -> Float64:
-        """(R,) CPU time of proposals of so many points [ms], on the safe side."""
+        """(R,) upper estimate of the CPU time of proposals of (R,) points [ms]."""
         per_call, per_point = np.maximum(self._theta, 1e-6)
-        cost: Float64 = self.margin * (per_call + per_point * np.minimum(points, self.max_points))
+        cost: Float64 = self.margin * (per_call + per_point * np.minimum(points, self._max_points))
         return cost
 
-    def learn(self, points: Int, cpu_ms: float) -> None:
-        """Take in what classifying proposals of so many points together did cost."""
+    def update(self, points: Int, cpu_ms: float) -> None:
+        """Add the measured CPU time of classifying proposals of (R,) points together."""
         if not len(points) or not np.isfinite(cpu_ms) or cpu_ms <= 0:
             return
-        x = np.array([len(points), np.minimum(points, self.max_points).sum()]) / self._unit
-        scale = 1.0 / len(points)  # per call: frames of few and of many calls count alike
+        config = self._config
+        x = np.array([len(points), np.minimum(points, self._max_points).sum()]) / self._unit
+        scale = 1.0 / len(points)  # per call: equal weight of frames with few and with many calls
         x, y = x * scale, cpu_ms * scale
         theta = self._theta * self._unit
-        gain = self._covariance @ x / (self.forget + x @ self._covariance @ x)
+        gain = self._covariance @ x / (config.forgetting + x @ self._covariance @ x)
         theta = theta + gain * (y - x @ theta)
-        self._covariance = (self._covariance - np.outer(gain, x @ self._covariance)) / self.forget
-        self._covariance *= min(1.0, 20.0 / np.trace(self._covariance))  # like frames all along must not blow it up
+        self._covariance = (self._covariance - np.outer(gain, x @ self._covariance)) / config.forgetting
+        # Bounded by its initial trace: without excitation it would grow for ever.
+        self._covariance *= min(1.0, 2 * config.initial_variance / np.trace(self._covariance))
         self._theta = theta / self._unit
         expected = float(self.cost_ms(points).sum()) / self.margin
-        self.margin = max(1.0, cpu_ms / expected, 1.0 + (self.margin - 1.0) * 0.95)
+        self.margin = max(1.0, cpu_ms / expected, 1.0 + (self.margin - 1.0) * config.margin_decay)
 
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """What the scheduler decided.
+    """Decision of the scheduler.
 
     Attributes:
-        rows: tracks to classify now, the worthiest first.
-        deferred: tracks that asked and must wait.
+        rows: tracks to classify now, by decreasing worth.
+        deferred: number of tracks that requested a class and have to wait.
     """
 
     rows: Int
@@ -87,27 +70,27 @@ class Selection:
 
 
 class Scheduler:
-    """Grants calls in the order of their worth until the budget is spent.
+    """Greedy selection by worth.
 
-    A call is worth more the less is known of the track, the more its view differs from the last one fused, the
-    nearer it is and the more of it is seen; and more with every frame it waits. Whatever fits into a frame's budget
-    by itself is therefore served in the end.
+    A call is worth more for an uncertain posterior, a view that differs from the last key view, and a near and whole
+    object; and more with each frame of waiting, so that every call that fits into one frame's budget is made at last.
 
     Args:
-        cost: what a call costs; a model of its own that assumes the textbook's cost where none is given.
+        config: weights of the worth.
+        cost: CPU time of a call.
     """
 
-    def __init__(self, cost: CostModel | None = None) -> None:
-        self.cost = cost or LinearCost()
+    def __init__(self, config: CallWorthConfig, cost: LinearCost) -> None:
+        self._config, self._cost = config, cost
 
     def select(self, tracks: Tracks, proposals: Proposals, asks: Bool, budget: Budget) -> Selection:
         """The tracks to classify in this frame; writes tracks.waiting.
 
         Args:
-            tracks: alive, each with its proposal.
+            tracks: alive.
             proposals: of this frame.
-            asks: (M,) which want a class; a track without a proposal must not.
-            budget: what the frame may spend.
+            asks: (M,) tracks that request a class, each with a proposal.
+            budget: of the frame.
         """
         asking = np.flatnonzero(asks & (tracks.proposal != NONE))
         worth = self.worth(tracks, proposals, asking)
@@ -119,33 +102,37 @@ class Scheduler:
         return Selection(ranked[granted], int(np.count_nonzero(~granted)))
 
     def worth(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Float64:
-        """(R,) what a call is worth: at most 1, and more for each frame waited."""
-        own = tracks.proposal[rows]
+        """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
+        config, own = self._config, tracks.proposal[rows]
         posterior = np.clip(tracks.posterior[rows], 1e-12, 1.0)
         uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / np.log(N_CLASSES)
         count, key = proposals.count[own], tracks.key_points[rows]
         novelty = np.minimum(np.abs(count - key) / np.maximum(key, 1), 1.0)
-        nearness = np.exp(-np.hypot(*proposals.box[own, :2].T) / NEAR_M)
-        whole = 1.0 - 0.5 * (proposals.truncated[own] | proposals.occluded[own])
-        value: Float64 = whole * (0.4 * uncertainty + 0.3 * nearness + 0.3 * novelty)
-        return value + WAITING_WORTH * tracks.waiting[rows]
+        nearness = np.exp(-np.hypot(*proposals.box[own, :2].T) / config.range_scale_m)
+        whole = np.where(proposals.truncated[own], config.partial_view_factor, 1.0)
+        value: Float64 = whole * (
+            config.uncertainty_weight * uncertainty
+            + config.nearness_weight * nearness
+            + config.novelty_weight * novelty
+        )
+        return value + config.waiting_weight * tracks.waiting[rows]
 
     def _affordable(self, points: Int, budget: Budget) -> Bool:
-        """(R,) which calls, in this order, the budget pays for; what does not fit lets smaller ones pass."""
+        """(R,) calls, in this order, that the budget pays for; a call that does not fit is skipped."""
         granted = np.ones(len(points), np.bool_)
         if budget.cpu_ms is not None:
-            cost = self.cost.cost_ms(points)
+            cost = self._cost.cost_ms(points)
             if cost.sum() > budget.cpu_ms:
-                granted = _fitting(cost, budget.cpu_ms)
+                granted = _greedy(cost, budget.cpu_ms)
         if budget.calls is not None:
             granted &= np.cumsum(granted) <= budget.calls
         return granted
 
 
-def _fitting(cost: Float64, budget: float) -> Bool:
-    """Greedy: each in its turn if what is left pays for it."""
+def _greedy(cost: Float64, budget: float) -> Bool:
+    """(R,) items taken in order, each if the remaining budget pays for it."""
     granted = np.zeros(len(cost), np.bool_)
-    for i, price in enumerate(cost):  # a frame's few askers, only when the budget binds
+    for i, price in enumerate(cost):  # few items, and only where the budget binds
         if price <= budget:
             granted[i] = True
             budget -= price

@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from modt.classification.fusion import EveryFrame, FirstView, KeyViews
-from modt.classification.instrumentation import CostedClassifier
-from modt.classification.pointnet import PointNet
-from modt.classification.prior import Prior, prior_of
-from modt.classification.scheduler import LinearCost, Scheduler
-from modt.config import FusionConfig, OdometryConfig, ProfileConfig
-from modt.energy.instrumentation import CountedClassifier
-from modt.energy.ledger import StageLedger
+from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.odometry.odometry import Odometry
-from modt.pipeline import Fusion, Pipeline
 from modt.profile import DEFAULT
-from modt.segmentation.segmenter import Segmenter
 from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry
 from modt.sources.pose_source import Odometry as PoseSource
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
-from modt.tracking.tracker import Tracker
-from modt.types import UNLIMITED, Budget
 
 EMBEDDED_SECONDS = 10.0
 OWN, NONE = "own", "none"
@@ -49,33 +34,6 @@ class Request:
     labels: bool = False
     odometry: str = OWN
     poses: Path | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Mode:
-    """One way of the method over the same stages.
-
-    Attributes:
-        machine: the states that a track goes through.
-        fusion: which views are classified and what becomes of them.
-        budget: what a frame may spend.
-    """
-
-    machine: StateMachine
-    fusion: Callable[[FusionConfig, Prior], Fusion]
-    budget: Callable[[ProfileConfig], Budget]
-
-
-def _profile_budget(profile: ProfileConfig) -> Budget:
-    return Budget(profile.scheduler.calls_per_frame, profile.classification_ms)
-
-
-MODES = {
-    "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, FirstView, _profile_budget),
-    "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
-}
-"""Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 
 
 def stream(request: Request) -> Stream:
@@ -123,25 +81,3 @@ def field_of_view(request: Request, stream: Stream) -> FieldOfView:
         missing = next((n for n in stream.info.notes if "camera" in n), "it has no calibration")
         raise MisuseError(stream.info.name, missing, "restore the calibration, or use --fov full")
     return FieldOfView.of_camera(stream.info.camera)
-
-
-def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
-    """The stages of a mode.
-
-    Raises:
-        MisuseError: the model cannot be used.
-    """
-    cost = LinearCost(profile.classification.max_points)
-    limits = profile.classification
-    network = PointNet(limits, profile.sensor)
-    prior = prior_of(network.boxes, profile.fusion.prior, profile.sensor, network.evidence)
-    classifier = CostedClassifier(network, cost, time.thread_time_ns)
-    return Pipeline(
-        segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
-        odometry=Odometry(profile.odometry),
-        tracker=Tracker(profile.tracking, mode.machine),
-        fusion=mode.fusion(profile.fusion, prior),
-        scheduler=Scheduler(cost),
-        classifier=CountedClassifier(classifier, ledger, limits.max_points, limits.batch),
-        ledger=ledger,
-    )

@@ -8,6 +8,7 @@ from itertools import chain, islice
 
 import numpy as np
 
+from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
@@ -66,10 +67,10 @@ class Contest:
         return Trial(contenders)
 
     def _contender(self, name: str, number: int, metered: bool) -> Contender:
-        mode = assemble.MODES[BASELINE if name == VARIED else name]
+        mode = assembly.MODES[BASELINE if name == VARIED else name]
         ledger = Ledger()
         fov = assemble.field_of_view(self.request, assemble.stream(self.request))
-        whole = assemble.pipeline(mode, self.profile, fov, ledger)
+        whole = assembly.pipeline(mode, self.profile, fov, ledger)
         watched = Watched(whole.classifier)
         return Contender(
             name=name,

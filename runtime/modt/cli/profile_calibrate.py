@@ -57,6 +57,7 @@ def _seconds(text: str) -> float:
 def run(arguments: argparse.Namespace) -> int:
     """Calibrate, print and write."""
     pinned = host.confine(arguments.core)
+    host.keep_freed_pages()
     # NumPy loads from here on, after the process is confined.
     from dataclasses import replace
 

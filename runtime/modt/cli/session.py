@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from modt import host, profile
+from modt import assembly, host, profile
 from modt.cli import assemble, metering
 from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
@@ -43,11 +43,11 @@ class Session:
     def __init__(self, request: assemble.Request, out: Path | None, core: int | None, command: list[str]) -> None:
         self.request, self.core = request, core
         self.profile = profile.load(request.profile)
-        self.mode = assemble.MODES[request.mode]
+        self.mode = assembly.MODES[request.mode]
         found = assemble.stream(request)
         self.odometry = assemble.odometry(request, found, self.profile.odometry)
         self.stream = PosedStream(found, self.odometry)
-        self.pipeline = assemble.pipeline(
+        self.pipeline = assembly.pipeline(
             self.mode, self.profile, assemble.field_of_view(request, self.stream), Ledger()
         )
         self.stop = Stop()

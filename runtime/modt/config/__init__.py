@@ -2,7 +2,13 @@
 
 from modt.config.base import StageConfig, ValueRangeError
 from modt.config.box_tracking import BoxTrackingConfig
-from modt.config.classification import ClassificationConfig, FusionConfig, SchedulerConfig
+from modt.config.classification import (
+    CallWorthConfig,
+    ClassificationConfig,
+    CostModelConfig,
+    FusionConfig,
+    SchedulerConfig,
+)
 from modt.config.energy import EnergyConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.profile import ProfileConfig
@@ -21,7 +27,9 @@ from modt.config.tracking import (
 
 __all__ = [
     "BoxTrackingConfig",
+    "CallWorthConfig",
     "ClassificationConfig",
+    "CostModelConfig",
     "EnergyConfig",
     "FilterConfig",
     "FragmentConfig",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from modt.classes import CLASS_NAMES, CLASSES, OBJECTS
+from modt.classes import CLASS_NAMES, CLASSES, OBJECTS, ObjectClass
 from modt.errors import MisuseError
 
 
@@ -27,11 +27,11 @@ def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
     return field(default=default, metadata={"options": options, "meaning": meaning})
 
 
-def per_class(column: str, low: float, high: float, meaning: str) -> Any:
-    """Field of a number for each class but background; the defaults are that column of the class table."""
-    values = tuple(getattr(CLASSES[c], column) for c in OBJECTS)
-    meaning = f"{meaning}: {', '.join(CLASS_NAMES[1:])}"
-    return field(default=values, metadata={"low": low, "high": high, "length": len(OBJECTS), "meaning": meaning})
+def per_class(column: str, low: float, high: float, meaning: str, classes: tuple[ObjectClass, ...] = OBJECTS) -> Any:
+    """Field of a number for each of the classes; the defaults are that column of the class table."""
+    values = tuple(getattr(CLASSES[c], column) for c in classes)
+    meaning = f"{meaning}: {', '.join(CLASS_NAMES[c] for c in classes)}"
+    return field(default=values, metadata={"low": low, "high": high, "length": len(classes), "meaning": meaning})
 
 
 def mechanism(config: type[StageConfig]) -> Any:

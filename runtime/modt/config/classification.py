@@ -4,50 +4,76 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from modt.config.base import StageConfig, number, per_class
+from modt.classes import CLASSES
+from modt.config.base import StageConfig, mechanism, number, per_class
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClassificationConfig(StageConfig):
-    """The network and how its input is made (section V-A)."""
+    """The network and its input (section V-A)."""
 
     model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
-    max_points: int = number(128, 8, 4096, "", "of a proposal handed to the network")
+    max_points: int = number(128, 8, 4096, "", "points of a proposal handed to the network")
     batch: int = number(8, 1, 256, "", "proposals of one network call at most")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CallWorthConfig(StageConfig):
+    """Worth of a classification, which decides who comes first where the budget binds; set by hand."""
+
+    uncertainty_weight: float = number(0.4, 0.0, 1.0, "", "of the normalised entropy of the posterior")
+    nearness_weight: float = number(0.3, 0.0, 1.0, "", "of exp(-distance / range_scale_m)")
+    novelty_weight: float = number(0.3, 0.0, 1.0, "", "of the relative change of points since the last key view")
+    range_scale_m: float = number(30.0, 1.0, 1000.0, "m", "distance at which nearness is 1/e")
+    partial_view_factor: float = number(0.5, 0.0, 1.0, "", "on the worth of truncated proposals")
+    waiting_weight: float = number(0.1, 0.001, 10.0, "", "added per frame of waiting, so that every call is made")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CostModelConfig(StageConfig):
+    """Recursive least squares for the CPU time of a classification; set by hand."""
+
+    call_ms: float = number(0.1, 0.0, 1000.0, "ms", "CPU time per proposal, before any measurement")
+    point_ms: float = number(0.001, 0.0, 1000.0, "ms", "CPU time per point, before any measurement")
+    forgetting: float = number(0.98, 0.5, 1.0, "", "weight of the past per frame")
+    initial_variance: float = number(10.0, 0.001, 1000.0, "", "of both parameters, relative to the residual's")
+    margin_decay: float = number(0.95, 0.0, 1.0, "", "per frame, of the margin that the last underestimate left")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SchedulerConfig(StageConfig):
-    """What one frame may spend on classification; none: no bound."""
+    """Budget of classification per frame; none: unlimited."""
 
     calls_per_frame: int | None = number(16, 0, 10000, "", "proposals classified")
-    cpu_ms_per_frame: float | None = number(None, 0.0, 10000.0, "ms", "CPU time by the measured cost model")
-    energy_mJ_per_frame: float | None = number(None, 0.0, 100000.0, "mJ", "drawn beyond idle during that time")
+    cpu_ms_per_frame: float | None = number(None, 0.0, 10000.0, "ms", "CPU time by the cost model")
+    energy_mJ_per_frame: float | None = number(None, 0.0, 100000.0, "mJ", "above idle during that time")
+    worth: CallWorthConfig = mechanism(CallWorthConfig)
+    cost: CostModelConfig = mechanism(CostModelConfig)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FusionConfig(StageConfig):
-    """Which views are independent, and when a class is settled (section V-C, Figs. 10 and 11)."""
+    """Independent views and final classes (section V-C, Figs. 10 and 11), found by tools/study/sweep_fusion.py.
 
-    threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is fixed")
-    background_threshold: float = number(0.6, 0.25, 1.0, "", "that of background, were all classes as common")
-    view_weight: float = number(1.0, 0.0, 1.0, "", "share of a further view's evidence; 1: as if independent")
-    alpha: tuple[float, ...] = per_class(
-        "point_change", 0.0, 10.0, "relative change of points of an independent view"
-    )
-    background_alpha: float = number(0.5, 0.0, 10.0, "", "the same, of what looks like background")
+    first_view_*: mode efficient; start_frame, thresholds, *_change and review_*: mode accurate.
+    """
+
     prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency among proposals")
-    likely: float = number(0.01, 0.0, 1.0, "", "probability of an object, by its box, from which it is classified")
-    likely_once: float = number(0.1, 0.0, 1.0, "", "the same where the first view is the only one (efficient)")
-    once_from: int = number(1, 1, 1000, "frames", "with a proposal, before that only view is taken")
-    likely_again: float = number(0.1, 0.0, 1.0, "", "the same of what is settled, or took its class over")
-    box_weight: float = number(0.75, 0.0, 1.0, "", "say of a box that has changed since the view fused last")
-    slip: float = number(0.1, 0.0, 1.0, "", "probability that a track's proposal is something else for the moment")
-    bearing_deg: float = number(40.0, 0.0, 180.0, "deg", "change of view that makes it independent")
-    range_ratio: float = number(0.4, 0.0, 10.0, "", "change of distance that makes it independent")
-    extent_ratio: float = number(0.6, 0.0, 10.0, "", "change of size that makes it independent")
-    reopen_ratio: float | None = number(
-        1.5, 1.0, 1000.0, "", "times the points, and five more, that raise doubt; none: never"
-    )
-    reopen_points: int = number(400, 0, 10000, "", "a class settled from so many is never doubted")
+    box_update_weight: float = number(0.75, 0.0, 1.0, "", "exponent of the change of the box prior since a view")
+    mismatch_probability: float = number(0.1, 0.0, 1.0, "", "that a proposal is not the object of its track")
+    first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")
+    first_view_min_hits: int = number(1, 1, 1000, "frames", "with a proposal, to be classified")
+    min_object_probability: float = number(0.01, 0.0, 1.0, "", "by the box prior, for the first of several views")
     start_frame: int = number(5, 1, 1000, "frames", "age of a track from which views are fused")
+    object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")
+    background_threshold: float = number(0.6, 0.25, 1.0, "", "posterior under equal frequencies; final background")
+    point_change: tuple[float, ...] = per_class(
+        "point_change", 0.0, 10.0, "relative change of points (Equation 4) of an independent view", tuple(CLASSES)
+    )
+    extent_change: float = number(0.6, 0.0, 10.0, "", "relative change of extent of an independent view")
+    review_point_ratio: float | None = number(
+        1.5, 1.0, 1000.0, "", "points, relative to the last key view, for the review of a final class; none: never"
+    )
+    review_extra_points: int = number(5, 0, 1000, "", "more points than that ratio, beyond random variation")
+    review_max_points: int = number(400, 0, 10000, "", "of the last key view; with more, no review (drive 0005)")
+    review_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, for a review")

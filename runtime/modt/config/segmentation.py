@@ -1,10 +1,121 @@
-"""Segmentation."""
+"""Segmentation: the keys of the stage, and one nested dataclass a mechanism.
+
+Defaults without another source were chosen on KITTI object frames and labelled odometry scans, and checked on drive
+0005 and on simulated streets (docs/segmentation.md).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.config.base import StageConfig, number
+from modt.config.base import StageConfig, mechanism, number
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorHeightConfig(StageConfig):
+    """Estimation of the height of the sensor, where sensor.height_m is null."""
+
+    default_m: float = number(1.73, 0.05, 5.0, "m", "without visible ground; KITTI's sensor")
+    sweeps: int = number(5, 1, 100, "frames", "first sweeps whose median is the estimate")
+    max_range_m: float = number(15.0, 1.0, 100.0, "m", "of the ground cells used")
+    bin_m: float = number(0.05, 0.005, 0.5, "m", "of the histogram of depths below the sensor")
+    min_cells: int = number(12, 1, 1000, "", "in three bins that count as ground")
+    flat_m: float = number(0.1, 0.0, 1.0, "m", "height range of the returns of a flat cell ...")
+    flat_slope: float = number(0.2, 0.0, 2.0, "", "... and what it grows by with the width of the cell")
+    horizon_beams: float = number(2.0, 0.0, 20.0, "beams", "below the horizon, whose returns are left out")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundConfig(StageConfig):
+    """Ground as piece-wise planes (section III-A), traced outwards along each ray of a polar grid."""
+
+    noise_m: float = number(0.1, 0.0, 1.0, "m", "residual of a lowest return on the plane of its ray")
+    max_bend_deg: float = number(4.0, 0.0, 45.0, "deg", "change of slope between two ground cells of a ray")
+    slope_gain: float = number(0.2, 0.01, 1.0, "", "weight of the newest slope in the running slope of a ray")
+    start_m: float = number(0.3, 0.0, 2.0, "m", "deviation of the ground below the sensor from the sensor height")
+    max_gap_m: float = number(
+        6.0, 0.1, 100.0, "m", "distance between ground cells beyond which tolerance stops growing"
+    )
+    flank_sectors: int = number(3, 1, 60, "", "to the left and right of a ray, whose median bounds its surface")
+    flank_m: float = number(0.25, 0.0, 100.0, "m", "above that median, from where on a surface is a vehicle's side")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClusterConfig(StageConfig):
+    """Connection of grid cells, and what is kept of a cluster larger than max_extent_m."""
+
+    max_gap_m: float = number(0.3, 0.0, 5.0, "m", "vertical gap between neighbouring cells of one cluster ...")
+    max_gap_beams: float = number(2.0, 0.0, 20.0, "beams", "... and what it grows by, at the range of the cell")
+    min_part_top_m: float = number(0.9, 0.0, 5.0, "m", "top above ground of a part of an oversized cluster")
+    min_part_points: int = number(15, 1, 1000, "", "of a part of an oversized cluster")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PersonSplitConfig(StageConfig):
+    """Splitting of a person from neighbouring people and objects at gaps in azimuth or depth."""
+
+    min_extent_m: float = number(0.8, 0.0, 10.0, "m", "of a cluster that is split")
+    max_extent_m: float = number(3.0, 0.1, 20.0, "m", "of a cluster that is split")
+    min_range_extents: float = number(1.5, 0.0, 10.0, "", "range over extent: nearer clusters surround the sensor")
+    min_top_m: float = number(1.1, 0.0, 3.0, "m", "head of a person above ground: a child of five")
+    max_top_m: float = number(2.2, 0.5, 5.0, "m", "head of a person above ground: a tall person on a kerb")
+    min_width_m: float = number(0.2, 0.0, 2.0, "m", "of a person from the side")
+    max_width_m: float = number(0.85, 0.1, 3.0, "m", "of a person from the front")
+    max_depth_m: float = number(0.8, 0.0, 5.0, "m", "range of the nearest returns of a person's columns")
+    max_mean_depth_m: float = number(0.35, 0.0, 5.0, "m", "mean return behind the nearest; a car's roof exceeds it")
+    min_points: int = number(8, 1, 1000, "", "of each side of a split; at least segmentation.min_points")
+    visible_m: float = number(1.5, 0.1, 3.0, "m", "height of a person clear of the ground")
+    min_beams: float = number(4.0, 1.0, 100.0, "beams", "on that height; fewer look like half a car")
+    min_fill: float = number(0.3, 0.0, 1.0, "", "returns of a filled column over those expected of a person")
+    column_m: float = number(0.06, 0.005, 1.0, "m", "least width of an azimuth column")
+    min_gap_columns: int = number(2, 1, 100, "", "empty columns of a gap; a single one may be a lost return")
+    depth_step_m: float = number(0.4, 0.0, 5.0, "m", "between neighbouring columns on two objects")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarMergeConfig(StageConfig):
+    """Merging of the strips that few beams show of one car."""
+
+    max_diagonal_m: float = number(6.0, 0.5, 30.0, "m", "of a strip and of the merged car")
+    min_width_m: float = number(0.7, 0.0, 10.0, "m", "of the merged car, across the ray")
+    max_width_m: float = number(5.2, 0.5, 30.0, "m", "of the merged car, across the ray")
+    min_top_m: float = number(0.8, 0.0, 5.0, "m", "of the merged car above ground")
+    max_top_m: float = number(2.2, 0.5, 10.0, "m", "of the merged car above ground")
+    max_bottom_m: float = number(0.8, 0.0, 5.0, "m", "of the merged car above ground")
+    max_gap_m: float = number(1.8, 0.0, 10.0, "m", "in range between two strips; the length of a bonnet")
+    min_gap_beams: float = number(-1.0, -20.0, 20.0, "beams", "in elevation from the nearer strip to the farther")
+    max_gap_beams: float = number(2.0, -20.0, 20.0, "beams", "in elevation from the nearer strip to the farther")
+    max_person_width_m: float = number(0.9, 0.0, 3.0, "m", "of a strip that may be a person and is not merged")
+    min_person_top_m: float = number(1.1, 0.0, 3.0, "m", "above ground of such a strip")
+    min_person_height_m: float = number(0.7, 0.0, 3.0, "m", "top less bottom of such a strip")
+    visible_m: float = number(1.5, 0.1, 5.0, "m", "height of a car ...")
+    max_beams: float = number(
+        8.0, 1.0, 200.0, "beams", "... and the beams on it, from which on cars are not in strips"
+    )
+    min_points: int = number(2, 1, 1000, "", "of a strip")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ViewMarginConfig(StageConfig):
+    """Segmentation beyond the edge of a limited field of view."""
+
+    margin_m: float = number(
+        6.0, 0.0, 50.0, "m", "outside the view within which points are segmented: a car is whole"
+    )
+    object_m: float = number(1.0, 0.0, 10.0, "m", "outside the view of a proposal that still counts as in view")
+    truncation_m: float = number(
+        0.3, 0.0, 10.0, "m", "from the end of the margin, within which a proposal is truncated"
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoxConfig(StageConfig):
+    """Heading of a box by closeness to its sides."""
+
+    noise_m: float = number(
+        0.1, 0.001, 1.0, "m", "points nearer to a side lie on it: sensor noise and rounded outlines"
+    )
+    max_cells: int = number(32, 1, 10000, "", "of a proposal that decide on its heading")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -12,9 +123,16 @@ class SegmentationConfig(StageConfig):
     """Ground, clusters and the sizes of what can be an object (section III-A)."""
 
     max_slope_deg: float = number(12.0, 0.5, 45.0, "deg", "of the ground")
-    clearance_m: float = number(0.25, 0.02, 1.0, "m", "above ground, from where on points make objects")
-    max_height_m: float = number(2.6, 0.3, 20.0, "m", "above ground; what hangs higher joins nothing")
+    clearance_m: float = number(0.25, 0.02, 1.0, "m", "lowest point of an object above ground")
+    max_height_m: float = number(2.6, 0.3, 20.0, "m", "highest point of an object above ground")
     cell_m: float = number(0.105, 0.01, 2.0, "m", "side of a cell at 10 m; grows as the square root of range")
     min_points: int = number(5, 1, 1000, "", "of a proposal")
     max_extent_m: float = number(13.0, 0.5, 50.0, "m", "longest side of a proposal")
     min_height_m: float = number(0.2, 0.0, 3.0, "m", "lowest proposal")
+    sensor_height: SensorHeightConfig = mechanism(SensorHeightConfig)
+    ground: GroundConfig = mechanism(GroundConfig)
+    clusters: ClusterConfig = mechanism(ClusterConfig)
+    person_splitting: PersonSplitConfig = mechanism(PersonSplitConfig)
+    car_merging: CarMergeConfig = mechanism(CarMergeConfig)
+    view_margin: ViewMarginConfig = mechanism(ViewMarginConfig)
+    boxes: BoxConfig = mechanism(BoxConfig)

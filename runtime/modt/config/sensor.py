@@ -9,14 +9,14 @@ from modt.config.base import StageConfig, choice, number
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorConfig(StageConfig):
-    """The sensor as segmentation sees it."""
+    """Mount, range and resolution of the sensor."""
 
-    height_m: float | None = number(1.73, 0.05, 5.0, "m", "above the ground; none: estimated from the stream")
-    min_range_m: float = number(2.0, 0.0, 20.0, "m", "nearer points belong to the robot itself")
-    max_range_m: float = number(80.0, 1.0, 400.0, "m", "farther points are left out")
+    height_m: float | None = number(1.73, 0.05, 5.0, "m", "above the ground; null: estimated from the stream")
+    min_range_m: float = number(2.0, 0.0, 20.0, "m", "of the points used; nearer ones are on the robot itself")
+    max_range_m: float = number(80.0, 1.0, 400.0, "m", "of the points used")
     elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
     azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
     period_s: float = number(0.1, 0.001, 10.0, "s", "of a sweep, where the stream has no stamps")
     reflectance: str = choice(
-        "none", ("none", "hdl-64e"), "on whose scale; models use that which they learnt from; none: not looked at"
+        "none", ("none", "hdl-64e"), "scale; models use only the one they learnt; none: not used"
     )

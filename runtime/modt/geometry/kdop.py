@@ -1,9 +1,8 @@
-"""Outlines: how far points reach in eight directions, bird's-eye view.
+"""k-DOPs: extents of point sets in eight directions of the ground plane (discrete oriented polytopes, k = 8).
 
-An outline is eight numbers: the greatest coordinate of its points along each of DIRECTIONS. What lies opposite is
-four further on, so the ends along axis k are at outline[k] and at -outline[k + 4]. As all eight say how far something
-reaches, the outline of two things together is the greater of theirs in each direction, and both ends of an axis are
-treated alike. Many are an (8, n) array, a contiguous row a direction: arithmetic along an axis of eight is slow.
+A k-DOP is eight numbers: the greatest coordinate of its points along each of DIRECTIONS. Opposite directions are
+four apart: the ends along axis k are at kdop[k] and at -kdop[k + 4]. The k-DOP of a union is the maximum of both.
+Many are an (8, n) array, a contiguous row a direction.
 """
 
 from __future__ import annotations
@@ -12,24 +11,22 @@ import numpy as np
 
 from modt.types import Bool, Float64, Int, Int16, Proposals
 
-AXIS_BEARINGS_RAD = np.deg2rad([0.0, 45.0, 90.0, 135.0])
-"""Bearings of the axes along which an outline is measured, world frame [rad]."""
-AXES = np.stack([np.cos(AXIS_BEARINGS_RAD), np.sin(AXIS_BEARINGS_RAD)])
-"""(2, 4) their unit vectors."""
+_BEARINGS_RAD = np.deg2rad([0.0, 45.0, 90.0, 135.0])
+AXES = np.stack([np.cos(_BEARINGS_RAD), np.sin(_BEARINGS_RAD)])
+"""(2, 4) unit vectors of the axes, world frame."""
 DIRECTIONS = np.concatenate([AXES, -AXES], axis=1)
 """(2, 8) the directions: each axis forth, then each axis back."""
-PAD_M = 0.15
-"""Outlines jitter by this much."""
-CELL_M, FAR = 0.02, 2**15 - 1
-"""Where outlines touch is looked for in whole cells up to so many away: 16 bits are compared twice as fast as 32."""
-HANDFUL, FEW_PAIRS = 4_000, 400_000
-"""Up to so many pairs, looking at every one of them costs less than cells, and then than sorting."""
+_PAD_M = 0.15
+"""Jitter of the ends of k-DOPs."""
+_CELL_M, _FARTHEST = 0.02, 2**15 - 1
+"""Many k-DOPs are compared in whole cells: 16 bits are compared twice as fast as 32."""
+_FEW_PAIRS = 4_000
+"""Up to so many pairs, exact comparison costs less than cells."""
 
 
 def kdops(proposals: Proposals, T_world_sensor: Float64) -> Float64:
-    """(8, P) outlines of the proposals in the world [m]."""
-    n = len(proposals)
-    if not n:
+    """(8, P) k-DOPs of the proposals in the world [m]."""
+    if not len(proposals):
         return np.zeros((8, 0))
     along = (AXES.T @ T_world_sensor[:2, :3]).astype(np.float32) @ proposals.coordinates
     starts = proposals.offsets[:-1]
@@ -39,77 +36,55 @@ def kdops(proposals: Proposals, T_world_sensor: Float64) -> Float64:
 
 
 def widths(kdop: Float64) -> Float64:
-    """(4, n) from end to end of each outline (8, n) along each axis [m]."""
-    length: Float64 = kdop[:4] + kdop[4:]
-    return length
+    """(4, n) from end to end along each axis, of (8, n) k-DOPs [m]."""
+    width: Float64 = kdop[:4] + kdop[4:]
+    return width
 
 
 def width_sum(kdop: Float64) -> Float64:
-    """(n,) sum of the four lengths of each outline (8, n) [m]."""
+    """(n,) sum of the four widths of (8, n) k-DOPs [m]."""
     total: Float64 = widths(kdop).sum(axis=0)
     return total
 
 
 def centres(kdop: Float64) -> Float64:
-    """(4, n) middle of each outline (8, n) along each axis [m]."""
-    middle: Float64 = (kdop[:4] - kdop[4:]) / 2
-    return middle
+    """(4, n) middle along each axis, of (8, n) k-DOPs [m]."""
+    centre: Float64 = (kdop[:4] - kdop[4:]) / 2
+    return centre
 
 
-def coverage(kdop: Float64, position: Float64) -> Float64:
-    """(n,) part of each outline (8, n) within its place (8, n): the lesser for the two squares that hold them."""
-    common = np.maximum(widths(np.minimum(kdop, position + PAD_M)), 0.0)
-    part = common / np.maximum(widths(kdop), PAD_M)
+def coverage(kdop: Float64, other: Float64) -> Float64:
+    """(n,) part of each k-DOP (8, n) that the other (8, n) covers: the lesser for the two rectangles around it."""
+    common = np.maximum(widths(np.minimum(kdop, other + _PAD_M)), 0.0)
+    part = common / np.maximum(widths(kdop), _PAD_M)
     least: Float64 = np.minimum(part[0] * part[2], part[1] * part[3])
     return least
 
 
 def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
-    """Pairs of outlines a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
+    """Pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
 
-    Of many, what is less than CELL_M apart may count as touching, and so may all that lies more than FAR cells away
-    from the first of b, on the same side. Outlines b are finite; those of a that never saw anything touch nothing.
+    Of many, pairs less than a cell of 2 cm apart may count as overlapping, and so may all that lie more than 655 m
+    from the first of b, on the same side. k-DOPs b are finite; an infinitely small one of a overlaps nothing.
     """
     n, k = a.shape[1], b.shape[1]
-    if n * k <= HANDFUL:
-        pair = compare_all(a[::2], -b[::2])
+    if n * k <= _FEW_PAIRS:
+        pair = _compare(a[::2], -b[::2])
     else:
         origin = (b[:4:2, 0] @ DIRECTIONS[:, ::2])[:, None]
-        ends, facing = _cells(a[::2] - origin), _cells(-b[::2] + origin)
-        pair = (compare_all if n * k < FEW_PAIRS else sweep)(ends, facing)
+        pair = _compare(_cells(a[::2] - origin), _cells(-b[::2] + origin))
     i = pair // k
     return i, pair - i * k
 
 
 def _cells(coordinate: Float64) -> Int16:
-    """Coordinates about the same origin [m], in cells of CELL_M."""
-    return np.minimum(np.maximum(coordinate / CELL_M, -FAR), FAR).astype(np.int16)
+    """Coordinates about the same origin [m], in cells."""
+    return np.minimum(np.maximum(coordinate / _CELL_M, -_FARTHEST), _FARTHEST).astype(np.int16)
 
 
-def compare_all(ends: Int16 | Float64, facing: Int16 | Float64) -> Int:
-    """Pairs i * k + j, in order, of which ends (4, n) reach what faces them (4, k) on every side, all looked at.
-
-    What faces an end is the other's opposite one, two further on and with its sign reversed.
-    """
-    near: Bool = ends[0][:, None] >= facing[2]
+def _compare(ends: Int16 | Float64, opposite: Int16 | Float64) -> Int:
+    """Pairs i * k + j, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
+    near: Bool = ends[0][:, None] >= opposite[2]
     for side in (1, 2, 3):
-        near &= ends[side][:, None] >= facing[side - 2]
+        near &= ends[side][:, None] >= opposite[side - 2]
     return near.ravel().nonzero()[0]
-
-
-def sweep(ends: Int16, facing: Int16) -> Int:
-    """The same pairs: sorted along the first axis, those that can overlap an interval are a stretch of the others.
-
-    It ends where they begin beyond the interval, and begins where the first of them reaches it.
-    """
-    order = facing[2].argsort()
-    facing = facing.take(order, axis=1)
-    first = np.maximum.accumulate(-facing[0]).searchsorted(-ends[2])
-    n = np.maximum(facing[2].searchsorted(ends[0], side="right") - first, 0)
-    i = np.repeat(np.arange(len(n)), n)
-    j = np.arange(len(i)) + np.repeat(first + n - np.cumsum(n), n)
-    near = (ends[1].take(i) >= facing[3].take(j)) & (ends[3].take(i) >= facing[1].take(j))
-    near &= ends[2].take(i) >= facing[0].take(j)  # the first reaches it, not all that come after
-    pair: Int = i[near] * len(order) + order[j[near]]
-    pair.sort()
-    return pair

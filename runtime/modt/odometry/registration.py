@@ -12,7 +12,7 @@ import numpy as np
 from modt.config import RegistrationConfig
 from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS, centres, overlapping_pairs
-from modt.geometry.kdop_displacement import compare, shape_similarity, shift_between
+from modt.geometry.kdop_displacement import shape_similarity, shift_between
 from modt.observations import Observations
 from modt.odometry.landmarks import Landmarks
 from modt.types import Float64, Int
@@ -123,14 +123,15 @@ class Registration:
         scales: tuple[float, ...],
         choices: int,
     ) -> Fit | None:
-        """Motion fitted to pairs within reach of a first one, the pairs chosen so many times; jacobian as _jacobian."""
+        """Motion fitted to pairs within reach of a first one, after a number of choices of the pairs."""
         limit = self.config
         near = observations.kdop + np.tensordot(motion, jacobian, 1)
         i, j = _pairs(landmarks.kdop, near, reach_m)
         if len(i) < _MIN_LANDMARKS:
             return None
         if not self._initialised:
-            shift, size, _, _ = compare(landmarks.kdop[:, i], near[:, j])
+            a, b = landmarks.kdop[:, i], near[:, j]
+            shift, (size, _) = shift_between(a, b), shape_similarity(a, b)
             vote = _vote(shift[size < limit.max_size_difference], limit.reach_m, limit.vote_cell_m)
             motion = motion + np.append(-vote, 0.0)
         a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
@@ -140,7 +141,7 @@ class Registration:
         for _ in range(choices):
             moved = b + np.tensordot(motion, jacobian, 1)
             shift = shift_between(a, moved)
-            size, overlap, _ = shape_similarity(a, moved)
+            size, overlap = shape_similarity(a, moved)
             best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
             motion = _fit(gain.take(best, axis=1), jacobian.take(best, axis=2), variance[best], motion, scales)
         a, b, jacobian = a.take(best, axis=1), b.take(best, axis=1), jacobian.take(best, axis=2)

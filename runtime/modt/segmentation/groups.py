@@ -1,4 +1,4 @@
-"""Rows grouped by what they belong to."""
+"""Rows grouped by label, and reductions over all groups at once."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import NONE, Float64, Int
+from modt.types import NONE, Bool, Float32, Float64, Int
 
 Real = NDArray[np.floating[Any]]
 T = TypeVar("T", bound=np.generic)
@@ -16,10 +16,10 @@ T = TypeVar("T", bound=np.generic)
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """Rows sorted by group, for reductions over all groups at once. No group is empty.
+    """Rows sorted by group; no group is empty.
 
     Attributes:
-        rows: (K,) rows in the order of their groups, and in input order within one.
+        rows: (K,) rows sorted by group, in input order within a group.
         offsets: (G + 1,) group i owns rows[offsets[i]:offsets[i + 1]].
     """
 
@@ -27,12 +27,12 @@ class Groups:
     offsets: Int
 
     @classmethod
-    def of(cls, group: Int, n: int) -> Self:
-        """Groups 0 to n - 1 of each row; a row of group NONE is left out."""
-        rows = np.flatnonzero(group != NONE)
-        # 16-bit integers are sorted by radix: several times faster.
+    def from_labels(cls, labels: Int, n: int) -> Self:
+        """Groups 0 to n - 1; rows labelled NONE are left out."""
+        rows = np.flatnonzero(labels != NONE)
+        # NumPy sorts 16-bit integers by radix: several times faster.
         kind: type[np.signedinteger[Any]] = np.int16 if n < np.iinfo(np.int16).max else np.int64
-        own = group.astype(kind)[rows]
+        own = labels.astype(kind)[rows]
         rows = rows[np.argsort(own, kind="stable")]
         return cls(rows, np.append(0, np.cumsum(np.bincount(own, minlength=n))))
 
@@ -44,28 +44,47 @@ class Groups:
         """(G,) rows of each group."""
         return np.diff(self.offsets)
 
-    def thinned(self, most: int) -> Self:
-        """Every so manieth row of each group, so that none has more than so many."""
-        every = -(-self.count // most)
+    def subsample(self, limit: int) -> Self:
+        """Subsample each group to at most `limit` rows at a constant stride."""
+        stride = -(-self.count // limit)
         rank = np.arange(len(self.rows)) - np.repeat(self.offsets[:-1], self.count)
-        kept = rank % np.repeat(every, self.count) == 0
-        return type(self)(self.rows[kept], np.append(0, np.cumsum(-(-self.count // every))))
+        kept = rank % np.repeat(stride, self.count) == 0
+        return type(self)(self.rows[kept], np.append(0, np.cumsum(-(-self.count // stride))))
 
-    def spread(self, values: NDArray[T]) -> NDArray[T]:
-        """(..., K) values (..., G) of the groups given to each of their rows."""
+    def broadcast(self, values: NDArray[T]) -> NDArray[T]:
+        """(..., K) value of each row's group, given (..., G)."""
         return np.repeat(values, self.count, axis=-1)
 
-    def least(self, values: NDArray[T]) -> NDArray[T]:
-        """(..., G) least of (..., K) values in each group."""
+    def min(self, values: NDArray[T]) -> NDArray[T]:
+        """(..., G) minimum of each group, given (..., K) in the order of rows."""
         least: NDArray[T] = np.minimum.reduceat(values, self.offsets[:-1], axis=-1)
         return least
 
-    def most(self, values: NDArray[T]) -> NDArray[T]:
-        """(..., G) greatest of (..., K) values in each group."""
+    def max(self, values: NDArray[T]) -> NDArray[T]:
+        """(..., G) maximum of each group, given (..., K) in the order of rows."""
         most: NDArray[T] = np.maximum.reduceat(values, self.offsets[:-1], axis=-1)
         return most
 
     def mean(self, values: Real) -> Float64:
-        """(G,) mean of (K,) values in each group."""
+        """(G,) mean of each group, given (K,) in the order of rows."""
         total: Float64 = np.add.reduceat(values, self.offsets[:-1], dtype=np.float64)
         return total / self.count
+
+
+def consecutive(mask: Bool) -> Int:
+    """(n,) rank of each True entry among them, NONE for False."""
+    return np.where(mask, np.cumsum(mask) - 1, NONE)
+
+
+def label_min(values: Float32, labels: Int, n: int) -> Float32:
+    """(n,) minimum of the values of each label, infinite without any."""
+    least = np.full(n, np.inf, np.float32)
+    np.minimum.at(least, labels, values)
+    return least
+
+
+def label_max(values: Float32, labels: Int, n: int) -> Float32:
+    """(n,) maximum of the values of each label, minus infinity without any."""
+    most = np.full(n, -np.inf, np.float32)
+    np.maximum.at(most, labels, values)
+    return most

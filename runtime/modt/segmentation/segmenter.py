@@ -8,100 +8,100 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.box_fitting import headings, upright_boxes
-from modt.segmentation.clusters import Clusterer, Clusters
-from modt.segmentation.columns import Columns
-from modt.segmentation.ground import Ground
+from modt.segmentation.box_fitting import fit_headings, upright_boxes
+from modt.segmentation.car_merging import CarMerger
+from modt.segmentation.clustering import Clusterer, Merger, Splitter
+from modt.segmentation.clusters import Clusters
+from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups
-from modt.segmentation.occlusion import occluded
-from modt.segmentation.reflectance_statistics import brightness, recorded
+from modt.segmentation.person_splitting import PersonSplitter
+from modt.segmentation.point_columns import PointColumns
+from modt.segmentation.reflectance_statistics import has_reflectance, reflectance_statistics
 from modt.segmentation.sensor_height import sensor_height
 from modt.types import NONE, Bool, Float32, Int, Proposals
 
-MARGIN_M = 6.0
-"""Looked at beyond the edge of the field of view, so that what stands on the edge is segmented whole."""
-SLACK_M = 1.0
-"""Of an object that lies in view the sensor may see only what is this far out of it."""
-EDGE_M = 0.3
-"""A proposal this near the end of the margin counts as cut by it."""
-OCCLUDER_M = 0.6
-"""What rises this high above ground hides what is behind it."""
-OUTLINE = 32
-"""Cells of a cluster, at most, that decide on its heading."""
-
 
 class Segmenter:
-    """Turns a sweep into proposals (section III-A).
+    """Sweeps to proposals (section III-A).
 
     Args:
-        config: its parameters.
-        sensor: where the sensor is and how far it looks.
-        fov: the part of space to look at.
+        config: of the stage.
+        sensor: mount, range and resolution.
+        fov: part of space to segment.
+        splitter: PersonSplitter by default.
+        merger: CarMerger by default.
     """
 
-    def __init__(self, config: SegmentationConfig, sensor: SensorConfig, fov: FieldOfView) -> None:
+    def __init__(
+        self,
+        config: SegmentationConfig,
+        sensor: SensorConfig,
+        fov: FieldOfView,
+        *,
+        splitter: Splitter | None = None,
+        merger: Merger | None = None,
+    ) -> None:
         self.config, self.sensor, self.fov = config, sensor, fov
-        self.sensor_height = sensor_height(sensor)
-        self.ground = Ground(sensor, config)
-        self.clusterer = Clusterer(sensor, config)
-        _keep_freed_pages()
+        self.margin_m = config.view_margin.margin_m
+        self.truncated_m = config.view_margin.truncation_m - self.margin_m
+        self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
+        self.max_sqrt_range = np.float32(np.sqrt(sensor.max_range_m))
+        self.sensor_height = sensor_height(sensor, config)
+        self.ground = GroundEstimator(sensor, config)
+        splitter, merger = splitter or PersonSplitter(sensor, config), merger or CarMerger(sensor, config)
+        self.clusterer = Clusterer(sensor, config, splitter, merger)
 
     def segment(self, points: Float32) -> Proposals:
-        """Proposals of (N, 4) points; none for an empty sweep."""
-        looked_at = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -MARGIN_M)
-        sweep = Columns.of(points if looked_at is None else points[looked_at])
-        above = self.sensor_height.of(sweep)
-        height = self.ground.height(sweep, above)
-        raised = np.flatnonzero(self.raised(sweep, height))
-        if not len(raised):
+        """Proposals of (N, 4) points; none in an empty sweep."""
+        region = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -self.margin_m)
+        sweep = PointColumns.from_array(points if region is None else points[region])
+        sensor_height_m = self.sensor_height.height_m(sweep)
+        height = self.ground.height_above(sweep, sensor_height_m)
+        rows = np.flatnonzero(self.above_ground(sweep, height))
+        if not len(rows):
             return Proposals.empty()
-        index = raised if looked_at is None else looked_at[raised]
-        seen = self.sensor.reflectance != "none" and recorded(points[:, 3])
-        reflectance = points[index, 3] if seen else None
-        proposals = self._proposals(sweep.take(raised), height[raised], index, reflectance)
-        return replace(proposals, sensor_height_m=above)
+        index = rows if region is None else region[rows]
+        measured = self.sensor.reflectance != "none" and has_reflectance(points[:, 3])
+        reflectance = points[index, 3] if measured else None
+        proposals = self._proposals(sweep.take(rows), height[rows], index, reflectance)
+        return replace(proposals, sensor_height_m=sensor_height_m)
 
-    def raised(self, sweep: Columns, height: Float32) -> Bool:
-        """(N,) within range, clear of the ground and no higher than objects reach."""
-        near, far = np.float32(np.sqrt(self.sensor.min_range_m)), np.float32(np.sqrt(self.sensor.max_range_m))
-        raised: Bool = (height > self.config.clearance_m) & (height < self.config.max_height_m)
-        raised &= (sweep.root > near) & (sweep.root < far)
-        return raised
+    def above_ground(self, sweep: PointColumns, height: Float32) -> Bool:
+        """(N,) points within range, and between `clearance_m` and `max_height_m` above ground."""
+        mask: Bool = (height > self.config.clearance_m) & (height < self.config.max_height_m)
+        mask &= (sweep.sqrt_range > self.min_sqrt_range) & (sweep.sqrt_range < self.max_sqrt_range)
+        return mask
 
-    def _proposals(self, raised: Columns, height: Float32, index: Int, reflectance: Float32 | None) -> Proposals:
-        """The clusters of what is raised, and their boxes."""
-        clusters = self.clusterer.cluster(raised, height)
-        cell = raised.take(clusters.sample)
-        if not self.fov.full:
-            clusters = clusters.kept(self._in_view(clusters, cell))
+    def _proposals(self, points: PointColumns, height: Float32, index: Int, reflectance: Float32 | None) -> Proposals:
+        """Clusters of the points above ground, with their boxes."""
+        clusters = self.clusterer.cluster(points, height)
+        cells = points.take(clusters.sample)
+        depth = None if self.fov.full else self.fov.depth(cells.xyz())
+        if depth is not None:
+            clusters = clusters.select(self._in_view(clusters, depth))
         if not clusters.n:
             return Proposals.empty()
-        outline = Groups.of(clusters.of_cell, clusters.n)
-        few = outline.thinned(OUTLINE)
-        yaw = headings(cell.x[few.rows], cell.y[few.rows], few)
-        groups = Groups.of(clusters.of_cell.take(clusters.cell), clusters.n)
-        own = np.stack([column.take(groups.rows) for column in (raised.x, raised.y, raised.z)])
-        x, y, z = own
-        box = upright_boxes(x, y, z, groups, yaw)
-        centroid = np.stack([groups.mean(v) for v in own], axis=1)
-        truncated = np.zeros(clusters.n, np.bool_)
-        if not self.fov.full:
-            truncated = outline.least(self.fov.depth(cell.xyz())[outline.rows]) < EDGE_M - MARGIN_M
-        hidden = occluded(cell.x, cell.y, clusters.top > OCCLUDER_M, outline)
-        told = None if reflectance is None else brightness(reflectance.take(groups.rows), groups.offsets)
-        members = index.take(groups.rows)
-        return Proposals(members, groups.offsets, own, centroid, box, truncated, hidden, reflectance=told)
+        by_cell = Groups.from_labels(clusters.of_cell, clusters.n)
+        few = by_cell.subsample(self.config.boxes.max_cells)
+        yaw = fit_headings(cells.x[few.rows], cells.y[few.rows], few, self.config.boxes.noise_m)
+        groups = Groups.from_labels(clusters.of_cell.take(clusters.cell), clusters.n)
+        x, y, z = own = np.stack([column.take(groups.rows) for column in (points.x, points.y, points.z)])
+        truncated, statistics, offsets = np.zeros(clusters.n, np.bool_), None, groups.offsets
+        if depth is not None:
+            truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m
+        if reflectance is not None:
+            statistics = reflectance_statistics(reflectance.take(groups.rows), offsets)
+        return Proposals(
+            members=index.take(groups.rows),
+            offsets=offsets,
+            coordinates=own,
+            centroid=np.stack([groups.mean(v) for v in own], axis=1),
+            box=upright_boxes(x, y, z, groups, yaw),
+            truncated=truncated,
+            reflectance=statistics,
+        )
 
-    def _in_view(self, clusters: Clusters, cell: Columns) -> Bool:
-        """(n,) whether a cluster reaches into the field of view, or nearly."""
-        seen = (self.fov.depth(cell.xyz()) > -SLACK_M) & (clusters.of_cell != NONE)
+    def _in_view(self, clusters: Clusters, depth: Float32) -> Bool:
+        """(n,) clusters in the field of view or close to it, given the (C,) depth of each cell in it [m]."""
+        seen = (depth > -self.config.view_margin.object_m) & (clusters.of_cell != NONE)
         return np.bincount(clusters.of_cell[seen], minlength=clusters.n) > 0
-
-
-def _keep_freed_pages() -> None:
-    """Let the C library keep the memory of one sweep for the next.
-
-    glibc hands large blocks back to the kernel as they are freed, and every sweep then pays for fresh pages: a third
-    of the stage's time. Having once freed a block of nearly 32 MB (never touched, so it costs nothing), it stops.
-    """
-    np.empty(31 << 20, np.uint8)

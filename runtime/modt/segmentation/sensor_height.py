@@ -1,92 +1,68 @@
-"""How high the sensor stands above the ground."""
+"""Height of the sensor above the ground, given or estimated."""
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
-from modt.config import SensorConfig
-from modt.segmentation.columns import Columns
+from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import RING_STEP, SECTORS, PolarGrid
-from modt.types import Float32
-
-USUAL_M = 1.73
-"""Taken where no ground has been seen yet."""
-SWEEPS = 5
-"""The first sweeps, over which an estimate settles."""
-AROUND_M = 15.0
-"""The ground is looked for within this range."""
-BIN_M = 0.05
-MIN_CELLS = 12
-"""Fewer cells than this at one height are no ground."""
-FLAT_M, SLOPE = 0.1, 0.2
-"""The returns of a cell of ground lie within this of one another in height, more by this share of its width."""
-GRAZING_BEAMS = 2.0
-"""Whatever the beams just below the horizon hit lies just below the sensor; ground is seen by lower ones."""
+from modt.segmentation.groups import label_max, label_min
+from modt.segmentation.point_columns import PointColumns
 
 
-class SensorHeight(Protocol):
-    """Knows the height of the sensor, or finds it out."""
-
-    def of(self, points: Columns) -> float:
-        """Height above the ground in a sweep [m]."""
-        ...
-
-
-class KnownHeight:
-    """A height that was measured."""
+class FixedHeight:
+    """Height of the mount [m]."""
 
     def __init__(self, height_m: float) -> None:
-        self.height_m = height_m
+        self.fixed_m = height_m
 
-    def of(self, points: Columns) -> float:
-        """The height given [m]."""
-        return self.height_m
+    def height_m(self, points: PointColumns) -> float:
+        """The height of the mount [m]."""
+        return self.fixed_m
 
 
-class EstimatedHeight:
-    """The height at which most of what lies flat around the sensor lies, settled over the first sweeps.
+class HeightEstimator:
+    """Mode of the depths of flat cells around the sensor, median over the first sweeps.
 
-    Walls have lowest returns too, and between four of them they are most of what is seen: their cells are not flat.
+    Cells on walls are excluded, since they are not flat: indoors they outnumber the cells on the floor.
 
     Args:
-        sensor: its range and the spacing of its beams.
+        sensor: range and beam spacing.
+        config: the keys of `sensor_height`.
     """
 
-    def __init__(self, sensor: SensorConfig) -> None:
-        self.near, self.far = sensor.min_range_m, min(AROUND_M, sensor.max_range_m)
-        self.grid = PolarGrid(self.far)
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
+        self.config = c = config.sensor_height
+        max_range_m = min(c.max_range_m, sensor.max_range_m)
+        self.near, self.far = np.sqrt(sensor.min_range_m), np.sqrt(max_range_m)
+        self.grid = PolarGrid(max_range_m)
         range_m = np.repeat(self.grid.range_m, SECTORS).astype(np.float64)
-        self.spread = FLAT_M + SLOPE * 2 * RING_STEP * np.sqrt(range_m)
-        self.grazing = GRAZING_BEAMS * np.deg2rad(sensor.elevation_step_deg) * range_m
-        self.seen: list[float] = []
+        self.flat_m = c.flat_m + c.flat_slope * 2 * RING_STEP * np.sqrt(range_m)
+        self.horizon_m = c.horizon_beams * np.deg2rad(sensor.elevation_step_deg) * range_m
+        self.estimates_m: list[float] = []
 
-    def of(self, points: Columns) -> float:
-        """Median of the estimates of the first sweeps, this one's among them [m]."""
-        if len(self.seen) < SWEEPS:
+    def height_m(self, points: PointColumns) -> float:
+        """Median of the estimates of the first sweeps, including this one; the default before any [m]."""
+        if len(self.estimates_m) < self.config.sweeps:
             estimate = self._estimate(points)
             if estimate is not None:
-                self.seen.append(estimate)
-        return float(np.median(self.seen)) if self.seen else USUAL_M
+                self.estimates_m.append(estimate)
+        return float(np.median(self.estimates_m)) if self.estimates_m else self.config.default_m
 
-    def _estimate(self, points: Columns) -> float | None:
-        around = points.take((points.root > np.sqrt(self.near)) & (points.root < np.sqrt(self.far)))
-        cell = self.grid.cell(around)
-        lowest: Float32 = np.full(self.grid.size, np.inf, np.float32)
-        highest: Float32 = np.full(self.grid.size, -np.inf, np.float32)
-        np.minimum.at(lowest, cell, around.z)
-        np.maximum.at(highest, cell, around.z)
-        flat = (highest - lowest < self.spread) & (-lowest > self.grazing)
+    def _estimate(self, points: PointColumns) -> float | None:
+        around = points.take((points.sqrt_range > self.near) & (points.sqrt_range < self.far))
+        cell, bin_m = self.grid.cell(around), self.config.bin_m
+        lowest, highest = (reduce(around.z, cell, self.grid.size) for reduce in (label_min, label_max))
+        flat = (highest - lowest < self.flat_m) & (-lowest > self.horizon_m)
         depth = -lowest[flat].astype(np.float64)
-        cells = np.bincount((depth / BIN_M).astype(np.int64), minlength=1)
-        alike = np.convolve(cells, np.ones(3, np.int64), mode="same")
-        if alike.max() < MIN_CELLS:
+        cells = np.bincount((depth / bin_m).astype(np.int64), minlength=1)
+        in_three_bins = np.convolve(cells, np.ones(3, np.int64), mode="same")
+        if in_three_bins.max() < self.config.min_cells:
             return None
-        middle = (int(np.argmax(alike)) + 0.5) * BIN_M
-        return float(depth[np.abs(depth - middle) < 1.5 * BIN_M].mean())
+        mode = (int(np.argmax(in_three_bins)) + 0.5) * bin_m
+        return float(depth[np.abs(depth - mode) < 1.5 * bin_m].mean())
 
 
-def sensor_height(sensor: SensorConfig) -> SensorHeight:
-    """The height the configuration gives, or one that will be estimated."""
-    return EstimatedHeight(sensor) if sensor.height_m is None else KnownHeight(sensor.height_m)
+def sensor_height(sensor: SensorConfig, config: SegmentationConfig) -> FixedHeight | HeightEstimator:
+    """The height of the profile, or its estimator where the profile has none."""
+    return HeightEstimator(sensor, config) if sensor.height_m is None else FixedHeight(sensor.height_m)

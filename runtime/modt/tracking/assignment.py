@@ -41,7 +41,7 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float) -> Int:
 
 
 def _two_best(index: Int, cost: Float64, limit: float) -> tuple[Int, Float64]:
-    """(K,) best pair of the same index, (K,) cost of the next best, limit where there is none; sorted by falling cost."""
+    """(K,) best pair of the same index, (K,) cost of the next best or limit; pairs sorted by falling cost."""
     k = np.arange(len(index))
     best = np.empty(index.max() + 1, np.int64)
     best[index] = k  # the last written is the cheapest

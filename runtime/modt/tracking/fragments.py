@@ -1,7 +1,7 @@
 """Fragments: parts of one object that were segmented apart, and the one track that goes on with it.
 
-A pole before a car, or the edge of a bush, splits it; each part has a track, and which part is the larger changes from
-frame to frame. Two tracks of one class whose boxes fit together into one object of that class, one of them within the
+A pole before a car, or the edge of a bush, splits it; each part has a track, and the larger part changes between
+frames. Two tracks of one class whose boxes fit together into one object of that class, one of them within the
 known extent of the other or around it, are one object: the older track takes the larger part, and the whole when only
 one is visible. A part that may be a person, and has an established track, stays with it.
 """
@@ -78,7 +78,7 @@ class Reunion:
         return older[related], part[related]
 
     def _gives_way(self, tracks: TrackTable, older: Int, other: Int) -> Bool:
-        """(k,) whether a part that may be a person goes to the older track: no established one has it, or a car asks."""
+        """(k,) whether a part that may be a person goes to the older track."""
         car = tracks.final[older] & (tracks.last_class[older] == ObjectClass.CAR.value)
         way: Bool = (other == NONE) | (tracks.hits[other] < self.min_hits) | car
         return way

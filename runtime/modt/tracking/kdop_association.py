@@ -5,23 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import KdopAssociationConfig
-from modt.geometry.kdop import AXES, DIRECTIONS, overlapping_pairs, width_sum
+from modt.geometry.kdop import AXES, overlapping_pairs, width_sum
 from modt.geometry.kdop_displacement import least, measured, shape_similarity
 from modt.observations import Observations
 from modt.tracking import kalman
 from modt.tracking.assignment import assign
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
-from modt.types import Bool, Float64, Int
+from modt.types import Float64
 
 
 class KdopAssociation:
     """Matches k-DOPs.
 
     The visible part of an object changes with the view: its far side appears, a pole hides its rear, the field of
-    view cuts it. Along each of four axes a k-DOP has two ends. Where both moved alike, the object moved by their mean;
-    where they did not, one of them usually stayed, and the smaller of the two displacements from where the filter
-    expects them is the object's own. Pairs are gated by the smaller displacements alone.
+    view cuts it. Along each of four axes a k-DOP has two ends, of which one usually stays: the smaller of their
+    displacements from where the filter expects them is the object's own, and pairs are gated by it alone.
 
     Args:
         config: gate, weights of the cost and noise of the positions.
@@ -31,14 +30,14 @@ class KdopAssociation:
         self.config = config
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
-        """Pairs within the gate; then, among the rest, those that overlap although they changed their shape."""
+        """Pairs of least cost within the gate."""
         weight = self.config
         expected = tracks.predicted_kdops()
         variance = self.noise(observations)
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
         rows, columns = overlapping_pairs(expected + reach, observations.kdop)
         a, b = expected.take(rows, axis=1), observations.kdop.take(columns, axis=1)
-        size, overlap, coverage = shape_similarity(a, b)
+        size, overlap = shape_similarity(a, b)
         S = tracks.P[:, :2, :2].transpose(1, 2, 0).copy().take(rows, axis=2)
         noise = variance[columns] + weight.jump_sigma_m**2
         for k in (0, 1):
@@ -50,17 +49,14 @@ class KdopAssociation:
         shape = weight.size_weight * size + weight.overlap_weight * (1 - overlap)
         shape += weight.height_weight * (height + bottom) / 2 + weight.count_weight * count
         cost = distance / 2 + shape
-        first = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
-        first = first[assign(rows[first], columns[first], cost[first], weight.max_cost)]
-        free = _free(rows, rows[first], len(tracks)) & _free(columns, columns[first], len(observations))
-        second = (free & (coverage > weight.min_coverage)).nonzero()[0]
-        second = second[assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
-        kept = np.concatenate([first, second])
+        near = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
+        kept = near[assign(rows[near], columns[near], cost[near], weight.max_cost)]
         rows, columns = rows[kept], columns[kept]
-        x = tracks.x.take(rows, axis=0)[:, :2]
-        a, b = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T, b.take(kept, axis=1)
-        shift, covariance, end_variance = measured(a, b, variance[columns], tracks.end_variance.T.take(rows, axis=1))
-        return Matches(rows, columns, x + shift, covariance, end_variance.T)
+        before = tracks.end_variance.T.take(rows, axis=1)
+        shift, covariance, end_variance = measured(
+            a.take(kept, axis=1), b.take(kept, axis=1), variance[columns], before
+        )
+        return Matches(rows, columns, tracks.x.take(rows, axis=0)[:, :2] + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:
         """Centre of the k-DOP."""
@@ -74,10 +70,3 @@ class KdopAssociation:
         sigma = np.where(observations.partial, noise.partial_factor * sigma, sigma)
         variance: Float64 = np.square(sigma)
         return variance
-
-
-def _free(index: Int, taken: Int, n: int) -> Bool:
-    """(K,) which of the indices, each below n, were not taken."""
-    free = np.ones(n, np.bool_)
-    free[taken] = False
-    return free[index]

@@ -2,8 +2,8 @@
 
 A pole before a car, or the edge of a bush, splits it in frame after frame, and neither part looks like a car. What
 lies within the known extent of a classified car, beside the proposal matched with it, is merged with that proposal,
-unless a classified person or cyclist is matched with it, or an older classified car, or both together exceed the known
-extent.
+unless a classified person or cyclist is matched with it, or an older classified car, or both together exceed the
+known extent.
 
 The risk: a person who steps close to a parked car, and is not classified yet, becomes a part of it.
 """

@@ -7,7 +7,6 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kdop import DIRECTIONS, widths
-from modt.geometry.kdop_displacement import AGREE_M
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
@@ -22,10 +21,7 @@ from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
 
-_AGILITY = np.array([spec.agility for spec in CLASSES.values()])
 _MAX_LENGTH_M = np.array([spec.max_length_m for spec in CLASSES.values()])
-_MEAN_KDOP_DECAY = 0.8
-"""Greatest weight of the past in a mean k-DOP."""
 
 
 def association_of(config: TrackingConfig) -> Association:
@@ -135,10 +131,8 @@ class Tracker:
         self._stamp_s = stamp_s
         t, noise = self._tracks, self.config.filter
         t.last_class = t.object_class
-        known = t.final & ((t.last_class != ObjectClass.BACKGROUND.value) | self._near_rest(t.x, t.rest_position))
-        agility = np.where(known, _AGILITY[t.last_class], 1.0)  # background that moved away was no background
-        acceleration, turn = agility * noise.acceleration_sigma_mps2, agility * noise.turn_sigma_radps
-        t.x, t.P = tracks_first(*kalman.predict(*components_first(t.x, t.P), dt_s, acceleration, turn))
+        x, P = components_first(t.x, t.P)
+        t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, noise.acceleration_sigma_mps2, noise.turn_sigma_radps))
 
     def _update(self, matches: Matches, observations: Observations) -> None:
         """Equation 1's filter on the matched positions; the proposals take over the standing of their tracks."""
@@ -156,13 +150,11 @@ class Tracker:
         t.end_variance[rows] = matches.end_variance
         about = self._record(rows, matches.proposals, observations, matches.position)
         known = t.envelope.take(rows, axis=0)
-        envelope = np.maximum(about, self.config.envelope_decay * known + (1 - self.config.envelope_decay) * about)
+        decay = self.config.envelope_decay
+        envelope = np.maximum(about, decay * known + (1 - decay) * about)
         merged = _oversized(t.last_class[rows], about)
         envelope[merged] = known[merged]
         t.envelope[rows] = envelope
-        off = t.mean_kdop.take(rows, axis=0) - about
-        weight = np.minimum(1.0 - 1.0 / t.hits[rows], _MEAN_KDOP_DECAY)[:, None]
-        t.mean_kdop[rows] = about + (np.abs(off) < AGREE_M) * weight * off
 
     def _record(self, rows: Int, proposals: Int, observations: Observations, position: Float64) -> Float64:
         """Record what is observed of tracks (R,) at positions (R, 2); returns (R, 8) their k-DOPs about these [m]."""
@@ -175,21 +167,14 @@ class Tracker:
         about: Float64 = kdop - position @ DIRECTIONS
         return about
 
-    def _near_rest(self, x: Float64, rest_position: Float64) -> Bool:
-        """(R,) whether states (R, 4) are near their rest positions (R, 2)."""
-        step = x[:, :2] - rest_position
-        near: Bool = np.hypot(step[:, 0], step[:, 1]) < self.config.filter.stationary_radius_m
-        return near
-
     def _observe_rest(self, rows: Int) -> None:
-        """Zero-velocity update of tracks near their rest position; a track that stopped rests where it is."""
+        """Zero-velocity update of tracks near their rest position."""
         t, rest = self._tracks, self.config.filter
-        x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
-        stopped = ((x[:, SPEED] < rest.stopped_mps) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
-        position[stopped] = x[stopped, :2]
-        near = self._near_rest(x, position)
-        t.stationary[rows] = near & (hits > 2)
-        t.rest_position[rows] = position + rest.rest_gain * near[:, None] * (x[:, :2] - position)
+        x, position = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0)
+        step = x[:, :2] - position
+        near = np.hypot(step[:, 0], step[:, 1]) < rest.stationary_radius_m
+        t.stationary[rows] = near & (t.hits[rows] > 2)
+        t.rest_position[rows] = position + rest.rest_gain * near[:, None] * step
         at_rest = rows[near]
         x, P = components_first(x.compress(near, axis=0), t.P.take(at_rest, axis=0))
         t.x[at_rest], t.P[at_rest] = tracks_first(*kalman.observe_speed(x, P, 0.0, rest.stationary_sigma_mps))
@@ -228,11 +213,11 @@ class Tracker:
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
-        t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
+        t.envelope[new] = self._record(new, proposals, observations, position)
 
 
 def _oversized(object_class: Int, kdop: Float64) -> Int:
-    """Indices of objects, of classes (n,) and k-DOPs (n, 8), longer than any of their class: merged with something."""
+    """Indices of objects, by classes (n,) and k-DOPs (n, 8), that are longer than their class: merged with others."""
     objects: Int = (object_class != ObjectClass.BACKGROUND.value).nonzero()[0]
     longer: Bool = (
         widths(kdop.take(objects, axis=0).T).max(axis=0, initial=0.0) > _MAX_LENGTH_M[object_class[objects]]

@@ -12,7 +12,7 @@ import pytest
 from modt import profile
 from modt.classes import ObjectClass
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
-from modt.classification.prior import Frequency, Prior
+from modt.classification.prior import FrequencyPrior, Prior
 from modt.config import FusionConfig
 from modt.geometry import FieldOfView
 from modt.pipeline import Fusion
@@ -26,7 +26,7 @@ from tools.train.labelled_scans import TEST_DRIVE, Scan
 from tools.train.synthetic_scans import scan_of
 
 ASK_FROM = 2
-ALONE = FusionConfig(bearing_deg=180.0, range_ratio=10.0, extent_ratio=10.0, reopen_ratio=None)
+ALONE = FusionConfig(extent_change=10.0, review_point_ratio=None)
 """The number of points alone makes a view independent, and nothing is doubted."""
 
 
@@ -70,25 +70,25 @@ def test_efficient_classifies_each_track_once(played: Recording) -> None:
 
 def test_without_an_independent_view_none_is_taken_after_the_first(played: Recording) -> None:
     never = dataclasses.replace(
-        ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=1, threshold=1.0, background_threshold=1.0
+        ALONE, point_change=(10.0,) * 4, start_frame=1, object_threshold=1.0, background_threshold=1.0
     )
     few = replay([played], keyed(never), ASK_FROM)
     assert few.calls == dict(zip(CALLS, (6, 0, 0, 0), strict=True))
-    always = dataclasses.replace(never, alpha=(0.0,) * 3, background_alpha=0.0)
+    always = dataclasses.replace(never, point_change=(0.0,) * 4)
     many = replay([played], keyed(always), ASK_FROM)
     assert many.calls == dict(zip(CALLS, (6, 0, 48, 0), strict=True))  # each of the nine frames that may ask
 
 
 def test_a_late_start_replaces_the_first_view(played: Recording) -> None:
     late = dataclasses.replace(
-        ALONE, alpha=(10.0,) * 3, background_alpha=10.0, start_frame=5, threshold=1.0, background_threshold=1.0
+        ALONE, point_change=(10.0,) * 4, start_frame=5, object_threshold=1.0, background_threshold=1.0
     )
     assert replay([played], keyed(late), ASK_FROM).calls == dict(zip(CALLS, (6, 6, 0, 0), strict=True))
 
 
 def test_what_is_settled_from_few_points_is_doubted(played: Recording) -> None:
     settled = dataclasses.replace(
-        ALONE, threshold=0.25, background_threshold=0.25, prior=(0.25,) * 3, reopen_ratio=2.0
+        ALONE, object_threshold=0.25, background_threshold=0.25, prior=(0.25,) * 3, review_point_ratio=2.0
     )
     outcome = replay([played], keyed(settled), ASK_FROM)
     assert outcome.calls["first views"] == 6
@@ -119,7 +119,7 @@ def test_only_large_proposals_are_judged_on_request(played: Recording) -> None:
 def test_the_ideal_tracker_follows_the_largest_piece_of_an_object() -> None:
     box, none, points = np.zeros((4, 7)), np.zeros(4, np.bool_), np.zeros((40, 4), np.float32)
     offsets = np.array([0, 10, 30, 35, 40])
-    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none, none)
+    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none)
     car, rider = np.arange(2, 28), np.arange(36, 40)  # pieces of 8 and of 18 points; 4 of 5 points
     kinds = (ObjectClass.CAR, ObjectClass.CYCLIST)
     unlabelled = np.zeros(40, np.bool_)
@@ -135,7 +135,7 @@ def test_a_drive_is_recorded_with_one_track_a_body() -> None:
     network = PointNet(config.classification, config.sensor)
     sweeps = list(SyntheticStream("crossing", "hdl-64e", 0.4, 7).sweeps())
     drive = [(frame, scan_of(frame, truth, "x", "x", camera=True)) for frame, truth in sweeps]
-    recording = record("x", drive, config, network, Frequency(config.fusion.prior))
+    recording = record("x", drive, config, network, FrequencyPrior(config.fusion.prior))
     assert len(recording.moments) == 4
     bodies: dict[int, set[int]] = {}
     for moment, (frame, scan) in zip(recording.moments, drive, strict=True):
@@ -149,7 +149,7 @@ def test_a_drive_is_recorded_with_one_track_a_body() -> None:
     assert bodies
     assert all(len(tracks) == 1 for tracks in bodies.values())
     assert replay([recording], lambda prior: EveryFrame(), 1).share == 1.0
-    own = record("x", drive, config, network, Frequency(config.fusion.prior), ideal=False)
+    own = record("x", drive, config, network, FrequencyPrior(config.fusion.prior), ideal=False)
     for moment, ideal in zip(own.moments, recording.moments, strict=True):
         assert len(np.unique(moment.track)) == len(moment.track)
         assert (moment.judged | ~ideal.judged).all()
@@ -161,7 +161,7 @@ def test_each_sweep_holds_the_default_once_where_its_values_do() -> None:
     settings = list(sweep_fusion.sweeps(config))
     starred = [s.sweep for s in settings if s.value.endswith("*")]
     assert len(starred) == len(set(starred))
-    assert set(starred) == {s.sweep for s in settings} - {"reopen_ratio, reopen_points"}
+    assert set(starred) == {s.sweep for s in settings} - {"review_point_ratio, review_max_points"}
 
 
 def tried(mean: float, share: float, checked: tuple[float, float] | None = None) -> Tried:

@@ -1,4 +1,4 @@
-"""The points of a sweep as columns."""
+"""Points of a sweep as columns."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from modt.types import Bool, Float32, Int
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
-    """Points of a sweep, a contiguous column a coordinate: what vectorised arithmetic is fastest on.
+class PointColumns:
+    """Points of a sweep, one contiguous column a coordinate: the fastest layout for vectorised arithmetic.
 
     Attributes:
         x, y, z: (N,) position [m, sensor frame].
-        root: (N,) square root of the horizontal range [sqrt(m)]; the measure in which grids are spaced.
+        sqrt_range: (N,) square root of the horizontal range [sqrt(m)], the unit of the grids.
     """
 
     x: Float32
     y: Float32
     z: Float32
-    root: Float32
+    sqrt_range: Float32
 
     def __len__(self) -> int:
         return len(self.x)
 
     @classmethod
-    def of(cls, points: Float32) -> Self:
+    def from_array(cls, points: Float32) -> Self:
         """Columns of (N, 3) or wider points."""
         x, y, z = np.ascontiguousarray(points[:, :3].T, np.float32)
         return cls(x, y, z, np.sqrt(np.sqrt(x * x + y * y)))
 
     def take(self, rows: Int | Bool) -> Self:
-        """The rows given, by index or mask."""
-        return type(self)(self.x[rows], self.y[rows], self.z[rows], self.root[rows])
+        """Rows by index or mask."""
+        return type(self)(self.x[rows], self.y[rows], self.z[rows], self.sqrt_range[rows])
 
     def xyz(self) -> Float32:
-        """(N, 3) positions, a row a point [m]."""
+        """(N, 3) positions [m]."""
         return np.stack([self.x, self.y, self.z], axis=1)

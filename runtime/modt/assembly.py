@@ -1,0 +1,74 @@
+"""The modes of the method, and the one place where the stages of a pipeline are put together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from modt import host
+from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.instrumentation import TimedClassifier
+from modt.classification.pointnet import PointNet
+from modt.classification.prior import Prior, make_prior
+from modt.classification.scheduler import LinearCost, Scheduler
+from modt.config import FusionConfig, ProfileConfig
+from modt.energy.instrumentation import CountedClassifier
+from modt.energy.ledger import StageLedger
+from modt.geometry import FieldOfView
+from modt.odometry.odometry import Odometry
+from modt.pipeline import Fusion, Pipeline
+from modt.segmentation.segmenter import Segmenter
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
+from modt.tracking.tracker import Tracker
+from modt.types import UNLIMITED, Budget
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One way of the method over the same stages.
+
+    Attributes:
+        machine: the states that a track goes through.
+        fusion: which views are classified and what becomes of them.
+        budget: what a frame may spend.
+    """
+
+    machine: StateMachine
+    fusion: Callable[[FusionConfig, Prior], Fusion]
+    budget: Callable[[ProfileConfig], Budget]
+
+
+def _profile_budget(profile: ProfileConfig) -> Budget:
+    return Budget(profile.scheduler.calls_per_frame, profile.classification_ms)
+
+
+MODES = {
+    "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
+    "efficient": Mode(EFFICIENT, FirstView, _profile_budget),
+    "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
+}
+"""Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
+
+
+def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
+    """The stages of a mode.
+
+    Raises:
+        MisuseError: the model cannot be used.
+    """
+    host.keep_freed_pages()
+    limits = profile.classification
+    cost = LinearCost(limits.max_points, profile.scheduler.cost)
+    network = PointNet(limits, profile.sensor)
+    prior = make_prior(network.boxes, network.reflectance, profile.fusion.prior, profile.sensor)
+    classifier = TimedClassifier(network, cost, time.thread_time_ns)
+    return Pipeline(
+        segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
+        odometry=Odometry(profile.odometry),
+        tracker=Tracker(profile.tracking, mode.machine),
+        fusion=mode.fusion(profile.fusion, prior),
+        scheduler=Scheduler(profile.scheduler.worth, cost),
+        classifier=CountedClassifier(classifier, ledger, limits.max_points, limits.batch),
+        ledger=ledger,
+    )

@@ -1,0 +1,163 @@
+"""The library: a pipeline for programs that have their own loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from modt import assembly, profile
+from modt.classes import CLASS_NAMES, ObjectClass
+from modt.config import ProfileConfig
+from modt.energy.ledger import NullLedger
+from modt.errors import MisuseError
+from modt.geometry import FieldOfView
+from modt.sources.pose_file import fault
+from modt.sources.scan_file import sanitised
+from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int
+
+
+@dataclass(frozen=True, slots=True)
+class TrackedObjects:
+    """The tracks alive after a frame, n rows.
+
+    Attributes:
+        id: (n,) never used twice.
+        object_class: (n,) index in modt.CLASS_NAMES.
+        posterior: (n, 4) probability of each class.
+        final: (n,) the class is final.
+        visible: (n,) matched with a proposal of this frame.
+        box_sensor: (n, 7) x, y, z of the centre, length, width, height [m], yaw [rad] in the sensor frame; NaN if not
+            visible.
+        box_world: (n, 7) last box in the world.
+        position: (n, 2) filtered x, y [m, world].
+        heading_rad, speed_mps: (n,) of the motion in the world.
+        points: (n,) of the last proposal.
+        age, missed: (n,) frames since birth, and since the last proposal.
+    """
+
+    id: Int
+    object_class: Int
+    posterior: Float64
+    final: Bool
+    visible: Bool
+    box_sensor: Float64
+    box_world: Float64
+    position: Float64
+    heading_rad: Float64
+    speed_mps: Float64
+    points: Int
+    age: Int
+    missed: Int
+
+    def __len__(self) -> int:
+        return len(self.id)
+
+    def take(self, rows: Int | Bool) -> Self:
+        """The rows given, by index or mask."""
+        return type(self)(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+
+    def objects(self) -> Self:
+        """The rows whose class is not background and that are visible."""
+        return self.take((self.object_class != ObjectClass.BACKGROUND) & self.visible)
+
+    def as_dicts(self) -> list[dict[str, Any]]:
+        """A dictionary a row, of plain numbers and lists; object_class is a name."""
+        columns = {f.name: getattr(self, f.name).tolist() for f in fields(self)}
+        columns["object_class"] = [CLASS_NAMES[c] for c in self.object_class.tolist()]
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+class Pipeline:
+    """Segmentation, tracking, scheduled classification and fusion of one sensor's sweeps.
+
+        import modt
+        pipeline = modt.Pipeline.from_profile("vlp-16", mode="accurate")
+        for stamp_s, points in sweeps:
+            for found in pipeline.step(points, stamp_s).objects().as_dicts():
+                print(found["id"], found["object_class"], found["box_sensor"])
+
+    Args:
+        config: of sensor and board.
+        mode: "conventional", "efficient" or "accurate".
+
+    Raises:
+        MisuseError: an unknown mode, or a model that cannot be used.
+    """
+
+    def __init__(self, config: ProfileConfig, mode: str = "accurate") -> None:
+        if mode not in assembly.MODES:
+            raise MisuseError(f"mode {mode!r}", "unknown", f"use one of {', '.join(assembly.MODES)}")
+        chosen = assembly.MODES[mode]
+        self.config, self.mode = config, mode
+        self._pipeline = assembly.pipeline(chosen, config, FieldOfView(), NullLedger())
+        self._budget = chosen.budget(config)
+        self._index, self._stamp_s = 0, -np.inf
+
+    @classmethod
+    def from_profile(cls, name: str | Path = profile.DEFAULT, mode: str = "accurate") -> Self:
+        """Pipeline of a profile, by its name or file.
+
+        Raises:
+            MisuseError: no such profile or mode, or a profile with an error; it names the line.
+        """
+        return cls(profile.load(str(name)), mode)
+
+    def step(
+        self, points: ArrayLike, stamp_s: float, T_world_sensor: ArrayLike | None = None, *, turn_s: float = 0.0
+    ) -> TrackedObjects:
+        """The tracks after one sweep.
+
+        Args:
+            points: (N, 3) or (N, 4) x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1]; points
+                that are not finite count as no return.
+            stamp_s: time of the sweep [s], never before that of the last one.
+            T_world_sensor: (4, 4) pose at the stamp; None: the proposals themselves tell the motion of the sensor.
+            turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
+
+        Raises:
+            MisuseError: arguments of another shape, a stamp that goes back, a matrix that is no pose.
+            ScanError: columns that are not x, y, z, reflectance.
+        """
+        if not np.isfinite(stamp_s) or stamp_s < self._stamp_s:
+            raise MisuseError(
+                f"stamp {stamp_s!r}", f"not after the last one, {self._stamp_s!r}", "give rising times [s]"
+            )
+        pose = None if T_world_sensor is None else np.array(T_world_sensor, np.float64)
+        if pose is not None and (pose.shape != (4, 4) or fault(pose)):
+            cause = fault(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"
+            raise MisuseError("T_world_sensor", str(cause), "give a rigid (4, 4) transform from sensor to world")
+        frame = Frame(self._index, float(stamp_s), _checked(points), pose, turn_s=turn_s)
+        self._index, self._stamp_s = self._index + 1, float(stamp_s)
+        result = self._pipeline.step(frame, self._budget)
+        tracks, visible = result.tracks, result.tracks.proposal != NONE
+        box = np.full((len(tracks), 7), np.nan)
+        box[visible] = result.proposals.box[tracks.proposal[visible]]
+        return TrackedObjects(
+            id=tracks.id,
+            object_class=tracks.object_class,
+            posterior=tracks.posterior,
+            final=tracks.final,
+            visible=visible,
+            box_sensor=box,
+            box_world=tracks.box,
+            position=tracks.x[:, :2],
+            heading_rad=tracks.x[:, 2],
+            speed_mps=tracks.x[:, 3],
+            points=tracks.points,
+            age=tracks.age,
+            missed=tracks.missed,
+        )
+
+
+def _checked(points: ArrayLike) -> Float32:
+    """(N, 4) finite points; a missing fourth column is filled with unrecorded reflectance."""
+    rows = np.array(points, np.float32)
+    if rows.ndim != 2 or rows.shape[1] not in (3, 4):
+        raise MisuseError("points", f"of shape {rows.shape}", "give rows of x, y, z or x, y, z, reflectance")
+    if rows.shape[1] == 3:
+        rows = np.column_stack([rows, np.full(len(rows), UNRECORDED, np.float32)])
+    return sanitised(rows, "points")[0]

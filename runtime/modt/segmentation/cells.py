@@ -1,0 +1,59 @@
+"""Occupied grid cells, and their connected components."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from modt.segmentation.grids import Int32, SqrtRangeGrid
+from modt.segmentation.groups import label_max, label_min
+from modt.types import Float32, Int
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """Occupied cells of a grid.
+
+    Attributes:
+        row, column: (C,) position in the grid.
+        low, high: (C,) least and greatest height of the points above ground [m].
+        sqrt_range: (C,) square root of the range of the last point [sqrt(m)].
+    """
+
+    row: Int32
+    column: Int32
+    low: Float32
+    high: Float32
+    sqrt_range: Float32
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def take(self, rows: Int) -> Cells:
+        """Cells by index."""
+        return Cells(self.row[rows], self.column[rows], self.low[rows], self.high[rows], self.sqrt_range[rows])
+
+
+def occupied_cells(
+    grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32, sqrt_range: Float32
+) -> tuple[Cells, Int, Int]:
+    """Cells of (K,) entries (points, or cells of a finer grid), (C,) last entry of each, (K,) cell of each entry."""
+    sample, cell = grid.occupied(grid.flat_index(row, column))
+    bounds = label_min(low, cell, len(sample)), label_max(high, cell, len(sample))
+    return Cells(row[sample], column[sample], *bounds, sqrt_range[sample]), sample, cell
+
+
+def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
+    """(C,) connected component of each cell: neighbours with a vertical gap below (C,) max_gap_m are connected."""
+    one, other = grid.neighbour_pairs(grid.flat_index(cells.row, cells.column))
+    gap = np.maximum(cells.low.take(one), cells.low.take(other))
+    gap -= np.minimum(cells.high.take(one), cells.high.take(other))
+    near = np.flatnonzero(gap < max_gap_m.take(one))
+    ends = np.zeros(len(cells) + 1, np.int32)
+    np.cumsum(np.bincount(one.take(near), minlength=len(cells)), out=ends[1:])
+    graph = csr_array((np.ones(len(near)), other.take(near), ends), shape=(len(cells), len(cells)))
+    component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
+    return component

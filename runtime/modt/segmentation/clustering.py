@@ -1,0 +1,104 @@
+"""Euclidean clustering (section III-A) on a bird's-eye grid whose spacing grows with range."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from modt.config import SegmentationConfig, SensorConfig
+from modt.segmentation.cells import Cells, connect, occupied_cells
+from modt.segmentation.clusters import Clusters, ClusterSizes, diagonals
+from modt.segmentation.grids import SqrtRangeGrid
+from modt.segmentation.groups import consecutive, label_max, label_min
+from modt.segmentation.point_columns import PointColumns
+from modt.types import Bool, Float32, Int
+
+
+class Splitter(Protocol):
+    """Splits clusters of several objects."""
+
+    def split(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> tuple[Int, int]:
+        """(C,) cluster of each cell after splitting some of the (G,) valid ones; their number, new ones from G."""
+        ...
+
+
+class Merger(Protocol):
+    """Merges clusters of one object."""
+
+    def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
+        """(G,) cluster into which each of the (G,) valid ones is merged, itself for the others."""
+        ...
+
+
+class Clusterer:
+    """Clusters of points that can be objects.
+
+    A coarse grid connects objects with sparse returns. An oversized cluster (a wall, a hedge and who stands in front
+    of it) is clustered again on a grid of half the spacing; parts that stand out from it are kept.
+
+    Args:
+        sensor: range and beam spacing.
+        config: clustering distance, sizes of objects, and the keys of `clusters`.
+        splitter: splits clusters of several objects.
+        merger: merges clusters of one object.
+    """
+
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig, splitter: Splitter, merger: Merger) -> None:
+        step = config.cell_m / np.sqrt(10.0)
+        beam_rad = float(np.deg2rad(sensor.elevation_step_deg))
+        self.config = config
+        self.gap_m = np.float32(config.clusters.max_gap_m)
+        self.gap_per_range = np.float32(config.clusters.max_gap_beams * beam_rad)
+        self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
+        self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
+        self.splitter, self.merger = splitter, merger
+
+    def cluster(self, points: PointColumns, height: Float32) -> Clusters:
+        """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
+        row, column = self.fine.row_column(points)
+        cells, sample, cell = occupied_cells(self.fine, row, column, height, height, points.sqrt_range)
+        cluster, sizes = self._connect(cells, points.take(sample), np.bincount(cell))
+        n, valid = len(sizes), self._valid(sizes)
+        clusters = Clusters(points, height, cell, cells, sample, cluster, n)
+        split, total = self.splitter.split(clusters, sizes, valid)
+        mergeable = valid | ~sizes.is_part
+        mergeable[cluster[split >= n]] = False
+        target = self.merger.merge(clusters, sizes, mergeable)
+        valid = np.append(self._valid(sizes.merged(target)), np.ones(total - n, np.bool_))
+        of_cell = consecutive(valid)[np.append(target, np.arange(n, total))[split]]
+        return replace(clusters, of_cell=of_cell, n=int(valid.sum()))
+
+    def _connect(self, cells: Cells, points: PointColumns, count: Int) -> tuple[Int, ClusterSizes]:
+        """(C,) cluster of each cell, given one point of each and (C,) its number of points; sizes of the clusters."""
+        cluster = self._connect_coarse(cells)
+        extent = diagonals(points.x, points.y, cluster)
+        oversized = np.flatnonzero((extent >= self.config.max_extent_m)[cluster])
+        part = self._components(self.fine, cells.take(oversized))
+        cluster[oversized] = part + len(extent)
+        extents = np.append(extent, diagonals(points.x[oversized], points.y[oversized], part))
+        n = len(extents)
+        n_points = np.bincount(cluster, count, n).astype(np.int64)
+        bottom, top = label_min(cells.low, cluster, n), label_max(cells.high, cluster, n)
+        sqrt_range = np.zeros(n, np.float32)
+        sqrt_range[cluster] = cells.sqrt_range
+        return cluster, ClusterSizes(n_points, extents, bottom, top, sqrt_range, np.arange(n) >= len(extent))
+
+    def _connect_coarse(self, fine: Cells) -> Int:
+        """(C,) cluster of each fine cell: that of the coarse cell of which it is a quarter."""
+        row, column = fine.row >> 1, fine.column >> 1
+        cells, _, coarse = occupied_cells(self.coarse, row, column, fine.low, fine.high, fine.sqrt_range)
+        return self._components(self.coarse, cells)[coarse]
+
+    def _components(self, grid: SqrtRangeGrid, cells: Cells) -> Int:
+        """(C,) connected component of each cell."""
+        return connect(grid, cells, self.gap_m + self.gap_per_range * np.square(cells.sqrt_range))
+
+    def _valid(self, sizes: ClusterSizes) -> Bool:
+        """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""
+        config, c = self.config, self.config.clusters
+        valid: Bool = (sizes.points >= config.min_points) & (sizes.extent_m < config.max_extent_m)
+        valid &= sizes.top_m - sizes.bottom_m >= config.min_height_m
+        valid &= ~sizes.is_part | ((sizes.top_m >= c.min_part_top_m) & (sizes.points >= c.min_part_points))
+        return valid

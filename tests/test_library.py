@@ -1,0 +1,92 @@
+"""The library, as a program with its own loop uses it."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import modt
+from modt import assembly
+from modt.energy.ledger import NullLedger
+from modt.errors import MisuseError
+from modt.geometry import FieldOfView
+from modt.profile import load
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.types import NONE
+
+
+@pytest.fixture(scope="module", name="frames")
+def a_second_of_a_street():
+    return list(SyntheticStream("street", "vlp-16", 1.0, seed=3))
+
+
+def test_importing_the_package_loads_nothing_heavy():
+    code = "import modt, sys; print(modt.__version__, 'numpy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [modt.__version__, "False"]
+
+
+@pytest.mark.parametrize("mode", assembly.MODES)
+def test_step_returns_what_the_pipeline_finds(frames, mode):
+    library = modt.Pipeline.from_profile("vlp-16", mode=mode)
+    config, chosen = load("vlp-16"), assembly.MODES[mode]
+    pipeline = assembly.pipeline(chosen, config, FieldOfView(), NullLedger())
+    for frame in frames:
+        found = library.step(frame.points, frame.stamp_s, frame.T_world_sensor)
+        result = pipeline.step(frame, chosen.budget(config))
+        np.testing.assert_array_equal(found.id, result.tracks.id)
+        np.testing.assert_array_equal(found.posterior, result.tracks.posterior)
+        np.testing.assert_array_equal(found.visible, result.tracks.proposal != NONE)
+        boxes = result.proposals.box[result.tracks.proposal[found.visible]]
+        np.testing.assert_array_equal(found.box_sensor[found.visible], boxes)
+        assert np.isnan(found.box_sensor[~found.visible]).all()
+    assert len(found.objects()) > 0
+    assert not (found.objects().object_class == 0).any()
+
+
+def test_rows_are_arrays_with_names_and_dictionaries(frames):
+    library = modt.Pipeline.from_profile("vlp-16")
+    found = library.step(frames[0].points, frames[0].stamp_s)
+    rows = found.as_dicts()
+    assert len(rows) == len(found)
+    assert [row["id"] for row in rows] == found.id.tolist()
+    assert {row["object_class"] for row in rows} <= set(modt.CLASS_NAMES)
+    assert rows[0]["box_sensor"] == found.box_sensor[0].tolist()
+    assert found.take(np.array([1])).as_dicts() == rows[1:2]
+
+
+def test_points_without_reflectance_and_without_returns_are_taken(frames):
+    library = modt.Pipeline.from_profile("vlp-16")
+    points = np.vstack([frames[0].points[:, :3], [[np.nan, 0.0, 0.0]]])
+    with_nan = library.step(points.tolist(), 0.0)
+    without = modt.Pipeline.from_profile("vlp-16").step(frames[0].points[:, :3], 0.0)
+    np.testing.assert_array_equal(with_nan.box_world, without.box_world)
+    assert len(library.step(np.zeros((0, 4)), 0.1).objects()) == 0
+
+
+@pytest.mark.parametrize(
+    ("points", "stamp_s", "T", "subject"),
+    [
+        (np.zeros((3, 5)), 1.0, None, "points"),
+        (np.zeros(12), 1.0, None, "points"),
+        (np.zeros((3, 4)), -1.0, None, "stamp"),
+        (np.zeros((3, 4)), np.nan, None, "stamp"),
+        (np.zeros((3, 4)), 1.0, np.eye(3), "T_world_sensor"),
+        (np.zeros((3, 4)), 1.0, 2 * np.eye(4), "T_world_sensor"),
+        (np.zeros((3, 4)), 1.0, np.full((4, 4), np.nan), "T_world_sensor"),
+    ],
+)
+def test_wrong_arguments_are_named(points, stamp_s, T, subject):
+    library = modt.Pipeline.from_profile("vlp-16")
+    library.step(np.zeros((3, 4)), 0.0)
+    with pytest.raises(MisuseError, match=subject):
+        library.step(points, stamp_s, T)
+    library.step(np.zeros((3, 4)), 0.0)  # nothing was broken by it
+
+
+def test_an_unknown_mode_is_named():
+    with pytest.raises(MisuseError, match="accurate"):
+        modt.Pipeline.from_profile("vlp-16", mode="fast")
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = modt.nothing
