@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
 from modt.config import FragmentConfig
+from modt.geometry.kdop import DIRECTIONS
 from modt.tracking.fragments import Reunion, swap_proposals
 from modt.types import NONE
 from tests.tracking.tracking_scenes import EYE, Follower, associated, box, frame_of, tracks_at
@@ -97,6 +98,20 @@ def test_a_part_without_a_track_is_taken():
 def test_what_is_no_fragment_stays_with_its_track(older, younger, boxes, columns, why):
     tracks = tracks_at([older, younger], CAR, CAR, **columns)
     assert reunited(tracks, boxes, [0, 1], (40, 80))[0] == [0, 1], why
+
+
+def test_a_part_around_the_older_track_is_taken():
+    """The older track knows a fragment only; the whole came to a younger one."""
+    assert reunited(tracks_at([FRONT, WHOLE], CAR, CAR), [WHOLE], [1], 80)[0] == [0, NONE]
+
+
+@pytest.mark.parametrize(("length_m", "swapped"), [(1.8, True), (3.5, False)])
+def test_parts_that_are_longer_than_their_class_together_are_not_one_object(length_m, swapped):
+    """Both lie within the known extent, which once was that of a merged object."""
+    part = box(14.2 + length_m / 2, 4, length_m)
+    tracks = tracks_at([WHOLE, part], CAR, CAR)
+    tracks.envelope[0] += 6 * np.maximum(DIRECTIONS[0], 0)
+    assert (reunited(tracks, [REAR, part], [0, 1], (40, 80))[0] == [1, 0]) == swapped
 
 
 @pytest.mark.parametrize(
