@@ -105,7 +105,7 @@ def test_a_part_around_the_older_track_is_taken():
     assert reunited(tracks_at([FRONT, WHOLE], CAR, CAR), [WHOLE], [1], 80)[0] == [0, NONE]
 
 
-@pytest.mark.parametrize(("length_m", "swapped"), [(1.8, True), (3.5, False)])
+@pytest.mark.parametrize(("length_m", "swapped"), [(1.5, True), (3.5, False)])
 def test_parts_that_are_longer_than_their_class_together_are_not_one_object(length_m, swapped):
     """Both lie within the known extent, which once was that of a merged object."""
     part = box(14.2 + length_m / 2, 4, length_m)

@@ -46,6 +46,12 @@ def test_a_pair_beyond_the_gate_is_not_matched():
     assert matched(tracks, person, gate=2.0)[0] == []
 
 
+def test_pairs_are_sought_as_far_as_the_filter_is_uncertain():
+    person = observed([box(12, 0, 0.6, 0.6)])
+    assert matched(tracks_at([box(10, 0, 0.6, 0.6)]), person)[0] == []
+    assert matched(tracks_at([box(10, 0, 0.6, 0.6)], P=4 * np.eye(4)), person)[0] == [(0, 0)]
+
+
 def test_a_pair_above_the_highest_cost_is_not_matched():
     """A car of which most disappeared."""
     tracks, part = tracks_at([box(10, 3)], points=300), observed([box(9.0, 3, 0.5, 1.8, 0.4, z=-1.5)], points=8)

@@ -81,6 +81,13 @@ def test_tracks_live_as_many_frames_without_a_proposal_as_configured(max_missed)
     assert len(tracker.tracks) == 0
 
 
+def test_the_id_of_a_deleted_track_is_never_used_again():
+    tracker = Follower(TrackingConfig(max_missed=0))
+    for i, boxes in enumerate([[box(10, 0), box(20, 8)], [box(10, 0)], [box(10, 0), box(20, 8)]]):
+        tracker.follow(*frame_of(boxes, i, EYE))
+    assert tracker.tracks.id.tolist() == [0, 2]
+
+
 def test_an_uncertain_class_is_wanted_until_it_is_certain():
     tracker = Follower(machine=ACCURATE)
     for i, certain in enumerate([False, False, True]):
