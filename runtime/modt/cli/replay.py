@@ -34,9 +34,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     )
     motion.add_argument(
         "--odometry",
-        default="own",
+        default="recording",
         metavar="SOURCE",
-        help="own (the stream's, the default), none, or a socket that poses are sent to: udp://HOST:PORT, unix:///PATH",
+        help="poses: recording (the stream's, default), none, or from a socket: udp://HOST:PORT, unix:///PATH",
     )
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")

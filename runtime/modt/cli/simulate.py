@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.scene, arguments.sensor, arguments.seconds, arguments.seed, distort=arguments.distort
     )
     try:
-        writer = DriveWriter(out, stream, all_around=arguments.all_around)
+        writer = DriveWriter(out, stream.camera, all_around=arguments.all_around)
         for frame, truth in stream.sweeps():
             writer.write(frame, truth)
         writer.close()

@@ -66,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         text, n = follow(sequence, poses, arguments.period, arguments.sure)
         spent_s += time.process_time() - began
         frames, ids = frames + sequence.n_frames, ids + n
-        lines = LineFile(arguments.out / f"{sequence.name}.txt")
+        lines = LineFile[str](arguments.out / f"{sequence.name}.txt")
         lines.write(text)
         lines.close()
     if not ids and any(map(len, sequences)):
@@ -92,25 +92,29 @@ def follow(
 
     import numpy as np
 
-    from modt.box_tracking.box_tracker import BoxTracker, box_config
+    from modt.box_tracking.box_tracker import BoxTracker
+    from modt.classes import CLASSES
+    from modt.config.box_tracking import box_tracking_config
     from modt.geometry import inverse, transform_boxes
-    from modt.sinks.kitti_detections import result_lines
-    from modt.sources.detections import T_LEVEL_CAMERA, TYPES, kitti
+    from modt.sinks.kitti import box_lines
+    from modt.sources.detections import DETECTED, T_LEVEL_CAMERA, boxes_to_kitti
 
     lines: list[str] = []
     order: list[int] = []
     tracks = 0
-    for type_, name in enumerate(TYPES):
-        own = detections.take(detections.type_ == type_)
-        config = box_config(name)
-        tracker = BoxTracker(config if sure is None else replace(config, sure=sure))
+    for number, object_class in enumerate(DETECTED):
+        own = detections.take(detections.object_class == object_class)
+        config = box_tracking_config(object_class)
+        if sure is not None:
+            config = replace(config, confidence=replace(config.confidence, report_above=sure))
+        tracker = BoxTracker(config)
         last = np.zeros((0, 4))
         reports: list[tuple[Int, Int, Float64, Float64, Float64]] = []
         for frame, rows in own.frames():
             T = None if poses is None else T_LEVEL_CAMERA @ poses[frame] @ inverse(T_LEVEL_CAMERA)
             seen = own.box[rows]
             boxes = seen if T is None else transform_boxes(T, seen)
-            found = tracker.follow(frame * period_s, boxes, own.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
+            found = tracker.step(frame * period_s, boxes, own.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
             if not len(found.id):
                 continue
             if found.id.max() >= len(last):
@@ -121,7 +125,8 @@ def follow(
             reports.append((np.full(len(found.id), frame), found.id, last[found.id], placed, found.confidence))
         if reports:
             frames, ids, image_box, box, score = (np.concatenate(column) for column in zip(*reports, strict=True))
-            lines += result_lines(frames, name, ids * len(TYPES) + type_, image_box, kitti(box), score)
+            name = CLASSES[object_class].kitti[0]
+            lines += box_lines(frames, name, ids * len(DETECTED) + number, image_box, boxes_to_kitti(box), score)
             order += frames.tolist()
             tracks += len(np.unique(ids))
     return "".join(lines[k] for k in np.argsort(order, kind="stable")), tracks

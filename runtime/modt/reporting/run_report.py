@@ -66,8 +66,8 @@ def run_tree(run: Path) -> dict[str, Any]:
         MisuseError: it is no run directory, or holds no whole frame yet.
     """
     facts = _facts(run)
-    lines = list(read_records(run / LEDGER, LEDGER_SCHEMA, beside={ENERGY_SCHEMA}))
-    windows = list(read_records(run / LEDGER, ENERGY_SCHEMA, beside={LEDGER_SCHEMA}))
+    lines = list(read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA}))
+    windows = list(read_records(run / LEDGER, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}))
     limits = facts["profile"]["classification"]
     tally = Tally(limits["max_points"], limits["batch"])
     for record in read_records(run / TRACKS, FRAME_SCHEMA):

@@ -134,7 +134,7 @@ def summarise(run: Path) -> dict[str, Any]:
     summary = Summary()
     for record in read_records(run / TRACKS, FRAME_SCHEMA):
         summary.add_frame(record)
-    for record in read_records(run / LEDGER, LEDGER_SCHEMA, beside={ENERGY_SCHEMA}):
+    for record in read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA}):
         summary.add_ledger(record)
     return summary.result()
 
