@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.geometry.kdop import AXES, DIRECTIONS
-from modt.geometry.kdop_displacement import least, measured, shape_similarity, shift_between
+from modt.geometry.kdop_displacement import AGREE_M, least, measured, shape_similarity, shift_between
 
-AGREE_M, DISAGREEMENT, DECAY, SOFT_M = 0.6, 0.3, 0.97, 0.3
+DISAGREEMENT, DECAY, SOFT_M = 0.3, 0.97, 0.3
 
 
 def random_kdops(rng, n):
@@ -24,16 +24,21 @@ def square(centre, half):
     return (np.asarray(centre) @ DIRECTIONS + half)[:, None]
 
 
+def slow_moved(a, b, k):
+    """Displacement along an axis, and from 0 to 1 how little its ends agree."""
+    longest = max(*(a[:4] + a[4:]), *(b[:4] + b[4:]), 1.0)
+    ahead, behind = b[k] - a[k], a[k + 4] - b[k + 4]
+    agree = max(0.0, 1 - ((ahead - behind) * longest / AGREE_M) ** 2) ** 2
+    return agree * (ahead + behind) / 2 + (1 - agree) * min(ahead, behind, key=abs), 1 - agree
+
+
 def slow_measured(a, b, variance, before):
     """Displacement, covariance and end variances of one pair, axis by axis."""
-    width_a, width_b = [[o[k] + o[k + 4] for k in range(4)] for o in (a, b)]
-    longest = max(*width_a, *width_b, 1.0)
+    width_a, width_b = a[:4] + a[4:], b[:4] + b[4:]
     information, weighted, end_variance = np.zeros((2, 2)), np.zeros(2), []
     for k in range(4):
-        ahead, behind, axis = b[k] - a[k], a[k + 4] - b[k + 4], AXES[:, k]
-        agree = max(0.0, 1 - ((ahead - behind) * longest / AGREE_M) ** 2) ** 2
-        moved = min(ahead, behind, key=abs)
-        new = (1 - agree) * (DISAGREEMENT * (width_b[k] - width_a[k])) ** 2
+        axis, (moved, unlike) = AXES[:, k], slow_moved(a, b, k)
+        new = unlike * (DISAGREEMENT * (width_b[k] - width_a[k])) ** 2
         end_variance.append(min(max(new, DECAY * before[k]), (DISAGREEMENT * max(width_b)) ** 2))
         information += np.outer(axis, axis) / (2 * (variance + end_variance[-1]))
         weighted += axis * moved / (2 * (variance + end_variance[-1]))
@@ -54,9 +59,8 @@ def slow_similarity(a, b):
 
 
 def slow_shift(a, b):
-    """Displacement of one pair of k-DOPs by the end of each axis that moved less."""
-    moved = [min(b[k] - a[k], a[k + 4] - b[k + 4], key=abs) for k in range(4)]
-    return [sum(m * c for m, c in zip(moved, axis, strict=True)) / 2 for axis in AXES]
+    """Displacement of one pair of k-DOPs, axis by axis."""
+    return sum(AXES[:, k] * slow_moved(a, b, k)[0] for k in range(4)) / 2
 
 
 @given(st.integers(0, 6), st.integers(0, 2**16))

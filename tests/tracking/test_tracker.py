@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
 from modt.config.tracking import FilterConfig
+from modt.geometry.kdop import DIRECTIONS
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, UndefinedTransitionError
@@ -197,6 +198,17 @@ def test_a_track_at_rest_is_stationary_until_it_leaves_its_rest_position():
             assert tracks.x[0, 3] < 0.3
     assert not tracks.stationary[0]
     assert tracks.x[0, 3] == pytest.approx(4.0, abs=0.5)
+
+
+def test_the_mean_kdop_follows_views_that_jitter_and_restarts_at_an_end_that_jumps():
+    tracker = Follower()
+    for i in range(12):
+        tracks = run(tracker, [frame_of([box(12, 3, 2.0, 1.0)], i, EYE, points=2000)])
+    np.testing.assert_allclose(tracks.mean_kdop[0][[0, 2, 4, 6]], [1.0, 0.5, 1.0, 0.5], atol=0.05)
+    tracks = run(tracker, [frame_of([box(12.5, 3, 3.0, 1.0)], 12, EYE, points=2000)])  # its front comes into view
+    reach = tracks.kdop[0] - tracks.x[0, :2] @ DIRECTIONS
+    assert tracks.mean_kdop[0, 0] == pytest.approx(reach[0], abs=0.15)
+    np.testing.assert_allclose(tracks.mean_kdop[0][[2, 4, 6]], [0.5, 1.0, 0.5], atol=0.15)
 
 
 def test_new_tracks_begin_with_the_uncertainty_of_the_configuration():

@@ -123,7 +123,7 @@ def tracks_at(boxes, *classes, points=60, **columns):
     t.P[:] = 0.01 * np.eye(4)
     t.box[:], t.kdop[:] = observations.box, observations.kdop.T
     t.bottom[:], t.top[:] = observations.bottom, observations.top
-    t.envelope[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
+    t.envelope[:] = t.mean_kdop[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
     t.final[:] = True
     t.last_class[:] = [*classes, *[ObjectClass.BACKGROUND] * (n - len(classes))]
     for row in range(n):
