@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from modt import assembly
-from modt.cli.replay import frames as frame_range
+from modt.cli.options import frames as frame_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
 from modt.observations import Located, StaticTracks

@@ -1,4 +1,4 @@
-"""`modt track`: the tracker alone, on the detections of another detector."""
+"""`modt track`: track the boxes of another detector."""
 
 from __future__ import annotations
 
@@ -7,40 +7,43 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from modt.cli import options
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
     from modt.sources.detections import Detections
     from modt.types import Float64, Int
 
-PERIOD_S = 0.1
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("track", help="follow the boxes that another detector has found")
-    p.add_argument("detections", type=Path, metavar="DETECTIONS", help="a file a sequence, or a folder of them")
-    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="KITTI tracking results go here")
+    p = commands.add_parser("track", help="track the boxes of another detector")
+    p.add_argument("detections", type=Path, metavar="DETECTIONS", help="file of a sequence, or a folder of files")
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the KITTI tracking results")
     motion = p.add_mutually_exclusive_group()
     motion.add_argument(
-        "--poses", type=Path, metavar="FILE", help="camera poses, KITTI odometry; or a folder of them"
+        "--poses", type=Path, metavar="FILE", help="camera poses in KITTI odometry's format, or a folder"
     )
     motion.add_argument("--oxts", type=Path, metavar="DIR", help="OXTS records, KITTI tracking; calib/ beside it")
     p.add_argument(
-        "--period", type=float, default=PERIOD_S, metavar="S", help="between frames (default: %(default)g)"
+        "--period",
+        type=options.real(0.001, 10, "seconds"),
+        default=0.1,
+        metavar="S",
+        help="time between frames (default: %(default)g)",
     )
     p.add_argument(
         "--sure",
-        type=float,
+        type=options.real(-1000, 1000, "a confidence"),
         metavar="CONFIDENCE",
-        help="least of a track that is written (default: by type, for PointRCNN)",
+        help="minimum of the tracks written (default: by type, for PointRCNN)",
     )
     p.add_argument("--quiet", action="store_true", help="no summary")
     p.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Follow each sequence and write its results.
+    """Track each sequence and write its results.
 
     Raises:
         MisuseError: detections or poses cannot be used.
@@ -51,10 +54,6 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import LineFile, writing
     from modt.sources.detections import files, read
 
-    if arguments.sure is not None and not -1000 <= arguments.sure <= 1000:
-        raise MisuseError("--sure", f"{arguments.sure:g} is out of range", "give -1000, for all tracks, to 1000")
-    if not 0.001 <= arguments.period <= 10:
-        raise MisuseError("--period", f"{arguments.period:g} s is no time between frames", "give 0.001 to 10")
     paths = files(arguments.detections)
     sequences = read(paths)
     motions = [_poses(arguments, sequence, len(paths)) for sequence in sequences]
@@ -80,13 +79,13 @@ def run(arguments: argparse.Namespace) -> int:
 def follow(
     detections: Detections, poses: Float64 | None, period_s: float, sure: float | None = None
 ) -> tuple[str, int]:
-    """KITTI tracking results of a sequence, and how many tracks they hold.
+    """KITTI tracking results of a sequence, and the number of its tracks.
 
     Args:
         detections: of the sequence.
-        poses: (n, 4, 4) T_world_camera of its frames, None where no ego-motion is known.
-        period_s: between frames.
-        sure: confidence of a track that is written, None for that of its type.
+        poses: (n, 4, 4) T_world_camera of its frames, None without ego-motion.
+        period_s: time between frames.
+        sure: minimum confidence of the tracks written, None for that of the type.
     """
     from dataclasses import replace
 
