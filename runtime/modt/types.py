@@ -7,7 +7,7 @@ number of proposals in a frame, M the number of tracks alive, N the number of po
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from operator import attrgetter
 from typing import Any, Self
@@ -135,51 +135,36 @@ class Proposals:
         )
 
 
+def column(kind: type, *shape: int, fill: float = 0) -> Any:
+    """Column of a track table: type and shape of an entry, and its value in a new row."""
+    return field(metadata={"blank": np.full(shape, fill, kind)})
+
+
 @dataclass(slots=True)
 class Tracks:
-    """The tracks alive, one row each; stages write the columns they own in place.
+    """The tracks alive, one row each; stages write the columns they own in place."""
 
-    Columns of the tracker:
-        id: never used twice in a run.
-        state: where the track stands in the state machine (its enumeration's value).
-        x: (M, 4) filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1).
-        P: (M, 4, 4) its covariance.
-        box: (M, 7) last box seen, world frame.
-        proposal: proposal of this frame, NONE while the track is lost.
-        points: points of the last proposal.
-        age: frames since birth, the birth frame counting as 1.
-        hits: frames with a proposal.
-        missed: frames since the last proposal.
-    Columns of the fusion:
-        prior: (M, 4) P(class | box) of the last box seen, uniform before any.
-        posterior: (M, 4) P(class | views, box), the prior before any view.
-        final: the class is final: it is not asked for again unless the view improves.
-        views: key observations fused.
-        key_prior, key_posterior: (M, 4) prior and posterior at the last key observation.
-        key_points: points of it, 0 before any.
-        key_extent: (M, 3) its box l, w, h [m].
-        waiting: frames since the track first asked for the class that it waits for.
-    """
-
-    id: Int
-    state: Int
-    x: Float64
-    P: Float64
-    box: Float64
-    proposal: Int
-    points: Int
-    age: Int
-    hits: Int
-    missed: Int
-    prior: Float64
-    posterior: Float64
-    final: Bool
-    views: Int
-    key_prior: Float64
-    key_posterior: Float64
-    key_points: Int
-    key_extent: Float64
-    waiting: Int
+    # Columns of the tracker
+    id: Int = column(int, fill=NONE)  # never used twice in a run
+    state: Int = column(int)  # value of the state machine's enumeration
+    x: Float64 = column(float, 4)  # filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1)
+    P: Float64 = column(float, 4, 4)  # its covariance
+    box: Float64 = column(float, 7)  # last box seen, world frame
+    proposal: Int = column(int, fill=NONE)  # of this frame, NONE while the track is lost
+    points: Int = column(int)  # of the last proposal
+    age: Int = column(int)  # frames since birth, the birth frame counting as 1
+    hits: Int = column(int)  # frames with a proposal
+    missed: Int = column(int)  # frames since the last proposal
+    # Columns of the fusion
+    prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen
+    posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, box); before a view, prior
+    final: Bool = column(bool)  # the class is not asked for again unless the view improves
+    views: Int = column(int)  # key views fused
+    key_prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # at the last key view
+    key_posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)
+    key_points: Int = column(int)  # 0 before any key view
+    key_extent: Float64 = column(float, 3)  # l, w, h of the box [m]
+    waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
 
     def __len__(self) -> int:
         return len(self.id)
@@ -200,55 +185,25 @@ class Tracks:
     @classmethod
     def blank(cls, m: int = 0) -> Self:
         """M rows: no identity, no proposal, no view yet, all classes alike."""
-
-        def zero(*shape: int) -> Float64:
-            return np.zeros((m, *shape))
-
-        def count() -> Int:
-            return np.zeros(m, np.int64)
-
-        def uniform() -> Float64:
-            return np.full((m, N_CLASSES), 1.0 / N_CLASSES)
-
-        return cls(
-            id=np.full(m, NONE, np.int64),
-            state=count(),
-            x=zero(4),
-            P=zero(4, 4),
-            box=zero(7),
-            proposal=np.full(m, NONE, np.int64),
-            points=count(),
-            age=count(),
-            hits=count(),
-            missed=count(),
-            prior=uniform(),
-            posterior=uniform(),
-            final=np.zeros(m, np.bool_),
-            views=count(),
-            key_prior=uniform(),
-            key_posterior=uniform(),
-            key_points=count(),
-            key_extent=zero(3),
-            waiting=count(),
-        )
-
-    def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Every column with its name."""
-        return zip(self._names(), self._columns(), strict=True)
-
-    def _columns(self) -> tuple[NDArray[Any], ...]:
-        columns: tuple[NDArray[Any], ...] = self._getter()(self)
-        return columns
+        return cls(*(np.repeat(entry[None], m, axis=0) for entry in cls._blank_row()))
 
     @classmethod
     @cache
-    def _names(cls) -> tuple[str, ...]:
-        return tuple(f.name for f in fields(cls))
+    def _blank_row(cls) -> tuple[NDArray[Any], ...]:
+        return tuple(f.metadata["blank"] for f in fields(cls))
 
     @classmethod
     @cache
     def _getter(cls) -> attrgetter[tuple[NDArray[Any], ...]]:
-        return attrgetter(*cls._names())
+        return attrgetter(*(f.name for f in fields(cls)))
+
+    def columns(self) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Every column with its name."""
+        return zip((f.name for f in fields(self)), self._columns(), strict=True)
+
+    def _columns(self) -> tuple[NDArray[Any], ...]:
+        columns: tuple[NDArray[Any], ...] = self._getter()(self)
+        return columns
 
     def copy(self) -> Self:
         """The same rows, independent of these."""
@@ -263,11 +218,6 @@ class Tracks:
         for column, blank in zip(columns, self._blank_row(), strict=True):
             column[len(kept) :] = blank
         return type(self)(*columns)
-
-    @classmethod
-    @cache
-    def _blank_row(cls) -> tuple[NDArray[Any], ...]:
-        return cls.blank(1)._columns()
 
     def row_of_proposal(self, n_proposals: int) -> Int:
         """(n_proposals,) row of the track that owns each proposal, NONE where there is none."""
