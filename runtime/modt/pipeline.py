@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import StageLedger
 from modt.observations import Located, StaticTracks
 from modt.types import (
@@ -42,7 +43,6 @@ class Segmenter(Protocol):
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points."""
-        ...
 
 
 class Odometry(Protocol):
@@ -50,7 +50,6 @@ class Odometry(Protocol):
 
     def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
         """Placement of the frame and observations of its proposals."""
-        ...
 
 
 class Tracker(Protocol):
@@ -59,41 +58,15 @@ class Tracker(Protocol):
     @property
     def state_names(self) -> tuple[str, ...]:
         """Name of each value of tracks.state."""
-        ...
 
     def static_tracks(self) -> StaticTracks:
         """What the odometry needs to know of the tracks."""
-        ...
 
     def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """Predict, associate and update; afterwards every proposal belongs to one track."""
-        ...
 
     def conclude(self, rows: Int, certain: Bool) -> Tracks:
         """Tell the state machine of the frame's classifications; a copy of the tracks."""
-        ...
-
-
-class Selection(Protocol):
-    """What the scheduler chose."""
-
-    @property
-    def rows(self) -> Int:
-        """(R,) rows of the tracks to classify now."""
-        ...
-
-    @property
-    def deferred(self) -> int:
-        """Tracks that asked and must wait."""
-        ...
-
-
-class Scheduler(Protocol):
-    """Keeps the frame's classifications within its budget."""
-
-    def select(self, tracks: Tracks, proposals: Proposals, asks: Bool, budget: Budget) -> Selection:
-        """The tracks to classify now, the most worthwhile first."""
-        ...
 
 
 class Classifier(Protocol):
@@ -101,11 +74,9 @@ class Classifier(Protocol):
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) P(Y|X) of the proposals named."""
-        ...
 
     def facts(self) -> dict[str, str]:
         """Which model it is, for the record of a run."""
-        ...
 
 
 class Fusion(Protocol):
@@ -113,11 +84,9 @@ class Fusion(Protocol):
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks whose view of this frame is worth a classification."""
-        ...
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Write the posterior of the rows; (R,) whether each is certain now."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

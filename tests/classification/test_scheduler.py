@@ -143,6 +143,9 @@ def test_timed_classifier_updates_the_cost_model() -> None:
         def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
             return np.full((len(which), 4), 0.25)
 
+        def facts(self) -> dict[str, str]:
+            return {}
+
     points, proposals = blobs([40, 60], np.random.default_rng(0))
     cost, clock = cost_model(), iter(range(0, 10**9, 3_000_000))
     classifier = TimedClassifier(Constant(), cost, lambda: next(clock))

@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -26,19 +25,6 @@ _MAX_COUNT = 1000
 _LENGTH_OFFSET_M = 0.05  # keeps the logarithm of a length finite
 
 
-class BoxClassifier(Protocol):
-    """Log probabilities of the classes by box features."""
-
-    @property
-    def pool_weight(self) -> float:
-        """Exponent of P(class | box) in the log-linear pool with the network, without reflectance (0 to 1)."""
-        ...
-
-    def log_probability(self, features: Float64) -> Float64:
-        """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features`."""
-        ...
-
-
 class NoBoxClassifier:
     """No information from boxes."""
 
@@ -51,14 +37,22 @@ class NoBoxClassifier:
 
 @dataclass(frozen=True, slots=True)
 class MlpBoxClassifier:
-    """Multilayer perceptron of 1,444 weights."""
+    """Multilayer perceptron of 1,444 weights.
+
+    Attributes:
+        layers: of the network.
+        pool_weight: exponent of P(class | box) in the log-linear pool with the network, without reflectance (0 to 1).
+    """
 
     layers: Layers
     pool_weight: float
 
     def log_probability(self, features: Float64) -> Float64:
-        """(R, 4) log P(class | box) up to a constant."""
+        """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features`."""
         return logits(self.layers, features)
+
+
+BoxClassifier = NoBoxClassifier | MlpBoxClassifier
 
 
 def beam_solid_angle_sr(azimuth_step_deg: float, elevation_step_deg: float) -> float:

@@ -31,7 +31,7 @@ class EveryFrame:
         return np.ones(len(rows), np.bool_)
 
 
-class FirstView:
+class FirstView(EveryFrame):
     """Mode efficient: the first classification is final (Table I).
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
@@ -53,13 +53,6 @@ class FirstView:
         observed = tracks.proposal != NONE
         asks: Bool = wants_class & ~tracks.final & observed & (tracks.hits >= config.first_view_min_hits)
         return asks & self.prior.may_be_object(tracks.prior, config.first_view_min_object_probability)
-
-    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """Replace the posterior; every row is certain."""
-        tracks.posterior[rows] = normalise(likelihood)
-        tracks.views[rows] = 1
-        _record_key_view(tracks, proposals, rows)
-        return np.ones(len(rows), np.bool_)
 
 
 class KeyViews:

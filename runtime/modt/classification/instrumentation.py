@@ -20,6 +20,7 @@ class TimedClassifier:
 
     def __init__(self, classifier: PointNet, cost: LinearCost, cpu_ns: Callable[[], int]) -> None:
         self._classifier, self._cost, self._cpu_ns = classifier, cost, cpu_ns
+        self.facts = classifier.facts
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) class probabilities of the given proposals, in their order."""
@@ -27,7 +28,3 @@ class TimedClassifier:
         likelihood = self._classifier.classify(points, proposals, which)
         self._cost.update(proposals.count[which], (self._cpu_ns() - start_ns) / 1e6)
         return likelihood
-
-    def facts(self) -> dict[str, str]:
-        """File and hash of the model."""
-        return self._classifier.facts()

@@ -21,15 +21,12 @@ class Prior(Protocol):
     @property
     def pool_weight(self) -> float:
         """Exponent of the prior in the classifier's log-linear pool (0 to 1)."""
-        ...
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) of each proposal of a frame."""
-        ...
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) rows of priors (M, 4) worth a classification: objects with at least this probability."""
-        ...
 
 
 class FrequencyPrior:

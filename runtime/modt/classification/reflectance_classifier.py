@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 
@@ -26,29 +25,6 @@ METADATA_KEY = "reflectance"
 """Key of the reflectance classifier in the metadata of an ONNX model."""
 
 
-class ReflectanceClassifier(Protocol):
-    """Log likelihoods of reflectance statistics given class and box."""
-
-    @property
-    def pool_weight(self) -> float | None:
-        """Exponent of P(class | box) in the log-linear pool with reflectance; None: the box classifier's own."""
-        ...
-
-    @property
-    def weight(self) -> float:
-        """Exponent of the likelihood in that pool: the part of it that the shape does not imply (0 to 1)."""
-        ...
-
-    def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) log P(reflectance | class, box) up to a constant.
-
-        Args:
-            box_features: (R, 7) as `box_classifier.box_features`.
-            reflectance: (R, 5) statistics, NaN where a proposal has none; None where the sweep has none.
-        """
-        ...
-
-
 class NoReflectanceClassifier:
     """No information from reflectance."""
 
@@ -61,14 +37,23 @@ class NoReflectanceClassifier:
 
 
 class MlpReflectanceClassifier:
-    """Multilayer perceptron of 1,604 weights over box features and reflectance statistics, side by side."""
+    """Multilayer perceptron of 1,604 weights over box features and reflectance statistics, side by side.
+
+    Args:
+        layers: of the network.
+        pool_weight: exponent of P(class | box) in the log-linear pool with reflectance (0 to 1).
+        weight: exponent of the likelihood in that pool: the part of it that the shape does not imply (0 to 1).
+    """
 
     def __init__(self, layers: Layers, pool_weight: float, weight: float) -> None:
         self._layers, self.pool_weight, self.weight = layers, pool_weight, weight
         self._warned = False
 
     def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
-        """(R, 4) log P(reflectance | class, box) up to a constant; zeros without reflectance."""
+        """(R, 4) log P(reflectance | class, box) up to a constant, of (R, 7) `box_features` and (R, 5) statistics.
+
+        Zeros where a proposal has no reflectance (NaN) or the sweep has none (None).
+        """
         if reflectance is not None:
             likelihood = logits(self._layers, np.hstack([box_features, reflectance]))
             likelihood[np.isnan(reflectance[:, 0])] = 0.0
@@ -80,6 +65,9 @@ class MlpReflectanceClassifier:
             )
             self._warned = True
         return np.zeros((len(box_features), N_CLASSES))
+
+
+ReflectanceClassifier = NoReflectanceClassifier | MlpReflectanceClassifier
 
 
 def to_metadata(layers: Layers, pool_weight: float, weight: float, sensor: str) -> str:

@@ -121,19 +121,10 @@ class Scheduler:
         """(R,) calls, in this order, that the budget pays for; a call that does not fit is skipped."""
         granted = np.ones(len(points), np.bool_)
         if budget.cpu_ms is not None:
-            cost = self._cost.cost_ms(points)
-            if cost.sum() > budget.cpu_ms:
-                granted = _greedy(cost, budget.cpu_ms)
+            left_ms = budget.cpu_ms
+            for i, cost_ms in enumerate(self._cost.cost_ms(points)):
+                granted[i] = cost_ms <= left_ms
+                left_ms -= cost_ms * granted[i]
         if budget.calls is not None:
             granted &= np.cumsum(granted) <= budget.calls
         return granted
-
-
-def _greedy(cost: Float64, budget: float) -> Bool:
-    """(R,) items taken in order, each if the remaining budget pays for it."""
-    granted = np.zeros(len(cost), np.bool_)
-    for i, price in enumerate(cost):  # few items, and only where the budget binds
-        if price <= budget:
-            granted[i] = True
-            budget -= price
-    return granted
