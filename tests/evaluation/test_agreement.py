@@ -31,7 +31,7 @@ def judged(frames, truth_of, fov=None, name="hdl-64e"):
 
 
 def agree(frames):
-    found = score(frames, ALL_COUNTS, metrics=False)
+    found = score(frames, ALL_COUNTS)
     segmentation = found.ranges["all"].segmentation
     for name, (expected, n) in recall(frames).items():
         assert (segmentation[name].recall, segmentation[name].objects) == (pytest.approx(expected), n)

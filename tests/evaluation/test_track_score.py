@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.errors import MisuseError
 from modt.evaluation.evaluation import collect, evaluation, score
 from modt.evaluation.rows import Association
 from modt.evaluation.rules import KITTI_RULES
@@ -31,7 +30,7 @@ def followed(*histories, points=30):
 
 
 def tracked(*histories, **more):
-    return score(followed(*histories, **more), metrics=False).tracks["all"]
+    return score(followed(*histories, **more)).tracks["all"]
 
 
 def test_misses_count_as_misses():
@@ -115,12 +114,6 @@ def test_sequences_add_up_and_empty_ones_count_nothing():
     assert track_metrics([right, nothing])["HOTA"] == pytest.approx(1)
     assert track_metrics([[association([5], [])] * 10])["MOTA"] == pytest.approx(0)
     assert track_metrics([nothing]) == {}
-
-
-def test_the_extra_is_named_where_it_is_missing(monkeypatch):
-    monkeypatch.setitem(sys.modules, "trackeval.metrics", None)
-    with pytest.raises(MisuseError, match=r"modt\[evaluate\]"):
-        track_metrics([])
 
 
 def test_without_the_extra_the_rest_is_there(monkeypatch):

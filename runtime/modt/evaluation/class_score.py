@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.classes import CLASS_NAMES, N_CLASSES
-from modt.evaluation.rows import Outcome, Rows
+from modt.evaluation.rows import Outcome, Rows, ratio
 from modt.evaluation.truth import Role
 from modt.types import Bool, Float64, Int
 
@@ -18,29 +18,19 @@ CURVE_RECALLS = np.arange(1, 21) / 20
 
 @dataclass(frozen=True, slots=True)
 class ClassScore:
-    """Proposals of one class.
+    """Proposals of one class."""
 
-    Attributes:
-        objects: of the class, one count an object and frame.
-        average_precision: area under the envelope of precision over recall.
-        curve: threshold of the posterior, precision and recall, where recall first reaches each twentieth.
-        called: proposals that the program says are of the class.
-        precision: share of them that lie on an object of the class.
-        segmentable: objects of the class that are judged for segmentation.
-        recall: share of them that are found and said to be of the class.
-        recall_of_found: share of those that are found.
-        calibration_error: of the class's posterior over all judged proposals.
-    """
-
-    objects: int
-    average_precision: float | None
-    curve: tuple[tuple[float, float, float], ...]
-    called: int
-    precision: float | None
-    segmentable: int
-    recall: float | None
-    recall_of_found: float | None
-    calibration_error: float | None
+    objects: int  # of the class, one count an object and frame
+    average_precision: float | None  # area under the envelope of precision over recall
+    curve: tuple[
+        tuple[float, float, float], ...
+    ]  # threshold, precision, recall where it first reaches each twentieth
+    called: int  # proposals that the program says are of the class
+    precision: float | None  # share of them that lie on an object of the class
+    segmentable: int  # objects of the class that are judged for segmentation
+    recall: float | None  # share of them that are found and said to be of the class
+    recall_of_found: float | None  # of those that are found, share said to be of the class
+    calibration_error: float | None  # of the class's posterior over all judged proposals
 
 
 def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
@@ -59,10 +49,10 @@ def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
             average_precision=_area(*curve[1:]) if n else None,
             curve=_sampled(*curve) if n else (),
             called=int(said.sum()),
-            precision=_ratio(int((said & (called["owner"] == c)).sum()), int(said.sum())),
+            precision=ratio(int((said & (called["owner"] == c)).sum()), int(said.sum())),
             segmentable=len(wanted),
-            recall=_ratio(correct, len(wanted)),
-            recall_of_found=_ratio(correct, int((wanted["outcome"] == Outcome.FOUND).sum())),
+            recall=ratio(correct, len(wanted)),
+            recall_of_found=ratio(correct, int((wanted["outcome"] == Outcome.FOUND).sum())),
             calibration_error=expected_calibration_error(score, hit),
         )
     return scores
@@ -87,12 +77,9 @@ def _sampled(threshold: Float64, precision: Float64, recall: Float64) -> tuple[t
 
 
 def average_precision(probability: Float64, label: Int, truth: Int) -> dict[str, float]:
-    """Area under the precision-recall curve of each class; an object without a proposal is a false negative.
+    """Area under the precision-recall curve of each class, given (R, 4) posteriors and (R,) classes of proposals.
 
-    Args:
-        probability: (R, 4) of proposals.
-        label: (R,) their classes.
-        truth: (4,) objects of each class that are there to be found.
+    An object without a proposal is a false negative; truth is the (4,) number of objects of each class.
     """
     curves = (precision_recall(probability[:, c], label == c, int(truth[c])) for c in range(1, N_CLASSES))
     return {name: round(_area(*curve[1:]), 4) for name, curve in zip(CLASS_NAMES[1:], curves, strict=True)}
@@ -117,7 +104,3 @@ def expected_calibration_error(confidence: Float64, correct: Bool) -> float | No
 def top_calibration_error(posterior: Float64, label: Int) -> float | None:
     """Expected calibration error of the most probable class of (R, 4) posteriors."""
     return expected_calibration_error(posterior.max(axis=1, initial=0), posterior.argmax(axis=1) == label)
-
-
-def _ratio(a: int, b: int) -> float | None:
-    return a / b if b else None

@@ -12,7 +12,7 @@ from modt.classes import CLASS_NAMES
 from modt.evaluation.class_score import ClassScore, class_scores, top_calibration_error
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.matching import judge
-from modt.evaluation.rows import Association, Rows
+from modt.evaluation.rows import Association, Rows, ratio
 from modt.evaluation.rules import KITTI_RULES, Rules
 from modt.evaluation.segmentation_score import SegmentationScore, segmentation
 from modt.evaluation.track_score import TrackScore, track_metrics, track_scores
@@ -46,42 +46,26 @@ class RangeScore:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """How good some drives came out.
-
-    Attributes:
-        drives, frames, proposals: judged.
-        beta: proposals classified over all.
-        ranges: scores by band of range.
-        tracks: of all objects, by class and by labelled type; empty where labels have no identities.
-        metrics: HOTA, DetA, AssA, MOTA, IDF1, id switches and fragmentations, of all classes and each; None where
-            trackeval is not installed or labels have no identities.
-        calibration_error: expected, of the most probable class, over all judged proposals.
-        calibration_error_of_objects: over those that stand for an object.
-    """
+    """Scores of some drives; tracks and metrics are empty and None where labels have no identities."""
 
     drives: int
     frames: int
     proposals: int
-    beta: float | None
-    ranges: dict[str, RangeScore]
-    tracks: dict[str, TrackScore]
-    metrics: dict[str, dict[str, float]] | None
-    calibration_error: float | None
-    calibration_error_of_objects: float | None
+    beta: float | None  # proposals classified over all
+    ranges: dict[str, RangeScore]  # by band of range
+    tracks: dict[str, TrackScore]  # of all objects, by class and by labelled type
+    metrics: dict[str, dict[str, float]] | None  # of all classes and each; None where trackeval is not installed
+    calibration_error: float | None  # expected, of the most probable class, over all judged proposals
+    calibration_error_of_objects: float | None  # over those that stand for an object
 
 
-def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES, *, metrics: bool = True) -> Evaluation:
-    """The evaluation of one drive.
-
-    Args:
-        frames: of the drive, in order.
-        rules: what counts.
-        metrics: compute HOTA, CLEAR and Identity, if trackeval is installed.
+def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES) -> Evaluation:
+    """The evaluation of the frames of one drive, in order.
 
     Raises:
         ValueError: there are no frames.
     """
-    return evaluation([collect(frames, rules)], metrics=metrics)
+    return evaluation([collect(frames, rules)])
 
 
 def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> DriveRows:
@@ -101,7 +85,7 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Driv
     return DriveRows(len(judged), n_proposals, classified, *tables, tuple(zip(*associations, strict=True)))
 
 
-def evaluation(drives: Sequence[DriveRows], *, metrics: bool = True) -> Evaluation:
+def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
     """Every figure over all drives together."""
     objects = np.concatenate([drive.objects for drive in drives])
     proposals = np.concatenate([drive.proposals for drive in drives])
@@ -111,10 +95,10 @@ def evaluation(drives: Sequence[DriveRows], *, metrics: bool = True) -> Evaluati
         drives=len(drives),
         frames=sum(drive.frames for drive in drives),
         proposals=n_proposals,
-        beta=sum(drive.classified for drive in drives) / n_proposals if n_proposals else None,
+        beta=ratio(sum(drive.classified for drive in drives), n_proposals),
         ranges={name: _in_range(objects, proposals, *band) for name, band in RANGES_M.items()},
         tracks=track_scores(objects, proposals),
-        metrics=_metrics(drives) if metrics and (objects["id"] != NONE).any() else None,
+        metrics=_metrics(drives) if (objects["id"] != NONE).any() else None,
         calibration_error=top_calibration_error(judged["posterior"], judged["label"]),
         calibration_error_of_objects=top_calibration_error(on_objects["posterior"], on_objects["label"]),
     )

@@ -14,31 +14,17 @@ from modt.types import NONE, Float32, Float64, FrameResult, Int
 
 @dataclass(frozen=True, slots=True)
 class JudgedFrame:
-    """What was found in a frame, and what is true of it.
-
-    Attributes:
-        index: number of the frame.
-        points: (N, 4) sensor frame.
-        proposal: (N,) proposal of each point, NONE where it belongs to none.
-        n_proposals: in the frame.
-        classified: proposals classified in it.
-        track: (M,) identity of each track that is seen.
-        of_track: (M,) its proposal.
-        said: (M,) its class.
-        posterior: (M, 4) its posterior.
-        truth: labels of the frame.
-        fov: the part of space that was looked at.
-    """
+    """What was found in a frame of N points and M tracks seen, and what is true of it."""
 
     index: int
-    points: Float32
-    proposal: Int
+    points: Float32  # (N, 4) sensor frame
+    proposal: Int  # (N,) of each point, NONE where it belongs to none
     n_proposals: int
-    classified: int
-    track: Int
-    of_track: Int
-    said: Int
-    posterior: Float64
+    classified: int  # proposals classified in the frame
+    track: Int  # (M,) identities
+    of_track: Int  # (M,) proposals
+    said: Int  # (M,) classes
+    posterior: Float64  # (M, 4)
     truth: FrameTruth
     fov: FieldOfView = field(default_factory=FieldOfView)
 

@@ -19,28 +19,18 @@ PAD_M, FOOT_M = 0.15, 0.25
 
 @dataclass(frozen=True, slots=True)
 class Overlap:
-    """Points that n objects and P proposals of a frame share; the last proposal is none, without points.
+    """Points that n objects and P proposals of a frame share; the last proposal is none, without points."""
 
-    Attributes:
-        own: points of each object, clear of the ground.
-        count, size: (n,) points of each object, (P,) of each proposal.
-        shared: (n, P) points of an object in a proposal.
-        held: (n, P) points of a proposal in an object's box, those near the ground too.
-        best, most: (n,) proposal that shares most with each object, and how many points.
-        iou: (n,) intersection over union of the points of both.
-        most_of_object, most_of_proposal: (n,) whether they share more than half of either.
-    """
-
-    own: list[Int]
-    count: Int
-    size: Int
-    shared: Int
-    held: Int
-    best: Int
-    most: Int
-    iou: Float64
-    most_of_object: Bool
-    most_of_proposal: Bool
+    own: list[Int]  # points of each object, clear of the ground
+    count: Int  # (n,) points of each object
+    size: Int  # (P,) points of each proposal
+    shared: Int  # (n, P) points of an object in a proposal
+    held: Int  # (n, P) points of a proposal in an object's box, those near the ground too
+    best: Int  # (n,) proposal that shares most with each object
+    most: Int  # (n,) points that it shares
+    iou: Float64  # (n,) intersection over union of the points of both
+    most_of_object: Bool  # (n,) whether they share more than half of the object
+    most_of_proposal: Bool  # (n,) whether they share more than half of the proposal
 
     @classmethod
     def of(cls, frame: JudgedFrame) -> Overlap:

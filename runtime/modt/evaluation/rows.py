@@ -78,6 +78,11 @@ def kinds(objects: Rows) -> dict[str, Bool]:
     return groups | {name: objects["type"] == name for name in sorted(set(objects["type"].tolist()))}
 
 
+def ratio(part: float, whole: float) -> float | None:
+    """Part of a whole, None of nothing."""
+    return part / whole if whole else None
+
+
 @dataclass(frozen=True, slots=True)
 class Association:
     """Identities of (n,) objects and (k,) tracks of one class in a frame, and the (n, k) similarity of each pair."""

@@ -5,29 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 IGNORABLE = ("cut", "few", "parked", "dontcare")
+"""Objects cut by the view or of few points; proposals on parked cars outside their labels or in DontCare regions."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rules:
     """Thresholds of a judgement.
 
-    Attributes:
-        min_points: least points of an object that must be segmented.
-        min_points_followed: least points of an object that must be followed, and of one for average precision.
-        by_iou: an object has a proposal for average precision if their intersection over union of points exceeds
-            one half; otherwise if each holds more than half of the other.
-        sector_deg: half the sector about x in which proposals are judged: where everything is labelled.
-        max_range_m: of objects and proposals that are judged.
-        ignored: of IGNORABLE, what counts neither for nor against: objects `cut` by the view, objects of `few`
-            points, proposals on `parked` cars outside their labels, proposals in DontCare regions.
+    By IoU, an object has a proposal for average precision if that of their points exceeds one half; otherwise if each
+    holds more than half of the other.
     """
 
-    min_points: int = 20
-    min_points_followed: int = 10
+    min_points: int = 20  # of an object that must be segmented
+    min_points_followed: int = 10  # of an object that must be followed, and of one for average precision
     by_iou: bool = False
-    sector_deg: float = 40.0
-    max_range_m: float = float("inf")
-    ignored: frozenset[str] = frozenset(IGNORABLE)
+    sector_deg: float = 40.0  # half the sector about x in which proposals are judged: where everything is labelled
+    max_range_m: float = float("inf")  # of objects and proposals that are judged
+    ignored: frozenset[str] = frozenset(IGNORABLE)  # what counts neither for nor against
 
 
 KITTI_RULES = Rules()

@@ -26,19 +26,12 @@ LABELS = "labels"
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
-    """The directory of a run.
-
-    Attributes:
-        path: of the directory.
-        stream: where its scans lay, None for the embedded stream.
-        fov: `camera` or `full`.
-        sensor: name of its profile.
-    """
+    """The directory of a run."""
 
     path: Path
-    stream: Path | None
-    fov: str
-    sensor: str
+    stream: Path | None  # where its scans lay, None for the embedded stream
+    fov: str  # camera or full
+    sensor: str  # name of its profile
 
     @classmethod
     def open(cls, path: Path) -> RunRecord:

@@ -6,28 +6,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.evaluation.rows import Outcome, Rows, kinds
+from modt.evaluation.rows import Outcome, Rows, kinds, ratio
 from modt.evaluation.truth import Role
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentationScore:
-    """Objects of one kind, one count an object and frame.
+    """Objects of one kind, one count an object and frame; merged to missed are those not found (`Outcome`)."""
 
-    Attributes:
-        objects: judged.
-        recall: share of them that is found.
-        merged, split, partial, missed: of those not found (`Outcome`).
-        cut: objects of which most is out of view, judged or not.
-    """
-
-    objects: int
-    recall: float | None
+    objects: int  # judged
+    recall: float | None  # share of them that is found
     merged: int
     split: int
     partial: int
     missed: int
-    cut: int
+    cut: int  # most is out of view, judged or not
 
 
 def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
@@ -38,6 +31,6 @@ def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
         found, merged, split, partial, missed = np.bincount(judged, minlength=len(Outcome)).tolist()
         cut = int((which & ~objects["in_view"] & (objects["role"] != Role.IGNORED)).sum())
         if len(judged) or cut:
-            recall = found / len(judged) if len(judged) else None
+            recall = ratio(found, len(judged))
             scores[name] = SegmentationScore(len(judged), recall, merged, split, partial, missed, cut)
     return scores

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.errors import MisuseError
-from modt.evaluation.rows import Association, Rows, kinds
+from modt.evaluation.rows import Association, Rows, kinds, ratio
 from modt.evaluation.truth import Role
 from modt.types import NONE, Int
 
@@ -23,54 +22,32 @@ STAY = 3
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """Mean frames that a track follows an object (N_go), of those ideal.
+    """Mean frames that a track follows an object (N_go), of those ideal."""
 
-    Attributes:
-        objects: that are there to be followed.
-        frames: in which they are.
-        life: frames followed over objects and discontinuities.
-        ideal: frames over objects.
-        ratio: of the two.
-    """
+    objects: int  # that are there to be followed
+    frames: int  # in which they are
+    life: float | None  # frames followed over objects and discontinuities
+    ideal: float | None  # frames over objects
+    ratio: float | None  # of the two
 
-    objects: int
-    frames: int
-    life: float | None
-    ideal: float | None
-    ratio: float | None
 
-    @classmethod
-    def of(cls, objects: int, frames: int, followed: int, discontinuities: int) -> Life:
-        """From counts."""
-        if not objects:
-            return cls(0, 0, None, None, None)
-        life, ideal = followed / (objects + discontinuities), frames / objects
-        return cls(objects, frames, life, ideal, life / ideal if frames else None)
+def _life(objects: int, frames: int, followed: int, discontinuities: int) -> Life:
+    life, ideal = ratio(followed, objects + discontinuities), ratio(frames, objects)
+    return Life(objects, frames, life, ideal, ratio(life or 0.0, ideal or 0.0))
 
 
 @dataclass(frozen=True, slots=True)
 class TrackScore:
-    """Objects of one kind over all frames.
+    """Objects of one kind over all frames."""
 
-    Attributes:
-        life: misses count as misses.
-        life_as_seen: over the objects and frames that are followed.
-        labelled: objects and frames that are labelled, whatever points they have; its ideal is that of Table III.
-        followed: share of the frames in which an object is followed.
-        discontinuities: times that another track than before follows an object.
-        taken_over: of these, by a track that was there before.
-        returned: of these, by one that had followed the object before.
-        mis_associations: tracks that follow more than one object for STAY frames or more.
-    """
-
-    life: Life
-    life_as_seen: Life
-    labelled: Life
-    followed: float | None
-    discontinuities: int
-    taken_over: int
-    returned: int
-    mis_associations: int
+    life: Life  # misses count as misses
+    life_as_seen: Life  # over the objects and frames that are followed
+    labelled: Life  # objects and frames that are labelled, whatever points they have; its ideal is that of Table III
+    followed: float | None  # share of the frames in which an object is followed
+    discontinuities: int  # times that another track than before follows an object
+    taken_over: int  # of these, by a track that was there before
+    returned: int  # of these, by one that had followed the object before
+    mis_associations: int  # tracks that follow more than one object for STAY frames or more
 
 
 def track_scores(objects: Rows, proposals: Rows) -> dict[str, TrackScore]:
@@ -100,10 +77,10 @@ def _score(labelled: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
     frames_of = Counter(seen[["drive", "track", "id"]].tolist())
     owned = Counter((drive, track) for (drive, track, _), n in frames_of.items() if n >= STAY)
     return TrackScore(
-        life=Life.of(_count(rows), len(rows), len(seen), breaks),
-        life_as_seen=Life.of(len(histories), len(seen), len(seen), breaks),
-        labelled=Life.of(_count(labelled), len(labelled), len(seen), breaks),
-        followed=len(seen) / len(rows) if len(rows) else None,
+        life=_life(_count(rows), len(rows), len(seen), breaks),
+        life_as_seen=_life(len(histories), len(seen), len(seen), breaks),
+        labelled=_life(_count(labelled), len(labelled), len(seen), breaks),
+        followed=ratio(len(seen), len(rows)),
         discontinuities=breaks,
         taken_over=taken,
         returned=returned,
@@ -117,15 +94,9 @@ def _count(rows: Rows) -> int:
 
 
 def track_metrics(sequences: Sequence[Sequence[Association]]) -> dict[str, float]:
-    """HOTA, DetA, AssA, MOTA, IDF1 [0 to 1], id switches and fragmentations over all sequences, frame by frame.
+    """HOTA, DetA, AssA, MOTA, IDF1 [0 to 1], id switches and fragmentations over all sequences; needs trackeval."""
+    from trackeval.metrics import CLEAR, HOTA, Identity
 
-    Raises:
-        MisuseError: trackeval is not installed.
-    """
-    try:
-        from trackeval.metrics import CLEAR, HOTA, Identity
-    except ImportError:
-        raise MisuseError("trackeval", "is not installed", "pip install 'modt[evaluate]'") from None
     options = {"THRESHOLD": SIMILARITY_THRESHOLD, "PRINT_CONFIG": False}
     data = [d for d in map(_trackeval_data, sequences) if d["num_gt_dets"]]
     if not data:

@@ -52,14 +52,9 @@ PANDASET_TYPES: Types = {
 
 @dataclass(frozen=True, slots=True)
 class Regions:
-    """Image regions in which nothing is labelled (KITTI's DontCare).
+    """Image regions in which nothing is labelled (KITTI's DontCare)."""
 
-    Attributes:
-        edges: (r, 4) left, top, right, bottom [pixel].
-        camera: whose image it is.
-    """
-
-    edges: Float64
+    edges: Float64  # (r, 4) left, top, right, bottom [pixel]
     camera: Camera
 
     def contains(self, points: Float32) -> Bool:
@@ -74,26 +69,15 @@ class Regions:
 
 @dataclass(frozen=True, slots=True)
 class FrameTruth:
-    """The objects of one frame.
+    """The n objects of one frame; boxes are upright in a frame of their own, the sensor's by default."""
 
-    Attributes:
-        id: (n,) identities, NONE where objects are not followed.
-        type_: (n,) labelled type of each.
-        object_class: (n,) class that it should be said to be.
-        role: (n,) `Role` of each.
-        box: (n, 7) x, y, z of the centre, l, w, h [m], yaw [rad], upright in the frame of T_box_sensor.
-        parked: (k, 7) boxes of parked cars that are not labelled in this frame, the same coordinates.
-        regions: where nothing is labelled, None for nowhere.
-        T_box_sensor: (4, 4) sensor to box coordinates.
-    """
-
-    id: Int
-    type_: Sequence[str]
-    object_class: Int
-    role: Int
-    box: Float64
-    parked: Float64 = field(default_factory=lambda: np.zeros((0, 7)))
-    regions: Regions | None = None
+    id: Int  # (n,) NONE where objects are not followed
+    type_: Sequence[str]  # (n,) as labelled
+    object_class: Int  # (n,) that each should be said to be
+    role: Int  # (n,) `Role`
+    box: Float64  # (n, 7) x, y, z of the centre, l, w, h [m], yaw [rad]
+    parked: Float64 = field(default_factory=lambda: np.zeros((0, 7)))  # (k, 7) parked cars that are not labelled here
+    regions: Regions | None = None  # where nothing is labelled, None for nowhere
     T_box_sensor: Float64 = field(default_factory=lambda: np.eye(4))
 
     @classmethod
@@ -106,17 +90,11 @@ class FrameTruth:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """The labels of a recording.
+    """The labels of a recording."""
 
-    Attributes:
-        frames: of each labelled frame, by its index.
-        scans: the recording itself, None where it does not lie beside the labels.
-        rules: by which its labels are judged, unless others are given.
-    """
-
-    frames: Mapping[int, FrameTruth]
-    scans: ScanStream | None
-    rules: Rules
+    frames: Mapping[int, FrameTruth]  # of each labelled frame, by its index
+    scans: ScanStream | None  # the recording itself, None where it is not found
+    rules: Rules  # by which its labels are judged, unless others are given
 
 
 def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Float64]) -> dict[int, Float64]:
