@@ -10,9 +10,8 @@ from modt.config.classification import (
     SchedulerConfig,
 )
 from modt.config.energy import EnergyConfig, WindowConfig
-from modt.config.odometry import OdometryConfig
+from modt.config.odometry import LandmarkConfig, OdometryConfig, RegistrationConfig
 from modt.config.profile import ProfileConfig
-from modt.config.registration import LandmarkConfig, RegistrationConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.sensor import SensorConfig
 from modt.config.tracking import (

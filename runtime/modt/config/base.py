@@ -51,38 +51,33 @@ class StageConfig:
         for f in fields(self):
             if isinstance(f.default_factory, type) and issubclass(f.default_factory, StageConfig):
                 continue  # checked as it was made
-            _check(f.name, getattr(self, f.name), f.type, dict(f.metadata))
+            _check(f.name, getattr(self, f.name), str(f.type), dict(f.metadata))
 
 
-def _check(key: str, value: object, kind: object, bounds: dict[str, Any]) -> None:
-    optional = "None" in str(kind)
-    if value is None and optional:
+def _check(key: str, value: object, kind: str, bounds: dict[str, Any]) -> None:
+    if value is None and "None" in kind:
         return
     if "options" in bounds:
         if value not in bounds["options"]:
             raise ValueRangeError(key, f"{value!r} is unknown", f"use one of {', '.join(bounds['options'])}")
-        return
-    if str(kind) == "bool":
-        if not isinstance(value, bool):
-            raise ValueRangeError(key, f"{value!r} is no truth value", "use true or false")
-        return
-    if str(kind) == "str":
+    elif kind == "str":
         if not isinstance(value, str):
             raise ValueRangeError(key, f"{value!r} is no text", "write a name")
-        return
+    else:
+        _check_numbers(key, value, kind.startswith("int"), bounds)
+
+
+def _check_numbers(key: str, value: object, whole: bool, bounds: dict[str, Any]) -> None:
     numbers = value if "length" in bounds and isinstance(value, tuple) else (value,)
-    whole = str(kind).startswith("int")
-    span = f"{'a whole number' if whole else 'a number'} from {bounds['low']:g} to {bounds['high']:g}"
+    noun = "a whole number" if whole else "a number"
+    span = f"{noun} from {bounds['low']:g} to {bounds['high']:g}"
     if "length" in bounds:
         span = f"{bounds['length']} values, each {span}"
         if len(numbers) != bounds["length"]:
             raise ValueRangeError(key, f"{value!r} does not fit", f"give {span}")
-    unit = f" {bounds['unit']}" if bounds.get("unit") else ""
+    remedy = f"give {span} {bounds.get('unit', '')}".rstrip()
     for number in numbers:
-        numeric = isinstance(number, int) if whole else isinstance(number, int | float)
-        if isinstance(number, bool) or not numeric:
-            raise ValueRangeError(
-                key, f"{value!r} is not {'a whole number' if whole else 'a number'}", f"give {span}{unit}"
-            )
+        if isinstance(number, bool) or not isinstance(number, int if whole else (int, float)):
+            raise ValueRangeError(key, f"{value!r} is not {noun}", remedy)
         if not bounds["low"] <= number <= bounds["high"]:
-            raise ValueRangeError(key, f"{number!r} is out of range", f"give {span}{unit}")
+            raise ValueRangeError(key, f"{number!r} is out of range", remedy)

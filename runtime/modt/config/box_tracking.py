@@ -14,9 +14,7 @@ class BoxFilterConfig(StageConfig):
 
     position_sigma_m: float = number(0.2, 0.01, 5.0, "m", "of a detected centre of score zero")
     score_scale: float = number(10.0, 0.1, 1e6, "", "increase of the score that divides that sigma by e")
-    acceleration_sigma_mps2: float = number(
-        10.0, 0.01, 50.0, "m/s2", "process noise, unmodelled motion of the sensor included"
-    )
+    acceleration_sigma_mps2: float = number(10.0, 0.01, 50.0, "m/s2", "process noise, with the sensor's own motion")
     initial_speed_sigma_mps: float = number(20.0, 0.1, 50.0, "m/s", "of a new track, along each axis")
     size_gain: float = number(0.3, 0.0, 1.0, "", "least weight of a new measurement of the size")
     height_gain: float = number(0.7, 0.0, 1.0, "", "weight of a new measurement of the height of the centre")
@@ -27,9 +25,7 @@ class BoxFilterConfig(StageConfig):
 class BoxAssociationConfig(StageConfig):
     """Cost of a pair of a track and a detection, 1 at the edge of the gate."""
 
-    gate: float = number(
-        13.8, 0.1, 1000.0, "", "greatest squared Mahalanobis distance, the 0.999 quantile of chi2(2)"
-    )
+    gate: float = number(13.8, 0.1, 1000.0, "", "squared Mahalanobis distance at most, 0.999 quantile of chi2(2)")
     length_share: float = number(0.7, 0.0, 2.0, "", "share of the track's length added to the gate's radius")
     height_weight_per_m: float = number(0.2, 0.0, 10.0, "1/m", "weight of the difference of height")
     yaw_weight: float = number(0.1, 0.0, 10.0, "", "weight of the absolute sine of the difference of yaw")

@@ -72,7 +72,7 @@ class FusionConfig(StageConfig):
     )
     extent_change: float = number(0.6, 0.0, 10.0, "", "relative change of extent of an independent view")
     review_point_ratio: float | None = number(
-        1.5, 1.0, 1000.0, "", "points, relative to the last key view, for the review of a final class; none: never"
+        1.5, 1.0, 1000.0, "", "points over those of the key view, for a review; none: never"
     )
     review_extra_points: int = number(5, 0, 1000, "", "more points than that ratio, beyond random variation")
     review_max_points: int = number(400, 0, 10000, "", "of the last key view; with more, no review (drive 0005)")

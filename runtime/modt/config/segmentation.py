@@ -33,9 +33,7 @@ class GroundConfig(StageConfig):
     max_bend_deg: float = number(4.0, 0.0, 45.0, "deg", "change of slope between two ground cells of a ray")
     slope_gain: float = number(0.2, 0.01, 1.0, "", "weight of the newest slope in the running slope of a ray")
     start_m: float = number(0.3, 0.0, 2.0, "m", "deviation of the ground below the sensor from the sensor height")
-    max_gap_m: float = number(
-        6.0, 0.1, 100.0, "m", "distance between ground cells beyond which tolerance stops growing"
-    )
+    max_gap_m: float = number(6.0, 0.1, 100.0, "m", "between ground cells, beyond which tolerance stops growing")
     flank_sectors: int = number(3, 1, 60, "", "to the left and right of a ray, whose median bounds its surface")
     flank_m: float = number(0.25, 0.0, 100.0, "m", "above that median, from where on a surface is a vehicle's side")
 
@@ -89,9 +87,7 @@ class CarMergeConfig(StageConfig):
     min_person_top_m: float = number(1.1, 0.0, 3.0, "m", "above ground of such a strip")
     min_person_height_m: float = number(0.7, 0.0, 3.0, "m", "top less bottom of such a strip")
     visible_m: float = number(1.5, 0.1, 5.0, "m", "height of a car ...")
-    max_beams: float = number(
-        8.0, 1.0, 200.0, "beams", "... and the beams on it, from which on cars are not in strips"
-    )
+    max_beams: float = number(8.0, 1.0, 200.0, "beams", "... and the beams on it, from which cars are whole")
     min_points: int = number(2, 1, 1000, "", "of a strip")
 
 
@@ -99,22 +95,16 @@ class CarMergeConfig(StageConfig):
 class ViewMarginConfig(StageConfig):
     """Segmentation beyond the edge of a limited field of view."""
 
-    margin_m: float = number(
-        6.0, 0.0, 50.0, "m", "outside the view within which points are segmented: a car is whole"
-    )
+    margin_m: float = number(6.0, 0.0, 50.0, "m", "outside the view within which points are segmented")
     object_m: float = number(1.0, 0.0, 10.0, "m", "outside the view of a proposal that still counts as in view")
-    truncation_m: float = number(
-        0.3, 0.0, 10.0, "m", "from the end of the margin, within which a proposal is truncated"
-    )
+    truncation_m: float = number(0.3, 0.0, 10.0, "m", "from the end of the margin to a truncated proposal")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoxConfig(StageConfig):
     """Heading of a box by closeness to its sides."""
 
-    noise_m: float = number(
-        0.1, 0.001, 1.0, "m", "points nearer to a side lie on it: sensor noise and rounded outlines"
-    )
+    noise_m: float = number(0.1, 0.001, 1.0, "m", "points nearer to a side lie on it")
     max_cells: int = number(32, 1, 10000, "", "of a proposal that decide on its heading")
 
 
