@@ -59,26 +59,18 @@ class Frame:
 class Proposals:
     """The segments of one frame that could be objects.
 
-    Attributes:
-        members: (K,) indices of points in the frame, grouped by proposal.
-        offsets: (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]].
-        coordinates: (3, K) float32 x, y and z of the members [m, sensor frame], gathered once.
-        centroid: (P, 3) mean of each proposal's points [m, sensor frame].
-        box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
-        truncated: (P,) cut by the edge of the field of view.
-        sensor_height_m: of the sensor above the ground that they were found on, None where it is not known.
-        reflectance: (P, 5) of each proposal's returns: mean, standard deviation and greatest, share of bright and of
-            dark ones, NaN where none of them has any; None where the sweep carries none.
+    Reflectance is the mean, standard deviation and greatest of a proposal's returns, and the share of bright and of
+    dark ones; NaN where none of them has any, None where the sweep carries none.
     """
 
-    members: Int
-    offsets: Int
-    coordinates: Float32
-    centroid: Float64
-    box: Float64
-    truncated: Bool
-    sensor_height_m: float | None = None
-    reflectance: Float64 | None = None
+    members: Int  # (K,) indices of points in the frame, grouped by proposal
+    offsets: Int  # (P + 1,) proposal i owns members[offsets[i]:offsets[i + 1]]
+    coordinates: Float32  # (3, K) x, y and z of the members [m, sensor frame], gathered once
+    centroid: Float64  # (P, 3) mean of each proposal's points [m, sensor frame]
+    box: Float64  # (P, 7) minimum box: x, y, z of its centre, l, w, h [m], yaw [rad], sensor frame, l >= w
+    truncated: Bool  # (P,) cut by the edge of the field of view
+    sensor_height_m: float | None = None  # above the ground that they were found on, None where it is not known
+    reflectance: Float64 | None = None  # (P, 5)
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -229,30 +221,19 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class TrackedFrame:
-    """What tracking hands to the stages after it.
+    """What tracking hands to the stages after it."""
 
-    Attributes:
-        tracks: the live table.
-        proposals: of the frame, regrouped where the tracks know better; each belongs to one track.
-        wants_class: (M,) tracks with a proposal whose state asks for a class.
-    """
-
-    tracks: Tracks
-    proposals: Proposals
-    wants_class: Bool
+    tracks: Tracks  # the live table
+    proposals: Proposals  # of the frame, regrouped where the tracks know better; each belongs to one track
+    wants_class: Bool  # (M,) tracks with a proposal whose state asks for a class
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What one frame may spend on classification; None where nothing binds.
+    """What one frame may spend on classification; None where nothing binds."""
 
-    Attributes:
-        calls: proposals classified.
-        cpu_ms: CPU time by the cost model [ms].
-    """
-
-    calls: int | None = None
-    cpu_ms: float | None = None
+    calls: int | None = None  # proposals classified
+    cpu_ms: float | None = None  # CPU time by the cost model [ms]
 
 
 UNLIMITED = Budget()
@@ -260,20 +241,11 @@ UNLIMITED = Budget()
 
 @dataclass(frozen=True, slots=True)
 class FrameResult:
-    """What is known after a frame.
-
-    Attributes:
-        frame: the sweep it is about.
-        proposals: its segments.
-        tracks: a copy of the tracks alive after the frame.
-        state_names: name of each value of tracks.state.
-        n_classified: proposals classified in this frame.
-        n_deferred: tracks whose request for a class waits for the next frame's budget.
-    """
+    """What is known after a frame."""
 
     frame: Frame
     proposals: Proposals
-    tracks: Tracks
-    state_names: tuple[str, ...]
-    n_classified: int
-    n_deferred: int
+    tracks: Tracks  # a copy of those alive after the frame
+    state_names: tuple[str, ...]  # of each value of tracks.state
+    n_classified: int  # proposals classified in this frame
+    n_deferred: int  # tracks whose request for a class waits for the next frame's budget

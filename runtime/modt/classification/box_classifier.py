@@ -37,15 +37,10 @@ class NoBoxClassifier:
 
 @dataclass(frozen=True, slots=True)
 class MlpBoxClassifier:
-    """Multilayer perceptron of 1,444 weights.
-
-    Attributes:
-        layers: of the network.
-        pool_weight: exponent of P(class | box) in the log-linear pool with the network, without reflectance (0 to 1).
-    """
+    """Multilayer perceptron of 1,444 weights."""
 
     layers: Layers
-    pool_weight: float
+    pool_weight: float  # exponent of P(class | box) in the pool with the network, without reflectance (0 to 1)
 
     def log_probability(self, features: Float64) -> Float64:
         """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features`."""

@@ -16,15 +16,10 @@ _GROUND_OFFSET_M, _GROUND_SLOPE = 0.1, 0.02  # bound on the ground's height bene
 
 @dataclass(frozen=True, slots=True)
 class Crops:
-    """Points of R proposals, one after another.
+    """Points of R proposals, one after another."""
 
-    Attributes:
-        xyz: (K, 3) points grouped by proposal [m].
-        offsets: (R + 1,) crop i owns xyz[offsets[i]:offsets[i + 1]], at least one point.
-    """
-
-    xyz: Float32
-    offsets: Int
+    xyz: Float32  # (K, 3) points grouped by proposal [m]
+    offsets: Int  # (R + 1,) crop i owns xyz[offsets[i]:offsets[i + 1]], at least one point
 
     def __len__(self) -> int:
         return len(self.offsets) - 1

@@ -58,15 +58,10 @@ class LinearCost:
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Decision of the scheduler.
+    """Decision of the scheduler."""
 
-    Attributes:
-        rows: tracks to classify now, by decreasing worth.
-        deferred: number of tracks that requested a class and have to wait.
-    """
-
-    rows: Int
-    deferred: int
+    rows: Int  # tracks to classify now, by decreasing worth
+    deferred: int  # number of tracks that requested a class and have to wait
 
 
 class Scheduler:

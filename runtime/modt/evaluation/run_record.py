@@ -70,8 +70,7 @@ class RunRecord:
             place = f"{self.path / TRACKS}:{number}"
             try:
                 index = int(record["frame"])
-                track, of_track, said, posterior = _track_columns(record)
-                counts = int(record["proposals"]), int(record["classifications"])
+                found = _found(record)
             except (KeyError, TypeError, ValueError, IndexError) as error:
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
             labels, scan = truth.frames.get(index), scans.get(index)
@@ -82,10 +81,7 @@ class RunRecord:
                 points, _ = read_scan(scan)
             except ModtError as error:
                 raise MisuseError(scan, error.cause, "restore the scan") from None
-            yield JudgedFrame(
-                index, points, self._proposals(index, points), *counts, track, of_track, said, posterior, labels, fov
-            )
-
+            yield JudgedFrame(index, points, self._proposals(index, points), *found, labels, fov)
         if not number:
             raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
 
@@ -103,12 +99,13 @@ class RunRecord:
         return (labels >> 16).astype(np.int64) - 1
 
 
-def _track_columns(record: dict[str, Any]) -> tuple[Int, Int, Int, Float64]:
-    """Identity, proposal, class and posterior of the tracks that are seen: all that is read of tracks.jsonl."""
+def _found(record: dict[str, Any]) -> tuple[int, int, Int, Int, Int, Float64]:
+    """Proposals and those classified; identity, proposal, class and posterior of the tracks that are seen."""
+    n_proposals, n_classified = int(record["proposals"]), int(record["classifications"])
     seen = [track for track in record["tracks"] if track["proposal"] is not None]
     said = [CLASS_NAMES.index(track["class"]) for track in seen]
     posterior = np.array([track["posterior"] for track in seen], np.float64).reshape(-1, len(CLASS_NAMES))
     ids, proposals = (np.array([track[key] for track in seen], np.int64) for key in ("id", "proposal"))
-    if len(proposals) and not 0 <= proposals.min() <= proposals.max() < record["proposals"]:
+    if len(proposals) and not 0 <= proposals.min() <= proposals.max() < n_proposals:
         raise ValueError("a track's proposal is none of the frame's")
-    return ids, proposals, np.array(said, np.int64), posterior
+    return n_proposals, n_classified, ids, proposals, np.array(said, np.int64), posterior

@@ -15,19 +15,13 @@ from modt.types import Float32, Int
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """Occupied cells of a grid.
+    """Occupied cells of a grid."""
 
-    Attributes:
-        row, column: (C,) position in the grid.
-        low, high: (C,) least and greatest height of the points above ground [m].
-        sqrt_range: (C,) square root of the range of the last point [sqrt(m)].
-    """
-
-    row: Int32
-    column: Int32
-    low: Float32
-    high: Float32
-    sqrt_range: Float32
+    row: Int32  # (C,) of the grid
+    column: Int32  # (C,) of the grid
+    low: Float32  # (C,) least height of the points above ground [m]
+    high: Float32  # (C,) greatest height of the points above ground [m]
+    sqrt_range: Float32  # (C,) square root of the range of the last point [sqrt(m)]
 
     def __len__(self) -> int:
         return len(self.row)

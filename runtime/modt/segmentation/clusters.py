@@ -14,22 +14,14 @@ from modt.types import NONE, Bool, Float32, Int
 
 @dataclass(frozen=True, slots=True)
 class ClusterSizes:
-    """Sizes of clusters, some of them empty.
+    """Sizes of G clusters, some of them empty."""
 
-    Attributes:
-        points: (G,) number of points.
-        extent_m: (G,) diagonal of the axis-parallel rectangle [m], infinite where empty.
-        bottom_m, top_m: (G,) least and greatest height above ground [m].
-        sqrt_range: (G,) square root of the range of one cell [sqrt(m)].
-        is_part: (G,) part of an oversized cluster.
-    """
-
-    points: Int
-    extent_m: Float32
-    bottom_m: Float32
-    top_m: Float32
-    sqrt_range: Float32
-    is_part: Bool
+    points: Int  # (G,) number of points
+    extent_m: Float32  # (G,) diagonal of the axis-parallel rectangle [m], infinite where empty
+    bottom_m: Float32  # (G,) least height above ground [m]
+    top_m: Float32  # (G,) greatest height above ground [m]
+    sqrt_range: Float32  # (G,) square root of the range of one cell [sqrt(m)]
+    is_part: Bool  # (G,) part of an oversized cluster
 
     def __len__(self) -> int:
         return len(self.points)
@@ -47,24 +39,14 @@ class ClusterSizes:
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """Points in cells, and cells in clusters.
-
-    Attributes:
-        points: (K,) points above ground.
-        height: (K,) height above ground [m].
-        cell: (K,) cell of each point.
-        cells: (C,) occupied cells.
-        sample: (C,) last point of each cell.
-        of_cell: (C,) cluster of each cell, NONE where it cannot be an object.
-        n: number of clusters.
-    """
+    """K points above ground in C cells, and cells in n clusters."""
 
     points: PointColumns
-    height: Float32
-    cell: Int
+    height: Float32  # (K,) above ground [m]
+    cell: Int  # (K,) cell of each point
     cells: Cells
-    sample: Int
-    of_cell: Int
+    sample: Int  # (C,) last point of each cell
+    of_cell: Int  # (C,) cluster of each cell, NONE where it cannot be an object
     n: int
 
     def select(self, keep: Bool) -> Clusters:

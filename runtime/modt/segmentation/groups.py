@@ -16,15 +16,10 @@ T = TypeVar("T", bound=np.generic)
 
 @dataclass(frozen=True, slots=True)
 class Groups:
-    """Rows sorted by group; no group is empty.
+    """Rows sorted by group; no group is empty."""
 
-    Attributes:
-        rows: (K,) rows sorted by group, in input order within a group.
-        offsets: (G + 1,) group i owns rows[offsets[i]:offsets[i + 1]].
-    """
-
-    rows: Int
-    offsets: Int
+    rows: Int  # (K,) sorted by group, in input order within a group
+    offsets: Int  # (G + 1,) group i owns rows[offsets[i]:offsets[i + 1]]
 
     @classmethod
     def from_labels(cls, labels: Int, n: int) -> Self:

@@ -21,24 +21,15 @@ MIN_DEPTH_M = np.float32(0.1)
 
 @dataclass(frozen=True, slots=True)
 class AzimuthColumns:
-    """Azimuth columns of some clusters as the sensor sees them, right to left; the last of a cluster is empty.
+    """C azimuth columns of some clusters as the sensor sees them, right to left; the last of a cluster is empty."""
 
-    Attributes:
-        group: (C,) cluster of each column.
-        width_m: (C,) width at the range of the cluster [m].
-        returns: (C,) number of points.
-        expected: (C,) number of points that a person returns.
-        near_m, depth_m: (C,) least and mean depth of the points [m].
-        top_m: (C,) greatest height above ground [m].
-    """
-
-    group: Int
-    width_m: Float64
-    returns: Int
-    expected: Float64
-    near_m: Float32
-    depth_m: Float64
-    top_m: Float32
+    group: Int  # (C,) cluster of each column
+    width_m: Float64  # (C,) at the range of the cluster [m]
+    returns: Int  # (C,) number of points
+    expected: Float64  # (C,) number of points that a person returns
+    near_m: Float32  # (C,) least depth of the points [m]
+    depth_m: Float64  # (C,) mean depth of the points [m]
+    top_m: Float32  # (C,) greatest height above ground [m]
 
 
 class PersonSplitter:

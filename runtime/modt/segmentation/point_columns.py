@@ -12,17 +12,12 @@ from modt.types import Bool, Float32, Int
 
 @dataclass(frozen=True, slots=True)
 class PointColumns:
-    """Points of a sweep, one contiguous column a coordinate: the fastest layout for vectorised arithmetic.
+    """Points of a sweep, one contiguous column a coordinate: the fastest layout for vectorised arithmetic."""
 
-    Attributes:
-        x, y, z: (N,) position [m, sensor frame].
-        sqrt_range: (N,) square root of the horizontal range [sqrt(m)], the unit of the grids.
-    """
-
-    x: Float32
+    x: Float32  # (N,) [m, sensor frame]
     y: Float32
     z: Float32
-    sqrt_range: Float32
+    sqrt_range: Float32  # (N,) square root of the horizontal range [sqrt(m)], the unit of the grids
 
     def __len__(self) -> int:
         return len(self.x)

@@ -17,17 +17,11 @@ DIRECTION, RANGE, HEIGHT, ELEVATION = range(4)
 
 @dataclass(frozen=True, slots=True)
 class ViewBounds:
-    """Bounds of groups of cells in direction, range, height and elevation.
+    """Bounds of groups of cells: direction [pseudo-angle], range [m], height above ground [m], elevation [tan]."""
 
-    Attributes:
-        min, max: (4, G) bounds of direction [pseudo-angle], range [m], height above ground [m] and elevation
-            [tangent].
-        scale_m: (G,) metres across the ray per unit of the pseudo-angle.
-    """
-
-    min: Float32
-    max: Float32
-    scale_m: Float32
+    min: Float32  # (4, G)
+    max: Float32  # (4, G)
+    scale_m: Float32  # (G,) metres across the ray per unit of the pseudo-angle
 
     @classmethod
     def of_cells(cls, points: PointColumns, ground: Float32, low: Float32, high: Float32, groups: Groups) -> Self:
