@@ -108,7 +108,6 @@ def person_boundaries(x, y, height, sensor, config):
         if width <= config.min_width_m or len(own) < config.min_points:
             continue
         person = width < config.max_width_m and config.min_top_m < top < config.max_top_m
-        person = person and near.max() - near.min() < config.max_depth_m
         person = person and depth[own].mean(dtype=float) - near.min() < config.max_mean_depth_m
         parts.append((run[0][0], run[-1][0], near.mean(dtype=float), person))
     boundaries = []

@@ -59,7 +59,6 @@ class PersonSplitConfig(StageConfig):
     max_top_m: float = number(2.2, 0.5, 5.0, "m", "head of a person above ground: a tall person on a kerb")
     min_width_m: float = number(0.2, 0.0, 2.0, "m", "of a person from the side")
     max_width_m: float = number(0.85, 0.1, 3.0, "m", "of a person from the front")
-    max_depth_m: float = number(0.8, 0.0, 5.0, "m", "range of the nearest returns of a person's columns")
     max_mean_depth_m: float = number(0.35, 0.0, 5.0, "m", "mean return behind the nearest; a car's roof exceeds it")
     min_points: int = number(8, 1, 1000, "", "of each side of a split; at least segmentation.min_points")
     visible_m: float = number(1.5, 0.1, 3.0, "m", "height of a person clear of the ground")

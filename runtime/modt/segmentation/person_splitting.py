@@ -119,7 +119,6 @@ class PersonSplitter:
         mean_depth = np.add.reduceat(returns * depth, start) / count - nearest
         wide = (width > c.min_width_m) & (count >= self.min_points)
         person = wide & (width < c.max_width_m) & (top > c.min_top_m) & (top < c.max_top_m)
-        person &= np.maximum.reduceat(near, start) - nearest < c.max_depth_m
         person &= mean_depth < c.max_mean_depth_m
         front = np.add.reduceat(near, start) / length
         runs = np.flatnonzero(wide)
