@@ -16,7 +16,7 @@ def proposals(counts: list[int], boxes: np.ndarray | None = None) -> Proposals:
     made = np.tile([10.0, 0, -1, 4, 2, 1.5, 0], (p, 1)) + np.arange(p)[:, None] * [0, 3.0, 0, 0, 0, 0, 0]
     box = made if boxes is None else boxes
     none, nowhere = np.zeros(p, np.bool_), np.zeros((3, offsets[-1]), np.float32)
-    return Proposals(np.arange(offsets[-1]), offsets, nowhere, box[:, :3].copy(), box, none, none)
+    return Proposals(np.arange(offsets[-1]), offsets, nowhere, box[:, :3].copy(), box, none)
 
 
 def result(

@@ -23,7 +23,7 @@ class Observations:
         bottom, top: (P,) heights of the lowest and the highest point [m].
         count: (P,) points.
         range_m: (P,) distance from the sensor.
-        partial: (P,) cut by the field of view, or hidden in part by something nearer.
+        partial: (P,) cut by the field of view, or regrouped.
         sensor_xy: (2,) position of the sensor [m].
     """
 
@@ -83,7 +83,7 @@ def observe(proposals: Proposals, T_world_sensor: Float64) -> Observations:
         top=box[:, 2] + box[:, 5] / 2,
         count=proposals.count,
         range_m=np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]),
-        partial=proposals.truncated | proposals.occluded,
+        partial=proposals.truncated.copy(),
         sensor_xy=T_world_sensor[:2, 3],
     )
 

@@ -66,7 +66,6 @@ class Proposals:
         centroid: (P, 3) mean of each proposal's points [m, sensor frame].
         box: (P, 7) minimum box x, y, z (of its centre), l, w, h [m], yaw [rad], sensor frame, l >= w.
         truncated: (P,) cut by the edge of the field of view.
-        occluded: (P,) cut by something nearer that stands in front of it.
         sensor_height_m: of the sensor above the ground that they were found on, None where it is not known.
         reflectance: (P, 5) of each proposal's returns: mean, standard deviation and greatest, share of bright and of
             dark ones, NaN where none of them has any; None where the sweep carries none.
@@ -78,7 +77,6 @@ class Proposals:
     centroid: Float64
     box: Float64
     truncated: Bool
-    occluded: Bool
     sensor_height_m: float | None = None
     reflectance: Float64 | None = None
 
@@ -116,7 +114,6 @@ class Proposals:
             centroid=self.centroid.take(source, axis=0),
             box=self.box.take(source, axis=0),
             truncated=self.truncated[source],
-            occluded=self.occluded[source],
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
 
@@ -135,7 +132,6 @@ class Proposals:
             centroid=np.zeros((0, 3)),
             box=np.zeros((0, 7)),
             truncated=np.zeros(0, np.bool_),
-            occluded=np.zeros(0, np.bool_),
         )
 
 

@@ -20,7 +20,7 @@ def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposa
     box = np.c_[centre, np.full((n, 3), 1.5), np.zeros(n)].reshape(n, 7)
     none = np.zeros(n, np.bool_)
     offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
-    return points, Proposals(members, offsets, points[members, :3].T, centre, box, none, none)
+    return points, Proposals(members, offsets, points[members, :3].T, centre, box, none)
 
 
 def new_tracks(proposals: Proposals) -> Tracks:

@@ -84,7 +84,6 @@ def one(x, y, length, width):
         np.array([[x, y, 0.0]]),
         np.array([[x, y, 0.0, length, width, 1.0, 0.0]]),
         np.zeros(1, np.bool_),
-        np.zeros(1, np.bool_),
     )
 
 

@@ -9,12 +9,11 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.reflectance_statistics import has_reflectance, reflectance_statistics
+from modt.segmentation.reflectance_statistics import BRIGHT, DARK, has_reflectance, reflectance_statistics
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import scans
 
-CONFIG = SegmentationConfig().reflectance
 ONE = st.floats(0, 1, width=32)
 VALUES = st.lists(st.lists(ONE, min_size=1, max_size=9), min_size=1, max_size=6)
 SOME = st.lists(st.lists(ONE | st.just(UNRECORDED), min_size=1, max_size=9), min_size=1, max_size=6)
@@ -24,24 +23,24 @@ SOME = st.lists(st.lists(ONE | st.just(UNRECORDED), min_size=1, max_size=9), min
 def test_statistics_of_each_group(groups: list[list[float]]) -> None:
     values = np.array([v for group in groups for v in group], np.float32)
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
-    found = reflectance_statistics(values, offsets, CONFIG)
+    found = reflectance_statistics(values, offsets)
     assert found.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(found, groups, strict=True):
         own = np.array(group, np.float32)
-        expected = [own.mean(), own.std(), own.max(), (own > CONFIG.bright).mean(), (own < CONFIG.dark).mean()]
+        expected = [own.mean(), own.std(), own.max(), (own > BRIGHT).mean(), (own < DARK).mean()]
         np.testing.assert_allclose(row, expected, atol=2e-3)
 
 
 @given(SOME)
 def test_returns_without_reflectance_are_ignored(groups: list[list[float]]) -> None:
     values = np.array([v for group in groups for v in group], np.float32)
-    found = reflectance_statistics(values, np.append(0, np.cumsum([len(group) for group in groups])), CONFIG)
+    found = reflectance_statistics(values, np.append(0, np.cumsum([len(group) for group in groups])))
     assert found.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(found, groups, strict=True):
         own = np.array([v for v in group if v != UNRECORDED], np.float32)
         expected = np.full(N_REFLECTANCE, np.nan)
         if len(own):
-            expected = reflectance_statistics(own, np.array([0, len(own)]), CONFIG)[0]
+            expected = reflectance_statistics(own, np.array([0, len(own)]))[0]
         np.testing.assert_allclose(row, expected, atol=1e-6)
 
 

@@ -5,7 +5,6 @@ import pytest
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.occlusion import NoOcclusion
 from modt.segmentation.segmenter import Segmenter
 from modt.types import NONE
 from tests.segmentation import reference, scans
@@ -47,7 +46,6 @@ def test_one_object_is_one_proposal():
     assert set(on[proposals.members]) == {1}
     assert proposals.centroid[0] == pytest.approx(points[proposals.members, :3].mean(axis=0), abs=1e-4)
     assert not proposals.truncated[0]
-    assert not proposals.occluded[0]
 
 
 @pytest.mark.parametrize("fov", [None, AHEAD], ids=["all round", "ahead"])
@@ -108,31 +106,10 @@ def test_an_overhanging_object_is_not_part_of_the_car_below():
     assert purity == 1.0
 
 
-def test_a_car_behind_a_post_is_occluded():
-    points, on = scans.scan([(18.0, 0.0, *CAR), (9.0, 0.3, 0.3, 0.6, 0.0, 2.0), (15.0, -12.0, *CAR)], step_deg=0.17)
-    proposals = segmenter().segment(points)
-    owner = [
-        np.bincount(on[proposals.members[a:b]]).argmax()
-        for a, b in zip(proposals.offsets, proposals.offsets[1:], strict=False)
-    ]
-    occluded = dict(zip(owner, proposals.occluded.tolist(), strict=True))
-    assert occluded == {1: True, 2: False, 3: False}
-
-
-def test_without_the_mechanism_nothing_is_occluded():
-    points, _ = scans.scan([(18.0, 0.0, *CAR), (9.0, 0.3, 0.3, 0.6, 0.0, 2.0)], step_deg=0.17)
-    stage = Segmenter(SegmentationConfig(), SensorConfig(), FieldOfView(), occlusion=NoOcclusion())
-    proposals, expected = stage.segment(points), segmenter().segment(points)
-    assert expected.occluded.any()
-    assert not proposals.occluded.any()
-    np.testing.assert_array_equal(proposals.members, expected.members)
-
-
-def test_a_car_across_the_seam_of_directions_does_not_occlude_itself():
+def test_cars_across_the_seams_of_directions_are_one_proposal_each():
     points, _ = scans.scan([(0.5, -12.0, *CAR), (-12.0, 0.5, *CAR)], step_deg=0.17)
     proposals = segmenter().segment(points)
     assert len(proposals) == 2
-    assert not proposals.occluded.any()
 
 
 def test_objects_that_reach_into_the_field_of_view_are_whole():
@@ -158,7 +135,7 @@ def test_the_same_sweep_gives_the_same_bytes():
     points, _ = scans.scan([(12.0, 3.0, *CAR), (8.0, -4.0, *PERSON)])
     stage = segmenter()
     one, other = stage.segment(points), stage.segment(points.copy())
-    for name in ("members", "offsets", "centroid", "box", "truncated", "occluded"):
+    for name in ("members", "offsets", "centroid", "box", "truncated"):
         assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
 
 

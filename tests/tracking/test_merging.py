@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from modt.tracking.unions import Unions, united_proposals, united_sightings
 
 from modt.classes import N_CLASSES, ObjectClass
-from modt.config import SegmentationConfig, TrackingConfig
+from modt.config import TrackingConfig
 from modt.geometry import boxes_about, corners, inverse, rotation_zyx, se3, transform_boxes, upright_box
 from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
@@ -182,8 +182,7 @@ def test_unions_hold_what_their_parts_did(counts, yaw, data):
     n = len(counts)
     frame, proposals = frame_of([box(6 * k + 5, k, yaw=0.3 * k) for k in range(n)], points=counts)
     light = np.random.default_rng(n).uniform(0, 1, len(frame.points)).astype(np.float32)
-    config = SegmentationConfig().reflectance
-    told = reflectance_statistics(light[proposals.members], proposals.offsets, config)
+    told = reflectance_statistics(light[proposals.members], proposals.offsets)
     proposals = dataclasses.replace(proposals, reflectance=told, truncated=np.arange(n) % 3 == 0, sensor_height_m=1.6)
     hosts, parts = groups(data.draw, n)
     if not len(parts):
@@ -202,7 +201,7 @@ def test_unions_hold_what_their_parts_did(counts, yaw, data):
     np.testing.assert_array_equal(kept[label], before)
     own = [frame.points[label == k, :3].astype(np.float64) for k in range(len(kept))]
     np.testing.assert_allclose(after.centroid, [p.mean(axis=0) for p in own], atol=1e-5)
-    expected = reflectance_statistics(light[after.members], after.offsets, config)
+    expected = reflectance_statistics(light[after.members], after.offsets)
     np.testing.assert_allclose(after.reflectance, expected, atol=1e-5)
     for k in unions.new:
         exact = upright_box(own[k].T, float(after.box[k, 6]))

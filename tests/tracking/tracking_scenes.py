@@ -44,7 +44,7 @@ def frame_of(boxes, index=0, T_world_sensor=None, points=60, seed=0, period_s=0.
     frame = Frame(index, index * period_s, points, T_world_sensor)
     flags = np.zeros(len(boxes), np.bool_)
     centroid = np.array([c.mean(axis=0) for c in clouds]).reshape(-1, 3)
-    return frame, Proposals(np.arange(len(xyz)), offsets, points[:, :3].T.copy(), centroid, boxes, flags, flags)
+    return frame, Proposals(np.arange(len(xyz)), offsets, points[:, :3].T.copy(), centroid, boxes, flags)
 
 
 def cloud(box, n, rng):

@@ -59,7 +59,7 @@ def frames(n: int, count: int, alive: float, seed: int = 0) -> list[tuple[Frame,
         points = np.concatenate([xyz.reshape(-1, 3), np.zeros((n * POINTS, 1))], axis=1).astype(np.float32)
         flags = np.zeros(n, np.bool_)
         members, offsets, coordinates = np.arange(n * POINTS), np.arange(n + 1) * POINTS, points[:, :3].T.copy()
-        proposals = Proposals(members, offsets, coordinates, xyz.mean(axis=1), boxes, flags, flags)
+        proposals = Proposals(members, offsets, coordinates, xyz.mean(axis=1), boxes, flags)
         out.append((Frame(i, 0.1 * i, points, T), proposals))
     return out
 

@@ -109,7 +109,7 @@ class Scheduler:
         count, key = proposals.count[own], tracks.key_points[rows]
         novelty = np.minimum(np.abs(count - key) / np.maximum(key, 1), 1.0)
         nearness = np.exp(-np.hypot(*proposals.box[own, :2].T) / config.range_scale_m)
-        whole = np.where(proposals.truncated[own] | proposals.occluded[own], config.partial_view_factor, 1.0)
+        whole = np.where(proposals.truncated[own], config.partial_view_factor, 1.0)
         value: Float64 = whole * (
             config.uncertainty_weight * uncertainty
             + config.nearness_weight * nearness

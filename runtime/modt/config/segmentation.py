@@ -36,10 +36,6 @@ class GroundConfig(StageConfig):
     max_gap_m: float = number(
         6.0, 0.1, 100.0, "m", "distance between ground cells beyond which tolerance stops growing"
     )
-    extrapolation_share: float = number(
-        0.7, 0.0, 1.0, "", "of a ray's slope kept beyond its last ground cell; 0: level"
-    )
-    extrapolation_m: float = number(30.0, 0.0, 200.0, "m", "distance over which the slope is kept")
     flank_sectors: int = number(3, 1, 60, "", "to the left and right of a ray, whose median bounds its surface")
     flank_m: float = number(0.25, 0.0, 100.0, "m", "above that median, from where on a surface is a vehicle's side")
 
@@ -113,15 +109,6 @@ class ViewMarginConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OcclusionConfig(StageConfig):
-    """Occlusion of a proposal by what stands nearer beside it."""
-
-    min_top_m: float = number(0.6, 0.0, 5.0, "m", "above ground of an occluder")
-    bins: int = number(2, 1, 100, "", "of 0.35 deg beyond each edge of a proposal that are searched")
-    min_gap_m: float = number(0.5, 0.0, 10.0, "m", "in range from an occluder to the proposal")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class BoxConfig(StageConfig):
     """Heading of a box by closeness to its sides."""
 
@@ -129,14 +116,6 @@ class BoxConfig(StageConfig):
         0.1, 0.001, 1.0, "m", "points nearer to a side lie on it: sensor noise and rounded outlines"
     )
     max_cells: int = number(32, 1, 10000, "", "of a proposal that decide on its heading")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReflectanceConfig(StageConfig):
-    """Statistics of reflectance; the models are trained with these values."""
-
-    bright: float = number(0.8, 0.0, 1.0, "", "exceeded by number plates, lamps and signs only")
-    dark: float = number(0.005, 0.0, 1.0, "", "below which a return is too weak to be measured")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,6 +135,4 @@ class SegmentationConfig(StageConfig):
     person_splitting: PersonSplitConfig = mechanism(PersonSplitConfig)
     car_merging: CarMergeConfig = mechanism(CarMergeConfig)
     view_margin: ViewMarginConfig = mechanism(ViewMarginConfig)
-    occlusion: OcclusionConfig = mechanism(OcclusionConfig)
     boxes: BoxConfig = mechanism(BoxConfig)
-    reflectance: ReflectanceConfig = mechanism(ReflectanceConfig)

@@ -33,9 +33,9 @@ class GroundEstimator:
         """(N,) height of each point above the ground [m]."""
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
-        is_ground, slope = self.trace(lowest, sensor_height_m)
+        is_ground = self.trace(lowest, sensor_height_m)
         known = np.where(is_ground, lowest, np.float32(-sensor_height_m))
-        surface = _median_across(self._interpolate(known, is_ground, self._onward(slope)))
+        surface = _median_across(self._interpolate(known, is_ground))
         beside = _median_across(surface, self.config.flank_sectors)
         np.copyto(surface, beside, where=surface - beside > np.float32(self.config.flank_m))
         height: Float32 = points.z - surface.ravel().take(cell)
@@ -51,8 +51,8 @@ class GroundEstimator:
         z = np.where(plausible, points.z, np.float32(np.inf))
         return label_min(z, cell, self.grid.size).reshape(-1, SECTORS)
 
-    def trace(self, lowest: Float32, sensor_height_m: float) -> tuple[Bool, Float32]:
-        """(rings, SECTORS) ground cells, and the (1, SECTORS) slope of each ray at its last one.
+    def trace(self, lowest: Float32, sensor_height_m: float) -> Bool:
+        """(rings, SECTORS) ground cells.
 
         All rays advance together, ring by ring, from the foot of the sensor.
         """
@@ -75,29 +75,22 @@ class GroundEstimator:
             step[0], step[1] = here, range_m
             step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -max_slope), max_slope)
             np.copyto(last, step, where=found)
-        return is_ground, slope[None]
+        return is_ground
 
-    def _onward(self, slope: Float32) -> Float32:
-        """(1, SECTORS) slope of the surface beyond the last ground cell of each ray."""
-        smooth = _median_across(_median_across(slope), self.config.flank_sectors)
-        return np.float32(self.config.extrapolation_share) * smooth
-
-    def _interpolate(self, ground: Float32, is_ground: Bool, onward: Float32) -> Float32:
-        """(rings, SECTORS) surface: linear between the ground cells of a ray, then at a slope, then level."""
+    def _interpolate(self, ground: Float32, is_ground: Bool) -> Float32:
+        """(rings, SECTORS) surface: linear between the ground cells of a ray, level beyond the last one."""
         rings, sectors = ground.shape
         is_ground = is_ground.copy()
         is_ground[0] = True
         cell = np.arange(rings * sectors).reshape(rings, sectors)
         before = np.maximum.accumulate(np.where(is_ground, cell, 0), axis=0)
         after = np.minimum.accumulate(np.where(is_ground, cell, cell.size)[::-1], axis=0)[::-1]
-        beyond = after == cell.size
-        after = np.where(beyond, before, after)
+        after = np.where(after == cell.size, before, after)
         range_of = np.repeat(self.grid.range_m, sectors)
         low, near = ground.take(before), range_of.take(before)
         high, far = ground.take(after), range_of.take(after)
         since = self.grid.range_m[:, None] - near
         surface: Float32 = low + (high - low) * (since / np.maximum(far - near, np.float32(1e-3)))
-        surface += beyond * np.minimum(since, np.float32(self.config.extrapolation_m)) * onward
         return surface
 
 

@@ -14,7 +14,6 @@ from modt.segmentation.clustering import Clusterer, Merger, Splitter
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups
-from modt.segmentation.occlusion import EdgeOcclusion, Occlusion
 from modt.segmentation.person_splitting import PersonSplitter
 from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.reflectance_statistics import has_reflectance, reflectance_statistics
@@ -31,7 +30,6 @@ class Segmenter:
         fov: part of space to segment.
         splitter: PersonSplitter by default.
         merger: CarMerger by default.
-        occlusion: EdgeOcclusion by default.
     """
 
     def __init__(
@@ -42,7 +40,6 @@ class Segmenter:
         *,
         splitter: Splitter | None = None,
         merger: Merger | None = None,
-        occlusion: Occlusion | None = None,
     ) -> None:
         self.config, self.sensor, self.fov = config, sensor, fov
         self.margin_m = config.view_margin.margin_m
@@ -53,7 +50,6 @@ class Segmenter:
         self.ground = GroundEstimator(sensor, config)
         splitter, merger = splitter or PersonSplitter(sensor, config), merger or CarMerger(sensor, config)
         self.clusterer = Clusterer(sensor, config, splitter, merger)
-        self.occlusion = occlusion or EdgeOcclusion(config)
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""
@@ -94,7 +90,7 @@ class Segmenter:
         if depth is not None:
             truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m
         if reflectance is not None:
-            statistics = reflectance_statistics(reflectance.take(groups.rows), offsets, self.config.reflectance)
+            statistics = reflectance_statistics(reflectance.take(groups.rows), offsets)
         return Proposals(
             members=index.take(groups.rows),
             offsets=offsets,
@@ -102,7 +98,6 @@ class Segmenter:
             centroid=np.stack([groups.mean(v) for v in own], axis=1),
             box=upright_boxes(x, y, z, groups, yaw),
             truncated=truncated,
-            occluded=self.occlusion.occluded(cells.x, cells.y, clusters.cells.high, by_cell),
             reflectance=statistics,
         )
 

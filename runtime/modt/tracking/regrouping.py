@@ -55,7 +55,7 @@ class Grouping:
         source: (Q,) proposal whose columns each takes over.
         changed: (C,) those of the Q whose members changed.
         yaw: (C,) heading of their boxes [rad, sensor frame].
-        partial: (n,) those of the Q of which something nearer hides a part.
+        partial: (n,) those of the Q of which a part is missing or hidden.
     """
 
     runs: Sequence[slice | Int]
@@ -71,12 +71,12 @@ class Grouping:
         for row, yaw in zip(self.changed.tolist(), self.yaw.tolist(), strict=True):  # one to three a frame
             xyz = proposals.coordinates[:, slice(*proposals.offsets[row : row + 2])].astype(np.float64)
             proposals.box[row], proposals.centroid[row] = upright_box(xyz, yaw), xyz.mean(axis=1)
-        proposals.occluded[self.partial] = True
         # The deskew of a proposal that changed is that of the one whose columns it took over.
         old, T = self.source[self.changed], placement.T_world_sensor
         deskew = frame.observations.centroid[old] - transform(T, frame.proposals.centroid[old])[:, :2]
         observations = frame.observations.take(self.source)
         observations.put(self.changed, observe(proposals.take(self.changed), T).moved(deskew))
+        observations.partial[self.partial] = True
         return proposals, observations
 
 

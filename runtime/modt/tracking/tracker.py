@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import CLASSES, ObjectClass
 from modt.config import TrackingConfig
-from modt.geometry.kdop import DIRECTIONS
+from modt.geometry.kdop import DIRECTIONS, widths
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
@@ -19,6 +20,8 @@ from modt.tracking.splitting import ExpectedSplitting
 from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
+
+_MAX_LENGTH_M = np.array([spec.max_length_m for spec in CLASSES.values()])
 
 
 def association_of(config: TrackingConfig) -> Association:
@@ -148,7 +151,10 @@ class Tracker:
         about = self._record(rows, matches.proposals, observations, matches.position)
         known = t.envelope.take(rows, axis=0)
         decay = self.config.envelope_decay
-        t.envelope[rows] = np.maximum(about, decay * known + (1 - decay) * about)
+        envelope = np.maximum(about, decay * known + (1 - decay) * about)
+        merged = _oversized(t.last_class[rows], about)
+        envelope[merged] = known[merged]
+        t.envelope[rows] = envelope
 
     def _record(self, rows: Int, proposals: Int, observations: Observations, position: Float64) -> Float64:
         """Record what is observed of tracks (R,) at positions (R, 2); returns (R, 8) their k-DOPs about these [m]."""
@@ -208,3 +214,12 @@ class Tracker:
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
         t.envelope[new] = self._record(new, proposals, observations, position)
+
+
+def _oversized(object_class: Int, kdop: Float64) -> Int:
+    """Indices of objects, by classes (n,) and k-DOPs (n, 8), that are longer than their class: merged with others."""
+    objects: Int = (object_class != ObjectClass.BACKGROUND.value).nonzero()[0]
+    longer: Bool = (
+        widths(kdop.take(objects, axis=0).T).max(axis=0, initial=0.0) > _MAX_LENGTH_M[object_class[objects]]
+    )
+    return objects[longer]

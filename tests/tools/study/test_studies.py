@@ -106,7 +106,7 @@ def test_the_body_of_a_proposal_is_that_of_most_of_its_points():
     none = np.zeros(3, np.bool_)
     members, offsets = np.arange(7), np.array([0, 3, 5, 7])
     nowhere = np.zeros((3, 7), np.float32)
-    proposals = Proposals(members, offsets, nowhere, np.zeros((3, 3)), np.zeros((3, 7)), none, none)
+    proposals = Proposals(members, offsets, nowhere, np.zeros((3, 3)), np.zeros((3, 7)), none)
     body, share = majority_bodies(proposals, instance)
     assert body.tolist() == [3, NONE, 7]
     np.testing.assert_allclose(share, [2 / 3, 1.0, 1.0])

@@ -119,7 +119,7 @@ def test_only_large_proposals_are_judged_on_request(played: Recording) -> None:
 def test_the_ideal_tracker_follows_the_largest_piece_of_an_object() -> None:
     box, none, points = np.zeros((4, 7)), np.zeros(4, np.bool_), np.zeros((40, 4), np.float32)
     offsets = np.array([0, 10, 30, 35, 40])
-    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none, none)
+    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none)
     car, rider = np.arange(2, 28), np.arange(36, 40)  # pieces of 8 and of 18 points; 4 of 5 points
     kinds = (ObjectClass.CAR, ObjectClass.CYCLIST)
     unlabelled = np.zeros(40, np.bool_)

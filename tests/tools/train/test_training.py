@@ -56,7 +56,7 @@ def test_a_proposal_is_what_it_mostly_shows_and_mostly_covers() -> None:
     points = np.zeros((40, 4), np.float32)
     offsets = np.array([0, 10, 20, 30, 40])
     box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
-    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none, none)
+    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none)
     car = np.arange(0, 9)  # nearly the first proposal
     walker = np.arange(10, 14)  # too few points to count
     rider = np.arange(17, 40)  # three points of the second, all of the third and of the fourth: neither is whole
@@ -71,9 +71,7 @@ def test_a_proposal_is_what_it_mostly_shows_and_mostly_covers() -> None:
 def test_what_nobody_labelled_is_unknown() -> None:
     points = np.zeros((40, 4), np.float32)
     box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
-    proposals = Proposals(
-        np.arange(40), np.array([0, 10, 20, 30, 40]), points[:, :3].T, np.zeros((4, 3)), box, none, none
-    )
+    proposals = Proposals(np.arange(40), np.array([0, 10, 20, 30, 40]), points[:, :3].T, np.zeros((4, 3)), box, none)
     unlabelled = np.arange(40) >= 10
     assert label(scan_of(points, [], [], unlabelled), proposals).unknown.tolist() == [False, True, True, True]
 
@@ -81,9 +79,7 @@ def test_what_nobody_labelled_is_unknown() -> None:
 def test_an_object_that_is_to_be_found_is_judged_where_labels_end_as_well() -> None:
     points = np.zeros((40, 4), np.float32)
     box, none = np.zeros((2, 7)), np.zeros(2, np.bool_)
-    proposals = Proposals(
-        np.arange(40), np.array([0, 20, 40]), points[:, :3].T, np.zeros((2, 3)), box, none[:2], none[:2]
-    )
+    proposals = Proposals(np.arange(40), np.array([0, 20, 40]), points[:, :3].T, np.zeros((2, 3)), box, none[:2])
     unlabelled = np.tile(np.arange(20) >= 5, 2)  # of both, most lies there
     labels = label(scan_of(points, [np.arange(20)], [ObjectClass.CAR], unlabelled), proposals)
     assert labels.kind.tolist() == [ObjectClass.CAR, 0]
