@@ -52,7 +52,7 @@ from tools.train.synthetic_scans import scan_of
 WORLDS = ("street:2001", "street:2002", "crossing:2003")
 CHECKS = ("street:3001", "street:3002", "crossing:3003", "street:3004", "street:3005", "crossing:3006")
 PERIOD_S = 0.1
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "classification.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "log" / "fusion-sweep.md"
 BEGIN, END = "<!-- tools/study/sweep_fusion.py -->\n", "<!-- end of tools/study/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
 POINT_CHANGES = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
