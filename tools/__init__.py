@@ -1,0 +1,1 @@
+"""Training, benchmarks, studies and generated documentation; `python -m tools` lists the commands."""

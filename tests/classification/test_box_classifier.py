@@ -15,7 +15,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import N_REFLECTANCE, Float64, Int
 from tests.tools.train.datasets import data_of
-from tools.train.box_features import all_described, described
+from tools.train.box_features import crop_features, dataset_features
 from tools.train.dataset import SENSOR_HEIGHT_M, Dataset
 
 
@@ -27,7 +27,7 @@ def test_features_of_crops_and_proposals_agree() -> None:
     beam_sr = beam_solid_angle_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
     expected = box_features(proposals.count, proposals.box, SENSOR_HEIGHT_M, beam_sr)
     assert len(crops) > 50
-    off = np.abs(described(crops) - expected)
+    off = np.abs(crop_features(crops) - expected)
     assert off[:, 4:].max() < 1e-3  # height, foot and top
     assert np.quantile(off[:, :4], 0.9, axis=0).max() < 0.15  # at run time headings are fitted to fewer points
 
@@ -44,14 +44,14 @@ def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
 def test_training_separates_classes_by_size() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.mlp import logits
-    from tools.train.train_boxes import cross_validate, train
+    from tools.train.train_box_classifier import cross_validate, train
 
     rng = np.random.default_rng(0)
     label = np.arange(80) // 2 % 4
     data = cubes(0.1 * 4.0**label, label, rng)
     layers = train(data, np.arange(80), 150, seed=1)
     again = train(data, np.arange(80), 150, seed=1)
-    feature = all_described(data, np.arange(80))
+    feature = dataset_features(data, np.arange(80))
     assert feature.shape == (80, N_FEATURES)
     assert np.mean(logits(layers, feature).argmax(axis=1) == label) > 0.9
     assert all(
@@ -66,7 +66,7 @@ def test_training_separates_classes_by_size() -> None:
 def test_training_separates_classes_by_reflectance() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.mlp import logits
-    from tools.train.train_reflectance import Described, cross_validate, train, weigh
+    from tools.train.train_reflectance_classifier import Features, cross_validate, fit_pool, train
 
     rng = np.random.default_rng(0)
     label = np.arange(160) // 2 % 4
@@ -74,19 +74,19 @@ def test_training_separates_classes_by_reflectance() -> None:
     told = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
     told[::20] = np.nan  # of another sensor
     data = dataclasses.replace(alike, reflectance=told)
-    seen = Described(data)
+    features = Features(data)
     dumb = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
-    layers = train(data, seen, np.arange(160), dumb, 200, seed=1)
+    layers = train(data, features, np.arange(160), dumb, 200, seed=1)
     known = np.isfinite(told).all(axis=1)
-    assert np.mean(logits(layers, seen.whole[known]).argmax(axis=1) == label[known]) > 0.9
+    assert np.mean(logits(layers, features.all[known]).argmax(axis=1) == label[known]) > 0.9
 
     data = dataclasses.replace(alike, reflectance=np.nan_to_num(told, nan=0.3))
     network = np.full((160, 4), 0.25)
-    _, report = cross_validate(data, Described(data), network, 2, 200, seed=1)
+    _, report = cross_validate(data, Features(data), network, 2, 200, seed=1)
     assert report["weight"] > 0.9  # a network that knows nothing leaves all of it
     assert min(report["network"]["average_precision"].values()) > 0.7
     assert report["network"]["log_loss"] < 0.5 * report["network"]["log_loss_without"]
     sure = np.log(np.eye(4)[label] * 0.96 + 0.01)
-    assert max(weigh(sure, -sure, -sure, label)) < 0.05  # what contradicts a network that is right is left out
-    share, _ = weigh(np.zeros((160, 4)), sure, np.zeros((160, 4)), label)
+    assert max(fit_pool(sure, -sure, -sure, label)) < 0.05  # what contradicts a network that is right is left out
+    share, _ = fit_pool(np.zeros((160, 4)), sure, np.zeros((160, 4)), label)
     assert share > 0.95  # a box that knows goes before a network that does not

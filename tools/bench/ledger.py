@@ -1,29 +1,29 @@
-"""What the ledger costs: a stage's booking, a frame's, and their share of a frame of a recorded stream."""
+"""CPU time of the ledger: per stage, per frame, and relative to a frame of a recorded stream."""
 
 from __future__ import annotations
 
-import argparse
 import time
 from pathlib import Path
 
 from modt import host, profile
 from modt.cli.replay import frames
+from tools.options import parser
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("path", nargs="?", type=Path, help="stream (default: the embedded one)")
-    parser.add_argument("--frames", type=frames, default=(0, 60), metavar="A:B")
-    parser.add_argument("--fov", choices=("camera", "full"), default="full")
-    parser.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
-    arguments = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("path", nargs="?", type=Path, help="stream (default: the embedded one)")
+    options.add_argument("--frames", type=frames, default=(0, 60), metavar="A:B")
+    options.add_argument("--fov", choices=("camera", "full"), default="full")
+    options.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
+    arguments = options.parse_args()
     host.confine(host.last_core())
     from modt import assembly
     from modt.cli import assemble
     from modt.energy.ledger import STAGES, Ledger, NullLedger
 
     ledger = Ledger()
-    print(f"by its own measure: {ledger.span_overhead_ns} ns a call, {ledger.frame_overhead_ns} ns a frame")
+    print(f"calibrated by the ledger: {ledger.span_overhead_ns} ns per call, {ledger.frame_overhead_ns} ns per frame")
     empty_us = {}
     for name, books in (("ledger", ledger), ("null", NullLedger())):
         began_ns = time.thread_time_ns()
@@ -33,17 +33,17 @@ def main() -> None:
             books.close_frame(index)
         empty_us[name] = 1e-3 * (time.thread_time_ns() - began_ns) / arguments.repeat
     cost_us = empty_us["ledger"] - empty_us["null"]
-    print(f"a frame of {len(STAGES)} empty stages: {cost_us:.1f} us more than without a ledger")
+    print(f"a frame of {len(STAGES)} empty stages: {cost_us:.1f} us more than with the null ledger")
     request = assemble.Request(path=arguments.path, fov=arguments.fov, frames=arguments.frames)
     stream = assemble.stream(request)
     for mode in assembly.MODES:
         chosen, loaded = assembly.MODES[mode], profile.load()
-        whole = assembly.pipeline(chosen, loaded, assemble.field_of_view(request, stream), ledger)
+        pipeline = assembly.pipeline(chosen, loaded, assemble.field_of_view(request, stream), ledger)
         count = cpu_ns = 0
         budget = chosen.budget(loaded)
         for frame in stream:
             began_ns = time.thread_time_ns()
-            whole.step(frame, budget)
+            pipeline.step(frame, budget)
             ledger.close_frame(frame.index)
             cpu_ns += time.thread_time_ns() - began_ns
             count += 1

@@ -1,14 +1,13 @@
-"""What a synthetic sweep costs: CPU time to build the world, to the first frame and a sweep, beside a yardstick.
+"""CPU time of the simulator: building a world, the first sweep, later sweeps, and a reference workload.
 
     python -m tools.bench.simulation [--scene NAME] [--sensor NAME] [--sweeps N] [--seed S]
 
-The yardstick (sorting a million random numbers) tells a fast machine from a slow one. Run on one core with
+The reference workload, sorting a million random numbers, relates figures of different machines. Run on one core with
 OMP_NUM_THREADS=1.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import resource
 import time
@@ -16,15 +15,16 @@ import time
 import numpy as np
 
 from modt.sources.synthetic_stream import SyntheticStream
+from tools.options import parser
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scene", default="street")
-    parser.add_argument("--sensor", default="hdl-64e")
-    parser.add_argument("--sweeps", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=0)
-    args = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("--scene", default="street")
+    options.add_argument("--sensor", default="hdl-64e")
+    options.add_argument("--sweeps", type=int, default=50)
+    options.add_argument("--seed", type=int, default=0)
+    args = options.parse_args()
     marks = [time.process_time()]
     stream = SyntheticStream(args.scene, args.sensor, 10.0, args.seed)
     marks.append(time.process_time())

@@ -1,0 +1,1 @@
+"""Studies of accuracy and of parameters, on recorded and on simulated drives."""

@@ -1,14 +1,13 @@
-"""Compare synthetic sweeps with real ones, figure by figure.
+"""Compare simulated sweeps with real ones: points, proposals, sizes and recall.
 
     python -m tools.study.compare_synthetic KITTI_ROOT [--scene NAME ...] [--worlds N] [--sweeps N] [--real N]
 
-Real: the full scans of the object benchmark (or the frames of a raw drive with tracklets). Synthetic: a few sweeps
-of several worlds. Both go through the same segmentation and the same counting.
+Real: the full scans of the object benchmark. Simulated: a few sweeps of several worlds. The segmentation and the
+statistics are the same for both.
 """
 
 from __future__ import annotations
 
-import argparse
 from collections import defaultdict
 from collections.abc import Iterable
 from itertools import islice, pairwise
@@ -20,15 +19,16 @@ from modt import profile
 from modt.classes import CLASS_NAMES
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
+from tools.options import parser
 from tools.train.labelled_scans import FOOT_M, Scan, object_scans
-from tools.train.synthetic_scans import driven
+from tools.train.synthetic_scans import simulated_scans
 
 RINGS = (5, 10, 15, 20, 30, 50)
 HEIGHTS = (-2.5, -1.3, -0.5, 0.5, 3.0)
 
 
 def figures(scans: Iterable[Scan]) -> dict[str, str]:
-    """Every figure of a set of scans, as text."""
+    """Statistics of a set of scans, as text."""
     config = profile.load()
     whole = Segmenter(config.segmentation, config.sensor, FieldOfView())
     sums: dict[str, list[float]] = defaultdict(list)
@@ -85,16 +85,16 @@ def _objects(scan: Scan, segmenter: Segmenter, sums: dict[str, list[float]], hit
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("root", type=Path, help="KITTI root")
-    parser.add_argument("--scene", nargs="+", default=["street"])
-    parser.add_argument("--worlds", type=int, default=12, help="synthetic worlds of each scene")
-    parser.add_argument("--sweeps", type=int, default=2, help="of each world")
-    parser.add_argument("--real", type=int, default=106, help="real scans at most")
-    args = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("root", type=Path, help="KITTI root")
+    options.add_argument("--scene", nargs="+", default=["street"])
+    options.add_argument("--worlds", type=int, default=12, help="simulated worlds of each scene")
+    options.add_argument("--sweeps", type=int, default=2, help="of each world")
+    options.add_argument("--real", type=int, default=106, help="maximum number of real scans")
+    args = options.parse_args()
     real = islice((s for s in object_scans(args.root / "object" / "training") if len(s.points) > 80000), args.real)
     times_s = np.linspace(0, 3.9, args.sweeps)
-    synthetic = driven(args.scene, range(100, 100 + args.worlds), times_s.tolist(), camera=True)
+    synthetic = simulated_scans(args.scene, range(100, 100 + args.worlds), times_s.tolist(), camera=True)
     columns = figures(real), figures(synthetic)
     print("| figure | real | synthetic |\n|---|---|---|")
     for key in dict.fromkeys([*columns[0], *columns[1]]):

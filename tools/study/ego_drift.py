@@ -1,19 +1,18 @@
-"""Drift of ego-motion from the proposals, beside KISS-ICP's where that is installed (extra `kiss`).
+"""Drift of ego-motion estimated from proposals, compared with KISS-ICP where installed (extra `kiss`).
 
     python -m tools.study.ego_drift DRIVE [DRIVE ...] [--frames A:B] [--no-kiss]
 
-DRIVE is a KITTI raw drive, a recorded one or one of `modt simulate`. Each way is judged against two references: the
-positions of the OXTS records, and the velocities of the same records, integrated over their time stamps. Errors are
-those of the end: its place in percent of the way that the reference made, its heading in degrees. With several drives
-the means of the magnitudes follow.
+DRIVE is a KITTI raw drive, recorded or written by `modt simulate`. Each estimate is compared with two references: the
+positions of the OXTS records, and their velocities integrated over time. Errors are those of the last pose: position
+in percent of the reference's path length, heading in degrees. For several drives, means of the magnitudes follow.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -23,56 +22,80 @@ from modt import assembly
 from modt.cli.replay import frames as frame_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
+from modt.observations import Located, StaticTracks
+from modt.pipeline import Odometry
 from modt.profile import load
 from modt.sources import kitti_calibration, oxts
 from modt.sources.pose_source import NoOdometry, PosedStream
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
-from modt.types import Float64
+from modt.types import Float64, Frame, Proposals
+from tools.options import parser
 
 VN, VE, VU = 6, 7, 10
 """Columns of an OXTS record: velocities to the north, east and up [m/s]."""
 KISS_RANGE_M = (2.0, 80.0)
 
 
-def way_m(T: Float64) -> float:
-    """Length of the way of poses (n, 4, 4) in the plane."""
+def path_m(T: Float64) -> float:
+    """Path length of poses (n, 4, 4) in the plane."""
     return float(np.linalg.norm(np.diff(T[:, :2, 3], axis=0), axis=1).sum())
 
 
 def end_of(T: Float64) -> Float64:
-    """(3,) x, y [m] and yaw [rad] of the last pose as seen from the first, both laid flat."""
+    """(3,) x, y [m] and yaw [rad] of the last pose relative to the first, without roll and pitch."""
     level = [se3(rotation_zyx(0, 0, yaw_of(P)), np.array([P[0, 3], P[1, 3], 0.0])) for P in T[[0, -1]]]
     moved = inverse(level[0]) @ level[1]
     return np.array([moved[0, 3], moved[1, 3], yaw_of(moved)])
 
 
 def drift(estimate: Float64, reference: Float64) -> dict[str, float]:
-    """How poses (n, 4, 4) differ from those of a reference: way and end in percent of its way, heading in degrees."""
-    length = way_m(reference)
+    """Errors of poses (n, 4, 4): path length and last position in percent of the path, last heading in degrees."""
+    length = path_m(reference)
     error = end_of(estimate) - end_of(reference)
     return {
-        "way_percent": 100 * (way_m(estimate) / length - 1),
+        "path_percent": 100 * (path_m(estimate) / length - 1),
         "end_percent": 100 * float(np.hypot(*error[:2])) / length,
         "heading_deg": float(np.rad2deg(np.angle(np.exp(1j * error[2])))),
     }
 
 
+class PoseRecorder:
+    """Odometry that stores the pose of each frame.
+
+    Args:
+        odometry: wrapped.
+
+    Attributes:
+        poses: (4, 4) of each frame.
+    """
+
+    def __init__(self, odometry: Odometry) -> None:
+        self.odometry = odometry
+        self.poses: list[Float64] = []
+
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+        """Delegate and store the pose."""
+        located = self.odometry.locate(frame, proposals, static_tracks)
+        self.poses.append(located.placement.T_world_sensor)
+        return located
+
+
 def by_proposals(stream: Stream, *, camera: bool) -> Float64:
-    """(n, 4, 4) poses that the tracker finds without odometry."""
+    """(n, 4, 4) poses estimated from proposals, without odometry."""
     profile, mode = load(), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
     pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
-    poses = []
+    recorder = PoseRecorder(pipeline.odometry)
+    pipeline = replace(pipeline, odometry=recorder)
     for frame in PosedStream(stream, NoOdometry()):
         pipeline.step(frame, mode.budget(profile))
-        poses.append(pipeline.tracker.T_world_sensor)
-    return np.array(poses)
+    return np.array(recorder.poses)
 
 
 def by_kiss_icp(stream: Stream) -> Float64:
-    """(n, 4, 4) poses of KISS-ICP on the whole sweeps, deskewed where their head took time to turn."""
+    """(n, 4, 4) poses of KISS-ICP on full sweeps, deskewed if they are not compensated."""
     from kiss_icp.config import KISSConfig
     from kiss_icp.kiss_icp import KissICP
 
@@ -84,15 +107,15 @@ def by_kiss_icp(stream: Stream) -> Float64:
     odometry, poses = KissICP(config), []
     for frame in stream:
         xyz = frame.points[:, :3].astype(np.float64)
-        # From 0 to 1 over the sweep, seam to seam behind the sensor.
-        when = 0.5 - np.copysign(1.0, frame.turn_s) * np.arctan2(xyz[:, 1], xyz[:, 0]) / (2 * np.pi)
-        odometry.register_frame(xyz, when if config.data.deskew else np.zeros(0))
+        # Firing time, 0 to 1 over the sweep; the sweep begins and ends behind the sensor.
+        time = 0.5 - np.copysign(1.0, frame.turn_s) * np.arctan2(xyz[:, 1], xyz[:, 0]) / (2 * np.pi)
+        odometry.register_frame(xyz, time if config.data.deskew else np.zeros(0))
         poses.append(odometry.last_pose.copy())
     return np.array(poses)
 
 
 def integrated(drive: Path, indices: Iterable[int]) -> Float64:
-    """(n, 4, 4) sensor poses of frames: the records' velocities integrated, with the records' attitudes."""
+    """(n, 4, 4) sensor poses from the integrated velocities and the attitudes of the records."""
     folder = drive / "oxts"
     records = np.array([oxts.read_record(folder / "data" / f"{i:010d}.txt") for i in indices])
     texts = (folder / "timestamps.txt").read_text(encoding="ascii").splitlines()
@@ -106,7 +129,7 @@ def integrated(drive: Path, indices: Iterable[int]) -> Float64:
 
 
 def has_kiss_icp() -> bool:
-    """Whether the extra is installed."""
+    """Whether the extra `kiss` is installed."""
     try:
         import kiss_icp  # noqa: F401
     except ImportError:
@@ -115,7 +138,7 @@ def has_kiss_icp() -> bool:
 
 
 def study(drive: Path, span: tuple[int, int | None], *, kiss: bool) -> dict[str, dict[str, float]]:
-    """Drift of every estimate against every reference, by their names."""
+    """Drift of each estimate against each reference, by name."""
     stream = open_stream(drive).between(*span)
     poses = [(s.index, s.T_world_sensor) for s in stream.scans if s.T_world_sensor is not None]
     references = {
@@ -125,9 +148,9 @@ def study(drive: Path, span: tuple[int, int | None], *, kiss: bool) -> dict[str,
     estimates = {f"proposals, {fov}": by_proposals(stream, camera=fov == "camera") for fov in ("full", "camera")}
     if kiss:
         estimates["KISS-ICP"] = by_kiss_icp(stream)
-    out = {f"OXTS {name}": {"way_m": way_m(T)} for name, T in references.items()}
+    out = {f"OXTS {name}": {"path_m": path_m(T)} for name, T in references.items()}
     for name, T in estimates.items():
-        out[name] = {"way_m": way_m(T)}
+        out[name] = {"path_m": path_m(T)}
         for against, reference in references.items():
             out[f"{name} against OXTS {against}"] = drift(T, reference)
         if kiss and name != "KISS-ICP":
@@ -136,14 +159,14 @@ def study(drive: Path, span: tuple[int, int | None], *, kiss: bool) -> dict[str,
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("drives", type=Path, nargs="+", metavar="DRIVE")
-    parser.add_argument("--frames", type=frame_range, default=(0, None), metavar="A:B")
-    parser.add_argument("--no-kiss", action="store_true", help="leave KISS-ICP out")
-    arguments = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("drives", type=Path, nargs="+", metavar="DRIVE")
+    options.add_argument("--frames", type=frame_range, default=(0, None), metavar="A:B")
+    options.add_argument("--no-kiss", action="store_true", help="without KISS-ICP")
+    arguments = options.parse_args()
     kiss = has_kiss_icp() and not arguments.no_kiss
     if not kiss:
-        print("KISS-ICP is left out" + ("" if arguments.no_kiss else ": pip install 'modt[kiss]' to compare with it"))
+        print("without KISS-ICP" + ("" if arguments.no_kiss else ": not installed; pip install 'modt[kiss]'"))
     magnitudes: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for drive in arguments.drives:
         print(drive)

@@ -1,21 +1,21 @@
-"""Whether the filter is as wrong as it says: normalised estimation error squared (NEES) on synthetic drives.
+"""Consistency of the tracking filter: normalised estimation error squared (NEES) on simulated drives.
 
     python -m tools.study.filter_consistency [--scene street crossing] [--seeds 0:4] [--seconds 10]
                          [--sensor hdl-64e] [--fov full]
 
-A track follows some point of its body, which the filter does not say; it is taken for the one that it was at on
-average, fixed on the body. The error of the place is how far it is from there (2 degrees of freedom), that of the
-motion the difference of heading and speed (2 more), while the body moves. Errors of one track hang together, so the
-bounds are those of as many independent samples as there are tracks.
+The reference point of a track on its body is unknown; it is taken as the mean position of the track in the body
+frame. The position error is relative to that point (2 degrees of freedom), the motion error is that of heading and
+speed (2), for moving bodies. Errors of one track are correlated, so the bounds assume as many independent samples as
+tracks.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -25,26 +25,27 @@ from modt.geometry import wrap
 from modt.simulation.world import MOVING_MPS
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Float64
-from tools.study.truth_replay import Seen, add_drives, replay
+from tools.options import parser
+from tools.study.truth_replay import JudgedFrame, add_drives, replay
 
-SETTLED = 6
-"""Proposals that a track has had before it is judged."""
-PURE = 0.8
-"""Share of a proposal's points that must be of the body."""
-SHORTEST = 10
-"""Frames of a track that is judged."""
+MIN_HITS = 6
+"""Minimum number of proposals of a track before its errors count."""
+MIN_SHARE = 0.8
+"""Minimum share of a proposal's points on one body."""
+MIN_FRAMES = 10
+"""Minimum length of a track."""
 DEGREES = 2
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, slots=True)
-class Life:
-    """What a track said of one body, and what was so; n frames.
+class TrackLife:
+    """States of a track on one body, and the true poses, over n frames.
 
     Attributes:
-        kind: class and whether it moved, as in "car, moving".
+        kind: class and motion, as in "car, moving".
         x, P: (n, 4), (n, 4, 4) of the filter.
-        pose: (n, 4) x, y [m], heading [rad] and speed [m/s] of the body, world frame.
+        pose: (n, 4) true x, y [m], heading [rad] and speed [m/s], world frame.
     """
 
     kind: str
@@ -53,31 +54,31 @@ class Life:
     pose: Float64
 
 
-def lives(stream: SyntheticStream, seen: Iterator[Seen]) -> list[Life]:
-    """Every track of a drive that was of one body for long enough."""
+def lives(stream: SyntheticStream, frames: Iterable[JudgedFrame]) -> list[TrackLife]:
+    """Tracks of a drive that were on one body for at least MIN_FRAMES frames."""
     world = stream.simulator.world
-    records = defaultdict(list)
-    for s in seen:
+    records: dict[tuple[int, int, bool], list[tuple[Float64, Float64, Float64]]] = defaultdict(list)
+    for s in frames:
         tracks, poses = s.result.tracks, world.poses(s.result.frame.stamp_s)
-        rows = np.flatnonzero((tracks.proposal >= 0) & (tracks.hits >= SETTLED))
+        rows = np.flatnonzero((tracks.proposal >= 0) & (tracks.hits >= MIN_HITS))
         for row in rows:
             proposal = tracks.proposal[row]
-            if s.body[proposal] >= 0 and s.share[proposal] >= PURE:
+            if s.body[proposal] >= 0 and s.share[proposal] >= MIN_SHARE:
                 body = int(s.body[proposal])
                 moving = bool(poses[body, 4] > MOVING_MPS)
                 key = (int(tracks.id[row]), body, moving)
                 records[key].append((tracks.x[row], tracks.P[row], poses[body, [0, 1, 3, 4]]))
     out = []
-    for (_, body, moving), rows in records.items():
-        if len(rows) >= SHORTEST:
+    for (_, body, moving), states in records.items():
+        if len(states) >= MIN_FRAMES:
             name = CLASS_NAMES[world.bodies[body].kind.object_class]
-            x, P, pose = (np.array(column) for column in zip(*rows, strict=True))
-            out.append(Life(f"{name}, {'moving' if moving else 'standing'}", x, P, pose))
+            x, P, pose = (np.array(column) for column in zip(*states, strict=True))
+            out.append(TrackLife(f"{name}, {'moving' if moving else 'standing'}", x, P, pose))
     return out
 
 
-def errors(life: Life) -> tuple[Float64, Float64]:
-    """(n, 2) errors of the place [m], and (n, 2) of heading and speed [rad, m/s]."""
+def errors(life: TrackLife) -> tuple[Float64, Float64]:
+    """(n, 2) position errors [m], and (n, 2) errors of heading [rad] and speed [m/s]."""
     c, s = np.cos(life.pose[:, 2]), np.sin(life.pose[:, 2])
     R = np.stack([np.stack([c, -s], axis=1), np.stack([s, c], axis=1)], axis=1)
     off = life.x[:, :2] - life.pose[:, :2]
@@ -98,12 +99,12 @@ class Consistency:
     """NEES of one kind of track and one part of the state.
 
     Attributes:
-        tracks, samples: how many.
-        mean: of the tracks' own means; consistent if it is about the degrees of freedom.
+        tracks, samples: their numbers.
+        mean: of the means of the tracks; equal to the degrees of freedom if consistent.
         median: of all samples.
-        low, high: within which it lies with CONFIDENCE, for as many independent samples as tracks.
+        low, high: bounds of the mean at CONFIDENCE, for as many independent samples as tracks.
         beyond: share of samples above the chi-square quantile of CONFIDENCE; 1 - CONFIDENCE if consistent.
-        rms: of the error's length.
+        rms: of the length of the error.
     """
 
     tracks: int
@@ -117,7 +118,7 @@ class Consistency:
 
 
 def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
-    """Of the errors (n, 2) and covariances (n, 2, 2) of each track."""
+    """From the errors (n, 2) and covariances (n, 2, 2) of each track."""
     each = [normalised(e, p) for e, p in zip(error, P, strict=True)]
     n, all_ = len(each), np.concatenate(each)
     low, high = chi2(DEGREES * n).ppf([(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]) / n
@@ -127,33 +128,33 @@ def consistency(error: Sequence[Float64], P: Sequence[Float64]) -> Consistency:
     return Consistency(n, len(all_), mean, median, float(low), float(high), beyond, rms)
 
 
-def study(all_lives: Sequence[Life]) -> dict[str, dict[str, Consistency]]:
-    """By kind: of the place, and of the motion of what moves."""
+def study(all_lives: Sequence[TrackLife]) -> dict[str, dict[str, Consistency]]:
+    """By kind: consistency of the position, and of the motion of moving bodies."""
     out: dict[str, dict[str, Consistency]] = {}
     for kind in sorted({life.kind for life in all_lives}):
         chosen = [life for life in all_lives if life.kind == kind]
-        place, motion = zip(*(errors(life) for life in chosen), strict=True)
-        out[kind] = {"place": consistency(place, [life.P[:, :2, :2] for life in chosen])}
+        position, motion = zip(*(errors(life) for life in chosen), strict=True)
+        out[kind] = {"position": consistency(position, [life.P[:, :2, :2] for life in chosen])}
         if kind.endswith("moving"):
             out[kind]["motion"] = consistency(motion, [life.P[:, 2:, 2:] for life in chosen])
     return out
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add_drives(parser)
-    arguments = parser.parse_args()
-    found: list[Life] = []
+    options = parser(__doc__)
+    add_drives(options)
+    arguments = options.parse_args()
+    found: list[TrackLife] = []
     for seed in range(*arguments.seeds):
         for scene in arguments.scene:
             stream = SyntheticStream(scene, arguments.sensor, arguments.seconds, seed)
             found += lives(stream, replay(stream, arguments.sensor, camera=arguments.fov == "camera"))
     for kind, parts in study(found).items():
         for part, c in parts.items():
-            line = {"tracks": c.tracks, "samples": c.samples, "nees": c.mean, "bounds": [c.low, c.high]}
-            line |= {"median": c.median, "beyond": c.beyond, "rms": c.rms}
-            rounded = {k: [round(b, 2) for b in v] if isinstance(v, list) else round(v, 3) for k, v in line.items()}
-            print(f"{kind:<22}{part:<8}", json.dumps(rounded))
+            line: dict[str, Any] = {"tracks": c.tracks, "samples": c.samples, "nees": round(c.mean, 3)}
+            line |= {"bounds": [round(c.low, 2), round(c.high, 2)], "median": round(c.median, 3)}
+            line |= {"beyond": round(c.beyond, 3), "rms": round(c.rms, 3)}
+            print(f"{kind:<22}{part:<9}", json.dumps(line))
 
 
 if __name__ == "__main__":

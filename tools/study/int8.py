@@ -1,13 +1,12 @@
-"""Does int8 pay? Quantise a model (static, per channel, QDQ) and compare scores and CPU time on real crops.
+"""Accuracy and CPU time of an int8 model (static, per channel, QDQ) against float32, on real crops.
 
     python -m tools.study.int8 MODEL.onnx CROPS.npz [--points N]
 
-Prints one JSON object. The calibration sees every other crop, the comparison the rest.
+Prints one JSON object. Every other crop is for the calibration, the rest for the comparison.
 """
 
 from __future__ import annotations
 
-import argparse
 import json
 import tempfile
 import time
@@ -22,35 +21,36 @@ from modt.classification.crops import Crops, canonical
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
 from modt.types import Float32, Float64, Int
+from tools.options import parser
 from tools.train.dataset import SHIPPED, Dataset, load
 from tools.train.scores import average_precision
 
 BATCH = 8
 
 
-def batches(data: Dataset, rows: Int, most: int) -> Iterator[tuple[Int, Float32]]:
-    """Batches of like sizes, as the classifier makes them."""
-    crops = canonical(thinned(data.take(rows), most), SensorConfig().height_m or 0.0)
+def batches(data: Dataset, rows: Int, max_points: int) -> Iterator[tuple[Int, Float32]]:
+    """Batches of crops of similar size, as in the classifier."""
+    crops = canonical(subsample_evenly(data.take(rows), max_points), SensorConfig().height_m or 0.0)
     order = np.argsort(crops.count, kind="stable")
     for first in range(0, len(order), BATCH):
         chosen = order[first : first + BATCH]
         yield chosen, crops.padded(chosen)
 
 
-def thinned(crops: Crops, most: int) -> Crops:
-    """At most so many points of each crop, evenly."""
-    kept = np.minimum(crops.count, most)
+def subsample_evenly(crops: Crops, limit: int) -> Crops:
+    """Subsample each crop at equal steps to at most `limit` points."""
+    kept = np.minimum(crops.count, limit)
     offsets = np.append(0, np.cumsum(kept))
     step = np.arange(offsets[-1]) - np.repeat(offsets[:-1], kept)
     inside = step * np.repeat(crops.count, kept) // np.repeat(kept, kept)
     return Crops(crops.xyz[np.repeat(crops.offsets[:-1], kept) + inside], offsets)
 
 
-class Reader(CalibrationDataReader):  # type: ignore[misc]
-    """Batches for the calibration."""
+class Reader(CalibrationDataReader):
+    """Batches for the calibration of the quantisation."""
 
-    def __init__(self, data: Dataset, rows: Int, most: int) -> None:
-        self._batches = batches(data, rows, most)
+    def __init__(self, data: Dataset, rows: Int, max_points: int) -> None:
+        self._batches = batches(data, rows, max_points)
 
     def get_next(self) -> dict[str, Float32] | None:
         """The next batch, None after the last."""
@@ -58,10 +58,10 @@ class Reader(CalibrationDataReader):  # type: ignore[misc]
         return None if following is None else {"points": following[1]}
 
 
-def run(net: PointNet, data: Dataset, rows: Int, most: int) -> tuple[Float64, float]:
-    """(R, 4) probabilities, and CPU time of a crop [ms]."""
+def run(net: PointNet, data: Dataset, rows: Int, max_points: int) -> tuple[Float64, float]:
+    """(R, 4) probabilities, and CPU time per crop [ms]."""
     out = np.zeros((len(rows), N_CLASSES))
-    prepared = list(batches(data, rows, most))
+    prepared = list(batches(data, rows, max_points))
     times = []
     for _ in range(3):
         before = time.thread_time_ns()
@@ -72,13 +72,13 @@ def run(net: PointNet, data: Dataset, rows: Int, most: int) -> tuple[Float64, fl
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("model", type=Path)
-    parser.add_argument("crops", type=Path)
-    parser.add_argument("--points", type=int, default=ClassificationConfig().max_points)
-    args = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("model", type=Path)
+    options.add_argument("crops", type=Path)
+    options.add_argument("--points", type=int, default=ClassificationConfig().max_points)
+    args = options.parse_args()
     data = load(args.crops)
-    shipped = np.flatnonzero((data.variant == SHIPPED) & data.clear)
+    shipped = np.flatnonzero((data.variant == SHIPPED) & data.trainable)
     report: dict[str, object] = {}
     with tempfile.TemporaryDirectory() as folder:
         small = Path(folder) / "int8.onnx"

@@ -1,13 +1,13 @@
-"""A drive segmented, followed by its truth and classified once, and played back for whatever comes after that.
+"""Recordings of drives up to the classifier, with true tracks, and their playback in a pipeline.
 
-So that only key views and fusion act, the tracker is an ideal one: a proposal goes to the true object that holds most
-of its points; of several, the one with the most points. What belongs to no object, and what broke off one, is
-followed by our own tracker; and so is everything where that is asked for.
+The tracker of a recording is an ideal one, so that only key views and fusion differ between replays: a proposal
+belongs to the true object that holds most of its points; of several, the one with the most points. Proposals of no
+object, and further fragments of one, are tracked by modt's own tracker; without `ideal` all proposals are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,27 +15,31 @@ import numpy as np
 from modt.classification.prior import Prior, object_probability_reaches
 from modt.config import ProfileConfig
 from modt.geometry import transform_boxes
+from modt.observations import Located, StaticTracks, observe
+from modt.odometry.odometry import Odometry
 from modt.pipeline import Classifier
+from modt.placement import Placement
 from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
-from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, Tracks
+from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks
 from tools.train.build_crops import label
 from tools.train.labelled_scans import Scan
 
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """What is known of one frame.
+class RecordedFrame:
+    """One frame of a recording.
 
     Attributes:
         proposals: its segments.
         box: (P, 7) their boxes in the world.
         track: (P,) row of the track of each.
-        prior: (P, 4) what is thought of each by its box.
-        likelihood: (P, 4) what the network says of each.
+        prior: (P, 4) class probabilities from the box.
+        likelihood: (P, 4) class probabilities from the network.
         kind: (P,) true class.
-        judged: (P,) clearly one object, or clearly none; of our own tracker pieces and mergers too, as background.
+        scored: (P,) clearly one object, or clearly none; without the ideal tracker fragments and merged objects too,
+            as background.
     """
 
     proposals: Proposals
@@ -44,7 +48,7 @@ class Moment:
     prior: Float64
     likelihood: Float64
     kind: Int
-    judged: Bool
+    scored: Bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,26 +56,26 @@ class Recording:
     """A drive.
 
     Attributes:
-        name: of it.
-        moments: frame by frame.
-        n_tracks: how many tracks they show.
-        pool_weight: of the box in what the network said.
+        name: of the drive.
+        frames: in order.
+        n_tracks: number of tracks.
+        pool_weight: weight of the box in the likelihood.
     """
 
     name: str
-    moments: tuple[Moment, ...]
+    frames: tuple[RecordedFrame, ...]
     n_tracks: int
     pool_weight: float = 0.0
 
     @property
     def n_proposals(self) -> int:
-        """Calls of tracking by detection, which classifies whatever it sees."""
-        return sum(len(moment.proposals) for moment in self.moments)
+        """Classifier calls of tracking by detection, which classifies every proposal."""
+        return sum(len(recorded.proposals) for recorded in self.frames)
 
-    def judged_from(self, points: int) -> Recording:
-        """The same drive, of which only proposals of so many points are judged."""
-        large = (replace(m, judged=m.judged & (m.proposals.count >= points)) for m in self.moments)
-        return replace(self, moments=tuple(large))
+    def scored_from(self, points: int) -> Recording:
+        """The recording with only proposals of at least `points` points scored."""
+        large = (replace(r, scored=r.scored & (r.proposals.count >= points)) for r in self.frames)
+        return replace(self, frames=tuple(large))
 
 
 def record(
@@ -83,116 +87,118 @@ def record(
     *,
     ideal: bool = True,
 ) -> Recording:
-    """Everything before fusion, once.
+    """Run segmentation, tracking and classification of all proposals on a drive.
 
     Args:
         name: of the drive.
-        drive: frames, and their labels with the objects' numbers.
-        config: of segmentation and of our own tracker.
-        network: that says what each proposal is.
-        prior: that says what it may be by its box.
-        ideal: objects are followed by the ideal tracker.
+        drive: frames, and their labels with track identities.
+        config: of segmentation and tracker.
+        network: classifies proposals.
+        prior: classifies proposals by their boxes.
+        ideal: objects have their true tracks.
     """
-    tracker = Tracker(config.tracking, ACCURATE)
+    odometry, tracker = Odometry(config.odometry), Tracker(config.tracking, ACCURATE)
     rows: dict[tuple[str, int], int] = {}
-    moments = []
+    frames = []
     for frame, scan in drive:
         proposals = Segmenter(config.segmentation, config.sensor, scan.fov).segment(frame.points)
-        own, proposals = tracker.follow(frame, proposals), tracker.proposals
+        located = odometry.locate(frame, proposals, tracker.static_tracks)
+        tracked = tracker.follow(frame.stamp_s, proposals, located)
+        own, proposals = tracked.tracks, tracked.proposals
         ids = own.id[own.row_of_proposal(len(proposals))]
         keys = [
             ("body", body) if ideal and body != NONE else ("track", i)
             for i, body in zip(ids.tolist(), owners(scan, proposals).tolist(), strict=True)
         ]
         labels = label(scan, proposals)
-        moments.append(
-            Moment(
+        frames.append(
+            RecordedFrame(
                 proposals=proposals,
-                box=transform_boxes(tracker.T_world_sensor, proposals.box),
+                box=transform_boxes(located.placement.T_world_sensor, proposals.box),
                 track=np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64),
                 prior=prior.probability(proposals),
                 likelihood=network.classify(frame.points, proposals, np.arange(len(proposals))),
                 kind=labels.kind,
-                judged=~labels.unknown & ~(labels.partial & ideal),
+                scored=~labels.unknown & ~(labels.partial & ideal),
             )
         )
-    return Recording(name, tuple(moments), len(rows), prior.pool_weight)
+    return Recording(name, tuple(frames), len(rows), prior.pool_weight)
 
 
 def owners(scan: Scan, proposals: Proposals) -> Int:
-    """(P,) number of the object that each proposal shows most of, NONE where it is of none or a lesser piece."""
+    """(P,) track identity of the object with most of a proposal's points; NONE without, and for smaller fragments."""
     of = proposals.label(len(scan.points))
     owner = np.full(len(proposals), NONE, np.int64)
-    for members, number in zip(scan.objects, scan.numbers, strict=True):
+    for members, track_id in zip(scan.objects, scan.track_ids, strict=True):
         own = of[members]
         shared = np.bincount(own[own != NONE], minlength=len(proposals))
-        pieces = np.flatnonzero(shared > 0.5 * proposals.count)
-        if len(pieces):
-            owner[pieces[shared[pieces].argmax()]] = number
+        fragments = np.flatnonzero(shared > 0.5 * proposals.count)
+        if len(fragments):
+            owner[fragments[shared[fragments].argmax()]] = track_id
     return owner
 
 
-class Player:
-    """Segmenter, tracker, classifier and prior of a pipeline, from a recording, frame by frame.
+class Playback:
+    """Segmenter, odometry, tracker, classifier and prior of a pipeline that return the data of a recording.
 
-    The table has a row for every track of the drive, before its birth and after its end as well.
+    The track table has a row for each track of the drive from the first frame on.
 
     Args:
-        recording: what to play.
-        ask_from: frames with a proposal before a track asks for a class.
+        recording: data to return.
+        min_hits: minimum number of frames with a proposal before a track is classified.
     """
 
     state_names = ("followed",)
 
-    def __init__(self, recording: Recording, ask_from: int) -> None:
-        self._moments = iter(recording.moments)
-        self._ask_from = ask_from
+    def __init__(self, recording: Recording, min_hits: int) -> None:
+        self._frames = iter(recording.frames)
+        self._min_hits = min_hits
         self.pool_weight = recording.pool_weight
         self._tracks = Tracks.blank(recording.n_tracks)
         self._tracks.id[:] = np.arange(recording.n_tracks)
 
-    @property
-    def proposals(self) -> Proposals:
-        """Those of the moment."""
-        return self._moment.proposals
-
     def segment(self, points: Float32) -> Proposals:
-        """The next frame's proposals."""
-        self._moment = next(self._moments)
-        return self._moment.proposals
+        """Advance to the next frame; its proposals."""
+        self._current = next(self._frames)
+        return self._current.proposals
 
-    def follow(self, frame: Frame, proposals: Proposals) -> Tracks:
-        """Each to its track."""
-        t, rows = self._tracks, self._moment.track
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+        """Placement at the origin; the recorded boxes are in the world."""
+        placement = Placement(np.eye(4))
+        return Located(placement, observe(proposals, placement.T_world_sensor))
+
+    def static_tracks(self) -> StaticTracks:
+        """Never called, since `locate` registers nothing."""
+        raise NotImplementedError
+
+    def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
+        """Update the track table; tracks with enough hits whose class is not final want a class."""
+        t, rows = self._tracks, self._current.track
         t.proposal[:] = NONE
         t.proposal[rows] = np.arange(len(rows))
-        t.box[rows], t.points[rows] = self._moment.box, proposals.count
+        t.box[rows], t.points[rows] = self._current.box, proposals.count
         t.hits[rows] += 1
         t.age += t.hits > 0
         t.missed = np.where(t.proposal == NONE, t.missed + 1, 0)
-        return t
+        return TrackedFrame(t, proposals, (t.proposal != NONE) & ~t.final & (t.hits >= self._min_hits))
 
-    def asking(self) -> Bool:
-        """(M,) tracks seen often enough, whose class is not settled."""
-        t = self._tracks
-        asks: Bool = (t.proposal != NONE) & ~t.final & (t.hits >= self._ask_from)
-        return asks
-
-    def settle(self, rows: Int, certain: Bool) -> None:
-        """Nothing: what is settled stands in the table already."""
+    def conclude(self, rows: Int, certain: Bool) -> Tracks:
+        """A certain class is final."""
+        self._tracks.final[rows] = certain
+        return self._tracks
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) what the network said when the drive was recorded."""
-        return self._moment.likelihood[which]
+        """(R, 4) recorded likelihoods."""
+        return self._current.likelihood[which]
 
     def probability(self, proposals: Proposals) -> Float64:
-        """(P, 4) what was thought of them then."""
-        return self._moment.prior
+        """(P, 4) recorded priors."""
+        return self._current.prior
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
-        """(M,) which may be objects by what was thought of them."""
+        """(M,) rows of priors (M, 4) with an object probability of at least `threshold`."""
         return object_probability_reaches(probability, threshold)
 
     def facts(self) -> dict[str, str]:
-        """No model runs."""
+        """Empty: no model runs."""
         return {}

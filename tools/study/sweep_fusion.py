@@ -1,4 +1,4 @@
-"""Sweep the parameters of key views and fusion over drives with truth, followed by an ideal tracker.
+"""Sweep the parameters of key views and fusion over drives with truth and an ideal tracker.
 
     python -m tools.study.sweep_fusion [--world SCENE:SEED ...] [--check SCENE:SEED ...] [--frames N]
                          [--points N] [--page FILE] [--docs]
@@ -6,24 +6,22 @@
     python -m tools.study.sweep_fusion --paper
     python -m tools.study.sweep_fusion --drive KITTI_RAW_DRIVE
 
-Each drive is segmented and classified once; every setting then replays the fusion of the runtime over what the
-network said. The defaults of the profile stand in every table; one value at a time is moved away from them. Average
-precision over the proposals that are clearly one object or clearly none, from the frame in which a class is asked
-for; calls relative to tracking by detection. No network was trained on the worlds (tools/train/build_models.py
-takes seeds from 100000 on). What --world suggests --check must confirm: these are other worlds.
+Each drive is segmented and classified once; every setting then replays the fusion on the recorded likelihoods. One
+value at a time is changed from the profile. Average precision is over the proposals that are clearly one object or
+clearly none, from the first frame in which a track may be classified; calls are relative to tracking by detection.
+The worlds are in no training data (tools.train.build_models takes seeds from 100000 on); those of --check validate
+the results of those of --world.
 
---own takes our own tracker in place of the ideal one, and pieces of objects and mergers for background. --paper is
-the setting of Figs. 10 and 11: asked from the first frame, the number of points alone makes a view independent, and a
-class that is settled stays so. --docs writes what belongs there into docs/classification.md.
+--own uses modt's tracker instead of the ideal one and counts fragments and merged objects as background. --paper is
+the setting of Figs. 10 and 11: classification from the first frame, views independent by their number of points
+alone, no review. --docs updates the tables of docs/classification.md.
 
-A KITTI drive with tracklets stands in for the worlds, in the camera's view. Drive 0001 is five scans, of those that
-pointnet-kitti was trained on. Drive 0005 is the test drive: it is refused unless --confirm is given, and then nothing
-is swept on it.
+--drive replaces the worlds by a KITTI drive with tracklets, in the camera's view. Drive 0001 has five scans, which
+are training data of pointnet-kitti. The test drive, 0005, requires --confirm, and no parameter is swept on it.
 """
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -44,10 +42,11 @@ from modt.reporting import page, svg
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Frame
+from tools.options import parser
+from tools.study.fusion_replay import Outcome, replay
 from tools.study.recording import Recording, record
-from tools.study.replayed import Outcome, replay
 from tools.train.labelled_scans import TEST_DRIVE, Scan, raw_scans
-from tools.train.synthetic_scans import scan_of
+from tools.train.synthetic_scans import labelled_scan
 
 WORLDS = ("street:2001", "street:2002", "crossing:2003")
 CHECKS = ("street:3001", "street:3002", "crossing:3003", "street:3004", "street:3005", "crossing:3006")
@@ -56,8 +55,8 @@ DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "log" / "fusion-sweep.
 BEGIN, END = "<!-- tools/study/sweep_fusion.py -->\n", "<!-- end of tools/study/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
 POINT_CHANGES = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
-ONCE = "first_view_min_object_probability"
-"""The one that is mode efficient's."""
+FIRST_VIEW_KEY = "first_view_min_object_probability"
+"""The only swept key of mode `efficient`."""
 SWEEPS: dict[str, tuple[float | None, ...]] = {
     "start_frame": (1, 2, 3, 4, 5, 6, 7, 8),
     "object_threshold": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98),
@@ -65,14 +64,14 @@ SWEEPS: dict[str, tuple[float | None, ...]] = {
     "review_point_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
     "review_max_points": (30, 50, 100, 200, 400, 800),
     "min_object_probability": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
-    ONCE: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
+    FIRST_VIEW_KEY: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
     "review_min_object_probability": (0.0, 0.02, 0.05, 0.1, 0.2),
     "box_update_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
     "mismatch_probability": (0.0, 0.03, 0.1, 0.2, 0.3),
 }
 NO_BETTER = "No setting is better on both sets at no more calls."
-DOUBTS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
-"""Ratio and points together: to doubt sooner costs calls, to doubt only what was seen far away saves them."""
+REVIEWS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
+"""(review_point_ratio, review_max_points): a smaller ratio costs calls, fewer points save them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +79,9 @@ class Setting:
     """A line of a table.
 
     Attributes:
-        sweep: the table.
-        value: what is different in it.
-        fusion: makes it.
+        sweep: title of the table.
+        value: the changed value.
+        fusion: makes the fusion from a prior.
     """
 
     sweep: str
@@ -91,8 +90,8 @@ class Setting:
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
-    """A setting and what became of the drives, and of those it is checked on, if any, with it."""
+class Trial:
+    """A setting with its outcome on the drives and on the checks, if any."""
 
     setting: Setting
     found: Outcome
@@ -100,77 +99,69 @@ class Tried:
 
     @property
     def outcomes(self) -> tuple[Outcome, ...]:
-        """Of both sets of drives."""
+        """On both sets of drives."""
         return (self.found,) if self.checked is None else (self.found, self.checked)
 
 
 def variants(config: FusionConfig) -> list[Setting]:
-    """The ways of the method, and the defaults without one of their parts each."""
+    """The modes, and the defaults with one part removed each."""
     uniform = dataclasses.replace(config, prior=(0.25, 0.25, 0.25))
     never = dataclasses.replace(config, review_point_ratio=None)
-    title = "what makes the difference"
+    title = "variant"
     return [
         Setting(title, "conventional", lambda prior: EveryFrame()),
         Setting(title, "first view (efficient)", lambda prior: FirstView(config, prior)),
-        Setting(title, "first view, boxes unseen", lambda prior: FirstView(config)),
-        Setting(title, "boxes unseen", lambda prior: KeyViews(config)),
-        Setting(title, "uniform prior of views", lambda prior: KeyViews(uniform, prior)),
-        Setting(title, "never doubting", lambda prior: KeyViews(never, prior)),
+        Setting(title, "first view, no box prior", lambda prior: FirstView(config)),
+        Setting(title, "no box prior", lambda prior: KeyViews(config)),
+        Setting(title, "uniform class prior", lambda prior: KeyViews(uniform, prior)),
+        Setting(title, "no review", lambda prior: KeyViews(never, prior)),
         Setting(title, "defaults", lambda prior: KeyViews(config, prior)),
     ]
 
 
 def sweeps(config: FusionConfig) -> Iterator[Setting]:
-    """One value at a time, the others as configured; of doubt both that there are."""
+    """One value changed at a time; for the review of final classes its two values together as well."""
     default = config.point_change
     for k, name in enumerate(CLASS_NAMES):
         for value in sorted({*POINT_CHANGES, default[k]}):
-            changes = {"point_change": (*default[:k], value, *default[k + 1 :])}
-            yield _moved(config, f"point_change of {name}", _text(value), **changes)
+            point_change = (*default[:k], value, *default[k + 1 :])
+            yield _changed(config, f"point_change of {name}", _text(value), point_change=point_change)
     for key, values in SWEEPS.items():
-        for moved in values:
-            yield _moved(config, key, _text(moved), **{key: moved})
-    for ratio, points in DOUBTS if config.review_point_ratio is not None else ():
+        for other in values:
+            yield _changed(config, key, _text(other), **{key: other})
+    for ratio, points in REVIEWS if config.review_point_ratio is not None else ():
         changes = {"review_point_ratio": ratio, "review_max_points": points}
-        yield _moved(config, "review_point_ratio, review_max_points", f"{ratio:g}, {points}", **changes)
+        yield _changed(config, "review_point_ratio, review_max_points", f"{ratio:g}, {points}", **changes)
 
 
-def _moved(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
-    moved = dataclasses.replace(config, **changes)
-    made = FirstView if sweep == ONCE else KeyViews
-    return Setting(sweep, f"{text} *" if moved == config else text, lambda prior: made(moved, prior))
+def _changed(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
+    changed = dataclasses.replace(config, **changes)
+    made = FirstView if sweep == FIRST_VIEW_KEY else KeyViews
+    return Setting(sweep, f"{text} *" if changed == config else text, lambda prior: made(changed, prior))
 
 
 def _text(value: float | None) -> str:
     return "none" if value is None else f"{value:g}"
 
 
-def papers(config: ProfileConfig) -> ProfileConfig:
-    """Views independent by their points alone, from the first frame on; no review, no box prior."""
-    off = {"extent_change": 10.0, "review_point_ratio": None}
-    off |= {
-        "min_object_probability": 0.0,
-        "first_view_min_object_probability": 0.0,
-        "box_update_weight": 0.0,
-        "mismatch_probability": 0.0,
-    }
-    return dataclasses.replace(
-        config,
-        fusion=dataclasses.replace(config.fusion, **off),
-        tracking=dataclasses.replace(config.tracking, ask_from=1),
-    )
+def paper_config(config: ProfileConfig) -> ProfileConfig:
+    """The paper's fusion: views independent by their number of points alone; no review, no box prior."""
+    off: dict[str, Any] = {"extent_change": 10.0}
+    off |= {"review_point_ratio": None, "min_object_probability": 0.0, "first_view_min_object_probability": 0.0}
+    off |= {"box_update_weight": 0.0, "mismatch_probability": 0.0}
+    return dataclasses.replace(config, fusion=dataclasses.replace(config.fusion, **off))
 
 
 def world(name: str, frames: int, config: ProfileConfig, network: PointNet, *, ideal: bool) -> Recording:
-    """A synthetic drive, scene:seed, in the nominal camera's view."""
+    """Record a simulated drive, SCENE:SEED, in the nominal camera's view."""
     scene, _, seed = name.partition(":")
     stream = SyntheticStream(scene, "hdl-64e", frames * PERIOD_S, int(seed))
-    drive = ((frame, scan_of(frame, truth, name, name, camera=True)) for frame, truth in stream.sweeps())
+    drive = ((frame, labelled_scan(frame, truth, name, name, camera=True)) for frame, truth in stream.sweeps())
     return record(name, drive, config, network, _prior(config, network), ideal=ideal)
 
 
 def real(path: Path, config: ProfileConfig, network: PointNet, *, ideal: bool, confirm: bool) -> Recording:
-    """A KITTI raw drive."""
+    """Record a KITTI raw drive."""
     drive: Iterator[tuple[Frame, Scan]] = zip(open_stream(path), raw_scans(path, confirm=confirm), strict=True)
     return record(path.name, drive, config, network, _prior(config, network), ideal=ideal)
 
@@ -179,23 +170,23 @@ def _prior(config: ProfileConfig, network: PointNet) -> Prior:
     return make_prior(network.boxes, network.reflectance, config.fusion.prior, config.sensor)
 
 
-def tried(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording], *when: int) -> Tried:
-    """One setting on both sets of drives; when: frames of ask_from and judged_from."""
-    checked = replay(checks, setting.fusion, *when) if checks else None
-    return Tried(setting, replay(drives, setting.fusion, *when), checked)
+def trial(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording]) -> Trial:
+    """Replay a setting on both sets of drives."""
+    checked = replay(checks, setting.fusion) if checks else None
+    return Trial(setting, replay(drives, setting.fusion), checked)
 
 
-def front(results: Sequence[Tried]) -> list[Tried]:
-    """Those that no other one beats in precision at as few calls, cheapest first."""
-    kept: list[Tried] = []
+def pareto_front(results: Sequence[Trial]) -> list[Trial]:
+    """Trials whose precision no other trial reaches with as few calls, by increasing calls."""
+    kept: list[Trial] = []
     for result in sorted(results, key=lambda r: (r.found.share, -r.found.mean)):
         if not kept or result.found.mean > kept[-1].found.mean:
             kept.append(result)
     return kept
 
 
-def better(results: Sequence[Tried], default: Tried) -> list[Tried]:
-    """Those more precise at no more calls than the default on every set of drives."""
+def improvements(results: Sequence[Trial], default: Trial) -> list[Trial]:
+    """Trials more precise than the default with no more calls on every set of drives."""
     return [
         result
         for result in results
@@ -206,8 +197,8 @@ def better(results: Sequence[Tried], default: Tried) -> list[Tried]:
     ]
 
 
-def table(title: str, results: Sequence[Tried], default: Tried, *, named: bool = False) -> str:
-    """A line for each setting: precision, calls, on how many drives it is better and worse than the default."""
+def table(title: str, results: Sequence[Trial], default: Trial, *, named: bool = False) -> str:
+    """Markdown table of trials: precision, calls, number of drives better and worse than the default."""
     head = [title, *OBJECTS, "mean", "calls", *(("mean, checked", "calls, checked") if default.checked else ())]
     rows = []
     for result in results:
@@ -217,8 +208,8 @@ def table(title: str, results: Sequence[Tried], default: Tried, *, named: bool =
     return aligned([*head, "better, worse"], rows)
 
 
-def spans(results: Sequence[Tried]) -> str:
-    """A line for each sweep: how far it moves mean precision and calls, and where precision is best."""
+def sensitivity(results: Sequence[Trial]) -> str:
+    """Markdown table of sweeps: range of mean precision and of calls, best value on each set of drives."""
     rows = []
     for sweep, members in by_sweep(results).items():
         mean = [100 * r.found.mean for r in members]
@@ -231,21 +222,21 @@ def spans(results: Sequence[Tried]) -> str:
     return aligned(head[: len(rows[0])] if rows else head, rows)
 
 
-def _best(members: Sequence[Tried], k: int) -> Tried:
-    """The most precise of a sweep on one set of drives, to the digit that is shown; the default among equals."""
+def _best(members: Sequence[Trial], k: int) -> Trial:
+    """The most precise trial on set k of drives, rounded as in the table; the default among equals."""
     return max(members, key=lambda r: (round(100 * r.outcomes[k].mean, 1), r.setting.value.endswith("*")))
 
 
-def by_sweep(results: Sequence[Tried]) -> dict[str, list[Tried]]:
-    """The settings of each sweep."""
-    parts: dict[str, list[Tried]] = {}
+def by_sweep(results: Sequence[Trial]) -> dict[str, list[Trial]]:
+    """Trials grouped by sweep."""
+    parts: dict[str, list[Trial]] = {}
     for result in results:
         parts.setdefault(result.setting.sweep, []).append(result)
     return parts
 
 
 def aligned(head: list[str], body: Sequence[list[str]]) -> str:
-    """A table for reading, and Markdown for the pages."""
+    """Markdown table with aligned columns."""
     rows = [head, ["---"] * len(head), *body]
     width = [max(len(row[k]) for row in rows) for k in range(len(head))]
     return "\n".join(
@@ -259,7 +250,7 @@ def _cells(outcome: Outcome) -> list[str]:
     return [*precision, f"{100 * outcome.mean:.1f}", f"{100 * outcome.share:.1f} %"]
 
 
-def _drives(result: Tried, default: Tried) -> str:
+def _drives(result: Trial, default: Trial) -> str:
     gain = np.subtract(
         [value for outcome in result.outcomes for value in outcome.each],
         [value for outcome in default.outcomes for value in outcome.each],
@@ -267,8 +258,8 @@ def _drives(result: Tried, default: Tried) -> str:
     return f"{np.count_nonzero(gain > 0)}, {np.count_nonzero(gain < 0)}"
 
 
-def drawn(results: Sequence[Tried], title: str, subtitle: str) -> str:
-    """A page with average precision against calls, sweep by sweep."""
+def sweep_page(results: Sequence[Trial], title: str, subtitle: str) -> str:
+    """HTML page with a plot of average precision against calls for each sweep."""
     items = []
     for sweep, members in by_sweep(results).items():
         calls = np.array([100 * r.found.share for r in members])
@@ -284,52 +275,53 @@ def drawn(results: Sequence[Tried], title: str, subtitle: str) -> str:
     return page.page(title, subtitle, [page.plots(items)])
 
 
-def report(first: Sequence[Tried], moved: Sequence[Tried], about: str) -> tuple[str, str]:
-    """What belongs into the docs, and everything; the defaults are the last of the first."""
+def report(first: Sequence[Trial], moved: Sequence[Trial], about: str) -> tuple[str, str]:
+    """Tables for the documentation, and all tables; the last of `first` is the default."""
     default = first[-1]
     total = max(sum(default.found.calls.values()), 1)
     reasons = ", ".join(f"{100 * n / total:.0f} are {why}" for why, n in default.found.calls.items())
     short = [about, table(first[0].setting.sweep, first, default), f"Of 100 calls {reasons}."]
     whole = [*short, *(table(sweep, members, default) for sweep, members in by_sweep(moved).items())]
     if moved:
-        winners = better(moved, default)
+        winners = improvements(moved, default)
         ends = [
-            spans(moved),
+            sensitivity(moved),
             table("better at no more calls", winners, default, named=True) if winners else NO_BETTER,
         ]
         short += ends
-        whole += [table("front of precision and calls", front([*first, *moved]), default, named=True), *ends]
+        front = pareto_front([*first, *moved])
+        whole += [table("Pareto front of precision and calls", front, default, named=True), *ends]
     return "\n\n".join(short), "\n\n".join(whole)
 
 
-def renewed(text: str, section: str) -> str:
-    """The document with this section between its marks."""
+def replace_section(text: str, section: str) -> str:
+    """The document with the text between its marks replaced."""
     before, rest = text.split(BEGIN)
     return f"{before}{BEGIN}\n{section}\n\n{END}{rest.split(END)[1]}"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--world", nargs="+", default=WORLDS, metavar="SCENE:SEED", help="to sweep over")
-    parser.add_argument("--check", nargs="*", default=CHECKS, metavar="SCENE:SEED", help="to confirm by")
-    parser.add_argument("--frames", type=int, default=60, help="of each world")
-    parser.add_argument("--drive", type=Path, help="a KITTI raw drive with tracklets in place of the worlds")
-    parser.add_argument("--confirm", action="store_true", help="open the test drive, to confirm what is settled")
-    parser.add_argument("--model", default="pointnet-kitti")
-    parser.add_argument("--profile", default=profile.DEFAULT)
-    parser.add_argument("--own", action="store_true", help="our own tracker in place of the ideal one")
-    parser.add_argument("--paper", action="store_true", help="as the paper swept alpha and the starting frame")
-    parser.add_argument("--points", type=int, default=0, help="judge only proposals of so many points or more")
-    parser.add_argument("--page", type=Path, help="draw precision against calls into this HTML file")
-    parser.add_argument("--docs", action="store_true", help="renew the figures of docs/classification.md")
-    args = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("--world", nargs="+", default=WORLDS, metavar="SCENE:SEED", help="drives to sweep over")
+    options.add_argument("--check", nargs="*", default=CHECKS, metavar="SCENE:SEED", help="drives for validation")
+    options.add_argument("--frames", type=int, default=60, help="of each world")
+    options.add_argument("--drive", type=Path, help="a KITTI raw drive with tracklets in place of the worlds")
+    options.add_argument("--confirm", action="store_true", help="allow the test drive, without sweeps")
+    options.add_argument("--model", default="pointnet-kitti")
+    options.add_argument("--profile", default=profile.DEFAULT)
+    options.add_argument("--own", action="store_true", help="modt's tracker instead of the ideal one")
+    options.add_argument("--paper", action="store_true", help="the setting of the paper's Figs. 10 and 11")
+    options.add_argument("--points", type=int, default=0, help="minimum points of a scored proposal")
+    options.add_argument("--page", type=Path, help="HTML file for plots of precision against calls")
+    options.add_argument("--docs", action="store_true", help="update the tables of docs/classification.md")
+    args = options.parse_args()
     testing = args.drive is not None and args.drive.resolve().name == TEST_DRIVE
     if testing and not args.confirm:
-        parser.error(f"{TEST_DRIVE} is the test drive: tune elsewhere, and give --confirm to confirm what is settled")
+        options.error(f"{TEST_DRIVE} is the test drive; sweep on another drive, or give --confirm for final scores")
     if args.docs and (args.own or args.paper or args.drive or args.points):
-        parser.error("--docs is of the whole sweep over worlds: leave out --own, --paper, --drive and --points")
+        options.error("--docs needs the whole sweep over worlds: leave out --own, --paper, --drive and --points")
     shipped = profile.load(args.profile)
-    config = papers(shipped) if args.paper else shipped
+    config = paper_config(shipped) if args.paper else shipped
     network = PointNet(dataclasses.replace(config.classification, model=args.model), config.sensor)
     if args.drive:
         drives, checks = [real(args.drive, config, network, ideal=not args.own, confirm=args.confirm)], []
@@ -338,18 +330,17 @@ def main() -> None:
             [world(name, args.frames, config, network, ideal=not args.own) for name in names]
             for names in (args.world, args.check)
         )
-    drives, checks = ([d.judged_from(args.points) for d in of] for of in (drives, checks))
-    when = config.tracking.ask_from, shipped.tracking.ask_from
-    first = [tried(setting, drives, checks, *when) for setting in variants(config.fusion)]
-    moved = [] if testing else [tried(setting, drives, checks, *when) for setting in sweeps(config.fusion)]
+    drives, checks = ([d.scored_from(args.points) for d in of] for of in (drives, checks))
+    first = [trial(setting, drives, checks) for setting in variants(config.fusion)]
+    moved = [] if testing else [trial(setting, drives, checks) for setting in sweeps(config.fusion)]
     about = f"`{network.path.stem}` ({network.sha256[:8]}) on {', '.join(d.name for d in drives)}"
     about += f";\nchecked on {', '.join(d.name for d in checks)}." if checks else "."
     short, whole = report(first, moved, about)
     print(whole)
     if args.docs:
-        DOCUMENT.write_text(renewed(DOCUMENT.read_text(encoding="utf-8"), short), encoding="utf-8")
+        DOCUMENT.write_text(replace_section(DOCUMENT.read_text(encoding="utf-8"), short), encoding="utf-8")
     if args.page:
-        page.save(args.page, drawn(moved, "Fusion: precision against calls", about))
+        page.save(args.page, sweep_page(moved, "Fusion: precision against calls", about))
 
 
 if __name__ == "__main__":

@@ -1,13 +1,12 @@
-"""A synthetic drive through the pipeline, frame by frame beside its truth."""
+"""Replay of a simulated drive through the pipeline, with the truth of each frame."""
 
 from __future__ import annotations
 
 from argparse import ArgumentParser
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from modt.tracking.background_map import BackgroundMap, NoBackgroundMap
 
 from modt import assembly
 from modt.cli.replay import frames as number_range
@@ -16,60 +15,48 @@ from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.simulation.simulator import Truth
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.tracking.tracker import Tracker
-from modt.types import NONE, FrameResult, Int, Proposals
+from modt.types import NONE, Float64, FrameResult, Int, Proposals
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
-    """A frame's result and what is true of it.
+class JudgedFrame:
+    """Result and truth of a frame.
 
     Attributes:
         result: of the pipeline.
-        truth: about the sweep.
-        body: (P,) the body that most points of each proposal are of, NONE for the ground.
-        share: (P,) of its points that are.
-        tracker: after the frame.
+        truth: of the sweep.
+        body: (P,) body with most points of each proposal, NONE for the ground.
+        share: (P,) of its points on that body.
     """
 
     result: FrameResult
     truth: Truth
     body: Int
-    share: np.ndarray
-    tracker: Tracker
+    share: Float64
 
 
 def add_drives(parser: ArgumentParser) -> None:
-    """Options that say which synthetic drives to study."""
+    """Add the options that select simulated drives."""
     parser.add_argument("--scene", nargs="+", default=["street", "crossing"])
-    parser.add_argument("--sensor", default="hdl-64e", help="there must be a profile of its name")
+    parser.add_argument("--sensor", default="hdl-64e", help="sensor with a profile of the same name")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
     parser.add_argument("--fov", choices=("camera", "full"), default="full")
 
 
-def replay(
-    stream: SyntheticStream,
-    profile_name: str,
-    *,
-    mode_name: str = "efficient",
-    camera: bool = False,
-    background_map: NoBackgroundMap | BackgroundMap | None = None,
-) -> Iterator[Seen]:
-    """Every frame; the profile is that of the sensor, the memory the tracker's own where none is given."""
-    profile, mode = load(profile_name), assembly.MODES[mode_name]
+def replay(stream: SyntheticStream, profile_name: str, *, camera: bool = False) -> Iterator[JudgedFrame]:
+    """Run a stream in mode `efficient`, in the camera's view or over the full circle."""
+    profile, mode = load(profile_name), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
     pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
-    tracker = Tracker(profile.tracking, mode.machine, background_map=background_map)
-    pipeline = replace(pipeline, tracker=tracker)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, mode.budget(profile))
-        yield Seen(result, truth, *majority_bodies(result.proposals, truth.instance), tracker)
+        yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance))
 
 
-def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, np.ndarray]:
-    """(P,) body that most points of each proposal are of, NONE for the ground, and (P,) their share."""
+def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, Float64]:
+    """(P,) body with most points of each proposal, NONE for the ground, and (P,) its share of the points."""
     n = len(proposals)
     if not n:
         return np.zeros(0, np.int64), np.zeros(0)

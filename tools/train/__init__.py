@@ -1,0 +1,1 @@
+"""Data sets of crops, and training and export of the classifiers."""

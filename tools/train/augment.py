@@ -1,7 +1,7 @@
-"""Multiplies real crops honestly: other ranges at the sensor's resolution, occluders, sizes, slopes, dropped returns.
+"""Augmentation of crops: range, sensor resolution, occlusion, size, heading, slope, dropped returns.
 
-Everything happens in the sensor frame, where ranges and beams mean something, and to background as to objects, so
-that no trace of the augmentation tells a class.
+All transforms act in the sensor frame, where ranges and beams are defined, and on every class alike, so that no
+artefact of the augmentation reveals the class.
 """
 
 from __future__ import annotations
@@ -16,29 +16,29 @@ from modt.types import Bool, Float64, Int
 from tools.train.dataset import SENSOR_HEIGHT_M
 
 MAX_RANGE_M = 75.0
-FEWEST = 6
-"""Points that an augmented crop must keep; it is left whole otherwise."""
+MIN_POINTS = 6
+"""Minimum number of points of an augmented crop; a step that would leave fewer is skipped."""
 
 
 @dataclass(frozen=True)
 class Beams:
-    """Angular resolution of the sensor that is imitated."""
+    """Angular resolution of the simulated sensor."""
 
     azimuth_deg: float = 0.17
     elevation_deg: float = 0.42
 
 
 def augment(crops: Crops, beams: Beams, rng: Generator) -> Crops:
-    """Each crop seen anew."""
+    """Augment each crop once."""
     n, count = len(crops), crops.count
     owner = np.repeat(np.arange(n), count)
     xyz = crops.xyz.astype(np.float64)
     centre = np.stack([np.add.reduceat(xyz[:, k], crops.offsets[:-1]) / count for k in range(3)], axis=1)
-    xyz = _reshape(xyz, centre, owner, rng)
-    xyz = _move(xyz, centre, owner, rng)
-    keep = _at_resolution(xyz, owner, beams, rng)
-    keep = _unless_lost(keep, _shadow(xyz, owner, keep, n, rng), owner, n)
-    keep = _unless_lost(keep, rng.random(len(owner)) < 1 - rng.uniform(0, 0.35, n)[owner] ** 1.5, owner, n)
+    xyz = _deform(xyz, centre, owner, rng)
+    xyz = _change_range(xyz, centre, owner, rng)
+    keep = _one_return_per_beam(xyz, owner, beams, rng)
+    keep = _keep_enough(keep, _occlude(xyz, owner, keep, n, rng), owner, n)
+    keep = _keep_enough(keep, rng.random(len(owner)) < 1 - rng.uniform(0, 0.35, n)[owner] ** 1.5, owner, n)
     xyz += rng.normal(0, 0.012, xyz.shape)
     rho = np.hypot(*centre[:, :2].T)
     xyz[:, 2] += (rng.normal(0, 1, n) * (0.05 + 0.004 * rho))[owner]
@@ -47,36 +47,36 @@ def augment(crops: Crops, beams: Beams, rng: Generator) -> Crops:
     )
 
 
-def limit(crops: Crops, most: int, rng: Generator) -> Crops:
-    """At most so many points of each crop, drawn at random."""
+def subsample(crops: Crops, limit: int, rng: Generator) -> Crops:
+    """Subsample each crop at random to at most `limit` points."""
     owner = np.repeat(np.arange(len(crops)), crops.count)
     order = np.lexsort((rng.random(len(owner)), owner))
-    kept = np.sort(order[np.arange(len(owner)) - crops.offsets[:-1][owner] < most])
-    return Crops(crops.xyz[kept], np.append(0, np.cumsum(np.minimum(crops.count, most))))
+    kept = np.sort(order[np.arange(len(owner)) - crops.offsets[:-1][owner] < limit])
+    return Crops(crops.xyz[kept], np.append(0, np.cumsum(np.minimum(crops.count, limit))))
 
 
-def _reshape(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
-    """Mirrored about the line of sight, turned a little, of another size."""
+def _deform(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
+    """Mirror about the line of sight, rotate slightly, scale."""
     n = len(centre)
     bearing = np.arctan2(centre[:, 1], centre[:, 0])
-    local = _turn(xyz - np.c_[centre[:, :2], np.zeros(n)][owner], -bearing[owner])
+    local = _rotate(xyz - np.c_[centre[:, :2], np.zeros(n)][owner], -bearing[owner])
     local[:, 1] *= rng.choice([-1.0, 1.0], n)[owner]
-    local = _turn(local, rng.normal(0, np.deg2rad(6), n)[owner])
+    local = _rotate(local, rng.normal(0, np.deg2rad(6), n)[owner])
     size = rng.uniform(0.9, 1.1, n)
     local[:, :2] *= size[owner, None]
     ground = -SENSOR_HEIGHT_M
     local[:, 2] = ground + (local[:, 2] - ground) * (size * rng.uniform(0.96, 1.04, n))[owner]
-    out: Float64 = _turn(local, bearing[owner]) + np.c_[centre[:, :2], np.zeros(n)][owner]
+    out: Float64 = _rotate(local, bearing[owner]) + np.c_[centre[:, :2], np.zeros(n)][owner]
     return out
 
 
-def _turn(xyz: Float64, angle: Float64) -> Float64:
+def _rotate(xyz: Float64, angle: Float64) -> Float64:
     c, s = np.cos(angle), np.sin(angle)
     return np.stack([c * xyz[:, 0] - s * xyz[:, 1], s * xyz[:, 0] + c * xyz[:, 1], xyz[:, 2]], axis=1)
 
 
-def _move(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
-    """To another range along the line of sight; mostly farther, since no point can be added."""
+def _change_range(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
+    """Translate along the line of sight; mostly away from the sensor, since no point can be added."""
     rho = np.hypot(*centre[:, :2].T)
     farthest = np.clip(MAX_RANGE_M / rho, 1.0, 4.0)
     factor = np.where(rng.random(len(rho)) < 0.6, farthest ** rng.random(len(rho)), rng.uniform(0.9, 1.05, len(rho)))
@@ -85,8 +85,8 @@ def _move(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
     return moved
 
 
-def _at_resolution(xyz: Float64, owner: Int, beams: Beams, rng: Generator) -> Bool:
-    """One return a beam: of the points that a beam of the sensor would hit, one is kept."""
+def _one_return_per_beam(xyz: Float64, owner: Int, beams: Beams, rng: Generator) -> Bool:
+    """(K,) mask with one random point for each cell of azimuth and elevation."""
     azimuth = np.rad2deg(np.arctan2(xyz[:, 1], xyz[:, 0])) / beams.azimuth_deg
     elevation = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))) / beams.elevation_deg
     phase = rng.random((owner.max(initial=0) + 1, 2)) if len(owner) else np.zeros((0, 2))
@@ -97,17 +97,17 @@ def _at_resolution(xyz: Float64, owner: Int, beams: Beams, rng: Generator) -> Bo
     _, first = np.unique(key[order], return_index=True)
     keep = np.zeros(len(key), np.bool_)
     keep[order[first]] = True
-    return _unless_lost(np.ones(len(key), np.bool_), keep, owner, int(owner.max(initial=-1)) + 1)
+    return _keep_enough(np.ones(len(key), np.bool_), keep, owner, int(owner.max(initial=-1)) + 1)
 
 
-def _shadow(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Bool:
-    """What an occluder leaves: a part cut off at one side, at the foot or at the top, or a post in between."""
+def _occlude(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Bool:
+    """(K,) mask of points left by an occluder: one side, the foot or the top cut off, or a post in front."""
     across = np.arctan2(xyz[:, 1], xyz[:, 0])
     kind = rng.choice(5, n, p=[0.5, 0.28, 0.1, 0.05, 0.07])
     cut = rng.uniform(0.1, 0.65, n)
     left = rng.random(n) < 0.5
-    a = _rank(across, owner, keep, n)
-    z = _rank(xyz[:, 2], owner, keep, n)
+    a = _relative_position(across, owner, keep, n)
+    z = _relative_position(xyz[:, 2], owner, keep, n)
     side = np.where(left[owner], a, 1 - a) > cut[owner]
     foot, top = z > cut[owner], z < 1 - 0.5 * cut[owner]
     post = np.abs(a - (0.2 + 0.6 * cut)[owner]) > 0.08
@@ -115,17 +115,17 @@ def _shadow(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Boo
     return chosen
 
 
-def _rank(value: Float64, owner: Int, keep: Bool, n: int) -> Float64:
-    """Where each value stands between its crop's least (0) and greatest (1)."""
+def _relative_position(value: Float64, owner: Int, keep: Bool, n: int) -> Float64:
+    """(K,) values scaled to 0 (minimum of the crop) to 1 (maximum)."""
     low, high = np.full(n, np.inf), np.full(n, -np.inf)
     np.minimum.at(low, owner[keep], value[keep])
     np.maximum.at(high, owner[keep], value[keep])
-    rank: Float64 = (value - low[owner]) / np.maximum(high - low, 1e-6)[owner]
-    return rank
+    scaled: Float64 = (value - low[owner]) / np.maximum(high - low, 1e-6)[owner]
+    return scaled
 
 
-def _unless_lost(keep: Bool, further: Bool, owner: Int, n: int) -> Bool:
-    """Keep further what still leaves enough of its crop."""
+def _keep_enough(keep: Bool, further: Bool, owner: Int, n: int) -> Bool:
+    """(K,) `keep & further` for crops with at least MIN_POINTS of it, else `keep`."""
     both = keep & further
-    enough = np.bincount(owner[both], minlength=n) >= FEWEST
+    enough = np.bincount(owner[both], minlength=n) >= MIN_POINTS
     return np.where(enough[owner], both, keep)

@@ -1,4 +1,4 @@
-"""What the boxes of crops say, as those of the proposals that they are cut from do at run time."""
+"""Box features of crops, computed as those of proposals at run time."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from tools.train.augment import Beams
 from tools.train.dataset import SENSOR_HEIGHT_M, Dataset
 
 CHUNK = 2000
-"""Crops described at a time."""
+"""Crops processed at a time."""
 
 
-def described(crops: Crops) -> Float64:
-    """(R, 7) features of the boxes about crops."""
+def crop_features(crops: Crops) -> Float64:
+    """(R, 7) features of the boxes fitted to crops."""
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
     box = upright_boxes(x, y, z, groups, fit_headings(x, y, groups, BoxConfig().noise_m))
@@ -27,6 +27,6 @@ def described(crops: Crops) -> Float64:
     return box_features(crops.count, box, SENSOR_HEIGHT_M, beam_sr)
 
 
-def all_described(data: Dataset, rows: Int) -> Float64:
-    """(R, 7) features of these rows as they are."""
-    return np.concatenate([described(data.take(rows[i : i + CHUNK])) for i in range(0, len(rows), CHUNK)])
+def dataset_features(data: Dataset, rows: Int) -> Float64:
+    """(R, 7) features of rows of a data set, without augmentation."""
+    return np.concatenate([crop_features(data.take(rows[i : i + CHUNK])) for i in range(0, len(rows), CHUNK)])

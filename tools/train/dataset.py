@@ -1,4 +1,4 @@
-"""The data set of crops, as tools/train/build_crops.py writes it."""
+"""Data sets of crops, as written by build_crops and build_synthetic_crops."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from modt.classification.crops import Crops
 from modt.types import NONE, Bool, Float64, Int
 
 SHIPPED, CLUSTERED, PASTED, SYNTHETIC, UNLABELLED = range(5)
-"""Variants: real scans as the segmentation that ships cuts them up; cut up otherwise, pasted and synthetic ones are
-there for training alone, and so is what nobody labelled."""
+"""Variants of crops: real scans under the default segmentation; real scans under other cell sizes; real scans with
+pasted objects; synthetic sweeps; unlabelled parts of real scans. All but the first are for training alone."""
 
 SENSOR_HEIGHT_M = 1.73
-"""Of KITTI's, which the synthetic sensors stand at as well."""
-APART = ("offsets", "provenance")
+"""Height of the sensor above the ground in KITTI and in the simulation."""
+NOT_CONCATENATED = ("offsets", "provenance")
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,12 @@ class Dataset:
     """Labelled crops in the sensor frame.
 
     Attributes:
-        crops: all of them, and label, partial, unknown, tall, variant, drive: (R,) of each.
-        reflectance: (R, 5) of their returns where they were measured; NaN where unknown or of another sensor.
-        truth_label, truth_drive: of each labelled object, seen by the segmentation or not.
-        provenance: how each file was made.
+        crops: R crops.
+        label, partial, unknown, tall: (R,) as in tools.train.build_crops.Labels.
+        variant, drive: (R,) of each crop.
+        reflectance: (R, 5) statistics of the returns; NaN where unknown or measured by another sensor.
+        truth_label, truth_drive: (T,) of each labelled object, those missed by the segmentation included.
+        provenance: options and counts of each file.
         sha256: of each file.
     """
 
@@ -52,12 +54,12 @@ class Dataset:
         return len(self.label)
 
     @property
-    def clear(self) -> Bool:
-        """(R,) what can be learnt from: objects, and what is known to be none."""
+    def trainable(self) -> Bool:
+        """(R,) whole objects, and known background."""
         return ~self.partial & ((self.label > 0) | ~self.unknown)
 
     def take(self, rows: Int) -> Crops:
-        """Crops of these rows."""
+        """Crops of rows (R,)."""
         count = self.crops.count[rows]
         offsets = np.append(0, np.cumsum(count))
         return Crops(
@@ -67,12 +69,12 @@ class Dataset:
 
 
 def load(*paths: Path) -> Dataset:
-    """Read data sets and put them together."""
+    """Read and concatenate data sets."""
     parts = []
     for path in paths:
         with np.load(path) as file:
             parts.append({key: file[key] for key in file.files})
-    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key not in APART}
+    joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key not in NOT_CONCATENATED}
     count = np.concatenate([np.diff(part["offsets"]) for part in parts])
     _, drive = np.unique(np.concatenate([joined["drive"], joined["truth_drive"]]), return_inverse=True)
     n = len(joined["label"])
@@ -93,15 +95,15 @@ def load(*paths: Path) -> Dataset:
 
 
 def folds(data: Dataset, k: int) -> Int:
-    """Fold of each drive, objects of the rare classes spread evenly; NONE where nothing is judged: always learnt."""
-    counted = len(data.truth_drive) > 0
-    drive, label = (data.truth_drive, data.truth_label) if counted else (data.drive, data.label)
+    """(D,) fold of each drive, rare classes balanced over folds; NONE for drives used in every training set."""
+    has_truth = len(data.truth_drive) > 0
+    drive, label = (data.truth_drive, data.truth_label) if has_truth else (data.drive, data.label)
     weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
     np.add.at(weight, (drive, label), 1.0)
     weight /= weight.sum(axis=0).clip(1)
-    load_of, fold = np.zeros((k, N_CLASSES)), np.full(len(weight), NONE)
-    judged = np.unique(data.drive[data.variant == data.variant.min()])
-    for drive in judged[np.argsort(-weight[judged].max(axis=1), kind="stable")]:
-        fold[drive] = np.argmin((load_of + weight[drive]).max(axis=1) + load_of.sum(axis=1) * 1e-3)
-        load_of[fold[drive]] += weight[drive]
+    load, fold = np.zeros((k, N_CLASSES)), np.full(len(weight), NONE)
+    validation = np.unique(data.drive[data.variant == data.variant.min()])
+    for drive in validation[np.argsort(-weight[validation].max(axis=1), kind="stable")]:
+        fold[drive] = np.argmin((load + weight[drive]).max(axis=1) + load.sum(axis=1) * 1e-3)
+        load[fold[drive]] += weight[drive]
     return fold

@@ -2,17 +2,15 @@
 
     python -m tools.train.export_pointnet TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
 
-TRAINED_DIR is what train_pointnet, train_boxes and, where there is any, train_reflectance wrote. What boxes and
- reflectance say goes into the metadata.
+TRAINED_DIR holds the output of train_pointnet, train_box_classifier and, optionally, train_reflectance_classifier.
+The layers of the box and the reflectance classifier are stored in the model's metadata.
 
-Two identities make the exported graph cheap without changing a digit that matters: the maximum commutes with adding a
-bias and with ReLU, so both come after it, on one row instead of one a point; and it is idempotent, so that the point
-axis may be as long as a proposal has points. Batch and point axes are dynamic.
+The maximum over points commutes with adding a bias and with ReLU, so the exported graph applies both after it, to one
+row instead of one for each point. Batch and point axes are dynamic.
 """
 
 from __future__ import annotations
 
-import argparse
 import hashlib
 import json
 from pathlib import Path
@@ -23,6 +21,7 @@ from onnx import TensorProto, helper, numpy_helper
 
 from modt.classes import CLASS_NAMES
 from modt.classification import box_classifier, reflectance_classifier
+from tools.options import parser
 from tools.train.weights import Layer, load_layers
 
 N_SHARED = 3
@@ -30,8 +29,9 @@ OPSET, IR = 17, 8
 
 
 def graph(layers: list[Layer], *, pool_first: bool = True) -> onnx.ModelProto:
-    """The network; with pool_first False the textbook order, bias and ReLU on every point."""
-    nodes, value = [], "points"
+    """The ONNX graph; without `pool_first` in the textbook order, bias and ReLU applied to every point."""
+    value = "points"
+    nodes: list[onnx.NodeProto] = []
     initial: list[TensorProto] = []
 
     def add(op: str, *extra: str, **attributes: Any) -> None:
@@ -67,7 +67,7 @@ def graph(layers: list[Layer], *, pool_first: bool = True) -> onnx.ModelProto:
 
 
 def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str) -> str:
-    """What a user must know of a model."""
+    """Model card in Markdown."""
     lines = [
         f"# {name}",
         "",
@@ -84,7 +84,7 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
             f"- crops: {made['scans']} scans, {_tally(made)}; sha256 {digest}"
             for made, digest in zip(report["provenance"], report["crops_sha256"], strict=True)
         ),
-        f"- training: tools/train/train_pointnet.py, seed {report['seed']}, {report['epochs']} epochs, "
+        f"- training: tools.train.train_pointnet, seed {report['seed']}, {report['epochs']} epochs, "
         f"{report['teachers']} teachers, torch {report['torch']}, {report['cpu_s']} s on one core",
         f"- calibration: temperature {report['calibration']['temperature']}, "
         f"class offsets {report['calibration']['offset']}",
@@ -93,13 +93,13 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
     if "cross_validation" in report:
         lines += ["## Out of fold (drives never split)", "", *_scores(report["cross_validation"])]
     if "reflectance" in report:
-        lines += ["## With box and reflectance, out of fold", "", *_reflected(report["reflectance"])]
-    lines += ["## The box alone, out of fold", "", *_ruled_out(report["boxes"])]
+        lines += ["## With box and reflectance, out of fold", "", *_reflectance_section(report["reflectance"])]
+    lines += ["## The box alone, out of fold", "", *_box_section(report["boxes"])]
     return "\n".join(lines)
 
 
 def _tally(made: dict[str, Any]) -> str:
-    """Background, car, pedestrian, cyclist of each variant, and how many nobody labelled."""
+    """Crops by class (background/car/pedestrian/cyclist) and variant, and unlabelled crops."""
     tally = [f"{'/'.join(map(str, n))} {name}" for name, n in made["crops"].items() if sum(n)]
     return ", ".join([*tally, f"{made['unlabelled']} unlabelled"] if made["unlabelled"] else tally)
 
@@ -108,7 +108,7 @@ def _scores(scores: dict[str, Any]) -> list[str]:
     precision, objects = scores["average_precision"], scores["objects"]
     rows = [f"| {c} | {objects[c]} | {100 * precision[c]:.1f} % |" for c in CLASS_NAMES[1:]]
     return [
-        "Average precision over proposals; an object that the segmentation missed is a false negative.",
+        "Average precision over proposals; objects missed by the segmentation count as false negatives.",
         "",
         "| class | objects | AP |",
         "|---|---|---|",
@@ -116,50 +116,50 @@ def _scores(scores: dict[str, Any]) -> list[str]:
         "",
         f"Expected calibration error {scores['ece']} (before calibration {scores['ece_uncalibrated']}).",
         "",
-        *_confused(scores["confusion"]),
+        *_confusion_table(scores["confusion"]),
     ]
 
 
-def _confused(confusion: list[list[int]]) -> list[str]:
-    called = [f"| {c} | " + " | ".join(map(str, row)) + " |" for c, row in zip(CLASS_NAMES, confusion, strict=True)]
-    return ["| true, called | " + " | ".join(CLASS_NAMES) + " |", "|---|" + "---|" * len(CLASS_NAMES), *called, ""]
+def _confusion_table(confusion: list[list[int]]) -> list[str]:
+    rows = [f"| {c} | " + " | ".join(map(str, row)) + " |" for c, row in zip(CLASS_NAMES, confusion, strict=True)]
+    return ["| true, predicted | " + " | ".join(CLASS_NAMES) + " |", "|---|" + "---|" * len(CLASS_NAMES), *rows, ""]
 
 
 def _listed(precision: dict[str, float]) -> str:
     return ", ".join(f"{name} {100 * value:.1f} %" for name, value in precision.items())
 
 
-def _reflected(told: dict[str, Any]) -> list[str]:
-    shape = told["network"]
+def _reflectance_section(report: dict[str, Any]) -> list[str]:
+    pool = report["network"]
     return [
-        f"What the returns' reflectance says (modt.classification.reflectance_classifier), in the metadata, on the "
-        f"scale of an {told['sensor']}; not looked at elsewhere.",
+        f"Reflectance classifier (modt.classification.reflectance_classifier) in the metadata, for the sensor "
+        f"{report['sensor']}; not applied to other sensors.",
         "",
-        f"- the network to the power of {1 - told['share']:.2f}, the box to that of {told['share']} and the "
-        f"reflectance to that of {told['weight']}: average precision {_listed(shape['average_precision'])}, "
-        f"calibration error {shape['ece']}, log loss {shape['log_loss']} ({shape['log_loss_without']} by shape)",
-        f"- without reflectance the network to the power of {1 - told['share_without']:.2f} and the box to that of "
-        f"{told['share_without']}",
-        f"- the box and all of it: average precision {_listed(told['box']['average_precision'])}",
+        f"- log-linear pool, network to the power {1 - report['share']:.2f}, box {report['share']}, reflectance "
+        f"{report['weight']}: average precision {_listed(pool['average_precision'])}, calibration error "
+        f"{pool['ece']}, log loss {pool['log_loss']} ({pool['log_loss_without']} for the network alone)",
+        f"- pool without reflectance: network to the power {1 - report['share_without']:.2f}, box "
+        f"{report['share_without']}",
+        f"- box and reflectance: average precision {_listed(report['box']['average_precision'])}",
         "",
-        *_confused(shape["confusion"]),
-        "By box and reflectance an object with less than the probability in the first column:",
+        *_confusion_table(pool["confusion"]),
+        "Share of each class whose object probability from box and reflectance is below the first column:",
         "",
-        *_thresholds(told["box"]["ruled_out"]),
+        *_threshold_table(report["box"]["ruled_out"]),
     ]
 
 
-def _ruled_out(boxes: dict[str, Any]) -> list[str]:
+def _box_section(boxes: dict[str, Any]) -> list[str]:
     return [
-        f"What a box says (modt.classification.box_classifier), in the metadata; average precision "
+        f"Box classifier (modt.classification.box_classifier) in the metadata; average precision "
         f"{_listed(boxes['average_precision'])}.",
-        "By its box an object with less than the probability in the first column:",
+        "Share of each class whose object probability from the box is below the first column:",
         "",
-        *_thresholds(boxes["ruled_out"]),
+        *_threshold_table(boxes["ruled_out"]),
     ]
 
 
-def _thresholds(ruled_out: list[dict[str, Any]]) -> list[str]:
+def _threshold_table(ruled_out: list[dict[str, Any]]) -> list[str]:
     rows = [
         f"| {row['likely']} | " + " | ".join(f"{100 * row['share'][c]:.1f} %" for c in CLASS_NAMES) + " |"
         for row in ruled_out
@@ -168,26 +168,26 @@ def _thresholds(ruled_out: list[dict[str, Any]]) -> list[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("trained", type=Path, help="folder that tools/train/train_pointnet.py wrote")
-    parser.add_argument("out", type=Path, help="model to write (.onnx); its card goes beside it (.md)")
-    parser.add_argument("--data", required=True, help="what it was trained on, for the card")
-    parser.add_argument("--licence", required=True)
-    args = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("trained", type=Path, help="folder written by tools.train.train_pointnet")
+    options.add_argument("out", type=Path, help="model to write (.onnx), with its card beside it (.md)")
+    options.add_argument("--data", required=True, help="description of the training data, for the card")
+    options.add_argument("--licence", required=True)
+    args = options.parse_args()
     network = graph(load_layers(args.trained / "weights.npz"))
     report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
     report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
-    held, share = {}, 0.0
+    metadata, share = {}, 0.0
     if (args.trained / "reflectance.json").exists():
-        told = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
-        report["reflectance"] = told
+        fused = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
+        report["reflectance"] = fused
         layers = load_layers(args.trained / "reflectance.npz")
-        held[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
-            layers, told["share"], told["weight"], told["sensor"]
+        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
+            layers, fused["share"], fused["weight"], fused["sensor"]
         )
-        share = told["share_without"]
-    held[box_classifier.METADATA_KEY] = box_classifier.to_metadata(load_layers(args.trained / "boxes.npz"), share)
-    helper.set_model_props(network, held)
+        share = fused["share_without"]
+    metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(load_layers(args.trained / "boxes.npz"), share)
+    helper.set_model_props(network, metadata)
     model = network.SerializeToString(deterministic=True)
     args.out.write_bytes(model)
     text = card(args.out.stem, hashlib.sha256(model).hexdigest(), report, args.data, args.licence)

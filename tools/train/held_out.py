@@ -1,4 +1,4 @@
-"""What is said of crops by models that never saw their drives."""
+"""Out-of-fold predictions: each validation crop by a model trained without its drive."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ import numpy as np
 from modt.classes import N_CLASSES
 from modt.types import Bool, Float64, Int
 from tools.train.dataset import Dataset, folds
-from tools.train.temperature import Calibration, fit
+from tools.train.temperature_scaling import Calibration, fit_calibration
 
 Model = Callable[[Int], Float64]
-"""(R, 4) logits of rows."""
+"""Maps rows (R,) to logits (R, 4)."""
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What was said of the crops that are judged, those of real scans where there are any.
+    """Predictions for the validation crops: those of real scans where the data set has any.
 
     Attributes:
-        logits: (R, 4) of each.
+        logits: (R, 4) of each crop.
         label: (R,) its class.
-        clear: (R,) it is clearly one object, or clearly none.
-        truth: (4,) objects of each class that are there to be found; those that segmentation missed are missed.
-        calibration: fitted to the clear ones.
+        unambiguous: (R,) clearly one object, or clearly none.
+        truth: (4,) labelled objects of each class, those missed by the segmentation included.
+        calibration: fitted to the unambiguous crops.
     """
 
     logits: Float64
     label: Int
-    clear: Bool
+    unambiguous: Bool
     truth: Int
     calibration: Calibration
 
@@ -40,22 +40,22 @@ class HeldOut:
         return self.calibration.apply(self.logits)
 
 
-def cross_validated(data: Dataset, k: int, trained: Callable[[Bool, int], Model]) -> HeldOut:
-    """Every judged crop by the model that never saw its drive.
+def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> HeldOut:
+    """Cross-validate over drives.
 
     Args:
         data: all crops.
-        k: folds.
-        trained: makes a model of the rows among which it may learn, for each fold.
+        k: number of folds.
+        train: returns a model trained on a mask (R,) of rows, for each fold.
     """
     fold = folds(data, k)
-    judged = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
-    out = np.zeros((len(judged), N_CLASSES))
+    rows = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
+    out = np.zeros((len(rows), N_CLASSES))
     for i in range(k):
-        model = trained(fold[data.drive] != i, i)
-        mine = np.flatnonzero(fold[data.drive[judged]] == i)
-        out[mine] = model(judged[mine])
-    label, clear = data.label[judged], ~data.partial[judged]
-    there = np.isin(data.truth_drive, data.drive[judged])
-    truth = np.bincount(data.truth_label[there] if there.any() else label, minlength=N_CLASSES)
-    return HeldOut(out, label, clear, truth, fit(out[clear], label[clear]))
+        model = train(fold[data.drive] != i, i)
+        mine = np.flatnonzero(fold[data.drive[rows]] == i)
+        out[mine] = model(rows[mine])
+    label, clear = data.label[rows], ~data.partial[rows]
+    present = np.isin(data.truth_drive, data.drive[rows])
+    truth = np.bincount(data.truth_label[present] if present.any() else label, minlength=N_CLASSES)
+    return HeldOut(out, label, clear, truth, fit_calibration(out[clear], label[clear]))

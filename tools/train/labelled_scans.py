@@ -1,4 +1,4 @@
-"""Labelled scans: where real objects stand, whatever the format that says so."""
+"""Labelled scans of KITTI (object, raw, odometry) and Argoverse 2 in one form."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ CLASS_OF = {
     "Person_sitting": ObjectClass.PEDESTRIAN,
     "Cyclist": ObjectClass.CYCLIST,
 }
-"""Whatever else is labelled counts as background, as in the paper."""
+"""Other labelled types count as background, as in the paper."""
 IMAGE_PX = (1242.0, 375.0)
 PAD_M, FOOT_M = 0.15, 0.25
+"""Margin around a box, and height above its bottom from which points belong to the object and not to the ground."""
 SEMANTIC_CLASS = {
     10: ObjectClass.CAR,
     252: ObjectClass.CAR,
@@ -35,12 +36,12 @@ SEMANTIC_CLASS = {
     258: ObjectClass.BACKGROUND,
 }
 SEMANTIC_UNKNOWN = (0, 1, 13, 15, 16, 20, 32, 99, 255, 256, 257, 259)
-"""Labels that say nothing about the classes: unlabelled, and vehicles that KITTI's object labels name otherwise."""
+"""Labels without a known class: unlabelled, and vehicles that KITTI's object labels classify differently."""
 ARGOVERSE_CLASS = {"REGULAR_VEHICLE": "Car", "PEDESTRIAN": "Pedestrian", "BICYCLIST": "Cyclist"}
-ARGOVERSE_SENSOR = np.array([1.35, 0.0, 1.4], np.float32)
-"""Where its sweeps get their origin: at the heads, at the height above the ground that KITTI's have."""
-ARGOVERSE_CARRIER_M = 2.5
-"""Its own car is seen within this."""
+ARGOVERSE_SENSOR_M = np.array([1.35, 0.0, 1.4], np.float32)
+"""Sensor position in the vehicle frame: at the heads, at the height above the ground of KITTI's sensor."""
+ARGOVERSE_EGO_VEHICLE_M = 2.5
+"""Radius of the returns from the carrying vehicle."""
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
 
@@ -50,14 +51,14 @@ class Scan:
 
     Attributes:
         name: of the scan.
-        drive: recording it is part of; scans of one drive are never split between training and validation.
+        drive: its recording; the unit of the split into training and validation.
         points: (N, 4) sensor frame.
-        objects: indices of the points that show each labelled object.
-        kinds: class of each, BACKGROUND for what is labelled but is none of the classes.
-        boxes: (B, 7) x, y, z of the middle of the foot, l, w, h, yaw, sensor frame, of each; NaN where unknown.
-        fov: where labels are complete.
-        unlabelled: (N,) points of which nothing is known.
-        numbers: of each object, the same in every scan of a drive; none where nobody follows them.
+        objects: point indices of each of the B labelled objects.
+        kinds: class of each, BACKGROUND for other labelled types.
+        boxes: (B, 7) x, y, z of the centre of the bottom face, l, w, h, yaw, sensor frame; NaN where unknown.
+        fov: region with complete labels.
+        unlabelled: (N,) points without a label.
+        track_ids: of each object, constant over a drive; empty where not labelled.
     """
 
     name: str
@@ -68,11 +69,11 @@ class Scan:
     boxes: Float64
     fov: FieldOfView
     unlabelled: Bool
-    numbers: tuple[int, ...] = ()
+    track_ids: tuple[int, ...] = ()
 
 
-def inside(points: Float32, box: Float64) -> Bool:
-    """(N,) points of the object in a box: a little beyond its sides, and clear of the ground."""
+def points_in_box(points: Float32, box: Float64) -> Bool:
+    """(N,) points of the object in a box: at most PAD_M beyond its faces, at least FOOT_M above its bottom."""
     c, s = np.cos(box[6]), np.sin(box[6])
     x, y, z = points[:, 0] - box[0], points[:, 1] - box[1], points[:, 2] - box[2]
     within: Bool = (
@@ -84,7 +85,7 @@ def inside(points: Float32, box: Float64) -> Bool:
     return within
 
 
-def boxed(
+def scan_from_boxes(
     name: str,
     drive: str,
     points: Float32,
@@ -93,15 +94,15 @@ def boxed(
     fov: FieldOfView,
     unlabelled: Bool,
 ) -> Scan:
-    """A scan whose objects are known by their boxes."""
+    """A scan with the points of each object taken from its box."""
     table = np.array(boxes).reshape(-1, 7)
-    objects = tuple(np.flatnonzero(inside(points, box)) for box in table)
+    objects = tuple(np.flatnonzero(points_in_box(points, box)) for box in table)
     classes = tuple(CLASS_OF.get(kind, ObjectClass.BACKGROUND) for kind in kinds)
     return Scan(name, drive, points, objects, classes, table, fov, unlabelled | ~fov.contains(points))
 
 
 def object_scans(folder: Path) -> Iterator[Scan]:
-    """Scans of KITTI's object benchmark that lie in a folder with velodyne*/, label_2/ and calib/."""
+    """Scans of the KITTI object benchmark: folder/velodyne*, folder/label_2, folder/calib."""
     table = folder.parent / "training_all_labels" / "frame_to_raw.tsv"
     rows = (line.split("\t") for line in table.read_text(encoding="utf-8").splitlines())
     drive_of = {row[0]: row[2] for row in rows}
@@ -129,7 +130,7 @@ def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
         kinds.append(kind)
     fov = FieldOfView.of_camera(camera)
     unlabelled = _in_regions(points, camera, np.array(regions).reshape(-1, 4))
-    return boxed(path.stem, drive, points, boxes, kinds, fov, unlabelled)
+    return scan_from_boxes(path.stem, drive, points, boxes, kinds, fov, unlabelled)
 
 
 def object_camera(calib: Path) -> Camera:
@@ -152,24 +153,24 @@ def _in_regions(points: Float32, camera: Camera, regions: Float64) -> Bool:
 
 
 def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
-    """Scans of a KITTI raw drive with tracklets; of the test drive only to confirm what was found elsewhere."""
+    """Scans of a KITTI raw drive with tracklets; of the test drive only with `confirm`."""
     assert confirm or drive.name != TEST_DRIVE, drive
     camera = _raw_camera(drive.parent)
     tracklets = _tracklets(drive / "tracklet_labels.xml")
     for path in sorted((drive / "velodyne_points" / "data").glob("*.bin")):
         frame = int(path.stem)
-        seen = [k for k, (_, _, first, poses) in enumerate(tracklets) if first <= frame < first + len(poses)]
-        here = [(kind, hwl, poses[frame - first]) for kind, hwl, first, poses in (tracklets[k] for k in seen)]
+        ids = [k for k, (_, _, first, poses) in enumerate(tracklets) if first <= frame < first + len(poses)]
+        present = [(kind, hwl, poses[frame - first]) for kind, hwl, first, poses in (tracklets[k] for k in ids)]
         points = np.fromfile(path, np.float32).reshape(-1, 4)
-        boxes = [[*pose[:3], hwl[2], hwl[1], hwl[0], pose[3]] for _, hwl, pose in here]
+        boxes = [[*pose[:3], hwl[2], hwl[1], hwl[0], pose[3]] for _, hwl, pose in present]
         name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
-        kinds = [kind for kind, _, _ in here]
-        scan = boxed(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
-        yield replace(scan, numbers=tuple(seen))
+        kinds = [kind for kind, _, _ in present]
+        scan = scan_from_boxes(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
+        yield replace(scan, track_ids=tuple(ids))
 
 
 def semantic_scans(folder: Path) -> Iterator[Scan]:
-    """Scans with SemanticKITTI labels, all around: folder/*/velodyne, folder/*/labels."""
+    """Scans with SemanticKITTI labels over the full circle: folder/*/velodyne, folder/*/labels."""
     for label in sorted(folder.glob("*/labels/*.label")):
         path = label.parents[1] / "velodyne" / f"{label.stem}.bin"
         points = np.fromfile(path, np.float32).reshape(-1, 4)
@@ -189,26 +190,26 @@ def semantic_scans(folder: Path) -> Iterator[Scan]:
 
 
 def argoverse_scans(folder: Path) -> Iterator[Scan]:
-    """Sweeps of Argoverse 2 (two heads of 32 beams), labelled all around: folder/*.npz, folder/*.csv.
+    """Sweeps of Argoverse 2 (two heads of 32 beams), labelled over the full circle: folder/*.npz, folder/*.csv.
 
-    Their frame has its origin on the rear axle; the sweeps are moved to where the heads and our own sensor would be.
+    Their origin, the rear axle, is moved to ARGOVERSE_SENSOR_M.
     """
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as file:
             points = file["points"].astype(np.float32)
-        points[:, :3] -= ARGOVERSE_SENSOR
+        points[:, :3] -= ARGOVERSE_SENSOR_M
         points[:, 3] = 0.0  # on another scale
-        points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_CARRIER_M]
+        points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_EGO_VEHICLE_M]
         with path.with_suffix(".csv").open(encoding="utf-8") as rows:
             objects = [row for row in csv.DictReader(rows) if int(row["points"]) > 0]
         columns = ("x_m", "y_m", "z_centre_m", "length_m", "width_m", "height_m", "yaw_rad")
         boxes = np.array([[float(row[c]) for c in columns] for row in objects])
-        boxes[:, :3] -= ARGOVERSE_SENSOR
+        boxes[:, :3] -= ARGOVERSE_SENSOR_M
         boxes[:, 2] -= boxes[:, 5] / 2
         kinds = [ARGOVERSE_CLASS.get(row["category"], "") for row in objects]
         drive = f"argoverse2/{path.stem.split('_')[0]}"
         none = np.zeros(len(points), np.bool_)
-        yield boxed(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
+        yield scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
 
 
 def _raw_camera(date: Path) -> Camera:

@@ -1,4 +1,4 @@
-"""Training of the small networks that a model's metadata holds, modt.classification.mlp."""
+"""Training of the small networks stored in the metadata of a model, modt.classification.mlp."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HIDDEN = (32, 32)
 
 @dataclass(frozen=True)
 class Batch:
-    """What one step learns from.
+    """Input of a training step.
 
     Attributes:
         feature: (R, F) of crops.
@@ -32,15 +32,15 @@ class Batch:
     base: Float64 | None = None
 
 
-def trained(batch: Callable[[], Batch], sample: Float64, steps: int, rate: float, decay: float) -> Layers:
-    """Layers trained on so many batches, uncalibrated; they take features as they are.
+def train_mlp(batch: Callable[[], Batch], sample: Float64, steps: int, rate: float, decay: float) -> Layers:
+    """Train a network; uncalibrated layers that take unnormalised features.
 
     Args:
-        batch: the next one.
-        sample: (S, F) features as they are spread.
-        steps: batches.
-        rate: of learning, at most.
-        decay: of weights.
+        batch: returns the next batch.
+        sample: (S, F) features, for their mean and standard deviation.
+        steps: number of batches.
+        rate: maximum learning rate.
+        decay: weight decay.
     """
     mean, scale = sample.mean(axis=0), sample.std(axis=0)
     linear = [nn.Linear(a, b) for a, b in pairwise((sample.shape[1], *HIDDEN, N_CLASSES))]

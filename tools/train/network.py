@@ -1,7 +1,7 @@
-"""The network in PyTorch: the paper's PointNet at half width (section V-A), and its weights as plain arrays.
+"""The PointNet of section V-A at half width in PyTorch, and its weights as arrays.
 
-Crops lie one after another instead of side by side, so that none is padded. The last shared layer is normalised after
-the maximum, with a positive scale: then maximum, normalisation and ReLU commute.
+Crops of a batch are concatenated, without padding. The last shared layer is normalised after the maximum, with a
+positive scale, so that maximum, normalisation and ReLU commute.
 """
 
 from __future__ import annotations
@@ -20,34 +20,33 @@ SHARED = (3, 32, 64, 512)
 HEAD = (512, 256, 128, 4)
 
 
-class MaxOfLinear(torch.autograd.Function):
-    """Maximum over each crop of a linear layer, which is most of the network.
+class MaxPooledLinear(torch.autograd.Function):
+    """Linear layer with maximum over the points of each crop; most of the cost of the network.
 
-    A channel's gradient goes to the point that is its maximum alone: sparse products carry it back in a fraction of
-    the time of dense ones.
+    The gradient of a channel is non-zero at its maximum alone, so the backward pass uses sparse products.
     """
 
     @staticmethod
     def forward(ctx: Any, x: Tensor, weight: Tensor, count: Tensor) -> Tensor:
         """(R, out) of (K, in) points of R crops, an (out, in) weight and (R,) points of each crop."""
         y = (x.detach() @ weight.detach().T).numpy()
-        most = np.stack([own.max(axis=0) for own in np.split(y, np.cumsum(count.numpy())[:-1])])
-        ctx.kept = x.detach().numpy(), weight.detach().numpy(), y, most, count.numpy()
-        return torch.from_numpy(most)
+        maxima = np.stack([own.max(axis=0) for own in np.split(y, np.cumsum(count.numpy())[:-1])])
+        ctx.saved = x.detach().numpy(), weight.detach().numpy(), y, maxima, count.numpy()
+        return torch.from_numpy(maxima)
 
     @staticmethod
     def backward(ctx: Any, *grad: Tensor) -> tuple[Tensor, Tensor, None]:
         """Gradients of points and weight."""
-        x, weight, y, most, count = ctx.kept
+        x, weight, y, maxima, count = ctx.saved
         crop = np.repeat(np.arange(len(count)), count)
-        point, channel = np.divmod(np.flatnonzero(y == most[crop]), y.shape[1])
+        point, channel = np.divmod(np.flatnonzero(y == maxima[crop]), y.shape[1])
         starts = np.append(0, np.cumsum(np.bincount(point, minlength=len(y))))
         d_y = csr_matrix((grad[0].numpy()[crop[point], channel], channel, starts), shape=y.shape)
         return torch.from_numpy(d_y @ weight), torch.from_numpy(d_y.T @ x), None
 
 
-class PositiveNorm(nn.Module):
-    """Batch normalisation whose scale is positive."""
+class PositiveScaleNorm(nn.Module):
+    """Batch normalisation with a positive scale."""
 
     def __init__(self, width: int) -> None:
         super().__init__()
@@ -61,7 +60,7 @@ class PositiveNorm(nn.Module):
         return normal * self.log_scale.exp() + self.shift
 
     def folded(self, weight: Tensor) -> tuple[Tensor, Tensor]:
-        """Weight (out, in) and bias (out,) of a bias-free layer before it, with this folded in."""
+        """Weight (out, in) and bias (out,) of the preceding bias-free layer with the normalisation folded in."""
         mean, var = self.norm.running_mean, self.norm.running_var
         assert mean is not None
         assert var is not None
@@ -76,16 +75,16 @@ class PointNet(nn.Module):
         super().__init__()
         self.shared = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(SHARED))
         self.head = nn.ModuleList(nn.Linear(a, b, bias=False) for a, b in pairwise(HEAD[:-1]))
-        self.norms = nn.ModuleList(PositiveNorm(width) for width in (*SHARED[1:], *HEAD[1:-1]))
+        self.norms = nn.ModuleList(PositiveScaleNorm(width) for width in (*SHARED[1:], *HEAD[1:-1]))
         self.last = nn.Linear(*HEAD[-2:])
         self.dropout = nn.Dropout(dropout)
 
     def forward(self, xyz: Tensor, count: Tensor) -> Tensor:
-        """(R, 4) logits of R crops: (K, 3) points one crop after another, (R,) points of each."""
+        """(R, 4) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
         h = xyz
         for layer, norm in zip(self.shared[:-1], self.norms, strict=False):
             h = torch.relu(norm(layer(h)))
-        h = MaxOfLinear.apply(h, self.shared[-1].weight, count)
+        h = MaxPooledLinear.apply(h, self.shared[-1].weight, count)
         h = torch.relu(self.norms[len(self.shared) - 1](h))
         for layer, norm in zip(self.head, self.norms[len(self.shared) :], strict=True):
             h = torch.relu(norm(layer(h)))

@@ -1,8 +1,8 @@
-"""Real objects pasted into real scans: new surroundings, ranges and occlusions for the few that are labelled.
+"""Copy-paste augmentation: labelled objects pasted into other real scans.
 
-An object is turned about the sensor, which keeps the view of it true, or moved away along its line of sight and
-thinned to the sensor's resolution. It stands on the ground that it finds, casts its shadow on what lies behind it,
-and loses what something nearer hides. The segmentation then decides what becomes of it.
+An object is rotated about the sensor, which preserves its aspect, and half of the objects are moved away along the
+line of sight and thinned to the sensor's resolution. An object is set on the local ground; scene points behind it and
+object points behind nearer scene points are removed.
 """
 
 from __future__ import annotations
@@ -15,24 +15,25 @@ from numpy.random import Generator
 
 from modt.classes import ObjectClass
 from modt.geometry import FieldOfView
-from modt.types import Float32, Float64, Int
+from modt.types import Bool, Float32, Float64, Int
 from tools.train.augment import Beams
 from tools.train.labelled_scans import PAD_M, Scan
 
-FEWEST, CLEARANCE_M, HIDDEN_M = 8, 0.4, 0.4
-SHARE = {ObjectClass.CAR: 0.36, ObjectClass.PEDESTRIAN: 0.36, ObjectClass.CYCLIST: 0.28}
-BACK = 0.5
+MIN_POINTS, CLEARANCE_M, OCCLUSION_MARGIN_M = 8, 0.4, 0.4
+CLASS_SHARE = {ObjectClass.CAR: 0.36, ObjectClass.PEDESTRIAN: 0.36, ObjectClass.CYCLIST: 0.28}
+SAME_RANGE_SHARE = 0.5
 """Share of objects that keep their range."""
 
 
 @dataclass(frozen=True)
-class Item:
-    """An object cut from its scan.
+class ObjectCut:
+    """The points of a labelled object.
 
     Attributes:
         points: (n, 4) sensor frame.
-        box: (7,) as in a scan.
-        kind, drive: what it is and where from.
+        box: (7,) as in Scan.
+        kind: class.
+        drive: its source.
     """
 
     points: Float32
@@ -41,28 +42,29 @@ class Item:
     drive: str
 
 
-def library(scans: Iterable[Scan]) -> list[Item]:
-    """Every labelled object that shows enough points."""
+def cut_objects(scans: Iterable[Scan]) -> list[ObjectCut]:
+    """Labelled objects with a box and at least 2 * MIN_POINTS points."""
     return [
-        Item(scan.points[own], box, kind, scan.drive)
+        ObjectCut(scan.points[own], box, kind, scan.drive)
         for scan in scans
         for own, kind, box in zip(scan.objects, scan.kinds, scan.boxes, strict=True)
-        if kind != ObjectClass.BACKGROUND and len(own) >= 2 * FEWEST and np.isfinite(box).all()
+        if kind != ObjectClass.BACKGROUND and len(own) >= 2 * MIN_POINTS and np.isfinite(box).all()
     ]
 
 
-def pasted(scan: Scan, items: list[Item], tries: int, rng: Generator) -> Iterator[Scan]:
-    """The scan with objects of one drive at a time, all else unlabelled; tries objects in all."""
-    by_kind = {kind: [item for item in items if item.kind == kind] for kind in SHARE}
-    by_drive: dict[str, list[Item]] = {}
-    for kind in rng.choice(list(SHARE), tries, p=list(SHARE.values())):
-        item = by_kind[ObjectClass(kind)][rng.integers(len(by_kind[ObjectClass(kind)]))]
-        by_drive.setdefault(item.drive, []).append(item)
+def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generator) -> Iterator[Scan]:
+    """A scan with pasted objects for each source drive, the other points unlabelled; at most `attempts` objects."""
+    by_class = {kind: [cut for cut in cuts if cut.kind == kind] for kind in CLASS_SHARE}
+    by_drive: dict[str, list[ObjectCut]] = {}
+    for kind in rng.choice(list(CLASS_SHARE), attempts, p=list(CLASS_SHARE.values())):
+        cut = by_class[ObjectClass(kind)][rng.integers(len(by_class[ObjectClass(kind)]))]
+        by_drive.setdefault(cut.drive, []).append(cut)
     beams = Beams()
     for drive, chosen in by_drive.items():
-        points, objects, boxes, kinds = scan.points, [], [], []
-        for item in chosen:
-            placed = _place(item, points, beams, rng)
+        points, boxes, kinds = scan.points, [], []
+        objects: list[Int] = []
+        for cut in chosen:
+            placed = _place(cut, points, beams, rng)
             if placed is None:
                 continue
             own, box, hidden = placed
@@ -72,7 +74,7 @@ def pasted(scan: Scan, items: list[Item], tries: int, rng: Generator) -> Iterato
             objects.append(np.arange(len(kept), len(kept) + len(own)))
             points = np.concatenate([kept, own])
             boxes.append(box)
-            kinds.append(item.kind)
+            kinds.append(cut.kind)
         if objects:
             unknown = np.ones(len(points), np.bool_)
             unknown[np.concatenate(objects)] = False
@@ -85,41 +87,41 @@ def pasted(scan: Scan, items: list[Item], tries: int, rng: Generator) -> Iterato
                 boxes=np.array(boxes),
                 fov=FieldOfView(),
                 unlabelled=unknown,
-                numbers=(),
+                track_ids=(),
             )
 
 
-def _place(item: Item, scene: Float32, beams: Beams, rng: Generator) -> tuple[Float32, Float64, np.ndarray] | None:
-    """The object's points and box somewhere else, and which of the scene's points it hides; None if it cannot be."""
+def _place(cut: ObjectCut, scene: Float32, beams: Beams, rng: Generator) -> tuple[Float32, Float64, Bool] | None:
+    """Points and box at a random free place, and a mask of the scene points occluded there; None if not possible."""
     angle = rng.uniform(-np.pi, np.pi)
-    rho = float(np.hypot(*item.box[:2]))
-    factor = 1.0 if rng.random() < BACK else float(min(rng.uniform(1.0, 2.2), max(60.0 / rho, 1.0)))
+    rho = float(np.hypot(*cut.box[:2]))
+    factor = 1.0 if rng.random() < SAME_RANGE_SHARE else float(min(rng.uniform(1.0, 2.2), max(60.0 / rho, 1.0)))
     c, s = np.cos(angle), np.sin(angle)
-    xy = item.points[:, :2] + (factor - 1) * item.box[:2]
-    foot = item.box[:2] * factor
+    xy = cut.points[:, :2] + (factor - 1) * cut.box[:2]
+    foot = cut.box[:2] * factor
     target = np.array([c * foot[0] - s * foot[1], s * foot[0] + c * foot[1]])
-    near = scene[np.hypot(scene[:, 0] - target[0], scene[:, 1] - target[1]) < max(item.box[3] / 2 + PAD_M, 1.5)]
+    near = scene[np.hypot(scene[:, 0] - target[0], scene[:, 1] - target[1]) < max(cut.box[3] / 2 + PAD_M, 1.5)]
     if len(near) < 5:
         return None
     ground = float(np.percentile(near[:, 2], 10))
-    if abs(ground - item.box[2]) > 0.3 + 0.02 * rho * factor or np.mean(near[:, 2] > ground + CLEARANCE_M) > 0.05:
+    if abs(ground - cut.box[2]) > 0.3 + 0.02 * rho * factor or np.mean(near[:, 2] > ground + CLEARANCE_M) > 0.05:
         return None
-    points = item.points.copy()
+    points = cut.points.copy()
     points[:, 0], points[:, 1] = c * xy[:, 0] - s * xy[:, 1], s * xy[:, 0] + c * xy[:, 1]
-    points[:, 2] += ground - item.box[2]
+    points[:, 2] += ground - cut.box[2]
     cells = _cells(points, beams)
     if factor > 1.03:
         _, first = np.unique(cells, return_index=True)
         points, cells = points[first], cells[first]
     scene_cells = _cells(scene, beams)
     distance, scene_distance = np.linalg.norm(points[:, :3], axis=1), np.linalg.norm(scene[:, :3], axis=1)
-    front = np.flatnonzero((scene_distance < distance.min() - HIDDEN_M) & (scene_distance > 2.0))
-    seen = ~np.isin(cells, _spread(scene_cells[front]))
-    points, cells = points[seen], cells[seen]
-    if seen.sum() < max(FEWEST, 0.2 * len(seen)):
+    front = np.flatnonzero((scene_distance < distance.min() - OCCLUSION_MARGIN_M) & (scene_distance > 2.0))
+    visible = ~np.isin(cells, _dilate(scene_cells[front]))
+    points, cells = points[visible], cells[visible]
+    if visible.sum() < max(MIN_POINTS, 0.2 * len(visible)):
         return None
-    hidden = np.isin(scene_cells, _spread(cells)) & (scene_distance > distance.mean())
-    box = np.array([*target, ground, *item.box[3:6], item.box[6] + angle])
+    hidden = np.isin(scene_cells, _dilate(cells)) & (scene_distance > distance.mean())
+    box = np.array([*target, ground, *cut.box[3:6], cut.box[6] + angle])
     return points, box, hidden
 
 
@@ -129,6 +131,6 @@ def _cells(points: Float32, beams: Beams) -> Int:
     return (np.floor(azimuth).astype(np.int64) << 16) + np.floor(elevation).astype(np.int64) + 8192
 
 
-def _spread(cells: Int) -> Int:
-    """These cells and their neighbours to either side."""
+def _dilate(cells: Int) -> Int:
+    """Cells with their neighbours in azimuth."""
     return np.unique(np.concatenate([cells - (1 << 16), cells, cells + (1 << 16)]))

@@ -1,4 +1,4 @@
-"""Trained layers between the tools that train and the one that exports."""
+"""Files of trained layers, written by the training tools and read by the export."""
 
 from __future__ import annotations
 
@@ -9,21 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import Float32
-
-Layer = tuple[Float32, Float32]
+Layer = tuple[NDArray[Any], NDArray[Any]]
 """(in, out) weight and (out,) bias."""
 
 
-def save_layers(path: Path, layers: Sequence[tuple[NDArray[Any], NDArray[Any]]]) -> None:
-    """Write them."""
-    table: dict[str, Float32] = {}
+def save_layers(path: Path, layers: Sequence[Layer]) -> None:
+    """Write layers as float32."""
+    table: dict[str, Any] = {}
     for i, (weight, bias) in enumerate(layers):
         table |= {f"weight{i}": weight.astype(np.float32), f"bias{i}": bias.astype(np.float32)}
     np.savez(path, **table)
 
 
 def load_layers(path: Path) -> list[Layer]:
-    """Read them again."""
+    """Read the layers of a file."""
     with np.load(path) as file:
         return [(file[f"weight{i}"], file[f"bias{i}"]) for i in range(len(file.files) // 2)]

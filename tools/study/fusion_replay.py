@@ -1,4 +1,4 @@
-"""One fusion over recorded drives: what it says of every proposal, and what it asked for."""
+"""Replay of a fusion over recorded drives: average precision and number of classifier calls."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from modt.config import SchedulerConfig
 from modt.energy.ledger import NullLedger
 from modt.pipeline import Fusion, Pipeline
 from modt.types import Bool, Float64, Frame, Int, Proposals, Tracks
-from tools.study.recording import Player, Recording
+from tools.study.recording import Playback, Recording
 from tools.train.scores import average_precision
 
-FIRST, FIRST_KEY, FURTHER, DOUBT = CALLS = ("first views", "first key views", "further views", "doubts")
+CALLS = ("first views", "first key views", "further views", "reviews")
 
 
-class Counting:
-    """A fusion whose calls are counted by their reason; for the rest the fusion itself.
+class CallCounter:
+    """Wrapper of a fusion that counts classifier calls by reason.
 
     Args:
-        fusion: the one that decides.
+        fusion: wrapped.
 
     Attributes:
-        calls: made for each reason.
+        calls: number for each reason.
     """
 
     def __init__(self, fusion: Fusion) -> None:
         self.fusion = fusion
         self.calls = dict.fromkeys(CALLS, 0)
 
-    def asks(self, tracks: Tracks, proposals: Proposals, asking: Bool) -> Bool:
-        """As the fusion says."""
-        return self.fusion.asks(tracks, proposals, asking)
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+        """Delegate."""
+        return self.fusion.asks(tracks, proposals, wants_class)
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
-        """As the fusion does."""
+        """Count the calls and delegate."""
         new, unfused = ~tracks.viewed[rows], tracks.views[rows] == 0
         reason = np.select([new, tracks.final[rows], unfused], [0, 3, 1], 2)
         for name, n in zip(CALLS, np.bincount(reason, minlength=len(CALLS)).tolist(), strict=True):
@@ -49,13 +49,13 @@ class Counting:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of some drives.
+    """Result of a replay.
 
     Attributes:
-        precision: average precision of each class that the drives show.
-        calls: made for each reason.
-        share: of the calls of tracking by detection.
-        each: mean average precision of each drive by itself.
+        precision: average precision of each class present.
+        calls: number for each reason.
+        share: calls relative to tracking by detection.
+        each: mean average precision of each drive.
     """
 
     precision: dict[str, float]
@@ -65,48 +65,51 @@ class Outcome:
 
     @property
     def mean(self) -> float:
-        """Of the average precisions."""
+        """Mean average precision."""
         return _mean(self.precision)
 
 
 def replay(
-    recordings: Sequence[Recording], fusion: Callable[[Prior], Fusion], ask_from: int, judged_from: int | None = None
+    recordings: Sequence[Recording],
+    fusion: Callable[[Prior], Fusion],
+    min_hits: int = 1,
+    scored_from: int | None = None,
 ) -> Outcome:
-    """Play drives to a fusion, without a budget.
+    """Replay drives with a fusion, without a budget.
 
     Args:
         recordings: the drives.
-        fusion: makes one for each drive, which may ask the prior.
-        ask_from: frames with a proposal before a track asks for a class.
-        judged_from: frames from which proposals are judged, those of ask_from where it is not given: before it no
-            setting of the fusion has a say.
+        fusion: makes the fusion of a drive from its prior.
+        min_hits: minimum number of frames with a proposal before a track is classified.
+        scored_from: minimum number of such frames before a proposal is scored, by default `min_hits`: earlier ones
+            do not depend on the fusion.
     """
     calls = dict.fromkeys(CALLS, 0)
     parts: list[tuple[Float64, Int]] = []
     for recording in recordings:
-        player = Player(recording, ask_from)
-        counting = Counting(fusion(player))
-        parts.append(_played(recording, player, counting, judged_from or ask_from))
-        calls = {name: n + counting.calls[name] for name, n in calls.items()}
+        playback = Playback(recording, min_hits)
+        counter = CallCounter(fusion(playback))
+        parts.append(_played(recording, playback, counter, scored_from or min_hits))
+        calls = {name: n + counter.calls[name] for name, n in calls.items()}
     probability, kind = (np.concatenate(columns) for columns in zip(*parts, strict=True))
     total = sum(recording.n_proposals for recording in recordings)
     each = tuple(_mean(_precision(*part)) for part in parts)
     return Outcome(_precision(probability, kind), calls, sum(calls.values()) / max(total, 1), each)
 
 
-def _played(recording: Recording, player: Player, fusion: Fusion, judged_from: int) -> tuple[Float64, Int]:
-    """(R, 4) what is said of the judged proposals, and (R,) what they are."""
+def _played(recording: Recording, playback: Playback, fusion: Fusion, scored_from: int) -> tuple[Float64, Int]:
+    """(R, 4) posteriors of the scored proposals, and (R,) their true classes."""
     config = SchedulerConfig()
     scheduler = Scheduler(config.worth, LinearCost(128, config.cost))
-    pipeline = Pipeline(player, player, fusion, scheduler, player, NullLedger())
-    nothing = np.zeros((0, 4), np.float32)
-    said, true = [np.zeros((0, N_CLASSES))], [np.zeros(0, np.int64)]
-    for index, moment in enumerate(recording.moments):
-        tracks = pipeline.step(Frame(index, 0.0, nothing)).tracks
-        rows = moment.track[moment.judged & (tracks.hits[moment.track] >= judged_from)]
-        said.append(tracks.posterior[rows])
-        true.append(moment.kind[tracks.proposal[rows]])
-    return np.concatenate(said), np.concatenate(true)
+    pipeline = Pipeline(playback, playback, playback, fusion, scheduler, playback, NullLedger())
+    no_points = np.zeros((0, 4), np.float32)
+    posterior, true = [np.zeros((0, N_CLASSES))], [np.zeros(0, np.int64)]
+    for index, recorded in enumerate(recording.frames):
+        tracks = pipeline.step(Frame(index, 0.0, no_points)).tracks
+        rows = recorded.track[recorded.scored & (tracks.hits[recorded.track] >= scored_from)]
+        posterior.append(tracks.posterior[rows])
+        true.append(recorded.kind[tracks.proposal[rows]])
+    return np.concatenate(posterior), np.concatenate(true)
 
 
 def _precision(probability: Float64, kind: Int) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Confidences that mean what they say: a temperature and an offset a class, fitted on held-out logits."""
+"""Calibration of class probabilities: a temperature and an offset for each class, fitted on held-out logits."""
 
 from __future__ import annotations
 
@@ -6,32 +6,33 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
 from modt.classes import N_CLASSES
-from modt.types import Float32, Float64, Int
+from modt.types import Float64, Int
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """probability = softmax(base + logits / temperature + offset), mostly without a base."""
+    """probability = softmax(base + logits / temperature + offset); base is usually 0."""
 
     temperature: float
     offset: Float64
 
     @classmethod
-    def none(cls) -> Calibration:
-        """Leaves everything as it is."""
+    def identity(cls) -> Calibration:
+        """Calibration without effect."""
         return cls(1.0, np.zeros(N_CLASSES))
 
     def apply(self, logits: Float64, base: Float64 | float = 0.0) -> Float64:
-        """(R, 4) probabilities of logits, added to others that are calibrated."""
+        """(R, 4) probabilities of logits (R, 4), added to calibrated logits `base`."""
         probability: Float64 = softmax(base + logits / self.temperature + self.offset, axis=1)
         return probability
 
-    def folded(self, last: tuple[Float32, Float32]) -> tuple[Float32, Float32]:
-        """The last layer with this in it."""
+    def fold_into(self, last: tuple[NDArray[Any], NDArray[Any]]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Weight and bias of the last layer with the calibration folded in, float32."""
         weight, bias = last
         return (
             (weight / self.temperature).astype(np.float32),
@@ -39,22 +40,22 @@ class Calibration:
         )
 
     @classmethod
-    def of_dict(cls, report: dict[str, Any]) -> Calibration:
-        """From a report."""
+    def from_dict(cls, report: dict[str, Any]) -> Calibration:
+        """Read from a report."""
         return cls(float(report["temperature"]), np.array(report["offset"]))
 
     def as_dict(self) -> dict[str, Any]:
-        """For a report."""
+        """Entries of a report, rounded."""
         return {"temperature": round(self.temperature, 4), "offset": [round(float(v), 4) for v in self.offset]}
 
 
-def fit(logits: Float64, label: Int, base: Float64 | float = 0.0) -> Calibration:
-    """Maximum likelihood on held-out logits; the offsets carry how common each class is among proposals.
+def fit_calibration(logits: Float64, label: Int, base: Float64 | float = 0.0) -> Calibration:
+    """Maximum-likelihood calibration on held-out logits; the offsets absorb the class frequencies of proposals.
 
     Args:
-        logits: (R, 4) to be calibrated.
+        logits: (R, 4) uncalibrated.
         label: (R,) classes.
-        base: (R, 4) what they are added to.
+        base: (R, 4) calibrated logits that they are added to.
     """
 
     def loss(theta: Float64) -> float:
@@ -66,7 +67,7 @@ def fit(logits: Float64, label: Int, base: Float64 | float = 0.0) -> Calibration
     return Calibration(float(np.exp(found.x[0])), np.append(0.0, found.x[1:]))
 
 
-def expected_error(probability: Float64, label: Int, bins: int = 15) -> float:
+def expected_calibration_error(probability: Float64, label: Int, bins: int = 15) -> float:
     """Expected calibration error of the top class: mean gap between confidence and accuracy over equal bins."""
     confidence, right = probability.max(axis=1), probability.argmax(axis=1) == label
     which = np.minimum((confidence * bins).astype(np.int64), bins - 1)

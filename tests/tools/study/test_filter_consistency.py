@@ -1,0 +1,73 @@
+"""Consistency of the tracking filter."""
+
+import numpy as np
+import pytest
+
+from tools.study.filter_consistency import TrackLife, consistency, errors, lives, normalised, study
+from tools.study.truth_replay import replay
+
+
+def random_life(rng, n, scale):
+    """A track 0.3 m beside the centre of a walker, with random errors of `scale` times its covariance."""
+    heading = np.full(n, 0.7)
+    pose = np.c_[np.arange(n) * 0.1, np.zeros(n), heading, np.full(n, 1.2)]
+    A = rng.normal(0, 0.2, (n, 4, 4))
+    P = A @ A.transpose(0, 2, 1) + 0.01 * np.eye(4)
+    error = scale * np.einsum("nij,nj->ni", np.linalg.cholesky(P), rng.normal(0, 1, (n, 4)))
+    beside = 0.3 * np.array([-np.sin(0.7), np.cos(0.7)])
+    x = pose + error
+    x[:, :2] += beside
+    return TrackLife("pedestrian, moving", x, P, pose)
+
+
+def test_errors_are_consistent_only_at_the_scale_of_their_covariance():
+    rng = np.random.default_rng(0)
+    for scale, fits in ((1.0, True), (1.6, False), (0.5, False)):
+        found = study([random_life(rng, 60, scale) for _ in range(80)])["pedestrian, moving"]
+        for part in found.values():
+            assert (part.low < part.mean < part.high) is fits
+            assert (abs(part.beyond - 0.05) < 0.02) is fits
+
+
+def test_normalised_errors_equal_the_reference():
+    life = random_life(np.random.default_rng(1), 7, 1.0)
+    position, _ = errors(life)
+    reference = [e @ np.linalg.inv(P) @ e for e, P in zip(position, life.P[:, :2, :2], strict=True)]
+    np.testing.assert_allclose(normalised(position, life.P[:, :2, :2]), reference)
+    np.testing.assert_allclose(consistency([position], [life.P[:, :2, :2]]).mean, np.mean(reference))
+
+
+def test_a_fixed_point_of_a_turning_body_has_no_error():
+    heading = np.linspace(0, 2, 9)
+    pose = np.c_[np.zeros((9, 2)), heading, np.ones(9)]
+    x = pose.copy()
+    x[:, :2] = np.c_[np.cos(heading), np.sin(heading)]  # one metre ahead of the centre
+    position, _ = errors(TrackLife("car, moving", x, np.tile(np.eye(4), (9, 1, 1)), pose))
+    np.testing.assert_allclose(position, 0, atol=1e-12)
+
+
+@pytest.fixture(scope="module", name="consistencies")
+def consistencies_of_the_crossing(crossing):
+    return study(lives(crossing, replay(crossing, "vlp-16")))
+
+
+@pytest.mark.slow
+def test_the_filter_is_nearly_consistent_for_walkers(consistencies):
+    """A mean of 2 is consistent; it is 5.5 with displacements from consecutive outlines alone."""
+    position, motion = consistencies["pedestrian, moving"]["position"], consistencies["pedestrian, moving"]["motion"]
+    assert position.tracks >= 10
+    assert position.mean < 1.2 * position.high
+    assert position.beyond < 0.15
+    assert position.rms < 0.15
+    assert motion.mean < 2 * motion.high
+    assert motion.beyond < 0.15
+
+
+@pytest.mark.slow
+def test_the_filter_is_nearly_consistent_for_standing_objects(consistencies):
+    """The visible part of partly occluded background moves along the occluder, an error that no filter models."""
+    for kind, tracks, mean in (("pedestrian, standing", 3, 2.0), ("background, standing", 20, 8.0)):
+        position = consistencies[kind]["position"]
+        assert position.tracks >= tracks
+        assert position.mean < mean
+        assert position.beyond < 0.1

@@ -1,0 +1,37 @@
+"""The table of commands, and each command's options."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+import pytest
+
+from tools.__main__ import ROOT, commands, main
+
+COMMANDS = dict(commands())
+
+
+def test_the_table_has_a_summary_of_each_command(capsys: pytest.CaptureFixture[str]) -> None:
+    main()
+    lines = capsys.readouterr().out.splitlines()
+    assert "tools.train.build_models" in COMMANDS
+    assert "tools.train.dataset" not in COMMANDS
+    assert [line.split(maxsplit=3)[2:] for line in lines] == [[*item] for item in COMMANDS.items()]
+
+
+@pytest.mark.parametrize("module", COMMANDS)
+def test_a_command_has_help_and_is_named_by_its_usage(
+    module: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = (ROOT.parent / f"{module.replace('.', '/')}.py").read_text(encoding="utf-8")
+    usages = [line.split()[2] for line in source.splitlines() if line.startswith("    python -m tools.")]
+    assert set(usages) <= {module}
+    try:
+        command = importlib.import_module(module)
+    except ModuleNotFoundError as missing:
+        pytest.skip(f"needs {missing.name}")
+    monkeypatch.setattr(sys, "argv", [module, "--help"])
+    with pytest.raises(SystemExit, match="0"):
+        command.main()
+    assert COMMANDS[module] in capsys.readouterr().out

@@ -1,0 +1,44 @@
+"""LabelTargets of proposals."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.classes import ObjectClass
+from modt.types import Proposals
+from tests.tools.train.datasets import scan_of
+from tools.train.build_crops import label
+
+
+def test_a_proposal_takes_the_class_of_the_object_it_overlaps_by_more_than_half() -> None:
+    points = np.zeros((40, 4), np.float32)
+    offsets = np.array([0, 10, 20, 30, 40])
+    box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
+    proposals = Proposals(np.arange(40), offsets, points[:, :3].T, np.zeros((4, 3)), box, none)
+    car = np.arange(0, 9)  # nearly the first proposal
+    walker = np.arange(10, 14)  # too few points to count
+    rider = np.arange(17, 40)  # three points of the second, all of the third and of the fourth: neither is whole
+    unlabelled = np.zeros(40, np.bool_)
+    kinds = [ObjectClass.CAR, ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST]
+    labels = label(scan_of(points, [car, walker, rider], kinds, unlabelled), proposals)
+    assert labels.kind.tolist() == [ObjectClass.CAR, 0, 0, 0]
+    assert labels.partial.tolist() == [False, True, True, True]
+    assert labels.unknown.tolist() == [True, False, False, False]  # nine points are too few to be judged by
+
+
+def test_unlabelled_proposals_are_unknown() -> None:
+    points = np.zeros((40, 4), np.float32)
+    box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
+    proposals = Proposals(np.arange(40), np.array([0, 10, 20, 30, 40]), points[:, :3].T, np.zeros((4, 3)), box, none)
+    unlabelled = np.arange(40) >= 10
+    assert label(scan_of(points, [], [], unlabelled), proposals).unknown.tolist() == [False, True, True, True]
+
+
+def test_detectable_objects_are_known_outside_the_annotated_region() -> None:
+    points = np.zeros((40, 4), np.float32)
+    box, none = np.zeros((2, 7)), np.zeros(2, np.bool_)
+    proposals = Proposals(np.arange(40), np.array([0, 20, 40]), points[:, :3].T, np.zeros((2, 3)), box, none[:2])
+    unlabelled = np.tile(np.arange(20) >= 5, 2)  # of both, most lies there
+    labels = label(scan_of(points, [np.arange(20)], [ObjectClass.CAR], unlabelled), proposals)
+    assert labels.kind.tolist() == [ObjectClass.CAR, 0]
+    assert labels.unknown.tolist() == [False, True]
