@@ -58,7 +58,7 @@ def test_a_stall_is_counted_and_no_burst_follows():
     assert pace.report()["max_lateness_ms"] == pytest.approx(250)  # the stall is not hidden by starting anew
 
 
-def test_a_small_overrun_is_made_up_for():
+def test_small_overrun_is_made_up():
     out, pace = starts([0.12, 0.01, 0.01])
     assert out == pytest.approx([0.0, 0.12, 0.2])
     assert pace.missed == 0
@@ -136,7 +136,7 @@ class Frames(list):
     faults = Faults()
 
 
-def test_poses_that_come_while_the_loop_waits_are_those_of_the_frame_that_follows():
+def test_poses_received_while_waiting_apply_to_the_next_frame():
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     time, placed = Sender(there), []
     frames = Frames(Frame(i, 0.125 * i, np.zeros((0, 4), np.float32)) for i in range(4))

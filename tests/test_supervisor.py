@@ -42,7 +42,7 @@ def listeners():
 
 
 @pytest.mark.parametrize("abstract", [False, True])
-def test_it_is_ready_with_the_first_frame_and_alive_with_every_one(tmp_path, listen, abstract):
+def test_ready_with_the_first_frame_and_watchdog_with_every_one(tmp_path, listen, abstract):
     name = f"modt-test-{os.getpid()}"
     systemd = listen(f"\0{name}" if abstract else str(tmp_path / "notify"))
     told = supervisor_of({"NOTIFY_SOCKET": f"@{name}" if abstract else str(tmp_path / "notify")})
@@ -57,7 +57,7 @@ def test_it_is_ready_with_the_first_frame_and_alive_with_every_one(tmp_path, lis
 
 
 @pytest.mark.parametrize("environment", [{}, {"NOTIFY_SOCKET": ""}])
-def test_nobody_is_told_where_nobody_listens(environment):
+def test_without_a_socket_there_is_no_supervisor(environment):
     told = supervisor_of(environment)
     assert isinstance(told, NoSupervisor)
     told.frame_done()
@@ -65,12 +65,12 @@ def test_nobody_is_told_where_nobody_listens(environment):
 
 
 @pytest.mark.parametrize("place", ["notify", "/", "@", "vsock:2:1234"])
-def test_what_is_no_address_is_named(place):
+def test_invalid_address_is_named(place):
     with pytest.raises(MisuseError, match="NOTIFY_SOCKET"):
         supervisor_of({"NOTIFY_SOCKET": place})
 
 
-def test_a_supervisor_that_does_not_listen_is_logged_once_and_told_when_it_does(tmp_path, listen, caplog):
+def test_unreachable_supervisor_is_logged_once_and_retried(tmp_path, listen, caplog):
     told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     with caplog.at_level(logging.WARNING):
         told.frame_done()
@@ -82,7 +82,7 @@ def test_a_supervisor_that_does_not_listen_is_logged_once_and_told_when_it_does(
     told.close()
 
 
-def test_one_that_is_slow_to_hear_holds_nothing_up(tmp_path, listen):
+def test_slow_supervisor_does_not_block(tmp_path, listen):
     systemd = listen(str(tmp_path / "notify"))
     told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     for _ in range(10_000):  # far more than a socket holds

@@ -13,7 +13,7 @@ from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, ProfileConfig
-from modt.energy.instrumentation import CountedClassifier
+from modt.energy.instrumentation import CountingClassifier
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
 from modt.odometry.odometry import Odometry
@@ -69,6 +69,6 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
         tracker=Tracker(profile.tracking, mode.machine),
         fusion=mode.fusion(profile.fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost),
-        classifier=CountedClassifier(classifier, ledger, limits.max_points, limits.batch),
+        classifier=CountingClassifier(classifier, ledger, limits.max_points, limits.batch),
         ledger=ledger,
     )

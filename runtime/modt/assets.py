@@ -1,4 +1,4 @@
-"""Finds the files that come with the package: models/ and profiles/.
+"""Files of the package: models/ and profiles/.
 
 They lie beside runtime/ in a checkout and an editable install, and inside the package in a wheel.
 """
@@ -14,7 +14,7 @@ _ROOTS = (_PACKAGE / "data", _PACKAGE.parents[1])
 
 
 def folder(kind: str) -> Path:
-    """The folder of that kind ("models" or "profiles").
+    """Folder of a kind, "models" or "profiles".
 
     Raises:
         MisuseError: the installation lacks it.
@@ -26,10 +26,10 @@ def folder(kind: str) -> Path:
 
 
 def find(kind: str, name: str, suffix: str) -> Path:
-    """A file by its path, or by the bare name of one that comes with the package.
+    """A file by its path, or by the name of one of the package.
 
     Raises:
-        MisuseError: there is none; the error lists the names there are.
+        MisuseError: not found; the error lists the names.
     """
     path = Path(name)
     if path.suffix == suffix or len(path.parts) > 1:

@@ -1,13 +1,13 @@
-"""Errors a user can act on: one line that names the thing, the cause and the remedy."""
+"""Errors with a remedy, each one line of subject, cause and remedy."""
 
 
 class ModtError(Exception):
-    """Something failed for a reason that the user can see to; exit status 1.
+    """A failure that the user can remedy; exit status 1.
 
     Args:
-        subject: the file, key or device concerned.
-        cause: what is wrong with it.
-        remedy: what to do about it.
+        subject: the file, key or device.
+        cause: the fault.
+        remedy: the action that removes it.
     """
 
     exit_status = 1
@@ -18,10 +18,10 @@ class ModtError(Exception):
 
 
 class MisuseError(ModtError):
-    """The request itself cannot be met as it was made (a wrong path, key or option); exit status 2."""
+    """An invalid request (path, key or option); exit status 2."""
 
     exit_status = 2
 
 
 class ScanError(ModtError):
-    """One scan cannot be used; the stream goes on without it."""
+    """A scan that cannot be used; the stream continues without it."""

@@ -1,4 +1,4 @@
-"""The machine: one core for this process, and proof that it kept to it."""
+"""The machine: pinning to one core, a check of all threads, and its description."""
 
 from __future__ import annotations
 
@@ -13,25 +13,22 @@ import psutil
 
 from modt.errors import MisuseError
 
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
+_THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+_LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 
 
-def confine(core: int | None) -> int | None:
-    """Keep this process and every thread it will ever start on one core.
+def pin_to_core(core: int | None) -> int | None:
+    """Pin this process and its future threads to a core, and disable thread pools; returns the core.
 
-    Call it before NumPy, SciPy or ONNX Runtime is imported: they size their thread pools as they load.
+    Call it before NumPy, SciPy or ONNX Runtime is imported: they size their thread pools when imported.
 
     Args:
-        core: number of the core; None leaves the affinity alone and only forbids helper threads.
-
-    Returns:
-        The core.
+        core: its number; None leaves the affinity unchanged.
 
     Raises:
-        MisuseError: the core is not there for this process.
+        MisuseError: the core is not available to this process.
     """
-    for variable in THREAD_VARIABLES:
+    for variable in _THREAD_VARIABLES:
         os.environ[variable] = "1"
     if core is None:
         return None
@@ -48,19 +45,19 @@ def confine(core: int | None) -> int | None:
 
 
 def last_core() -> int:
-    """The last core this process may use: the one least likely to serve interrupts."""
+    """The last core available to this process: the least likely to serve interrupts."""
     return max(os.sched_getaffinity(0))
 
 
 @dataclass(frozen=True, slots=True)
 class ThreadReport:
-    """What the threads of this process did and where.
+    """Threads of this process.
 
     Attributes:
-        threads: how many there are.
-        cores: those that any thread may run on.
-        main_cpu_s: CPU time of the control loop's thread [s].
-        others_cpu_s: CPU time of all other threads together [s].
+        threads: their number.
+        cores: on which any of them may run.
+        main_cpu_s: CPU time of the main thread [s].
+        others_cpu_s: CPU time of all other threads [s].
     """
 
     threads: int
@@ -70,14 +67,14 @@ class ThreadReport:
 
 
 def thread_report() -> ThreadReport:
-    """Look at every thread of this process, as the kernel accounts for it."""
+    """Threads of this process, as the kernel accounts for them."""
     process = psutil.Process()
     used = {t.id: t.user_time + t.system_time for t in process.threads()}
     cores: set[int] = set()
     for thread in used:
         try:
             cores |= os.sched_getaffinity(thread)
-        except ProcessLookupError:  # it ended meanwhile
+        except ProcessLookupError:  # ended meanwhile
             continue
     main = used.get(process.pid, 0.0)
     return ThreadReport(len(used), tuple(sorted(cores)), main, sum(used.values()) - main)
@@ -93,12 +90,12 @@ def keep_freed_pages() -> None:
 
 
 def peak_rss_mb() -> float:
-    """Largest resident memory of this process so far [MB]."""
+    """Peak resident memory of this process [MB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def description() -> dict[str, object]:
-    """The machine and its clock policy, for the record."""
+    """The machine and its clock policy."""
     cpu = Path("/sys/devices/system/cpu/cpu0/cpufreq")
     return {
         "machine": platform.machine(),
@@ -106,15 +103,15 @@ def description() -> dict[str, object]:
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
         "system": f"{platform.system()} {platform.release()}",
-        "governor": _first_line(cpu / "scaling_governor"),
-        "frequency_khz": _first_line(cpu / "scaling_cur_freq"),
+        "governor": _content(cpu / "scaling_governor").strip() or "unavailable",
+        "frequency_khz": _content(cpu / "scaling_cur_freq").strip() or "unavailable",
     }
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of every library that takes part."""
+    """Versions of Python and of the libraries."""
     found = {"python": platform.python_version()}
-    for library in LIBRARIES:
+    for library in _LIBRARIES:
         try:
             found[library] = metadata.version(library)
         except metadata.PackageNotFoundError:
@@ -123,17 +120,14 @@ def versions() -> dict[str, str]:
 
 
 def _cpu_model() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        lines = []
-    fields = dict(line.split(":", 1) for line in lines if ":" in line)
-    named = {key.strip(): value.strip() for key, value in fields.items()}
-    return named.get("model name") or named.get("Model") or platform.processor() or "unknown"
+    lines = (line.partition(":") for line in _content(Path("/proc/cpuinfo")).splitlines())
+    fields = {key.strip(): value.strip() for key, _, value in lines}
+    return fields.get("model name") or fields.get("Model") or platform.processor() or "unknown"
 
 
-def _first_line(path: Path) -> str:
+def _content(path: Path) -> str:
+    """Text of a file, empty where it cannot be read."""
     try:
-        return path.read_text(encoding="ascii").strip()
+        return path.read_text(encoding="utf-8", errors="replace")
     except OSError:
-        return "unavailable"
+        return ""

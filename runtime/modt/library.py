@@ -15,7 +15,7 @@ from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.sources.pose_file import fault
+from modt.sources.pose_file import pose_defect
 from modt.sources.scan_file import sanitised
 from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int
 
@@ -127,8 +127,8 @@ class Pipeline:
                 f"stamp {stamp_s!r}", f"not after the last one, {self._stamp_s!r}", "give rising times [s]"
             )
         pose = None if T_world_sensor is None else np.array(T_world_sensor, np.float64)
-        if pose is not None and (pose.shape != (4, 4) or fault(pose)):
-            cause = fault(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"
+        if pose is not None and (pose.shape != (4, 4) or pose_defect(pose)):
+            cause = pose_defect(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"
             raise MisuseError("T_world_sensor", str(cause), "give a rigid (4, 4) transform from sensor to world")
         frame = Frame(self._index, float(stamp_s), _checked(points), pose, turn_s=turn_s)
         self._index, self._stamp_s = self._index + 1, float(stamp_s)

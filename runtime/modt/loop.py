@@ -1,9 +1,8 @@
-"""The loop that drives the pipeline, at the sensor's period or as fast as it goes."""
+"""The loop that drives the pipeline, at a fixed rate or at full speed."""
 
 from __future__ import annotations
 
 import gc
-import logging
 import signal
 import threading
 import time
@@ -15,44 +14,42 @@ from typing import Any, Protocol
 from modt.pipeline import SINK, SOURCE, Pipeline
 from modt.sinks.sink import LineSink, Sink
 from modt.sources.stream import Stream
-from modt.types import Budget, Frame, FrameResult
-
-log = logging.getLogger(__name__)
+from modt.types import Budget, FrameResult
 
 
 class Pace(Protocol):
-    """When the next frame may start."""
+    """Timing of the frames."""
 
     def wait(self) -> None:
-        """Return when it may be taken from its source."""
+        """Return when the next frame may be taken from its source."""
         ...
 
     def report(self) -> dict[str, Any]:
-        """What was asked for and what was kept."""
+        """Rate requested and kept."""
         ...
 
 
 class FullSpeed:
-    """Frames as fast as they can be worked off."""
+    """Frames without waiting."""
 
     def wait(self) -> None:
         """Return at once."""
 
     def report(self) -> dict[str, Any]:
-        """Nothing was asked for."""
+        """No rate was requested."""
         return {"rate_hz": None}
 
 
 @dataclass
 class FixedPeriod:
-    """Frames at absolute deadlines; after an overrun the deadlines start anew, so that no burst follows a stall.
+    """Frames at absolute deadlines, which restart after an overrun so that no burst follows.
 
     Attributes:
         period_s: time between frames [s].
         clock: monotonic time [s].
-        sleep: waits for that many seconds.
-        missed: deadlines that had passed before the frame could start.
-        max_lateness_s: how late a frame started at worst [s].
+        sleep: waits [s].
+        missed: deadlines that passed before their frame started.
+        max_lateness_s: largest delay of a frame [s].
     """
 
     period_s: float
@@ -78,7 +75,7 @@ class FixedPeriod:
         self._deadline_s += self.period_s
 
     def report(self) -> dict[str, Any]:
-        """The rate, deadlines missed, and the worst lateness [ms]."""
+        """Rate, deadlines missed, and largest delay [ms]."""
         return {
             "rate_hz": 1.0 / self.period_s,
             "missed_deadlines": self.missed,
@@ -87,25 +84,25 @@ class FixedPeriod:
 
 
 class Stop:
-    """Set by SIGINT or SIGTERM: the frame in hand is finished, then the loop ends."""
+    """Stop request by SIGINT or SIGTERM: the loop ends after the current frame."""
 
     def __init__(self) -> None:
         self.signal: str | None = None
 
     @contextmanager
     def on_signals(self) -> Iterator[Stop]:
-        """Listen meanwhile; a second signal ends the process the usual way."""
+        """Handle the signals within the context; a second signal ends the process."""
         if threading.current_thread() is not threading.main_thread():
             yield self
             return
-        previous = {s: signal.signal(s, self._heard) for s in (signal.SIGINT, signal.SIGTERM)}
+        previous = {s: signal.signal(s, self._on_signal) for s in (signal.SIGINT, signal.SIGTERM)}
         try:
             yield self
         finally:
             for number, handler in previous.items():
                 signal.signal(number, handler)
 
-    def _heard(self, number: int, _frame: object) -> None:
+    def _on_signal(self, number: int, _frame: object) -> None:
         self.signal = signal.Signals(number).name
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -125,7 +122,7 @@ def drive(
     stop: Stop,
     observe: Observer,
 ) -> int:
-    """Work through a stream; returns the number of frames done.
+    """Process a stream; returns the number of frames.
 
     Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
     """
@@ -135,8 +132,8 @@ def drive(
     gc.freeze()
     done = 0
     while stop.signal is None:
-        pace.wait()  # before the frame is taken, so that it gets the poses that came meanwhile
-        frame: Frame | None = run(SOURCE, next, frames, None)
+        pace.wait()  # before the frame is taken, so that poses received meanwhile apply to it
+        frame = run(SOURCE, next, frames, None)
         if frame is None:
             break
         result = pipeline.step(frame, budget)

@@ -1,4 +1,4 @@
-"""Profiles: strict YAML to configuration, and back."""
+"""Profiles: YAML to configuration with strict keys, and back."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def load(name: str = DEFAULT) -> ProfileConfig:
     """Read a profile by name or path.
 
     Raises:
-        MisuseError: no such profile, unreadable, no YAML, an unknown key or a value out of range; it names the
+        MisuseError: no such profile, unreadable, not YAML, an unknown key or a value out of range, with the
             line and the nearest valid key.
     """
     path = assets.find("profiles", name, ".yaml")
@@ -32,7 +32,7 @@ def load(name: str = DEFAULT) -> ProfileConfig:
 
 
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
-    """Profile of a YAML text; every key is optional, none may be unknown.
+    """Profile of a YAML text; every key is optional.
 
     Raises:
         MisuseError: as for load.
@@ -43,7 +43,7 @@ def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
         mark = getattr(error, "problem_mark", None)
         place = f"{origin}:{mark.line + 1}" if mark else str(origin)
         cause = str(getattr(error, "problem", None) or "unreadable")
-        raise MisuseError(place, f"no YAML ({cause})", "mend this line") from None
+        raise MisuseError(place, f"no YAML ({cause})", "correct this line") from None
     stages = {f.name: f.default_factory for f in dataclasses.fields(ProfileConfig)}
     built: dict[str, Any] = {}
     for key, node, line in _entries(root, origin, stages, "profile"):
@@ -57,13 +57,13 @@ def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
 
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
-    """The whole of a profile as plain data, defaults filled in."""
+    """A profile as plain data, with all defaults."""
     tree: dict[str, dict[str, Any]] = _listed(dataclasses.asdict(config))
     return tree
 
 
 def _listed(tree: Any) -> Any:
-    """A tree with lists for tuples, as YAML and JSON have them."""
+    """A tree with tuples as lists."""
     if isinstance(tree, dict):
         return {key: _listed(value) for key, value in tree.items()}
     return list(tree) if isinstance(tree, tuple) else tree
@@ -75,7 +75,7 @@ def to_yaml(data: Mapping[str, Any]) -> str:
 
 
 def from_yaml(text: str, origin: Path | str) -> Any:
-    """Plain data of a YAML text that this package wrote itself.
+    """Plain data of a YAML text written by this package.
 
     Raises:
         MisuseError: no YAML.

@@ -1,4 +1,4 @@
-"""Whoever started this process and watches over it: systemd by sd_notify(3), without its library, or nobody."""
+"""Notification of a supervisor: systemd by sd_notify(3), without its library, or none."""
 
 from __future__ import annotations
 
@@ -11,77 +11,78 @@ from modt.errors import MisuseError
 
 log = logging.getLogger(__name__)
 
-VARIABLE = "NOTIFY_SOCKET"
+_VARIABLE = "NOTIFY_SOCKET"
 
 
 class Supervisor(Protocol):
-    """Is told how the loop is doing."""
+    """Receiver of the state of the loop."""
 
     def frame_done(self) -> None:
-        """One more frame has been worked off and written."""
+        """Report that a frame was processed and written."""
         ...
 
     def close(self) -> None:
-        """The loop has ended."""
+        """Report the end of the loop."""
         ...
 
 
 class NoSupervisor:
-    """Nobody listens."""
+    """No receiver."""
 
     def frame_done(self) -> None:
-        """Nothing."""
+        """No effect."""
 
     def close(self) -> None:
-        """Nothing."""
+        """No effect."""
 
 
 class Systemd:
-    """READY=1 with the first frame, WATCHDOG=1 with every frame, STOPPING=1 at the end; never waited for.
+    """READY=1 with the first frame, WATCHDOG=1 with every frame, STOPPING=1 at the end; sending never blocks.
 
-    What cannot be sent is logged once and left, for the watchdog hears of the next frame; READY=1 is tried again.
+    The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
 
     Args:
-        address: of the datagram socket that it listens at.
+        address: of systemd's datagram socket.
     """
 
     def __init__(self, address: str) -> None:
-        self._address, self._ready, self._unheard = address, False, False
+        self._address, self._ready, self._failed = address, False, False
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
 
     def frame_done(self) -> None:
-        """The service is up, and alive."""
+        """Report that the service is ready and alive."""
         if self._ready:
-            self._say("WATCHDOG=1")
+            self._send("WATCHDOG=1")
         else:
-            self._ready = self._say("READY=1\nWATCHDOG=1")
+            self._ready = self._send("READY=1\nWATCHDOG=1")
 
     def close(self) -> None:
-        """The service is about to end."""
-        self._say("STOPPING=1")
+        """Report that the service ends."""
+        self._send("STOPPING=1")
         self._socket.close()
 
-    def _say(self, message: str) -> bool:
+    def _send(self, message: str) -> bool:
         try:
             self._socket.sendto(message.encode(), self._address)
         except OSError as error:
-            if not self._unheard:
-                self._unheard = True
-                log.warning("%s: systemd is not told (%s); tried again with every frame", VARIABLE, error.strerror)
+            if not self._failed:
+                self._failed = True
+                cause = error.strerror
+                log.warning("%s: systemd cannot be notified (%s); tried again with every frame", _VARIABLE, cause)
             return False
         return True
 
 
 def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
-    """Systemd where the environment names its socket: /PATH, or @NAME of an abstract one.
+    """Systemd where the environment names its socket: /PATH, or @NAME if abstract.
 
     Raises:
-        MisuseError: it names something else.
+        MisuseError: the name is neither.
     """
-    place = environment.get(VARIABLE)
-    if not place:
+    name = environment.get(_VARIABLE)
+    if not name:
         return NoSupervisor()
-    if place[0] not in "/@" or len(place) == 1:
-        raise MisuseError(VARIABLE, f"{place!r} is neither /PATH nor @NAME", "unset it, or let systemd set it")
-    return Systemd("\0" + place[1:] if place[0] == "@" else place)
+    if name[0] not in "/@" or len(name) == 1:
+        raise MisuseError(_VARIABLE, f"{name!r} is neither /PATH nor @NAME", "unset it, or let systemd set it")
+    return Systemd("\0" + name[1:] if name[0] == "@" else name)

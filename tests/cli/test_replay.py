@@ -13,7 +13,7 @@ import yaml
 
 from modt import profile
 from modt.classes import CLASS_NAMES
-from modt.reporting.summary import summarise
+from modt.reporting.run_report import run_tree
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt.sources.synthetic_stream import SyntheticStream
@@ -52,7 +52,7 @@ def test_the_only_view_of_a_track_settles_its_class(runs):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_a_run_leaves_what_the_formats_say(runs, mode):
+def test_run_directory_has_the_documented_files(runs, mode):
     root, _ = runs
     names = sorted(p.name for p in (root / mode).iterdir())
     assert names == ["kitti", "labels", "ledger.jsonl", "run.yaml", "summary.json", "tracks.jsonl"]
@@ -83,7 +83,7 @@ def test_the_ledger_counts_what_each_stage_made(runs, mode):
     assert found == [line["stages"]["segmentation"]["items"] for line in in_conventional if "frame" in line]
 
 
-def test_every_mode_follows_the_same_points(runs):
+def test_every_mode_has_the_same_proposals(runs):
     root, _ = runs
     for i in range(FRAMES):
         labels = [np.fromfile(root / mode / "labels" / f"{i:06d}.label", np.uint32) >> 16 for mode in MODES]
@@ -115,11 +115,14 @@ def test_conventional_classifies_everything_and_the_others_less(runs):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_the_summary_is_what_the_records_say(runs, mode):
+def test_summary_agrees_with_the_records(runs, mode):
     root, _ = runs
     written = json.loads((root / mode / "summary.json").read_text())
-    again = summarise(root / mode)
-    assert {k: written[k] for k in again} == again
+    report = run_tree(root / mode)
+    assert report["frames"] == written["frames"]
+    assert report["saved"]["beta"].value == written["beta"]
+    assert report["saved"]["N_go"].value == written["tracks"]["N_go"]
+    assert report["saved"]["proposals"].value == written["proposals_per_frame"]
     assert sum(f["classifications"] for f in tracks(root / mode)) == written["classifications"]
 
 
@@ -130,7 +133,7 @@ def test_the_run_keeps_to_one_core(runs):
     assert host["one_core_verified"] is True
 
 
-def test_run_yaml_holds_what_it_was_made_with(runs):
+def test_run_yaml_describes_the_run(runs):
     root, _ = runs
     facts = yaml.safe_load((root / "accurate" / "run.yaml").read_text())
     assert facts["schema"] == "modt.run/1"
@@ -283,7 +286,7 @@ def test_a_signal_ends_the_run_well(tmp_path, number, status):
     assert summary["run"]["stopped_by"] == signal.Signals(number).name
 
 
-def test_systemd_is_told_that_it_is_up_and_alive(tmp_path):
+def test_systemd_is_notified(tmp_path):
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
         systemd.bind(str(tmp_path / "notify"))
         environment_ = environment() | {"NOTIFY_SOCKET": str(tmp_path / "notify")}
@@ -298,7 +301,7 @@ def test_a_killed_run_stays_readable(tmp_path):
     wait_for_frames(tmp_path / "run", 2)
     process.kill()
     process.communicate()
-    assert summarise(tmp_path / "run")["frames"] >= 2
+    assert run_tree(tmp_path / "run")["frames"] >= 2
     done = modt("report", "run", cwd=tmp_path, module="modt.cli.profile")
     assert done.returncode == 0, done.stderr
     assert "beta" in done.stdout

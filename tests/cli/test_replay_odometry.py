@@ -41,9 +41,9 @@ def run(out, **options):
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
-@pytest.fixture(scope="module", name="own")
+@pytest.fixture(scope="module", name="recorded")
 def a_run_with_its_own_odometry(tmp_path_factory):
-    return run(tmp_path_factory.mktemp("own") / "run")
+    return run(tmp_path_factory.mktemp("recorded") / "run")
 
 
 def lives(raw, tmp_path):
@@ -93,45 +93,45 @@ def fed(tmp_path, street, **options):
     return summary, (tmp_path / "run" / "tracks.jsonl").read_bytes()
 
 
-def test_poses_sent_live_do_what_the_streams_own_do(tmp_path, street, own):
+def test_poses_from_a_socket_equal_recorded_poses(tmp_path, street, recorded):
     summary, tracks = fed(tmp_path, street)
     assert summary["odometry"]["frames_posed"] == FRAMES
     assert summary["odometry"]["used"] == FRAMES
-    assert tracks == own[1]
+    assert tracks == recorded[1]
 
 
-def test_a_sender_that_falls_silent_is_bridged(tmp_path, street, own):
+def test_silence_of_the_sender_is_bridged(tmp_path, street, recorded):
     summary, tracks = fed(tmp_path, street, silent=(4, 5, 6, 7, 8))
     assert summary["odometry"]["used"] == FRAMES - 5
     assert 1 <= summary["odometry"]["frames_unposed"] <= 5
-    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+    assert lives(tracks, tmp_path) > 0.9 * lives(recorded[1], tmp_path)
 
 
-def test_a_sender_that_begins_anew_moves_no_track(tmp_path, street, own):
+def test_restart_of_the_sender_moves_no_track(tmp_path, street, recorded):
     T_elsewhere = se3(rotation_zyx(0, 0, 2.0), np.array([400.0, -90.0, 0.0]))
     played = [(stamp_s, T if i < 5 else T_elsewhere @ T) for i, (stamp_s, T) in enumerate(street)]
     summary, tracks = fed(tmp_path, played)
     assert summary["odometry"]["restarts"] == 1
-    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+    assert lives(tracks, tmp_path) > 0.9 * lives(recorded[1], tmp_path)
 
 
-def test_without_odometry_the_proposals_tell(tmp_path, own):
+def test_without_poses_they_are_estimated(tmp_path, recorded):
     summary, tracks = run(tmp_path / "run", odometry="none")
     assert summary["odometry"] == {"source": "none"}
-    assert tracks != own[1]
-    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+    assert tracks != recorded[1]
+    assert lives(tracks, tmp_path) > 0.9 * lives(recorded[1], tmp_path)
 
 
-def test_poses_of_a_file_do_what_the_streams_own_do(tmp_path, street, own):
+def test_poses_of_a_file_equal_recorded_poses(tmp_path, street, recorded):
     """As `modt simulate` writes them: the camera's, from where it started."""
     camera = SyntheticStream("street", "hdl-64e", 1.0).info.camera.T_camera_sensor
     rows = [(camera @ inverse(street[0][1]) @ T @ inverse(camera))[:3].ravel() for _, T in street]
     np.savetxt(tmp_path / "poses.txt", rows, fmt="%.12e")
     summary, tracks = run(tmp_path / "run", poses=tmp_path / "poses.txt")
     assert summary["odometry"]["source"].endswith("poses.txt")
-    assert lives(tracks, tmp_path) > 0.9 * lives(own[1], tmp_path)
+    assert lives(tracks, tmp_path) > 0.9 * lives(recorded[1], tmp_path)
     again = list(read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA))[-1]["tracks"]
-    before = {t["id"]: t for t in json.loads(own[1].splitlines()[-1])["tracks"]}
+    before = {t["id"]: t for t in json.loads(recorded[1].splitlines()[-1])["tracks"]}
     T, apart = inverse(street[0][1]), []
     for t in again:
         if t["id"] in before and before[t["id"]]["proposal"] == t["proposal"] is not None:

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.classes import ObjectClass
 from modt.cli import track
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
-from modt.sources.detections import T_LEVEL_CAMERA, Detections, kitti, read
+from modt.sources.detections import T_LEVEL_CAMERA, Detections, boxes_to_kitti, read
 
 
 def run(*arguments):
@@ -19,7 +20,7 @@ def run(*arguments):
 
 
 def parked(n, T_world_level):
-    """A parked car and one that drives, seen from n poses."""
+    """Boxes of a parked and of a moving car, from n poses."""
     for i in range(n):
         world = np.array([[20.0, 3.0, -1.0, 4.0, 1.8, 1.5, 0.2], [10.0 + i, -3.0, -1.0, 4.2, 1.7, 1.6, 0.0]])
         yield transform_boxes(inverse(T_world_level(i)), world)
@@ -28,7 +29,7 @@ def parked(n, T_world_level):
 def write(path, n=20, T_world_level=lambda i: np.eye(4), score=9):
     with path.open("w") as out:
         for i, boxes in enumerate(parked(n, T_world_level)):
-            for d in kitti(boxes):
+            for d in boxes_to_kitti(boxes):
                 print(i, 2, 100, 100, 200, 200, score, *d, 0, sep=",", file=out)
 
 
@@ -36,7 +37,7 @@ def turning(i):
     return se3(rotation_zyx(0, 0, 0.05 * i), np.array([0.8 * i, 0.0, 0.0]))
 
 
-def test_results_read_back_as_they_were_seen(tmp_path, capsys):
+def test_results_are_read_back(tmp_path, capsys):
     source = tmp_path / "0003.txt"
     write(source)
     assert run(source, "--out", tmp_path / "out") == 0
@@ -48,7 +49,7 @@ def test_results_read_back_as_they_were_seen(tmp_path, capsys):
     assert "20 frames, 2 tracks" in capsys.readouterr().out
 
 
-def test_poses_place_what_is_seen_in_the_world(tmp_path):
+def test_poses_place_detections_in_the_world(tmp_path):
     source, poses = tmp_path / "a.txt", tmp_path / "poses.txt"
     write(source, T_world_level=turning)
     T_camera = [inverse(T_LEVEL_CAMERA) @ turning(i) @ T_LEVEL_CAMERA for i in range(20)]
@@ -59,14 +60,14 @@ def test_poses_place_what_is_seen_in_the_world(tmp_path):
     np.testing.assert_allclose(world[:, :2], [[20, 3], [29, -3]], atol=0.2)
 
 
-def test_two_runs_are_the_same(tmp_path):
+def test_two_runs_are_identical(tmp_path):
     write(tmp_path / "a.txt", T_world_level=turning)
     for out in ("one", "two"):
         run(tmp_path / "a.txt", "--out", tmp_path / out, "--quiet")
     assert (tmp_path / "one/a.txt").read_bytes() == (tmp_path / "two/a.txt").read_bytes()
 
 
-def test_what_is_not_sure_is_left_out_unless_it_is_asked_for(tmp_path, caplog):
+def test_tracks_of_low_confidence_are_written_on_request(tmp_path, caplog):
     write(tmp_path / "a.txt", score=1.5)
     run(tmp_path / "a.txt", "--out", tmp_path / "none", "--quiet")
     assert (tmp_path / "none/a.txt").read_text() == ""
@@ -75,7 +76,7 @@ def test_what_is_not_sure_is_left_out_unless_it_is_asked_for(tmp_path, caplog):
     assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
 
 
-def test_a_detector_that_gives_probabilities_is_followed(tmp_path):
+def test_a_detector_with_probabilities_is_tracked(tmp_path):
     for name, score in (("likely", 0.9), ("unlikely", 0.01)):
         write(tmp_path / f"{name}.txt", score=score)
     run(tmp_path, "--out", tmp_path / "out", "--quiet")
@@ -83,7 +84,7 @@ def test_a_detector_that_gives_probabilities_is_followed(tmp_path):
     assert (tmp_path / "out/unlikely.txt").read_text() == ""
 
 
-def test_boxes_without_a_score_are_followed(tmp_path):
+def test_boxes_without_a_score_are_tracked(tmp_path):
     lines = [f"{i} {k} Car 0 0 0 1 1 9 9 1.5 1.8 4 {5 * k} 1.6 12 0" for i in range(5) for k in range(2)]
     (tmp_path / "a.txt").write_text("\n".join(lines))
     run(tmp_path / "a.txt", "--out", tmp_path / "out", "--quiet")
@@ -94,12 +95,12 @@ def test_boxes_without_a_score_are_followed(tmp_path):
     st.lists(st.lists(st.tuples(st.floats(-20, 20), st.floats(-2, 12)), max_size=4), min_size=2, max_size=9),
     st.data(),
 )
-def test_what_is_written_of_a_frame_depends_on_no_later_one(scene, data):
+def test_results_of_a_frame_do_not_depend_on_later_frames(scene, data):
     rows = [(i, x, score) for i, seen in enumerate(scene) for x, score in seen]
     box = np.array([[x, 2.0, -1.0, 4.0, 1.8, 1.5, 0.0] for _, x, _ in rows]).reshape(-1, 7)
     frame = np.array([i for i, _, _ in rows], np.int64)
     score = np.array([s for _, _, s in rows], np.float64)
-    whole = Detections("a", frame, np.ones(len(rows), np.int64), np.zeros((len(rows), 4)), score, box)
+    whole = Detections("a", frame, np.full(len(rows), ObjectClass.CAR), np.zeros((len(rows), 4)), score, box)
     until = data.draw(st.integers(0, len(scene) - 1))
     early = [line for line in track.follow(whole, None, 0.1)[0].splitlines() if int(line.split()[0]) <= until]
     assert track.follow(whole.take(frame <= until), None, 0.1)[0].splitlines() == early
@@ -111,14 +112,19 @@ def test_what_is_written_of_a_frame_depends_on_no_later_one(scene, data):
         (["--poses", "absent.txt"], "is missing"),
         (["--poses", "short.txt"], "1 poses for 20 frames"),
         (["--poses", "bad.txt"], r"bad.txt:1: 3 numbers"),
-        (["--period", "0"], "no time between frames"),
-        (["--sure", "nan"], "out of range"),
     ],
 )
-def test_misuse_is_named(tmp_path, monkeypatch, options, cause):
+def test_invalid_arguments_are_refused(tmp_path, monkeypatch, options, cause):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "a.txt")
     np.savetxt("short.txt", np.eye(4)[:3].reshape(1, 12))
     (tmp_path / "bad.txt").write_text("1 2 3\n")
     with pytest.raises(MisuseError, match=cause):
         run(tmp_path / "a.txt", "--out", tmp_path / "out", *options)
+
+
+@pytest.mark.parametrize("option", [("--period", "0"), ("--sure", "nan"), ("--sure", "-1001")])
+def test_numbers_out_of_range_are_refused(tmp_path, option, capsys):
+    with pytest.raises(SystemExit):
+        run(tmp_path, "--out", tmp_path / "out", *option)
+    assert "from" in capsys.readouterr().err

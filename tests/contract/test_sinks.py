@@ -1,4 +1,4 @@
-"""What every sink promises, whichever it is."""
+"""Contract of every sink."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def content(root):
     return {str(p.relative_to(root)): p.read_bytes() for p in sorted(root.rglob("*")) if p.is_file()}
 
 
-def test_every_frame_is_on_the_disk_when_write_returns(make, tmp_path):
+def test_a_frame_is_in_the_file_when_write_returns(make, tmp_path):
     sink = make(tmp_path)
     before = content(tmp_path)
     sink.write(FRAMES[1])
@@ -40,7 +40,7 @@ def test_every_frame_is_on_the_disk_when_write_returns(make, tmp_path):
     assert content(tmp_path) == written
 
 
-def test_any_frame_is_taken_and_the_same_frames_give_the_same_bytes(make, tmp_path):
+def test_the_same_frames_give_the_same_bytes(make, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         sink = make(tmp_path / name)
@@ -51,7 +51,7 @@ def test_any_frame_is_taken_and_the_same_frames_give_the_same_bytes(make, tmp_pa
     assert content(tmp_path / "a")
 
 
-def test_a_place_that_cannot_be_written_is_one_clear_error(make, tmp_path):
+def test_a_path_that_cannot_be_written_is_an_error(make, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
     with pytest.raises(ModtError, match="cannot be written"):

@@ -1,4 +1,4 @@
-"""What every source promises, whichever it is."""
+"""Contract of every source."""
 
 import itertools
 import json
@@ -9,7 +9,7 @@ import pytest
 
 from modt.config import OdometryConfig
 from modt.sources.pose_socket import PoseSocket
-from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry, PosedStream
+from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
 from tests.sources import layouts
@@ -18,7 +18,7 @@ from tests.sources import layouts
 def listed(root):
     stream = open_stream(layouts.bare(root))
     (root / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 2\n" * 3)
-    return PosedStream(stream, ListedPoses(root / "poses.txt", stream.info.camera, stream.info.end))
+    return PosedStream(stream, PoseFile(root / "poses.txt", stream.info.camera, stream.info.end))
 
 
 def sent(root):
@@ -36,8 +36,8 @@ SOURCES = {
     "odometry": lambda root: open_stream(layouts.odometry(root)),
     "bare": lambda root: open_stream(layouts.bare(root)),
     "street": lambda root: SyntheticStream("street", "hdl-64e", 0.4, seed=3),
-    "own": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), OwnOdometry()),
-    "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoOdometry()),
+    "recorded": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), RecordedPoses()),
+    "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoPoses()),
     "listed": listed,
     "sent": sent,
     "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
@@ -52,7 +52,7 @@ def a_stream(request, tmp_path):
         stream.odometry.close()
 
 
-def test_frames_are_what_frames_are(stream):
+def test_frames_have_valid_points_and_poses(stream):
     frames = list(stream)
     assert len(frames) == stream.info.n_frames
     for frame in frames:
@@ -68,18 +68,18 @@ def test_frames_are_what_frames_are(stream):
             np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-6)
 
 
-def test_time_and_index_go_forward(stream):
+def test_stamps_and_indices_increase(stream):
     frames = list(stream)
     assert all(b.stamp_s >= a.stamp_s and b.index > a.index for a, b in itertools.pairwise(frames))
 
 
-def test_a_stream_gives_the_same_frames_again(stream):
+def test_a_stream_can_be_iterated_again(stream):
     for a, b in zip(stream, stream, strict=True):
         assert (a.index, a.stamp_s) == (b.index, b.stamp_s)
         assert a.points.tobytes() == b.points.tobytes()
 
 
-def test_a_part_is_those_frames_of_the_whole(stream):
+def test_a_part_of_a_stream_has_its_frames(stream):
     whole = {f.index: f for f in stream}
     part = stream.between(1, 3)
     assert part.info.n_frames == 2
@@ -91,6 +91,6 @@ def test_a_part_is_those_frames_of_the_whole(stream):
     assert stream.between(50, None).info.n_frames == 0
 
 
-def test_nothing_is_wrong_with_a_good_stream(stream):
+def test_a_valid_stream_has_no_faults(stream):
     list(stream)
     assert stream.faults.count == 0

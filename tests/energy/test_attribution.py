@@ -6,7 +6,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.energy.attribution import CLASS, SEG, TERMS, ByCoefficients, ByCpuTime, Fit, FitError, burst, fit
+from modt.config import WindowConfig
+from modt.energy.attribution import (
+    CLASS,
+    REGRESSORS,
+    SEG,
+    Fit,
+    FitError,
+    fit,
+    split_by_coefficients,
+    split_by_cpu_time,
+    unit_energy_J,
+)
 from modt.energy.conditions import Conditions
 from modt.energy.meters.powercap import find_powercap
 from modt.energy.windows import Windows
@@ -20,7 +31,9 @@ NOISE = 0.1
 def drive(machine: SimulatedMachine, windows: int, noise: float, faults: bool) -> list[dict[str, Any]]:
     random = machine.random
     ledger = machine.ledger()
-    recorder = Windows(find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys))
+    recorder = Windows(
+        find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys), WindowConfig()
+    )
     lines = []
     for _ in range(windows):
         if faults and not machine.zone.is_dir():
@@ -82,7 +95,7 @@ def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: P
     assert lost > 100
 
 
-def test_an_interval_is_worth_something(tmp_path: Path) -> None:
+def test_interval_is_narrower_than_its_coefficient(tmp_path: Path) -> None:
     result, _ = trial(tmp_path, seed=1, windows=120)
     assert result["seg_J"].high - result["seg_J"].low < TRUE["seg_J"]
     assert result["idle_W"].high - result["idle_W"].low < TRUE["idle_W"]
@@ -115,10 +128,10 @@ def test_too_few_windows_are_refused() -> None:
         fit([line_of(None, 1), line_of(3.0, 1, marks=["suspended"]), line_of(3.0, 1)], np.random.default_rng(0))
 
 
-def test_bursts_agree_with_the_truth(tmp_path: Path) -> None:
+def test_unit_energy_of_bursts_is_the_true_one(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path, idle_W=3.0)
     ledger = machine.ledger()
-    recorder = Windows(find_powercap(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
+    recorder = Windows(find_powercap(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path), WindowConfig())
     lines = []
     for _ in range(5):
         for _ in range(50):
@@ -127,22 +140,23 @@ def test_bursts_agree_with_the_truth(tmp_path: Path) -> None:
         line = recorder.add(ledger.close_frame(0))
         assert line is not None
         lines.append(line)
-    assert burst(lines, 3.0, SEG) == pytest.approx(TRUE["seg_J"], rel=1e-3)
-    assert burst(lines, 3.0, CLASS) is None
+    assert unit_energy_J(lines, 3.0, SEG) == pytest.approx(TRUE["seg_J"], rel=1e-3)
+    assert unit_energy_J(lines, 3.0, CLASS) is None
 
 
-@pytest.mark.parametrize("split", [ByCpuTime(3.0), ByCoefficients({"idle_W": 3.0, "seg_J": 0.1, "class_J": 0.01})])
 @given(energy_J=st.floats(0, 20), frames=st.integers(0, 9), load=st.integers(0, 9))
-def test_parts_add_up_to_the_window(split: Any, energy_J: float, frames: int, load: int) -> None:
-    parts = split.split(line_of(energy_J, frames, load))
-    assert sum(parts.values()) == pytest.approx(energy_J)
+def test_parts_sum_to_the_window(energy_J: float, frames: int, load: int) -> None:
+    line = line_of(energy_J, frames, load)
+    assert sum(split_by_cpu_time(line, 3.0).values()) == pytest.approx(energy_J)
+    by_fit = split_by_coefficients(line, {"idle_W": 3.0, "seg_J": 0.1, "class_J": 0.01})
+    assert sum(by_fit.values()) == pytest.approx(energy_J)
 
 
-def test_cpu_time_shares_what_is_above_idling() -> None:
-    parts = ByCpuTime(3.0).split(line_of(5.0, 1))
+def test_cpu_time_splits_the_energy_above_idling() -> None:
+    parts = split_by_cpu_time(line_of(5.0, 1), 3.0)
     assert parts == pytest.approx({"idle": 3.0, "segmentation": 1.2, "classification": 0.4, "unattributed": 0.4})
-    assert ByCpuTime(3.0).split(line_of(None, 1)) == {}
+    assert split_by_cpu_time(line_of(None, 1), 3.0) == {}
 
 
-def test_terms_count_what_they_are_named_for() -> None:
-    assert [term.count(line_of(1.0, 2, 3)) for term in TERMS] == [1.0, 2.0, 3.0, 27.0]
+def test_regressors_count_the_work_of_a_window() -> None:
+    assert [term.count(line_of(1.0, 2, 3)) for term in REGRESSORS] == [1.0, 2.0, 3.0, 27.0]

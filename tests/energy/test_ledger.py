@@ -46,7 +46,7 @@ def test_spans_are_timed_and_counted(ledger: Ledger, machine: Machine) -> None:
     assert (line["wall_ns"], line["cpu_ns"], line["idle_ns"], line["marks"]) == (155, 54, 100, [])
 
 
-def test_frames_do_not_leak_into_each_other(ledger: Ledger, machine: Machine) -> None:
+def test_frames_are_separate(ledger: Ledger, machine: Machine) -> None:
     ledger.run("sink", machine.work, 50, 40)
     ledger.close_frame(0)
     machine.work(9, 3)
@@ -60,7 +60,7 @@ def test_items_are_the_rows_of_an_array(ledger: Ledger) -> None:
     assert ledger.close_frame(0)["stages"]["classification"]["items"] == 5
 
 
-def test_a_failing_stage_is_booked_and_its_error_passes(ledger: Ledger, machine: Machine) -> None:
+def test_failing_stage_is_timed_and_its_error_propagates(ledger: Ledger, machine: Machine) -> None:
     def fail() -> None:
         machine.work(30, 20)
         raise ValueError("scan")
@@ -88,7 +88,7 @@ stage_work = st.tuples(
 
 
 @given(st.lists(st.lists(stage_work, max_size=6), max_size=4), st.integers(0, 300))
-def test_the_parts_are_the_whole(frames: list[list[tuple[str, int, int, int]]], tick: int) -> None:
+def test_parts_sum_to_the_frame(frames: list[list[tuple[str, int, int, int]]], tick: int) -> None:
     machine = Machine()
 
     def ticking() -> int:

@@ -8,7 +8,7 @@ import pytest
 from modt.energy.meters.battery import find_batteries
 from modt.energy.meters.discovery import Discovery, discover
 from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Kind, MeterLostError, Quantity, Scope
+from modt.energy.meters.meter import Kind, Measurand, MeterLostError, Scope
 from modt.energy.meters.model import ModelMeter
 from modt.energy.meters.pmic import find_pmic, rail_power_W
 from modt.energy.meters.powercap import find_powercap
@@ -47,7 +47,7 @@ def server(sys: Path) -> None:
     write_zone(powercap(sys) / "intel-rapl-mmio:0", "package-0", energy_uJ=5_000_001)
 
 
-def test_packages_are_added_up_and_nothing_that_overlaps_them(tmp_path: Path) -> None:
+def test_packages_are_summed_without_overlapping_zones(tmp_path: Path) -> None:
     server(tmp_path)
     best = look(tmp_path).best
     assert [meter.facts.name for meter in best.meters] == [
@@ -57,7 +57,7 @@ def test_packages_are_added_up_and_nothing_that_overlaps_them(tmp_path: Path) ->
     assert sum(meter.read() for meter in best.meters) == pytest.approx(12.0)
 
 
-def test_every_zone_left_out_says_why(tmp_path: Path) -> None:
+def test_every_zone_left_out_has_a_reason(tmp_path: Path) -> None:
     server(tmp_path)
     why = {c.name: c.why_not for c in find_powercap(tmp_path)}
     assert why["powercap intel-rapl:0:0 (core)"] == "counted by intel-rapl:0"
@@ -65,7 +65,7 @@ def test_every_zone_left_out_says_why(tmp_path: Path) -> None:
     assert why["powercap intel-rapl:2 (psys)"] == ""
 
 
-def test_platform_counter_is_a_choice_of_its_own(tmp_path: Path) -> None:
+def test_platform_counter_is_a_separate_candidate(tmp_path: Path) -> None:
     server(tmp_path)
     chosen = look(tmp_path).choose("psys")
     assert len(chosen.meters) == 1
@@ -77,7 +77,7 @@ def test_facts_of_a_counter_come_from_its_files(tmp_path: Path) -> None:
     write_zone(powercap(tmp_path) / "intel-rapl:0", "package-0", wrap_uJ=65_532_610_987)
     facts = look(tmp_path).best.meters[0].facts
     assert facts.wrap_J == pytest.approx(65_532.610987)
-    assert (facts.quantity, facts.kind, facts.unit) == (Quantity.ENERGY, Kind.MEASURED, "uJ")
+    assert (facts.measurand, facts.kind, facts.unit) == (Measurand.ENERGY, Kind.MEASURED, "uJ")
 
 
 @pytest.mark.parametrize("content", [None, "", "garbage"])
@@ -183,7 +183,7 @@ def test_amd_sockets_are_added_up_without_their_cores(tmp_path: Path) -> None:
     assert sum(m.read() for m in best.meters) == pytest.approx(17.0)
 
 
-def test_chip_of_another_kind_is_no_meter(tmp_path: Path) -> None:
+def test_other_chips_are_not_meters(tmp_path: Path) -> None:
     write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="nct6775", in1_input=5000, curr1_input=900)
     (candidate,) = find_hwmon(tmp_path)
     assert not candidate.usable
@@ -209,14 +209,14 @@ def test_battery_counts_only_while_it_discharges(tmp_path: Path) -> None:
         battery.meters[0].read()
 
 
-def test_battery_of_a_mouse_is_not_the_robots(tmp_path: Path) -> None:
+def test_battery_of_a_peripheral_is_left_out(tmp_path: Path) -> None:
     write_files(tmp_path / "class" / "power_supply" / "hid-1", type="Battery", scope="Device", status="Discharging")
     write_files(tmp_path / "class" / "power_supply" / "AC", type="Mains", online=1)
     (none,) = find_batteries(tmp_path)
     assert not none.usable
 
 
-def test_pmic_adds_the_rails_that_have_both_figures() -> None:
+def test_pmic_sums_rails_with_voltage_and_current() -> None:
     assert rail_power_W(PMIC) == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
     with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
         rail_power_W("error=2 error_msg=Invalid arguments")
@@ -239,13 +239,13 @@ def test_pmic_is_read_through_its_command(tmp_path: Path) -> None:
         pmic.meters[0].read()
 
 
-def test_pmic_that_refuses_says_so(tmp_path: Path) -> None:
+def test_failing_pmic_gives_its_message(tmp_path: Path) -> None:
     (pmic,) = find_pmic(script(tmp_path, "echo 'VCHI initialization failed' >&2; exit 255"))
     assert not pmic.usable
     assert "VCHI initialization failed" in pmic.why_not
 
 
-def test_model_is_what_is_left_on_a_bare_machine(tmp_path: Path) -> None:
+def test_without_meters_the_model_is_used(tmp_path: Path) -> None:
     found = look(tmp_path)
     assert found.best.meters[0].read() == pytest.approx(3.0 * 2.0 + 4.0 * 0.5)
     assert found.best.facts is not None
@@ -260,7 +260,7 @@ def test_unknown_meter_is_refused_with_the_names(tmp_path: Path) -> None:
         look(tmp_path).choose("wattmeter")
 
 
-def test_the_best_is_counted_then_integrated_then_estimated(tmp_path: Path) -> None:
+def test_candidates_are_ordered_measured_integrated_estimated(tmp_path: Path) -> None:
     server(tmp_path)
     jetson(tmp_path)
     kinds = [c.facts.kind for c in look(tmp_path).candidates if c.usable and c.facts]

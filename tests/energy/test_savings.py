@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.energy.instrumentation import CountedClassifier
+from modt.energy.instrumentation import CountingClassifier
 from modt.energy.ledger import Ledger
-from modt.energy.prediction import PaperModel
-from modt.energy.savings import Beside, Counts, Model, UnitCosts, predict
+from modt.energy.prediction import EnergyModel
+from modt.energy.savings import Counts, OtherCosts, UnitCosts, predict
 from modt.types import Float32, Float64, Int, Proposals
 
 COSTS = UnitCosts(seg=5e-3, track=1e-3, class_call=1e-4, class_item=2e-4, class_point=1e-6)
-NOTHING, SAME = Beside(0.0, 0.0), Beside(1e-3, 0.0)
+NOTHING, SAME = OtherCosts(0.0, 0.0), OtherCosts(1e-3, 0.0)
 
 
 def baseline(frames: int = 100, n: int = 40) -> Counts:
@@ -20,8 +20,8 @@ def baseline(frames: int = 100, n: int = 40) -> Counts:
     return Counts(frames, total, total // 10, 100, total, total, 0, total * 100, frames)
 
 
-def efficient(tracks: int = 200, reached: int = 200, classified: int = 200, refound: int = 0) -> Counts:
-    return Counts(100, 4000, 400, tracks, reached, classified, refound, classified * 60, min(classified, 100))
+def efficient(tracks: int = 200, reached: int = 200, classified: int = 200, reacquired: int = 0) -> Counts:
+    return Counts(100, 4000, 400, tracks, reached, classified, reacquired, classified * 60, min(classified, 100))
 
 
 @given(st.floats(1e-4, 1.0), st.floats(1e-5, 0.1), st.integers(1, 60), st.integers(1, 400))
@@ -29,15 +29,16 @@ def test_neutral_parameters_are_the_papers_equation(seg: float, item: float, n: 
     base = replace(baseline(n=n), points=0)
     run = replace(base, tracks=tracks, classified_tracks=tracks, classified=tracks)
     found = predict(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0), NOTHING, NOTHING)
-    paper = PaperModel(seg, item, n_obj=1.0, n_bg=n - 1.0, n_go=run.n_go)
+    paper = EnergyModel(seg, item, n, run.n_go)
     assert found.model.gamma == pytest.approx(paper.gamma)
     assert found.paper.gamma == pytest.approx(paper.gamma)
     assert found.paper.short_form_error == pytest.approx(paper.short_form_error)
 
 
 counts = st.builds(
-    lambda tracks, reached, repeats, refound, points: replace(
-        efficient(tracks, min(reached, tracks), min(reached, tracks) + repeats + refound, refound), points=points
+    lambda tracks, reached, repeats, reacquired, points: replace(
+        efficient(tracks, min(reached, tracks), min(reached, tracks) + repeats + reacquired, reacquired),
+        points=points,
     ),
     st.integers(1, 4000), st.integers(0, 4000), st.integers(0, 500), st.integers(0, 50), st.integers(0, 10**6),
 )  # fmt: skip
@@ -45,17 +46,17 @@ counts = st.builds(
 
 @given(counts, st.floats(1e-6, 1e-2), st.floats(0, 1e-2), st.floats(0, 100))
 def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: float, measured: float) -> None:
-    found = predict(baseline(), run, replace(COSTS, seg=seg), Beside(1e-3, choose), Beside(2e-3, 2 * choose))
-    assert found.paper.gamma_short + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
+    found = predict(baseline(), run, replace(COSTS, seg=seg), OtherCosts(1e-3, choose), OtherCosts(2e-3, 2 * choose))
+    assert found.paper.n_go + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
     explained = found.explain(measured)
-    assert found.paper.gamma_short + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
+    assert found.paper.n_go + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
     assert explained[-1].gamma == measured
 
 
 @given(counts)
 def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
     base = baseline()
-    found = predict(base, run, COSTS, Beside(2e-3, 1e-4), Beside(3e-3, 3e-4))
+    found = predict(base, run, COSTS, OtherCosts(2e-3, 1e-4), OtherCosts(3e-3, 3e-4))
     assert found.model.e1 == pytest.approx(COSTS.seg + 2e-3 + 1e-4 + COSTS.classification(base) / base.frames)
     if run.classified:
         assert found.model.e2 == pytest.approx(COSTS.seg + 3e-3 + 3e-4 + COSTS.classification(run) / run.frames)
@@ -65,7 +66,7 @@ def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
 def test_more_views_save_less() -> None:
     once = predict(baseline(), efficient(), COSTS, SAME, SAME)
     often = predict(baseline(), efficient(classified=900), COSTS, SAME, SAME)
-    again = predict(baseline(), efficient(classified=900, refound=300), COSTS, SAME, SAME)
+    again = predict(baseline(), efficient(classified=900, reacquired=300), COSTS, SAME, SAME)
     assert often.model.gamma < once.model.gamma
     assert often.model.gamma == pytest.approx(again.model.gamma)
     assert again.terms[3].name == "views after a track was lost"
@@ -77,7 +78,7 @@ def test_empty_runs_save_nothing() -> None:
     found = predict(nothing, nothing, COSTS, SAME, SAME)
     assert found.model.gamma == pytest.approx(1.0)
     assert (nothing.beta, nothing.n_go, nothing.n, nothing.n_obj) == (1.0, 1.0, 0.0, 0.0)
-    assert Model(0, 0, 0, 1).gamma == 1.0
+    assert EnergyModel(0, 0, 0, 1).gamma == 1.0
 
 
 class Half:
@@ -89,11 +90,11 @@ class Half:
 
 
 @pytest.mark.parametrize(("batch", "points"), [(1, 10 + 290 + 400), (2, 2 * 290 + 400), (8, 3 * 400)])
-def test_points_are_booked_as_the_network_is_given_them(batch: int, points: int) -> None:
+def test_points_are_counted_with_padding(batch: int, points: int) -> None:
     ledger = Ledger()
     offsets = np.array([0, 10, 710, 1000, 1001])
     proposals = replace(Proposals.empty(), members=np.arange(1001), offsets=offsets)
-    counted = CountedClassifier(Half(), ledger, max_points=400, batch=batch)
+    counted = CountingClassifier(Half(), ledger, max_points=400, batch=batch)
     which = np.array([0, 1, 2])
     out = ledger.run("classification", counted.classify, np.zeros((1001, 4), np.float32), proposals, which)
     assert out.shape == (3, 4)
@@ -104,6 +105,6 @@ def test_points_are_booked_as_the_network_is_given_them(batch: int, points: int)
 
 def test_nothing_to_classify_has_no_points() -> None:
     ledger = Ledger()
-    counted = CountedClassifier(Half(), ledger, max_points=400, batch=8)
+    counted = CountingClassifier(Half(), ledger, max_points=400, batch=8)
     counted.classify(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64))
     assert ledger.close_frame(0)["stages"]["classification"]["points"] == 0

@@ -5,12 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from modt.config import WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Facts, Kind, MeterLostError, Quantity, Scope
+from modt.energy.meters.meter import Facts, Kind, Measurand, MeterLostError, Scope
 from modt.energy.meters.powercap import find_powercap
-from modt.energy.windows import SCHEMA, Tape, Windows
+from modt.energy.windows import SCHEMA, EnergyAccumulator, Windows
 
 from .simulated import SimulatedMachine, write_files
 
@@ -22,7 +23,7 @@ def machine(tmp_path: Path) -> SimulatedMachine:
 
 def windows_of(machine: SimulatedMachine, least_s: float = 1.0) -> Windows:
     meters = find_powercap(machine.sys)[0].meters
-    return Windows(meters, machine.clocks, Conditions(0, machine.sys), least_s)
+    return Windows(meters, machine.clocks, Conditions(0, machine.sys), WindowConfig(min_s=least_s))
 
 
 def second(machine: SimulatedMachine, ledger: Ledger, windows: Windows, frame: int = 0) -> dict[str, Any]:
@@ -34,7 +35,7 @@ def second(machine: SimulatedMachine, ledger: Ledger, windows: Windows, frame: i
     return line
 
 
-def test_a_window_holds_its_energy_and_its_work(machine: SimulatedMachine) -> None:
+def test_window_has_its_energy_and_counts(machine: SimulatedMachine) -> None:
     ledger, windows = machine.ledger(), windows_of(machine)
     line = second(machine, ledger, windows, frame=7)
     assert line["schema"] == SCHEMA
@@ -53,7 +54,7 @@ def test_a_window_holds_its_energy_and_its_work(machine: SimulatedMachine) -> No
     assert line["marks"] == []
 
 
-def test_no_meter_is_read_before_a_second_has_passed(machine: SimulatedMachine) -> None:
+def test_window_closes_after_a_second(machine: SimulatedMachine) -> None:
     ledger, windows = machine.ledger(), windows_of(machine)
     machine.wait(0.9)
     assert windows.add(ledger.close_frame(0)) is None
@@ -63,7 +64,7 @@ def test_no_meter_is_read_before_a_second_has_passed(machine: SimulatedMachine) 
     assert line["frames"] == [0, 1, 2]
 
 
-def test_counter_that_starts_again_is_followed(tmp_path: Path) -> None:
+def test_wrapping_counter_gives_constant_energy(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path, wrap_uJ=2_000_000_000, idle_W=900.0)
     ledger, windows = machine.ledger(), windows_of(machine)
     lines = [second(machine, ledger, windows, k) for k in range(20)]
@@ -71,7 +72,7 @@ def test_counter_that_starts_again_is_followed(tmp_path: Path) -> None:
     assert [line["energy_J"] for line in lines] == [pytest.approx(900.5, abs=1e-3)] * 20
 
 
-def test_window_as_long_as_a_turn_of_the_counter_is_not_believed(tmp_path: Path) -> None:
+def test_window_as_long_as_the_counter_range_is_ambiguous(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path, wrap_uJ=500_000_000)
     line = second(machine, machine.ledger(), windows_of(machine))
     assert line["energy_J"] is None
@@ -86,7 +87,7 @@ def test_counter_without_known_range_drops_the_sample_when_it_goes_back(machine:
     assert (second(machine, ledger, windows)["energy_J"], second(machine, ledger, windows)["marks"]) == (None, [])
 
 
-def test_counter_set_back_is_no_wrap(machine: SimulatedMachine) -> None:
+def test_counter_reset_is_not_a_wrap(machine: SimulatedMachine) -> None:
     ledger, windows = machine.ledger(), windows_of(machine)
     machine.true_J = 0.5e-6 * machine.wrap_uJ
     second(machine, ledger, windows)
@@ -95,7 +96,7 @@ def test_counter_set_back_is_no_wrap(machine: SimulatedMachine) -> None:
     assert (line["energy_J"], line["marks"]) == (None, ["reset"])
 
 
-def test_meter_that_vanishes_is_marked_and_taken_up_again(machine: SimulatedMachine) -> None:
+def test_lost_meter_is_marked_and_resumes(machine: SimulatedMachine) -> None:
     ledger, windows = machine.ledger(), windows_of(machine)
     second(machine, ledger, windows)
     machine.vanish()
@@ -107,7 +108,7 @@ def test_meter_that_vanishes_is_marked_and_taken_up_again(machine: SimulatedMach
     assert good["energy_J"] == pytest.approx(3.5, abs=1e-3)
 
 
-def test_suspended_machine_is_marked_and_its_window_dropped(machine: SimulatedMachine) -> None:
+def test_window_of_a_suspension_has_no_energy(machine: SimulatedMachine) -> None:
     ledger, windows = machine.ledger(), windows_of(machine)
     machine.suspend(3600.0)
     line = second(machine, ledger, windows)
@@ -117,7 +118,7 @@ def test_suspended_machine_is_marked_and_its_window_dropped(machine: SimulatedMa
 
 
 @pytest.mark.parametrize("seconds", [-86_400.0, 3600.0])
-def test_calendar_that_is_set_changes_no_figure(machine: SimulatedMachine, seconds: float) -> None:
+def test_calendar_step_changes_no_value(machine: SimulatedMachine, seconds: float) -> None:
     ledger, windows = machine.ledger(), windows_of(machine)
     machine.step_calendar(seconds)
     line = second(machine, ledger, windows)
@@ -130,7 +131,7 @@ def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path)
     rail = write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="ina226", power1_input=4_000_000, in1_input=5000,
                        curr1_input=800)  # fmt: skip
-    windows = Windows(find_hwmon(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
+    windows = Windows(find_hwmon(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path), WindowConfig())
     ledger = machine.ledger()
     (rail / "power1_input").write_text("6000000\n")
     line = second(machine, ledger, windows)
@@ -141,16 +142,14 @@ def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
 
 
 def test_without_a_meter_energy_is_unavailable(machine: SimulatedMachine) -> None:
-    windows = Windows((), machine.clocks, Conditions(0, machine.sys))
+    windows = Windows((), machine.clocks, Conditions(0, machine.sys), WindowConfig())
     line = second(machine, machine.ledger(), windows)
     assert (line["energy_J"], line["kind"]) == (None, "unavailable")
 
 
 @settings(max_examples=40)
 @given(st.lists(st.tuples(st.floats(0, 0.6), st.floats(0, 0.6), st.integers(0, 4)), max_size=8))
-def test_the_parts_of_every_window_are_the_whole(
-    tmp_path_factory: Any, frames: list[tuple[float, float, int]]
-) -> None:
+def test_parts_of_every_window_sum_to_it(tmp_path_factory: Any, frames: list[tuple[float, float, int]]) -> None:
     machine = SimulatedMachine(tmp_path_factory.mktemp("sys"))
     ledger, windows = machine.ledger(), windows_of(machine)
     start, lines = machine.now_ns, []
@@ -174,7 +173,16 @@ class Readings:
 
     def __init__(self, values: list[float | None], wrap_J: float | None) -> None:
         self.values = iter(values)
-        self.facts = Facts("test", Quantity.ENERGY, "J", 0.0, 0.0, wrap_J, 100.0, Scope.CPU, Kind.MEASURED, "none")
+        self.facts = Facts(
+            name="test",
+            measurand=Measurand.ENERGY,
+            unit="J",
+            resolution=0.0,
+            max_W=100.0,
+            scope=Scope.CPU,
+            kind=Kind.MEASURED,
+            wrap_J=wrap_J,
+        )
 
     def read(self) -> float:
         value = next(self.values)
@@ -184,8 +192,8 @@ class Readings:
 
 
 @given(st.lists(st.one_of(st.none(), st.floats(0, 1000)), min_size=1), st.one_of(st.none(), st.floats(1000, 2000)))
-def test_energy_is_never_negative_whatever_the_counter_shows(values: list[float | None], wrap: float | None) -> None:
-    tape = Tape(Readings(values, wrap))
+def test_energy_is_never_negative(values: list[float | None], wrap: float | None) -> None:
+    tape = EnergyAccumulator(Readings(values, wrap))
     for value in values:
         energy_J, marks = tape.advance(1.0)
         assert energy_J is None or 0 <= energy_J <= 100.0

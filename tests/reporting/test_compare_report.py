@@ -1,19 +1,20 @@
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from modt.config import EnergyConfig, WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Facts, Kind, Quantity, Scope
+from modt.energy.meters.meter import Facts, Kind, Measurand, Scope
 from modt.energy.windows import Clocks, Windows
 from modt.reporting.compare_page import compare_page
 from modt.reporting.compare_report import Basis, compare_tree
 from modt.reporting.compare_text import compare_text
-from modt.reporting.comparison import Contender, Watched, interleave
-from modt.reporting.quantity import plain
-from modt.reporting.repetitions import Trial
+from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
+from modt.reporting.quantity import to_json
 from modt.types import UNLIMITED, Frame
 from tests.results import CAR, result
 
@@ -22,7 +23,7 @@ from .test_run_report import KINDS, figures
 MODES = ("conventional", "efficient", "accurate")
 FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(40)]
 EVERY = {"conventional": 1, "efficient": 20, "accurate": 5, "varied": 2}
-"""A contender classifies both proposals every so many frames."""
+"""A mode_run classifies both proposals every so many frames."""
 BUSY_W = 5.0
 
 
@@ -32,7 +33,15 @@ class Board:
     def __init__(self):
         self.now_ns = self.cpu_ns = 0
         self.energy_J = 0.0
-        self.facts = Facts("board", Quantity.ENERGY, "J", 1e-6, 0.0, None, 100.0, Scope.CPU, Kind.MEASURED, "none")
+        self.facts = Facts(
+            name="board",
+            measurand=Measurand.ENERGY,
+            unit="J",
+            resolution=1e-6,
+            max_W=100.0,
+            scope=Scope.CPU,
+            kind=Kind.MEASURED,
+        )
 
     def read(self):
         return self.energy_J
@@ -50,8 +59,8 @@ class Board:
 class Steps:
     """Segments in 10 ms, tracks in 2, classifies in 1 and 1 a proposal."""
 
-    def __init__(self, board, ledger, watched, every):
-        self.board, self.ledger, self.watched, self.every = board, ledger, watched, every
+    def __init__(self, board, ledger, recorder, every):
+        self.board, self.ledger, self.recorder, self.every = board, ledger, recorder, every
 
     def step(self, frame, budget=UNLIMITED):
         run, asked = self.ledger.run, frame.index % self.every == 0
@@ -59,7 +68,7 @@ class Steps:
         run("segmentation", self.board.work, 10.0 + frame.index % 3)
         run("tracking", self.board.work, 2.0)
         if asked:
-            run("classification", self.watched.classify, frame.points, found.proposals, np.arange(2))
+            run("classification", self.recorder.classify, frame.points, found.proposals, np.arange(2))
         return found
 
 
@@ -74,24 +83,26 @@ class Network:
         return {"file": "none"}
 
 
-def contender(name, metered):
+def mode_run(name, metered):
     board = Board()
-    ledger, watched = Ledger(lambda: board.now_ns, lambda: board.cpu_ns), Watched(Network(board))
-    windows = Windows([board], board.clocks(), Conditions(), least_s=0.1) if metered else None
-    steps = Steps(board, ledger, watched, EVERY[name])
-    return Contender(name, steps, ledger, watched, lambda index: UNLIMITED, windows)
+    ledger, recorder = Ledger(lambda: board.now_ns, lambda: board.cpu_ns), RecordingClassifier(Network(board))
+    windows = Windows([board], board.clocks(), Conditions(), WindowConfig(min_s=0.1)) if metered else None
+    steps = Steps(board, ledger, recorder, EVERY[name])
+    return ModeRun(steps, ledger, recorder, lambda index: UNLIMITED, windows)
 
 
 def tree_of(metered, coefficients=None):
-    made = [contender(name, metered) for name in EVERY]
-    interleave(FRAMES, made, 10**9 if metered else 1)
+    made = {name: mode_run(name, metered) for name in EVERY}
+    interleave(FRAMES, [*made.values()], 10**9 if metered else 1)
     kind = Kind.MEASURED if metered else Kind.ESTIMATED
-    basis = Basis(idle_W=1.0, busy_W=4.0, period_s=0.1, meter="board", kind=kind, coefficients=coefficients)
+    seg_J, class_J, point_J = coefficients or (None, None, None)
+    config = EnergyConfig(idle_W=1.0, busy_W=4.0, seg_J=seg_J, class_J=class_J, point_J=point_J)
+    basis = Basis(config, replace(Board().facts, kind=kind), period_s=0.1)
     about = {
         "stream": "street", "frames": len(FRAMES), "fov": "full", "repeat": 1, "turn": 1, "basis": "at 10 Hz",
         "board": "test", "conditions": {"governor": None, "frequency_MHz": None, "core": 0},
     }  # fmt: skip
-    return compare_tree([Trial(made)], MODES, "varied", basis, about)
+    return compare_tree([made], MODES, "varied", basis, about)
 
 
 @pytest.fixture(scope="module")
@@ -118,7 +129,7 @@ def test_estimated_energy_is_watts_times_cpu_time(estimated, mode):
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_measured_energy_is_the_meters_and_nobody_elses(measured, mode):
+def test_measured_energy_is_that_of_the_meter(measured, mode):
     found = measured["modes"][mode]
     assert found["gross_J"].value == pytest.approx(BUSY_W * MEAN_MS[mode] / 1e3)
     assert found["net_J"].value == pytest.approx((BUSY_W - 1.0) * MEAN_MS[mode] / 1e3)
@@ -140,7 +151,7 @@ def said(tree):
     return " ".join(compare_text(tree).split())
 
 
-def test_calibrated_joules_predict_too():
+def test_gamma_by_calibrated_joules():
     seg_J = 3.0 * 10.975e-3
     tree = tree_of(False, coefficients=(seg_J, 3.0 * 1.5e-3, 0.0))
     for mode, saving in tree["savings"].items():
@@ -148,12 +159,12 @@ def test_calibrated_joules_predict_too():
     assert "by calibrated joules" in said(tree)
 
 
-def test_without_a_calibration_there_is_nothing_to_predict_by(estimated):
+def test_gamma_by_calibration_is_unavailable_without_one(estimated):
     assert estimated["savings"]["efficient"]["gamma_calibrated"].kind is Kind.UNAVAILABLE
     assert "calibrated" not in said(estimated)
 
 
-def test_the_report_says_what_it_tests(estimated, measured):
+def test_report_states_what_it_tests(estimated, measured):
     assert "not the physics" in said(estimated)
     assert "not the physics" not in said(measured)
     assert "against the meter" in said(measured)
@@ -162,7 +173,7 @@ def test_the_report_says_what_it_tests(estimated, measured):
 
 
 def test_every_figure_carries_its_kind(measured):
-    found = [f for f in figures(plain(measured)) if f.get("bare") is None]
+    found = [f for f in figures(to_json(measured)) if f.get("bare") is None]
     assert len(found) > 100
     assert all(f["kind"] in KINDS for f in found)
 
@@ -171,7 +182,7 @@ def test_text_fits_a_terminal(estimated):
     assert max(map(len, compare_text(estimated).splitlines())) <= 100
 
 
-def test_page_holds_its_plots(estimated):
+def test_page_contains_its_plots(estimated):
     page = compare_page(estimated)
     plots = re.findall(r"<svg.*?</svg>", page, re.S)
     assert len(plots) == 8

@@ -1,11 +1,13 @@
 import numpy as np
 import pytest
 
+from modt.config import WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.meters.model import ModelMeter
 from modt.energy.windows import Clocks, Windows
-from modt.reporting.comparison import COUNTS, Contender, Watched, interleave, total
+from modt.pipeline import STAGES
+from modt.reporting.comparison import COUNTS, ModeRun, RecordingClassifier, interleave, total
 from modt.types import UNLIMITED, Budget, Frame
 from tests.results import CAR, result
 
@@ -25,8 +27,8 @@ ASKED = [[0, 1], [0], [1], [], [], [0]]
 class Scripted:
     """A pipeline that classifies what the script says."""
 
-    def __init__(self, name, ledger, watched, log):
-        self.name, self.ledger, self.watched, self.log, self.budgets = name, ledger, watched, log, []
+    def __init__(self, name, ledger, recorder, log):
+        self.name, self.ledger, self.recorder, self.log, self.budgets = name, ledger, recorder, log, []
 
     def step(self, frame, budget=UNLIMITED):
         self.log.append((self.name, frame.index))
@@ -34,7 +36,7 @@ class Scripted:
         found = SCRIPT[frame.index]
         if ASKED[frame.index]:
             which = np.array(ASKED[frame.index])
-            self.ledger.run("classification", self.watched.classify, frame.points, found.proposals, which)
+            self.ledger.run("classification", self.recorder.classify, frame.points, found.proposals, which)
         return found
 
 
@@ -46,9 +48,9 @@ class Network:
         return {"file": "none"}
 
 
-def contender(name, log, budget=lambda index: UNLIMITED, windows=None):
-    ledger, watched = Ledger(), Watched(Network())
-    return Contender(name, Scripted(name, ledger, watched, log), ledger, watched, budget, windows)
+def mode_run(name, log, budget=lambda index: UNLIMITED, windows=None):
+    ledger, recorder = Ledger(), RecordingClassifier(Network())
+    return ModeRun(Scripted(name, ledger, recorder, log), ledger, recorder, budget, windows)
 
 
 def column(made, name):
@@ -57,22 +59,22 @@ def column(made, name):
 
 @pytest.fixture
 def one():
-    made = contender("one", [])
+    made = mode_run("one", [])
     interleave(FRAMES, [made], turn=1)
     return made
 
 
-def test_counts_tell_first_views_from_further_ones_and_from_those_after_a_loss(one):
+def test_counts_of_first_further_and_reacquired_views(one):
     assert column(one, "proposals") == [2, 1, 2, 1, 0, 1]
     assert column(one, "tracks") == [2, 0, 0, 1, 0, 1]
     assert column(one, "classified_tracks") == [2, 0, 0, 0, 0, 1]
     assert column(one, "classified") == [2, 1, 1, 0, 0, 1]
-    assert column(one, "refound") == [0, 0, 1, 0, 0, 0]
+    assert column(one, "reacquired") == [0, 0, 1, 0, 0, 0]
     assert column(one, "calls") == [1, 1, 1, 0, 0, 1]
     assert column(one, "foreground") == [2, 1, 2, 0, 0, 1]
 
 
-def test_lives_are_the_frames_in_which_a_track_was_seen(one):
+def test_lives_are_frames_with_a_proposal(one):
     assert sorted(one.lives) == [1, 1, 2, 3]
     counts = total(one.counts())
     assert counts.tracks == len(one.lives)
@@ -80,28 +82,28 @@ def test_lives_are_the_frames_in_which_a_track_was_seen(one):
 
 
 def test_cpu_time_has_a_column_a_stage(one):
-    assert one.cpu_s().shape == (6, 5)
+    assert one.cpu_s().shape == (len(FRAMES), len(STAGES))
     assert (one.cpu_s() >= 0).all()
 
 
 @pytest.mark.parametrize(
     ("turn", "order"), [(1, "ab ba ab ba ab ba"), (2, "aabb bbaa aabb"), (10**9, "aaaaaabbbbbb")]
 )
-def test_everyone_works_on_everything_and_begins_equally_often(turn, order):
+def test_every_run_has_every_frame_and_the_first_rotates(turn, order):
     log = []
-    interleave(iter(FRAMES), [contender("a", log), contender("b", log)], turn)
+    interleave(iter(FRAMES), [mode_run("a", log), mode_run("b", log)], turn)
     assert "".join(name for name, _ in log) == order.replace(" ", "")
     for name in "ab":
         assert [index for who, index in log if who == name] == list(range(6))
 
 
 def test_each_frame_has_the_budget_of_its_index():
-    made = contender("a", [], budget=lambda index: Budget(calls=index))
+    made = mode_run("a", [], budget=lambda index: Budget(calls=index))
     interleave(FRAMES, [made], turn=2)
     assert [b.calls for b in made.pipeline.budgets] == list(range(6))
 
 
-def test_meters_are_read_at_the_edges_of_turns_alone():
+def test_meters_are_read_at_the_ends_of_turns():
     now = [0]
 
     def tick():
@@ -110,7 +112,11 @@ def test_meters_are_read_at_the_edges_of_turns_alone():
 
     clocks = Clocks(tick, tick, tick, tick)
     made = [
-        contender(name, [], windows=Windows([ModelMeter(1.0, 2.0, tick, tick)], clocks, Conditions(), least_s=1e9))
+        mode_run(
+            name,
+            [],
+            windows=Windows([ModelMeter(1.0, 2.0, tick, tick)], clocks, Conditions(), WindowConfig(min_s=1e9)),
+        )
         for name in "ab"
     ]
     interleave(FRAMES, made, turn=3)

@@ -5,14 +5,14 @@ from modt.energy.meters.meter import Kind
 from modt.energy.savings import UnitCosts
 from modt.pipeline import STAGES
 from modt.reporting.comparison import COUNTS
-from modt.reporting.gamma import Evidence, mean_interval, saving, unit_costs
-from modt.reporting.quantity import Figure, brief, figure, plain
+from modt.reporting.gamma import RunCosts, mean_interval, saving, unit_costs
+from modt.reporting.quantity import Quantity, format_number, quantity, to_json
 
 TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
 FRAMES, N = 120, 50
 
 
-def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> Evidence:
+def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> RunCosts:
     """A run of known costs: so many of the 50 proposals classified in each frame."""
     random = np.random.default_rng(seed)
     counts = np.zeros((len(classified), len(COUNTS)), np.int64)
@@ -32,10 +32,10 @@ def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> Evidence:
         cost[:, STAGES.index(stage)] = value
     used = counts[:, [COUNTS.index(name) for name in ("calls", "classified", "points")]]
     cost[:, STAGES.index("classification")] = used @ [TRUE.class_call, TRUE.class_item, TRUE.class_point]
-    return Evidence(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
+    return RunCosts(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
 
 
-def varied(noise: float = 0.0, passes: int = 2) -> Evidence:
+def varied(noise: float = 0.0, passes: int = 2) -> RunCosts:
     return run(np.random.default_rng(7).integers(0, N, passes * FRAMES), noise, seed=9)
 
 
@@ -49,14 +49,14 @@ def test_unit_costs_are_found_from_varied_load() -> None:
         assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
 
 
-def test_prediction_meets_the_measurement_where_costs_are_what_they_seem() -> None:
+def test_prediction_equals_measurement_at_constant_unit_costs() -> None:
     found = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
     assert found.predicted == pytest.approx(found.measured)
     assert found.deviation == pytest.approx(0.0, abs=1e-9)
     assert found.prediction.explain(found.measured)[-1].change == pytest.approx(0.0, abs=1e-6)
 
 
-def test_intervals_hold_the_truth_through_noise() -> None:
+def test_intervals_cover_the_truth_with_noise() -> None:
     truth = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured
     found = saving(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
     assert found.measured_interval[0] < truth < found.measured_interval[1]
@@ -64,7 +64,7 @@ def test_intervals_hold_the_truth_through_noise() -> None:
     assert found.deviation_interval[0] < 0 < found.deviation_interval[1]
 
 
-def test_a_cost_that_nobody_counted_is_left_unexplained() -> None:
+def test_uncounted_cost_is_unexplained() -> None:
     dear = run(FEW)
     dear.cost[:, STAGES.index("segmentation")] *= 2
     found = saving(run(EVERY), dear, varied(), np.random.default_rng(0))
@@ -86,20 +86,20 @@ def test_interval_of_a_constant_is_a_point() -> None:
 @pytest.mark.parametrize(
     ("value", "text"), [(0.0, "0"), (12345.6, "12346"), (0.01234, "0.0123"), (1.5e-7, "1.50e-07"), (None, "-")]
 )
-def test_numbers_are_brief(value: float | None, text: str) -> None:
-    assert brief(value) == text
+def test_numbers_have_three_digits(value: float | None, text: str) -> None:
+    assert format_number(value) == text
 
 
-def test_a_figure_without_a_value_is_unavailable() -> None:
-    assert figure(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
-    assert figure(float("nan")).value is None
-    assert figure(float("inf")).text() == "unavailable"
-    assert figure(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00 J (0.500 to 1.50)"
+def test_quantity_without_a_value_is_unavailable() -> None:
+    assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
+    assert quantity(float("nan")).value is None
+    assert quantity(float("inf")).text() == "unavailable"
+    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00 J (0.500 to 1.50)"
 
 
-def test_trees_of_figures_become_plain_data() -> None:
-    tree = {"a": [figure(1.0)], "b": {"c": Figure(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
-    assert plain(tree) == {
+def test_trees_of_quantities_become_plain_data() -> None:
+    tree = {"a": [quantity(1.0)], "b": {"c": Quantity(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
+    assert to_json(tree) == {
         "a": [{"value": 1.0, "unit": "", "kind": "measured"}],
         "b": {"c": {"value": 2.0, "unit": "J", "kind": "integrated", "low": 1.0, "high": 3.0}},
         "d": "text",

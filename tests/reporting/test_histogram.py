@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.reporting.histogram import EXACT, Spread, cut
+from modt.reporting.histogram import MAX_EXACT, Histogram, bucket_middle
 
 QUANTILES = (0.0, 0.25, 0.5, 0.95, 0.99, 1.0)
 
 
-def spread_of(values):
-    spread = Spread()
+def histogram_of(values):
+    spread = Histogram()
     for value in values:
         spread.add(value)
     return spread
@@ -27,26 +27,26 @@ def long_run(seed, n=30_000):
 
 @given(st.lists(st.integers(0, 2**40), min_size=1, max_size=200))
 def test_a_short_run_is_exact(values):
-    spread = spread_of(values)
-    assert (spread.count, spread.total, spread.greatest) == (len(values), sum(values), max(values))
+    spread = histogram_of(values)
+    assert (spread.count, spread.total, spread.maximum) == (len(values), sum(values), max(values))
     for share in QUANTILES:
         assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_long_run_is_off_by_less_than_it_says_and_the_sums_by_nothing(seed):
+def test_quantiles_of_many_values_are_within_the_stated_error(seed):
     values = long_run(seed)
-    spread = spread_of(values)
-    assert (spread.count, spread.total, spread.greatest) == (len(values), sum(values), max(values))
+    spread = histogram_of(values)
+    assert (spread.count, spread.total, spread.maximum) == (len(values), sum(values), max(values))
     assert spread.mean == pytest.approx(np.mean(values), rel=1e-12)
     for share in QUANTILES:
         assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1 / 256)
 
 
-def test_what_is_held_does_not_grow_with_the_run():
-    spread = spread_of(long_run(0, 2 * EXACT))
+def test_memory_is_bounded():
+    spread = histogram_of(long_run(0, 2 * MAX_EXACT))
     held = len(spread)
-    assert held < EXACT
+    assert held < MAX_EXACT
     for value in long_run(1, 50_000):
         spread.add(value)
     assert len(spread) < 2 * held
@@ -56,14 +56,14 @@ def test_what_is_held_does_not_grow_with_the_run():
     assert len(spread) < 8000
 
 
-def test_the_order_in_which_times_come_is_of_no_account():
+def test_order_of_values_is_irrelevant():
     values = long_run(2)
     again = random.Random(0).sample(values, len(values))
-    a, b = spread_of(values), spread_of(again)
+    a, b = histogram_of(values), histogram_of(again)
     assert [a.quantile(q) for q in QUANTILES] == [b.quantile(q) for q in QUANTILES]
 
 
 @given(st.integers(0, 2**62))
-def test_a_cut_value_is_near(value):
-    assert abs(cut(value) - value) <= value / 256
-    assert cut(value) == value or value >= 256
+def test_bucket_middle_is_near_its_value(value):
+    assert abs(bucket_middle(value) - value) <= value / 256
+    assert bucket_middle(value) == value or value >= 256

@@ -8,7 +8,7 @@ import yaml
 from modt import profile
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
-from modt.reporting.quantity import plain
+from modt.reporting.quantity import to_json
 from modt.reporting.run_page import run_page
 from modt.reporting.run_report import run_tree
 from modt.reporting.run_text import run_text
@@ -110,7 +110,7 @@ def write_run(path, *, windows=True, mode="efficient", frames=20, energy=None):
     return path
 
 
-def test_energy_is_the_meters(run):
+def test_energy_is_that_of_the_meter(run):
     tree = run_tree(run)
     assert tree["gross_J"].value == pytest.approx(1.5 / 5)
     assert tree["gross_J"].kind.value == "measured"
@@ -119,19 +119,19 @@ def test_energy_is_the_meters(run):
     assert tree["ended"]
 
 
-def test_parts_add_up_to_the_whole(run):
+def test_parts_sum_to_the_total(run):
     tree = run_tree(run)
     assert sum(p.value for p in tree["parts_J"].values()) == pytest.approx(tree["gross_J"].value)
 
 
-def test_parts_by_calibrated_coefficients_add_up_too(tmp_path):
+def test_parts_by_coefficients_sum_to_the_total(tmp_path):
     board = {"idle_W": 2.0, "seg_J": 0.1, "class_J": 0.01, "point_J": 1e-5}
     tree = run_tree(write_run(tmp_path / "run", energy=board))
     assert sum(p.value for p in tree["parts_J"].values()) == pytest.approx(tree["gross_J"].value)
     assert tree["parts_J"]["segmentation"].value == pytest.approx(0.1)
 
 
-def test_without_windows_the_model_stands_in_and_says_so(tmp_path):
+def test_without_windows_energy_is_modelled(tmp_path):
     tree = run_tree(write_run(tmp_path / "run", windows=False, energy={"idle_W": 2.0, "busy_W": 6.0}))
     assert tree["gross_J"].kind.value == "estimated"
     lines = [ledger_line(k, (k * 7) % 5) for k in range(20)]
@@ -149,7 +149,7 @@ def test_counts_and_terms(run):
     assert saved["gamma_predicted"].value == pytest.approx(saved["gamma_of_this_run"].value, rel=0.01)
 
 
-def test_a_run_that_goes_on_is_read_as_far_as_it_is_written(run):
+def test_unfinished_run_is_reported_so_far(run):
     (run / "summary.json").unlink()
     with (run / "ledger.jsonl").open("a") as out:
         out.write('{"schema": "modt.led')
@@ -159,7 +159,7 @@ def test_a_run_that_goes_on_is_read_as_far_as_it_is_written(run):
     assert "still running" in run_text(tree)
 
 
-def test_spoilt_windows_are_dropped_and_counted(run):
+def test_rejected_windows_are_dropped_and_counted(run):
     lines = [ledger_line(k, 1) for k in range(5)]
     with (run / "ledger.jsonl").open("a") as out:
         out.write(json.dumps(window(9, lines, None, "unavailable", ["lost"])) + "\n")
@@ -193,12 +193,12 @@ def figures(tree):
 
 
 def test_every_figure_carries_its_kind(run):
-    found = list(figures(plain(run_tree(run))))
+    found = list(figures(to_json(run_tree(run))))
     assert len(found) > 40
     assert all(f.get("kind") in KINDS for f in found), [f for f in found if f.get("kind") not in KINDS]
 
 
-def test_text_answers_first_and_fits_a_terminal(run):
+def test_text_has_results_first_and_fits_a_terminal(run):
     text = run_text(run_tree(run))
     assert text.splitlines()[2].startswith("  300 mJ a frame, ")
     assert max(map(len, text.splitlines())) <= 100

@@ -4,11 +4,9 @@ from array import array
 
 import pytest
 
-from modt.reporting.histogram import EXACT
-from modt.reporting.summary import Summary, TrackLives, summarise
-from modt.reporting.summary_text import summary_table
-from modt.sinks.records import JsonLines
-from modt.sinks.tracks import frame_record
+from modt.reporting.histogram import MAX_EXACT
+from modt.reporting.summary import Summary, TrackLives
+from modt.reporting.summary_text import summary_text
 from tests.results import CAR, result
 
 
@@ -48,41 +46,30 @@ def test_figures():
     assert figures["stages"]["segmentation"]["wall_ms"]["max"] == pytest.approx(4.0)
 
 
-def test_files_give_the_same_figures_as_the_live_run(tmp_path):
-    tracks, ledger = JsonLines(tmp_path / "tracks.jsonl"), JsonLines(tmp_path / "ledger.jsonl")
-    for r in FRAMES:
-        tracks.write(frame_record(r))
-        ledger.write(ledger_line(r.frame.index, 1 + r.frame.index))
-    tracks.close()
-    ledger.close()
-    assert summarise(tmp_path) == whole()
-
-
-def test_nothing_gives_no_ratio():
+def test_empty_run_has_no_ratio():
     figures = Summary().result()
     assert figures["beta"] is None
     assert figures["tracks"] == {"count": 0, "N_go": None}
-    assert "0 frames" in summary_table(figures)
+    assert "0 frames" in summary_text(figures)
 
 
-def test_only_the_living_are_remembered():
+def test_only_tracks_alive_are_held():
     lives = TrackLives()
     for i in range(50):
         lives.add([(i, True, False)])
-    assert len(lives._alive) == 1
+    assert len(lives) == 1
     assert lives.totals(foreground_only=False) == (50, 50)
 
 
-def test_a_long_run_holds_no_more_than_a_short_one():
-    """Held: the entries of every container in the summary, however deep."""
+def test_memory_is_bounded_in_a_long_run():
     summary, held = Summary(), []
-    for frame in range(3 * EXACT):
+    for frame in range(3 * MAX_EXACT):
         r = result(frame, [5, 5], {0: frame, 1: frame + 1}, {})
         summary.add_result(r)
         summary.add_ledger(ledger_line(frame, 1 + frame))  # no two frames take as long
-        if frame in (EXACT - 1, 3 * EXACT - 1):
+        if frame in (MAX_EXACT - 1, 3 * MAX_EXACT - 1):
             held.append(entries(summary))
-    assert held[0] > 2 * EXACT  # exact so far, wall and CPU time of a stage
+    assert held[0] > 2 * MAX_EXACT  # exact so far, wall and CPU time of a stage
     assert held[1] < held[0]
 
 
@@ -95,15 +82,15 @@ def entries(thing):
     return entries(vars(thing)) if hasattr(thing, "__dict__") else 0
 
 
-def test_the_table_names_what_it_prints():
-    text = summary_table(whole())
+def test_text_contains_its_figures():
+    text = summary_text(whole())
     for word in ("proposals", "N_go", "beta", "42.9 %", "segmentation", "classification"):
         assert word in text
     assert max(map(len, text.splitlines())) <= 100
 
 
 @pytest.mark.parametrize("missed", [0, 22])
-def test_missed_deadlines_are_told_where_there_were_any(missed):
+def test_missed_deadlines_are_reported(missed):
     paced = {"rate_hz": 10.0, "missed_deadlines": missed, "max_lateness_ms": 1965.7}
-    text = summary_table(whole() | {"run": paced})
+    text = summary_text(whole() | {"run": paced})
     assert ("missed 22 deadlines at 10 frames/s, the latest frame began 1966 ms late" in text) is (missed > 0)

@@ -1,4 +1,4 @@
-"""Bodies kept apart: the separating axes against points sampled, and who has to go."""
+"""Collisions: the separating axis test against sampled points, and which body stays."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.simulation.collisions import keep_apart, overlapping
+from modt.simulation.collisions import overlapping, without_collisions
 from modt.simulation.motion import Path
 
 place = st.floats(-4, 4)
@@ -27,23 +27,29 @@ def sampled_overlap(a, b):
 
 
 @given(boxes, boxes)
-def test_no_sampled_overlap_is_missed_and_no_far_one_found(a, b):
+def test_overlap_agrees_with_sampled_points(a, b):
     found = bool(overlapping(a[None], b[None])[0])
     assert found or not sampled_overlap(a, b)
     assert not found or sampled_overlap(a + WIDER, b + WIDER)
 
 
 @dataclass
-class Thing:
+class Occupant:
     path: Path
     footprint: tuple[float, float]
 
 
-def test_of_two_that_meet_on_the_way_the_later_goes():
-    mover = Thing(Path.steady(np.array([[0.0, 0.0], [20.0, 0.0]]), 0.0, 5.0, 3.0), (2.0, 1.0))
-    in_the_way = Thing(Path.standing(12.0, 0.0, 0.0), (1.0, 1.0))
-    beside = Thing(Path.standing(12.0, 3.0, 0.0), (1.0, 1.0))
-    ghost = Thing(Path.standing(12.0, 0.0, 0.0), (0.0, 0.0))
-    beyond = Thing(Path.standing(19.5, 0.0, 0.0), (1.0, 1.0))
-    assert keep_apart([mover, in_the_way, beside, ghost, beyond], 3.0).tolist() == [True, False, True, True, True]
-    assert keep_apart([in_the_way, mover], 3.0).tolist() == [True, False]
+def test_of_two_colliding_bodies_the_first_stays():
+    mover = Occupant(Path.steady(np.array([[0.0, 0.0], [20.0, 0.0]]), 0.0, 5.0, 3.0), (2.0, 1.0))
+    obstacle = Occupant(Path.standing(12.0, 0.0, 0.0), (1.0, 1.0))
+    beside = Occupant(Path.standing(12.0, 3.0, 0.0), (1.0, 1.0))
+    flat = Occupant(Path.standing(12.0, 0.0, 0.0), (0.0, 0.0))
+    beyond = Occupant(Path.standing(19.5, 0.0, 0.0), (1.0, 1.0))
+    assert without_collisions([mover, obstacle, beside, flat, beyond], 3.0).tolist() == [
+        True,
+        False,
+        True,
+        True,
+        True,
+    ]
+    assert without_collisions([obstacle, mover], 3.0).tolist() == [True, False]

@@ -1,4 +1,4 @@
-"""A synthetic drive on disk, read back as a real one."""
+"""A synthetic drive on disk, read back like a recorded one."""
 
 import xml.etree.ElementTree as ET
 
@@ -16,7 +16,7 @@ from modt.sources.synthetic_stream import SyntheticStream
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drive")
     stream = SyntheticStream("street", "vlp-16", 1.5, seed=4)
-    writer = DriveWriter(folder, stream)
+    writer = DriveWriter(folder, stream.camera)
     sweeps = list(stream.sweeps())
     for frame, truth in sweeps:
         writer.write(frame, truth)
@@ -25,7 +25,7 @@ def written(tmp_path_factory):
 
 
 @pytest.mark.parametrize("layout", ["drive", "sequence"])
-def test_the_reader_gives_back_points_times_poses_and_camera(written, layout):
+def test_points_times_poses_and_camera_are_read_back(written, layout):
     writer, stream, sweeps = written
     read = open_stream(getattr(writer, layout))
     frames = list(read)
@@ -44,9 +44,9 @@ def test_the_reader_gives_back_points_times_poses_and_camera(written, layout):
 
 
 @pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
-def test_a_drive_says_whether_its_sweeps_are_distorted(tmp_path, distort, turn_s):
+def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, turn_s):
     stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
-    writer = DriveWriter(tmp_path, stream)
+    writer = DriveWriter(tmp_path, stream.camera)
     for frame, truth in stream.sweeps():
         assert frame.turn_s == turn_s
         writer.write(frame, truth)
@@ -58,7 +58,7 @@ def test_a_drive_says_whether_its_sweeps_are_distorted(tmp_path, distort, turn_s
     assert (starts == stamps) is not distort
 
 
-def test_tracklets_hold_the_boxes_that_the_camera_sees(written):
+def test_tracklets_hold_the_boxes_in_view_of_the_camera(written):
     writer, _, sweeps = written
     items = ET.parse(writer.drive / "tracklet_labels.xml").getroot().find("tracklets").findall("item")
     assert len(items) > 3
@@ -74,7 +74,7 @@ def test_tracklets_hold_the_boxes_that_the_camera_sees(written):
             assert at[0] > 0
 
 
-def test_labels_name_the_class_and_the_body(written):
+def test_labels_hold_class_and_instance(written):
     writer, _, sweeps = written
     for frame, truth in sweeps[:3]:
         packed = np.fromfile(writer.sequence / "labels" / f"{frame.index:06d}.label", np.uint32)
@@ -84,7 +84,7 @@ def test_labels_name_the_class_and_the_body(written):
             np.testing.assert_array_equal(number == row + 1, truth.instance == body)
 
 
-def test_there_is_no_drive_over_a_drive(tmp_path, capsys):
+def test_an_existing_drive_is_not_overwritten(tmp_path, capsys):
     (tmp_path / DATE).mkdir()
     assert main(["simulate", "--out", str(tmp_path)]) == 2
     assert "already" in capsys.readouterr().err

@@ -1,16 +1,16 @@
-"""Limbs that bend, feet that reach the ground and stay with their owner."""
+"""People: on the ground, as tall as stated, legs moving when they walk."""
 
 import numpy as np
 import pytest
 
 from modt.simulation.materials import Material
-from modt.simulation.people import Figures, Posture
+from modt.simulation.people import People, Posture
 
 
-def figures(posture, n=8):
+def group(posture, n=8):
     rng = np.random.default_rng(0)
     one = np.ones(n)
-    return Figures(
+    return People(
         body=np.arange(n),
         posture=np.full(n, posture),
         height=rng.uniform(1.2, 2.0, n),
@@ -25,32 +25,32 @@ def figures(posture, n=8):
 
 
 @pytest.mark.parametrize("posture", Posture)
-def test_figures_stand_on_the_ground_as_tall_as_they_are(posture):
-    people = figures(posture)
+def test_people_stand_on_the_ground_with_the_stated_height(posture):
+    people = group(posture)
     for time_s in np.linspace(0, 1.1, 7):
-        pieces = people.pieces(time_s)
-        assert np.isfinite(pieces.centre).all()
-        np.testing.assert_allclose(np.linalg.det(pieces.rotation.astype(float)), 1, atol=1e-4)
-        reach = np.abs(pieces.rotation) @ pieces.half[:, :, None]
-        low = pieces.centre[:, 2] - reach[:, 2, 0]
-        high = pieces.centre[:, 2] + reach[:, 2, 0]
+        solids = people.solids(time_s)
+        assert np.isfinite(solids.centre).all()
+        np.testing.assert_allclose(np.linalg.det(solids.rotation.astype(float)), 1, atol=1e-4)
+        reach = np.abs(solids.rotation) @ solids.half[:, :, None]
+        low = solids.centre[:, 2] - reach[:, 2, 0]
+        high = solids.centre[:, 2] + reach[:, 2, 0]
         for body in people.body:
-            mine = pieces.body == body
+            mine = solids.body == body
             assert -0.1 < low[mine].min() < 0.35
             if posture in (Posture.STAND, Posture.WALK):
                 assert high[mine].max() == pytest.approx(people.height[body], abs=0.12)
 
 
-def test_walkers_move_their_legs_and_standers_do_not():
+def test_only_walking_people_move_their_legs():
     for posture, moves in ((Posture.WALK, True), (Posture.STAND, False)):
-        people = figures(posture)
-        a, b = people.pieces(0.0).centre, people.pieces(0.25).centre
+        people = group(posture)
+        a, b = people.solids(0.0).centre, people.solids(0.25).centre
         assert (np.abs(a - b).max() > 0.1) == moves
 
 
-def test_a_strip_is_worn_about_the_chest_by_those_who_have_one():
-    people = figures(Posture.WALK)
-    strips = people.pieces(0.4).take(people.pieces(0.4).material == Material.RETRO)
+def test_reflective_strips_are_at_the_chest():
+    people = group(Posture.WALK)
+    strips = people.solids(0.4).take(people.solids(0.4).material == Material.RETRO)
     assert strips.body.tolist() == np.flatnonzero(people.strip).tolist()
     np.testing.assert_allclose(2 * strips.half[:, 2], 0.07, atol=1e-4)
     share = strips.centre[:, 2] / people.height[strips.body]

@@ -1,4 +1,4 @@
-"""The synthetic stream: the same for the same seed, and its truth true."""
+"""The synthetic stream: reproducible, with consistent ground truth."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, transform, transform_boxes
 from modt.simulation.scenes import SCENES
 from modt.simulation.sensors import SENSORS
-from modt.simulation.simulator import SLICES, late_of
+from modt.simulation.simulator import N_SLICES, slice_delay_s
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import NONE
 
@@ -20,12 +20,12 @@ def street():
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_same_seed_gives_the_same_bytes_in_any_order(scene):
-    a, b = (SyntheticStream(scene, "vlp-16", 1.0, seed=5) for _ in range(2))
+    a, b = (SyntheticStream(scene, "vlp-16", 0.4, seed=5) for _ in range(2))
     frames = [f.points.tobytes() for f in a]
-    assert len(frames) == 10
-    assert frames[7] == next(iter(b.between(7, 8))).points.tobytes()
-    assert frames[7] != frames[6]
-    assert SyntheticStream(scene, "vlp-16", 1.0, seed=6).simulator.sweep(0)[0].points.tobytes() != frames[0]
+    assert len(frames) == 4
+    assert frames[2] == next(iter(b.between(2, 3))).points.tobytes()
+    assert frames[2] != frames[1]
+    assert SyntheticStream(scene, "vlp-16", 0.4, seed=6).simulator.sweep(0)[0].points.tobytes() != frames[0]
 
 
 @pytest.mark.parametrize("sensor", SENSORS)
@@ -40,7 +40,7 @@ def test_every_sensor_gives_valid_frames(sensor):
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_points_of_a_body_lie_in_its_box(scene):
-    stream = SyntheticStream(scene, "os1-64", 2.0, seed=1)
+    stream = SyntheticStream(scene, "os1-64", 0.8, seed=1)
     inside = total = 0
     for frame, truth in stream.sweeps():
         for body, box in zip(truth.bodies, truth.boxes, strict=True):
@@ -53,7 +53,7 @@ def test_points_of_a_body_lie_in_its_box(scene):
     assert inside > 0.98 * total
 
 
-def test_the_truth_speaks_of_every_point(street):
+def test_the_truth_covers_every_point(street):
     frame, truth = next(street.sweeps())
     assert len(truth.instance) == len(truth.semantic) == len(truth.object_class) == len(frame.points)
     assert {40, 50, 70} <= set(truth.semantic.tolist())
@@ -62,7 +62,7 @@ def test_the_truth_speaks_of_every_point(street):
     assert truth.points.tolist() == counted
 
 
-def test_standing_bodies_stand_still_in_the_world(street):
+def test_bodies_at_rest_stay_where_they_are_in_the_world(street):
     (first, a), (last, b) = (street.simulator.sweep(i) for i in (0, 39))
     world_a = transform_boxes(first.T_world_sensor, a.boxes)
     world_b = transform_boxes(last.T_world_sensor, b.boxes)
@@ -77,7 +77,7 @@ def test_the_ground_lies_beneath_the_sensor(street):
     assert np.median(road[:, 2]) == pytest.approx(-1.73, abs=0.15)
 
 
-def test_nothing_stands_inside_another(street):
+def test_no_two_bodies_overlap(street):
     world = street.simulator.world
     u = np.stack(np.meshgrid(np.linspace(-0.45, 0.45, 9), np.linspace(-0.45, 0.45, 5)), axis=-1).reshape(-1, 2)
     for time_s in (0.0, 2.0, 4.0):
@@ -95,38 +95,38 @@ def test_nothing_stands_inside_another(street):
             assert not inside.any()
 
 
-def test_the_camera_sees_ahead(street):
+def test_the_camera_looks_ahead(street):
     fov = FieldOfView.of_camera(street.info.camera)
     assert fov.contains(np.array([[10.0, 0, 0], [-10, 0, 0], [1, 10, 0]])).tolist() == [True, False, False]
 
 
-def test_distorted_scans_are_mended_by_the_motion_that_distorted_them():
+def test_distorted_scans_are_restored_by_the_motion_during_the_sweep():
     plain, distorted = (SyntheticStream(seconds=1.0, seed=2, distort=d) for d in (False, True))
     (a, truth), (b, _) = plain.simulator.sweep(5), distorted.simulator.sweep(5)
     world, sensor = plain.simulator.world, plain.simulator.sensor
-    moved = np.linalg.norm(a.points[:, :3] - b.points[:, :3], axis=1)
+    transformed = np.linalg.norm(a.points[:, :3] - b.points[:, :3], axis=1)
     still = truth.instance == NONE
-    assert moved[still].max() > 0.2
+    assert transformed[still].max() > 0.2
     bearing = np.arctan2(a.points[:, 1], a.points[:, 0]) % (2 * np.pi)
     column = (bearing / (2 * np.pi) * sensor.shape[1]).astype(np.int64)
-    part = column * SLICES // sensor.shape[1]
-    for k in range(SLICES):
+    part = column * N_SLICES // sensor.shape[1]
+    for k in range(N_SLICES):
         rows = still & (part == k)
-        late_s = late_of(k, sensor.period_s)
+        late_s = slice_delay_s(k, sensor.period_s)
         T = inverse(world.ego_pose(a.stamp_s)) @ world.ego_pose(a.stamp_s + late_s)
         mended = transform(T, b.points[rows, :3].astype(np.float64))
         np.testing.assert_allclose(mended, a.points[rows, :3], atol=1e-4)  # what float32 leaves of 80 m
 
 
-def test_the_head_looks_ahead_at_the_stamp_and_left_before_it():
-    late = [late_of(k, 0.1) for k in range(SLICES)]  # slices go counter-clockwise from straight ahead
+def test_the_sensor_points_ahead_at_the_stamp_and_left_before():
+    late = [slice_delay_s(k, 0.1) for k in range(N_SLICES)]  # slices go counter-clockwise from straight ahead
     assert abs(late[0]) < 0.001
-    assert late[SLICES // 4] == pytest.approx(-0.025, abs=0.001)
-    assert late[3 * SLICES // 4] == pytest.approx(0.025, abs=0.001)
+    assert late[N_SLICES // 4] == pytest.approx(-0.025, abs=0.001)
+    assert late[3 * N_SLICES // 4] == pytest.approx(0.025, abs=0.001)
     assert (min(late), max(late)) == pytest.approx((-0.05, 0.05), abs=0.001)
 
 
-def test_what_does_not_turn_is_not_distorted():
+def test_a_sensor_without_rotation_is_not_distorted():
     (frame, _), (plain, _) = (
         SyntheticStream("street", "solid-state", 0.1, distort=d).simulator.sweep(0) for d in (True, False)
     )
@@ -143,12 +143,12 @@ def test_what_does_not_turn_is_not_distorted():
         ("street", "vlp-16", 1.0, -1),
     ],
 )
-def test_misuse_is_named(arguments):
+def test_invalid_arguments_are_refused(arguments):
     with pytest.raises(MisuseError):
         SyntheticStream(*arguments)
 
 
-def test_objects_of_a_label_file_stand_where_it_says(tmp_path):
+def test_objects_of_a_label_file_stand_where_it_states(tmp_path):
     path = tmp_path / "000000.txt"
     path.write_text(
         "Car 0 0 0 0 0 9 9 1.5 1.6 4.0 2.0 1.7 15.0 -1.57\n"
@@ -165,7 +165,7 @@ def test_objects_of_a_label_file_stand_where_it_says(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["Car 0 0\n", "Car a b\n"])
-def test_what_is_no_label_file_is_named(tmp_path, text):
+def test_an_invalid_label_file_is_refused(tmp_path, text):
     (tmp_path / "x.txt").write_text(text)
     with pytest.raises(MisuseError, match="label"):
         SyntheticStream(str(tmp_path / "x.txt"))

@@ -1,4 +1,4 @@
-"""JSON Lines: whole lines or none, read back as written."""
+"""JSON Lines: complete lines, read back as written."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ record = st.dictionaries(st.text().filter(lambda k: k != "schema"), json_values,
 
 
 @given(st.lists(record, max_size=5))
-def test_what_is_written_is_read(tmp_path_factory, records):
+def test_records_are_read_back(tmp_path_factory, records):
     path = tmp_path_factory.getbasetemp() / "r.jsonl"
     lines = JsonLines(path)
     written = [{"schema": "s/1", **r} for r in records]
@@ -30,7 +30,7 @@ def test_what_is_written_is_read(tmp_path_factory, records):
 
 
 @given(cut=st.integers(0, 200))
-def test_a_file_cut_anywhere_keeps_its_whole_lines(tmp_path_factory, cut):
+def test_a_truncated_file_keeps_its_complete_lines(tmp_path_factory, cut):
     path = tmp_path_factory.getbasetemp() / "cut.jsonl"
     lines = JsonLines(path)
     for i in range(6):
@@ -41,7 +41,7 @@ def test_a_file_cut_anywhere_keeps_its_whole_lines(tmp_path_factory, cut):
     whole = content.count(b"\n")
     read = [r["i"] for r in read_records(path, "s/1")]
     assert read[:whole] == list(range(whole))
-    assert len(read) <= whole + 1  # a last line may lack nothing but its end
+    assert len(read) <= whole + 1  # the last line may lack its newline alone
 
 
 @pytest.mark.parametrize(
@@ -52,19 +52,19 @@ def test_a_file_cut_anywhere_keeps_its_whole_lines(tmp_path_factory, cut):
         ("[1]\n", ":1: schema is None"),
     ],
 )
-def test_what_is_no_record_is_named_with_its_line(tmp_path, content, where):
+def test_an_invalid_record_is_refused_with_its_line(tmp_path, content, where):
     path = tmp_path / "r.jsonl"
     path.write_text(content)
     with pytest.raises(MisuseError, match=where):
         list(read_records(path, "s/1"))
 
 
-def test_a_missing_file_is_one_clear_error(tmp_path):
+def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(MisuseError, match="cannot be read"):
         list(read_records(tmp_path / "none", "s/1"))
 
 
-def test_not_a_number_is_refused_before_it_reaches_the_file(tmp_path):
+def test_nan_is_refused_before_it_reaches_the_file(tmp_path):
     lines = JsonLines(tmp_path / "r.jsonl")
     with pytest.raises(ValueError, match="JSON"):
         lines.write({"x": float("nan")})
@@ -72,7 +72,7 @@ def test_not_a_number_is_refused_before_it_reaches_the_file(tmp_path):
     assert (tmp_path / "r.jsonl").read_bytes() == b""
 
 
-def test_a_full_device_is_one_clear_error():
+def test_a_full_device_is_an_error():
     from pathlib import Path
 
     lines = JsonLines(Path("/dev/full"))
@@ -95,7 +95,7 @@ except ModtError as error:
 """
 
 
-def test_a_line_that_does_not_fit_is_taken_back(tmp_path):
+def test_a_line_that_does_not_fit_is_removed(tmp_path):
     path = tmp_path / "r.jsonl"
     done = subprocess.run([sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True)
     assert "too large" in done.stdout
@@ -107,19 +107,19 @@ def test_a_line_that_does_not_fit_is_taken_back(tmp_path):
     assert len(read) >= 5
 
 
-def test_a_folder_that_is_not_there_is_one_clear_error(tmp_path):
+def test_a_missing_folder_is_an_error(tmp_path):
     with pytest.raises(ModtError, match="No such file"):
         JsonLines(tmp_path / "none" / "r.jsonl")
 
 
-def test_records_of_other_named_schemas_are_passed_over(tmp_path):
+def test_records_of_ignored_schemas_are_skipped(tmp_path):
     path = tmp_path / "mixed.jsonl"
     lines = JsonLines(path)
     for k in range(3):
         lines.write({"schema": "modt.ledger/1", "frame": k})
         lines.write({"schema": "modt.energy/1", "window": k})
     lines.close()
-    assert [r["frame"] for r in read_records(path, "modt.ledger/1", beside={"modt.energy/1"})] == [0, 1, 2]
-    assert [r["window"] for r in read_records(path, "modt.energy/1", beside={"modt.ledger/1"})] == [0, 1, 2]
+    assert [r["frame"] for r in read_records(path, "modt.ledger/1", ignored={"modt.energy/1"})] == [0, 1, 2]
+    assert [r["window"] for r in read_records(path, "modt.energy/1", ignored={"modt.ledger/1"})] == [0, 1, 2]
     with pytest.raises(MisuseError, match=r"mixed\.jsonl:2"):
         list(read_records(path, "modt.ledger/1"))

@@ -1,4 +1,4 @@
-"""The run directory: nothing already recorded is lost."""
+"""The run directory: no earlier result is lost."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from modt.sinks.run_directory import RunDirectory
 from tests.results import result
 
 
-def test_a_new_directory_is_made_with_its_parents(tmp_path):
+def test_a_new_directory_is_created_with_its_parents(tmp_path):
     directory = RunDirectory(tmp_path / "a" / "b")
     directory.describe("x: 1\n")
     directory.summarise({"frames": 3})
@@ -25,7 +25,7 @@ def test_an_earlier_run_is_kept(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["file", "foreign"])
-def test_what_is_no_run_is_left_alone(tmp_path, kind):
+def test_a_path_that_is_no_run_is_not_touched(tmp_path, kind):
     out = tmp_path / "out"
     if kind == "file":
         out.write_text("mine")
@@ -38,7 +38,7 @@ def test_what_is_no_run_is_left_alone(tmp_path, kind):
     assert kept.read_text() == "mine"
 
 
-def test_a_place_that_cannot_be_written_is_one_clear_error():
+def test_a_path_that_cannot_be_written_is_an_error():
     from pathlib import Path
 
     with pytest.raises(ModtError, match="cannot be written"):

@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.sinks.fast_json import beside, probabilities, text, thousandths
+from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
 from modt.sinks.records import line, read_records
 from modt.sinks.tracks import SCHEMA, TrackLines, frame_line, frame_record
 from tests.results import CAR, result
 
 
-def test_a_record_holds_what_the_format_says():
+def test_a_record_has_the_documented_fields():
     record = frame_record(result(3, [7, 5], {0: 11, 1: 12}, {11: CAR}, lost=(9,), classified=2))
     assert record["schema"] == SCHEMA
     assert (record["frame"], record["stamp_s"], record["proposals"]) == (3, 0.3, 2)
@@ -37,7 +37,7 @@ def test_a_record_holds_what_the_format_says():
     assert (lost["proposal"], lost["box"], lost["state"]) == (None, None, "lost")
 
 
-def test_an_empty_frame_is_a_frame_like_any_other():
+def test_an_empty_frame_has_a_record():
     record = frame_record(result(0, [], {}))
     assert record["proposals"] == 0
     assert record["tracks"] == []
@@ -66,9 +66,9 @@ COUNTS = st.one_of(st.integers(0, 300), st.sampled_from([9999, 10_000, 10**8 - 1
 
 @st.composite
 def results(draw):
-    """Frames of few or no tracks and proposals, with whatever numbers."""
-    seen, lost = draw(st.integers(0, 4)), draw(st.integers(0, 3))
-    r = result(draw(COUNTS), [3] * seen, {p: 7 + p for p in range(seen)}, lost=tuple(range(90, 90 + lost)))
+    """Frames of few or no tracks and proposals, with any numbers."""
+    tracked, lost = draw(st.integers(0, 4)), draw(st.integers(0, 3))
+    r = result(draw(COUNTS), [3] * tracked, {p: 7 + p for p in range(tracked)}, lost=tuple(range(90, 90 + lost)))
     t = r.tracks
     for column in (t.points, t.age, t.missed):
         column[:] = draw(arrays(np.int64, column.shape, elements=COUNTS))
@@ -79,20 +79,23 @@ def results(draw):
 
 
 @given(results())
-def test_the_line_of_a_frame_is_that_of_its_record(r):
+def test_the_fast_line_equals_that_of_the_record(r):
     assert frame_line(r) == line(frame_record(r))
 
 
 @given(st.integers(0, 2**32))
-def test_numbers_are_written_as_repr_writes_them(seed):
+def test_numbers_are_written_like_repr(seed):
     rng = np.random.default_rng(seed)
     lengths, likely = rng.normal(0, 10.0 ** rng.integers(-4, 7), 200), rng.random(200) ** rng.integers(1, 12)
-    assert text(beside(200, thousandths(lengths), ",")) == "".join(f"{v!r}," for v in np.round(lengths, 3).tolist())
-    assert text(beside(200, probabilities(likely), ",")) == "".join(f"{v!r}," for v in np.round(likely, 6).tolist())
+    for text, rounded in (
+        (rounded_to_3(lengths), np.round(lengths, 3)),
+        (probabilities(likely), np.round(likely, 6)),
+    ):
+        assert decode(join_columns(200, text, ",")) == "".join(f"{v!r}," for v in rounded.tolist())
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_is_not_finite_is_not_written(bad):
+def test_numbers_that_are_not_finite_are_refused(bad):
     for column in ("x", "posterior"):
         r = result(0, [3], {0: 1})
         getattr(r.tracks, column)[0, 1] = bad

@@ -1,4 +1,4 @@
-"""Small streams in every layout, for tests."""
+"""Small streams of every layout, for tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Dead reckoning against the development kit's formulas, written out."""
+"""Poses from OXTS records against the formulas of the development kit."""
 
 import math
 
@@ -28,13 +28,13 @@ def mercator_pose(record, scale):
 
 
 @given(records)
-def test_poses_are_the_development_kits(rows):
+def test_poses_equal_those_of_the_development_kit(rows):
     scale = math.cos(rows[0, 0] * math.pi / 180)
     origin = np.linalg.inv(mercator_pose(rows[0], scale))
     expected = np.stack([origin @ mercator_pose(r, scale) for r in rows])
     np.testing.assert_allclose(poses(rows), expected, atol=1e-6)
 
 
-def test_north_is_north_and_metres_are_metres():
+def test_axes_and_scale_of_the_world_frame():
     rows = np.array([[49.0, 8.4, 110, 0, 0, 0], [49.0 + math.degrees(10 / 6378137.0), 8.4, 110, 0, 0, 0]])
     np.testing.assert_allclose(poses(rows)[1][:3, 3], [0, 10, 0], atol=1e-3)

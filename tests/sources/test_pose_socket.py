@@ -1,4 +1,4 @@
-"""Poses that come in by a socket: any bytes are survived, and every datagram is counted once."""
+"""Poses received by a socket: any bytes are handled, and every datagram is counted once."""
 
 import json
 import logging
@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
+from modt.sources.pose_buffer import PoseBuffer, interpolate
 from modt.sources.pose_datagram import DatagramError, read_datagram
-from modt.sources.pose_ring import PoseRing, between
 from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.types import Frame
 
@@ -40,7 +40,7 @@ def matrix(T):
 
 @pytest.fixture(name="pair")
 def a_pair():
-    """A sender, and the odometry that it sends to."""
+    """A sender and the pose source that receives from it."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     odometry = PoseSocket(here, CONFIG, "test")
     yield there, odometry
@@ -63,22 +63,22 @@ payload = st.one_of(
 
 
 @given(payload)
-def test_any_bytes_are_a_pose_or_are_refused(raw):
-    kind = None
+def test_any_bytes_are_a_pose_or_refused(raw):
+    reason = None
     try:
         stamp_s, T = read_datagram(raw)
     except DatagramError as error:
-        kind = error.kind
-    if kind is None:
+        reason = error.reason
+    if reason is None:
         assert np.isfinite(stamp_s)
         np.testing.assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=0.02)
         np.testing.assert_array_equal(T[3], [0, 0, 0, 1])
-    assert kind in (None, *PoseSocket.KINDS)
+    assert reason in (None, *PoseSocket.REASONS)
 
 
 @given(st.lists(st.one_of(payload, st.floats(0, 3)), max_size=30))
-def test_counters_add_up_whatever_comes(events):
-    """Events are datagrams, or the stamp of a frame that asks."""
+def test_counters_add_up(events):
+    """Events are datagrams or stamps of frames."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     odometry, sent, frames = PoseSocket(here, CONFIG, "test"), 0, 0
     for event in [*events, 3.0]:
@@ -96,7 +96,7 @@ def test_counters_add_up_whatever_comes(events):
     odometry.close()
 
 
-def test_both_forms_say_the_same():
+def test_both_forms_give_the_same_pose():
     T = matrix([1.0, 2.0, 0.5])
     flat = {"stamp": 1.5, "pose": T.ravel().tolist(), "source": "wheels"}
     short = {"stamp": 1.5, "pose": T[:3].ravel().tolist()}
@@ -107,7 +107,7 @@ def test_both_forms_say_the_same():
 
 
 @pytest.mark.parametrize(
-    ("raw", "kind", "cause"),
+    ("raw", "reason", "cause"),
     [
         (b"", "malformed", "no JSON"),
         (b"\xff\xfe", "malformed", "no JSON"),
@@ -126,13 +126,13 @@ def test_both_forms_say_the_same():
         (planar(1) + b" " * 5000, "malformed", "4096 bytes"),
     ],
 )
-def test_what_is_wrong_is_said(raw, kind, cause):
+def test_the_reason_of_a_refusal_is_given(raw, reason, cause):
     with pytest.raises(DatagramError, match=cause) as caught:
         read_datagram(raw)
-    assert caught.value.kind == kind
+    assert caught.value.reason == reason
 
 
-def test_a_frame_between_two_poses_lies_between(pair):
+def test_poses_are_interpolated(pair):
     there, odometry = pair
     there.send(planar(1.0, 0.0, 0.0, 3.1))
     there.send(planar(1.2, 1.0, -2.0, -3.1))
@@ -142,7 +142,7 @@ def test_a_frame_between_two_poses_lies_between(pair):
     np.testing.assert_array_equal(pose_of(odometry, frame(1.2)), matrix([1.0, -2.0, -3.1]))
 
 
-def test_a_frame_soon_after_the_newest_pose_goes_on_as_it_went(pair):
+def test_poses_are_extrapolated(pair):
     there, odometry = pair
     for k in range(5):
         there.send(planar(0.1 * k, 1.0 * k, 0.0, 0.02 * k))
@@ -151,15 +151,15 @@ def test_a_frame_soon_after_the_newest_pose_goes_on_as_it_went(pair):
     assert pose_of(odometry, frame(0.4 + CONFIG.max_age_s - 0.01)) is not None
 
 
-def test_noise_between_poses_close_together_is_not_magnified():
-    ring, rng = PoseRing(256, 0.3), np.random.default_rng(0)
+def test_extrapolation_does_not_amplify_noise():
+    ring, rng = PoseBuffer(OdometryConfig()), np.random.default_rng(0)
     for k in range(200):
         ring.add(0.005 * k, matrix([0.05 * k + rng.normal(0, 0.005), 0.0, 0.0]))
     T = ring.at(0.995 + 0.1)
     assert abs(T[0, 3] - 10 * 1.095) < 0.05
 
 
-def test_one_pose_tells_no_other_time_and_long_gaps_none(pair):
+def test_one_pose_or_a_long_gap_gives_no_pose_at_other_times(pair):
     there, odometry = pair
     assert pose_of(odometry, frame(0.0)) is None
     there.send(planar(0.1))
@@ -171,7 +171,7 @@ def test_one_pose_tells_no_other_time_and_long_gaps_none(pair):
     assert pose_of(odometry, frame(1.05)) is None
 
 
-def test_each_cause_is_counted_and_logged_once(pair, caplog):
+def test_each_reason_is_counted_and_logged_once(pair, caplog):
     there, odometry = pair
     bad = [b"nonsense", b'{"stamp": NaN, "x": 0, "y": 0, "yaw": 0}', planar(9.0), planar(10.0), planar(1e9)]
     with caplog.at_level(logging.WARNING):
@@ -191,7 +191,7 @@ def test_each_cause_is_counted_and_logged_once(pair, caplog):
     assert "is it the stream's clock?" in caplog.text
 
 
-def test_a_sender_begun_anew_is_told_by_its_leap(pair, caplog):
+def test_a_restarted_sender_is_detected_by_its_jump(pair, caplog):
     there, odometry = pair
     for k in range(8):
         x = 20 + 0.1 * k if k < 5 else 0.1 * (k - 5)  # 20 m back in 0.05 s
@@ -210,7 +210,7 @@ def test_a_sender_begun_anew_is_told_by_its_leap(pair, caplog):
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 2), st.floats(-1, 1), st.floats(-1, 1)), max_size=40))
-def test_no_drive_at_a_speed_that_there_is_begins_anew(steps):
+def test_no_motion_below_the_speed_limit_is_a_restart(steps):
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     odometry, stamp_s, x, y = PoseSocket(here, CONFIG, "test"), 0.0, 0.0, 0.0
     there.send(planar(0.0))
@@ -224,7 +224,7 @@ def test_no_drive_at_a_speed_that_there_is_begins_anew(steps):
     odometry.close()
 
 
-def test_a_flood_takes_no_more_than_a_ringful_of_a_frame():
+def test_a_frame_reads_a_flood_up_to_the_capacity():
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     there.setblocking(False)
     odometry = PoseSocket(here, OdometryConfig(capacity=4), "test")
@@ -243,23 +243,23 @@ def test_a_flood_takes_no_more_than_a_ringful_of_a_frame():
     st.tuples(*[st.floats(-50, 50)] * 2, st.floats(-3, 3)),
     st.floats(-1, 2),
 )
-def test_between_is_what_the_plane_says(a, b, share):
-    """The slow, obvious way: each number by itself, the angle the short way round."""
+def test_planar_interpolation_equals_the_closed_form(a, b, share):
+    """Reference: each coordinate by itself, the angle along the shorter arc."""
     turn = (b[2] - a[2] + np.pi) % (2 * np.pi) - np.pi
     if abs(abs(turn) - np.pi) < 1e-6:
         return  # both ways round are as short
     expected = [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * turn]
-    np.testing.assert_allclose(between(matrix(a), matrix(b), share), matrix(expected), atol=1e-6)
+    np.testing.assert_allclose(interpolate(matrix(a), matrix(b), share), matrix(expected), atol=1e-6)
 
 
 @given(st.tuples(*[st.floats(-1.5, 1.5)] * 3), st.tuples(*[st.floats(-1.5, 1.5)] * 3))
-def test_between_in_space_ends_at_both_and_stays_rigid(begin, end):
+def test_interpolation_is_rigid_and_exact_at_both_ends(begin, end):
     a, b = se3(rotation_zyx(*begin), np.zeros(3)), se3(rotation_zyx(*end), np.ones(3))
-    np.testing.assert_allclose(between(a, b, 0.0), a, atol=1e-9)
-    np.testing.assert_allclose(between(a, b, 1.0), b, atol=1e-9)
-    half = between(a, b, 0.5)
+    np.testing.assert_allclose(interpolate(a, b, 0.0), a, atol=1e-9)
+    np.testing.assert_allclose(interpolate(a, b, 1.0), b, atol=1e-9)
+    half = interpolate(a, b, 0.5)
     np.testing.assert_allclose(half @ inverse(half), np.eye(4), atol=1e-9)
-    np.testing.assert_allclose(between(half, b, -1.0), a, atol=1e-6)
+    np.testing.assert_allclose(interpolate(half, b, -1.0), a, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -278,12 +278,12 @@ def test_between_in_space_ends_at_both_and_stays_rigid(begin, end):
         "nonsense",
     ],
 )
-def test_an_address_that_is_none_is_one_error(url):
-    with pytest.raises(MisuseError, match=r"write own, none, udp://HOST:PORT or unix:///PATH|cannot be bound"):
+def test_an_invalid_address_is_refused(url):
+    with pytest.raises(MisuseError, match=r"write recording, none, udp://HOST:PORT or unix:///PATH|cannot be bound"):
         open_socket(url)
 
 
-def test_a_udp_socket_hears_and_is_held(free_port):
+def test_a_udp_socket_receives_and_stays_bound(free_port):
     url = f"udp://127.0.0.1:{free_port}"
     odometry = PoseSocket(open_socket(url), CONFIG, url)
     with pytest.raises(MisuseError, match="cannot be bound"):
@@ -294,7 +294,7 @@ def test_a_udp_socket_hears_and_is_held(free_port):
     odometry.close()
 
 
-def test_a_unix_socket_goes_with_its_run_and_an_abandoned_one_is_replaced(tmp_path):
+def test_a_unix_socket_is_removed_on_close_and_a_stale_one_replaced(tmp_path):
     path = tmp_path / "odometry.sock"
     killed = open_socket(f"unix://{path}")
     with pytest.raises(MisuseError, match="cannot be bound"):
@@ -309,15 +309,15 @@ def test_a_unix_socket_goes_with_its_run_and_an_abandoned_one_is_replaced(tmp_pa
     assert not path.exists()
 
 
-def test_a_file_in_the_way_is_left_alone(tmp_path):
+def test_an_existing_file_is_not_replaced(tmp_path):
     (tmp_path / "mine").write_text("mine")
     with pytest.raises(MisuseError, match="cannot be bound"):
         open_socket(f"unix://{tmp_path / 'mine'}")
     assert (tmp_path / "mine").read_text() == "mine"
 
 
-def test_asking_never_waits(pair):
-    """Nobody sends: the answer is there all the same, from another thread that would otherwise hang."""
+def test_reading_does_not_block(pair):
+    """Without a sender; in a thread, which would hang otherwise."""
     _, odometry = pair
     answers = []
     asking = threading.Thread(target=lambda: answers.append(pose_of(odometry, frame(0.0))), daemon=True)

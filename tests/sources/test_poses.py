@@ -1,4 +1,4 @@
-"""Poses from files: which frame they are in, and what is wrong with a bad one."""
+"""Poses from files: their coordinate frames, and the errors of invalid files."""
 
 import dataclasses
 import shutil
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
 from modt.sources.pose_file import read_poses
-from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry, PosedStream
+from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
 
 from . import layouts
@@ -28,7 +28,7 @@ def write(path, poses):
 
 
 @given(st.lists(pose, min_size=1, max_size=5))
-def test_poses_read_back_as_they_were_written(tmp_path_factory, poses):
+def test_poses_are_read_back(tmp_path_factory, poses):
     path = write(tmp_path_factory.mktemp("poses") / "p.txt", poses)
     np.testing.assert_allclose(read_poses(path), poses, atol=1e-9)
 
@@ -51,7 +51,7 @@ GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
         ("\u00e9", "no text"),
     ],
 )
-def test_a_bad_file_is_named_with_its_line(tmp_path, text, named):
+def test_an_invalid_file_is_refused_with_its_line(tmp_path, text, named):
     path = tmp_path / "p.txt"
     if text is not None:
         path.write_text(text, encoding="utf-8")
@@ -59,39 +59,39 @@ def test_a_bad_file_is_named_with_its_line(tmp_path, text, named):
         read_poses(path)
 
 
-def test_poses_of_a_camera_are_brought_to_the_sensor_and_others_taken_as_they_are(tmp_path):
+def test_camera_poses_are_converted_and_sensor_poses_unchanged(tmp_path):
     frame = next(iter(open_stream(layouts.bare(tmp_path))))
     T_sensor = se3(rotation_zyx(0.01, -0.02, 0.7), np.array([3.0, -2.0, 0.1]))
     path = write(tmp_path / "p.txt", [T_CAMERA_SENSOR @ T_sensor @ inverse(T_CAMERA_SENSOR)])
-    np.testing.assert_allclose(ListedPoses(path, CAMERA, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
+    np.testing.assert_allclose(PoseFile(path, CAMERA, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
     path = write(tmp_path / "q.txt", [T_sensor])
-    np.testing.assert_allclose(ListedPoses(path, None, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
+    np.testing.assert_allclose(PoseFile(path, None, 1).place(frame).T_world_sensor, T_sensor, atol=1e-9)
 
 
-def test_a_line_belongs_to_the_frame_of_its_number(tmp_path):
+def test_a_line_belongs_to_the_frame_of_its_index(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     path = write(tmp_path / "p.txt", [se3(np.eye(3), np.array([0.0, 0.0, float(k)])) for k in range(5)])
-    posed = PosedStream(stream, ListedPoses(path, stream.info.camera, stream.info.end))
+    posed = PosedStream(stream, PoseFile(path, stream.info.camera, stream.info.end))
     # z of this camera is x of the sensor
     assert [f.T_world_sensor[0, 3] for f in posed] == [0, 1, 4]
     assert [f.T_world_sensor[0, 3] for f in posed.between(1, 5)] == [1, 4]
 
 
-def test_too_few_lines_are_named_before_the_start(tmp_path):
+def test_too_few_lines_are_refused_before_the_start(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     path = write(tmp_path / "p.txt", [np.eye(4)] * 3)
     with pytest.raises(MisuseError, match="3 poses, too few for frame 4"):
-        ListedPoses(path, None, stream.info.end)
-    assert ListedPoses(path, None, stream.between(0, 2).info.end)
+        PoseFile(path, None, stream.info.end)
+    assert PoseFile(path, None, stream.between(0, 2).info.end)
     endless = dataclasses.replace(stream.info, end=None)
-    posed = PosedStream(stream, ListedPoses(path, None, endless.end))
+    posed = PosedStream(stream, PoseFile(path, None, endless.end))
     with pytest.raises(MisuseError, match="too few for frame 4"):
         list(posed)
 
 
 def test_the_streams_own_may_be_kept_or_switched_off(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path))
-    own, none = PosedStream(stream, OwnOdometry()), PosedStream(stream, NoOdometry())
+    own, none = PosedStream(stream, RecordedPoses()), PosedStream(stream, NoPoses())
     assert (own.info.has_poses, none.info.has_poses) == (True, False)
     assert all(f.T_world_sensor is None for f in none)
     for a, b in zip(own, stream, strict=True):
@@ -99,19 +99,19 @@ def test_the_streams_own_may_be_kept_or_switched_off(tmp_path):
         assert a.points.tobytes() == b.points.tobytes()
 
 
-def test_faults_of_the_stream_are_those_of_the_posed_one(tmp_path):
+def test_a_posed_stream_shares_the_faults(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     (drive / "velodyne_points" / "data" / f"{1:010d}.bin").write_bytes(b"short")
-    posed = PosedStream(open_stream(drive), NoOdometry()).between(0, 3)
+    posed = PosedStream(open_stream(drive), NoPoses()).between(0, 3)
     list(posed)
     assert [f.frame for f in posed.faults.first] == [1]
 
 
-def test_the_poses_beside_a_sequence_given_again_are_the_same(tmp_path):
+def test_the_poses_of_a_sequence_given_as_a_file_are_the_same(tmp_path):
     sequence = layouts.odometry(tmp_path)
     before = [f.T_world_sensor for f in open_stream(sequence)]
     path = shutil.copy(sequence / "poses.txt", tmp_path / "again.txt")
     (sequence / "poses.txt").unlink()
     stream = open_stream(sequence)
-    posed = PosedStream(stream, ListedPoses(path, stream.info.camera, stream.info.end))
+    posed = PosedStream(stream, PoseFile(path, stream.info.camera, stream.info.end))
     np.testing.assert_allclose([f.T_world_sensor for f in posed], before, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Layouts are told from what lies there, and what is missing is named."""
+"""Recognition of layouts, and notes on missing files."""
 
 import re
 import shutil
@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError, ModtError
-from modt.sources.pose_source import NoOdometry, PosedStream
+from modt.sources.pose_source import NoPoses, PosedStream
 from modt.sources.recognise import open_stream
-from modt.sources.stream import FIRST
+from modt.sources.stream import MAX_KEPT_FAULTS
 
 from . import layouts
 
@@ -42,7 +42,7 @@ def test_an_odometry_sequence_is_found_from_its_scans(tmp_path):
     assert open_stream(layouts.odometry(tmp_path) / "velodyne").info.layout == "KITTI odometry"
 
 
-def test_odometry_poses_are_brought_to_the_sensor(tmp_path):
+def test_odometry_poses_are_converted_to_sensor_poses(tmp_path):
     frames = list(open_stream(layouts.odometry(tmp_path)))
     np.testing.assert_allclose(frames[2].T_world_sensor[:3, 3], [6, 0, 0], atol=1e-12)
     assert frames[1].stamp_s == 0.104
@@ -63,13 +63,13 @@ def test_stamps_count_from_the_first(tmp_path):
     ("build", "turn_s"),
     [(layouts.raw_drive, 0.1), (layouts.tracking, 0.1), (layouts.odometry, 0.0), (layouts.bare, 0.0)],
 )
-def test_frames_say_how_long_the_head_took_to_turn(tmp_path, build, turn_s):
+def test_frames_have_the_duration_of_the_sweep(tmp_path, build, turn_s):
     stream = open_stream(build(tmp_path))
     np.testing.assert_allclose([f.turn_s for f in stream], turn_s, atol=1e-9)
-    assert [f.turn_s for f in PosedStream(stream, NoOdometry())] == [f.turn_s for f in stream]
+    assert [f.turn_s for f in PosedStream(stream, NoPoses())] == [f.turn_s for f in stream]
 
 
-def test_each_sweep_has_its_own_turn(tmp_path):
+def test_each_sweep_has_its_own_duration(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     ends = drive / "velodyne_points" / "timestamps_end.txt"
     ends.write_text(ends.read_text().replace("25.150000000", "25.151234567"))
@@ -86,46 +86,46 @@ def test_each_sweep_has_its_own_turn(tmp_path):
     ],
     ids=["broken", "blank", "backwards", "too long"],
 )
-def test_turns_that_cannot_be_are_named_and_left_out(tmp_path, end, text, named):
+def test_impossible_sweep_durations_are_noted_and_ignored(tmp_path, end, text, named):
     drive = layouts.raw_drive(tmp_path)
     (drive / "velodyne_points" / f"timestamps_{end}.txt").write_text(text)
     stream = open_stream(drive)
     (note,) = stream.info.notes
     assert re.search(named, note)
-    assert note.endswith("seen at once")
+    assert note.endswith("not deskewed")
     assert [f.turn_s for f in stream] == [0.0] * 4
 
 
 def lines_of(drive, end):
-    """A list of times of a drive, and its lines."""
+    """Path and lines of a list of times of a drive."""
     path = drive / "velodyne_points" / f"timestamps{end}.txt"
     return path, path.read_text().splitlines(keepends=True)
 
 
 @pytest.mark.parametrize("end", ["_start", "_end"])
 @pytest.mark.parametrize("blank", ["\n", "  \n", "25.05 nonsense\n"])
-def test_a_sweep_without_its_times_is_seen_at_once_and_the_others_keep_theirs(tmp_path, end, blank):
+def test_a_sweep_without_times_is_not_deskewed_and_the_others_are(tmp_path, end, blank):
     drive = layouts.raw_drive(tmp_path)
     path, lines = lines_of(drive, end)
     path.write_text("".join([lines[0], blank, *lines[2:]]))
     stream = open_stream(drive)
     np.testing.assert_allclose([f.turn_s for f in stream], [0.1, 0, 0.1, 0.1], atol=1e-9)
     (note,) = stream.info.notes
-    assert note == f"1 frames have no time in {path} (the first is 1): those sweeps are taken for seen at once"
+    assert note == f"1 frames have no time in {path} (the first is 1): sweeps are not deskewed"
 
 
-def test_a_frame_without_its_stamp_lies_evenly_between_the_others_which_keep_theirs(tmp_path):
+def test_a_missing_stamp_is_interpolated(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     path, lines = lines_of(drive, "")
     path.write_text("".join(["\n", lines[1], "\n", lines[3].replace("25.3", "25.31")]))
     stream = open_stream(drive)
     np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.105, 0.21, 0.315], atol=1e-9)
     (note,) = stream.info.notes
-    assert note == f"2 frames have no time in {path} (the first is 0): those lie evenly between the others"
+    assert note == f"2 frames have no time in {path} (the first is 0): theirs are interpolated"
 
 
 @pytest.mark.parametrize("end", ["", "_start", "_end"])
-def test_blank_lines_of_scans_that_are_missing_are_as_they_should_be(tmp_path, end):
+def test_blank_lines_of_missing_scans_are_valid(tmp_path, end):
     drive = layouts.raw_drive(tmp_path, [0, 1, 4])
     path, lines = lines_of(drive, end)
     path.write_text("".join([*lines[:2], "\n", "\n", lines[4]]))
@@ -137,13 +137,13 @@ def test_blank_lines_of_scans_that_are_missing_are_as_they_should_be(tmp_path, e
 
 
 @pytest.mark.parametrize("end", ["", "_start", "_end"])
-def test_a_list_of_another_length_is_named_and_counts_line_by_line(tmp_path, end):
+def test_a_list_of_another_length_is_noted_and_used_by_line(tmp_path, end):
     drive = layouts.raw_drive(tmp_path)
     path, lines = lines_of(drive, end)
     path.write_text("".join(lines[:3]))
     stream = open_stream(drive)
     assert len(stream.info.notes) == 2
-    assert stream.info.notes[0].startswith(f"{path} holds 3 lines where the last scan is number 3")
+    assert stream.info.notes[0].startswith(f"{path} has 3 lines, the last scan is number 3")
     assert "restore" in stream.info.notes[0]
     assert stream.info.notes[1].startswith(f"1 frames have no time in {path} (the first is 3)")
     np.testing.assert_allclose([f.stamp_s for f in stream], [0, 0.1, 0.2, 0.3], atol=1e-9)
@@ -151,7 +151,7 @@ def test_a_list_of_another_length_is_named_and_counts_line_by_line(tmp_path, end
     path.write_text("".join([*lines, lines[3]]))
     stream = open_stream(drive)
     (note,) = stream.info.notes
-    assert note.startswith(f"{path} holds 5 lines where the last scan is number 3")
+    assert note.startswith(f"{path} has 5 lines, the last scan is number 3")
     np.testing.assert_allclose([f.turn_s for f in stream], 0.1, atol=1e-9)
 
 
@@ -169,11 +169,11 @@ def test_missing_frames_leave_gaps_and_a_note(tmp_path):
         ("calib_imu_to_velo.txt", "no odometry"),
         ("2011_09_26_drive_9999_sync/oxts", "no odometry"),
         ("2011_09_26_drive_9999_sync/velodyne_points/timestamps.txt", "0.1 s apart"),
-        ("2011_09_26_drive_9999_sync/velodyne_points/timestamps_start.txt", "seen at once"),
-        ("2011_09_26_drive_9999_sync/velodyne_points/timestamps_end.txt", "seen at once"),
+        ("2011_09_26_drive_9999_sync/velodyne_points/timestamps_start.txt", "not deskewed"),
+        ("2011_09_26_drive_9999_sync/velodyne_points/timestamps_end.txt", "not deskewed"),
     ],
 )
-def test_what_is_missing_is_named_and_the_rest_works(tmp_path, lost, named):
+def test_a_missing_file_is_noted_and_the_stream_works(tmp_path, lost, named):
     drive = layouts.raw_drive(tmp_path)
     gone = drive.parent / lost
     shutil.rmtree(gone) if gone.is_dir() else gone.unlink()
@@ -197,7 +197,7 @@ def test_broken_oxts_is_an_error_with_its_file(tmp_path):
         open_stream(drive)
 
 
-def test_frames_without_a_pose_keep_the_one_before(tmp_path):
+def test_a_frame_without_a_pose_has_that_of_the_frame_before(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     (drive / "oxts" / "data" / f"{2:010d}.txt").unlink()
     frames = list(open_stream(drive))
@@ -219,7 +219,7 @@ def test_bad_scans_are_counted_and_skipped(tmp_path, caplog):
     assert "not finite" in caplog.text
 
 
-def test_points_that_lack_reflectance_alone_are_kept_and_counted(tmp_path, caplog):
+def test_points_without_reflectance_are_kept_and_counted(tmp_path, caplog):
     folder = layouts.bare(tmp_path)
     broken = layouts.scan(1)
     broken[:3, 3] = np.nan
@@ -233,19 +233,23 @@ def test_points_that_lack_reflectance_alone_are_kept_and_counted(tmp_path, caplo
     assert re.search(r"000001\.bin: 3 reflectances .* not recorded: .*driver", record.getMessage())
 
 
-def test_faults_without_end_are_counted_and_the_first_kept(tmp_path, caplog):
-    folder, n = layouts.bare(tmp_path), 3 * FIRST
+def test_all_faults_are_counted_and_the_first_are_kept(tmp_path, caplog):
+    folder, n = layouts.bare(tmp_path), 3 * MAX_KEPT_FAULTS
     for k in range(n):
         (folder / f"{k:06d}.bin").write_bytes(layouts.scan(k).tobytes() + b"cut" * (k % 3 > 0))
     stream = open_stream(folder)
-    assert len(list(stream)) == FIRST
-    assert (stream.faults.count, stream.faults.skipped, len(stream.faults.first)) == (2 * FIRST, 2 * FIRST, FIRST)
+    assert len(list(stream)) == MAX_KEPT_FAULTS
+    assert (stream.faults.count, stream.faults.skipped, len(stream.faults.first)) == (
+        2 * MAX_KEPT_FAULTS,
+        2 * MAX_KEPT_FAULTS,
+        MAX_KEPT_FAULTS,
+    )
     assert [f.frame for f in stream.faults.first[:3]] == [1, 2, 4]
-    assert len(caplog.records) == FIRST
-    assert [("only counted" in r.getMessage()) for r in caplog.records] == [False] * (FIRST - 1) + [True]
+    assert len(caplog.records) == MAX_KEPT_FAULTS
+    assert [("only counted" in r.getMessage()) for r in caplog.records] == [False] * (MAX_KEPT_FAULTS - 1) + [True]
 
 
-def test_a_stream_without_one_good_scan_fails(tmp_path):
+def test_a_stream_without_a_usable_scan_is_an_error(tmp_path):
     folder = layouts.bare(tmp_path)
     for path in folder.glob("*.bin"):
         path.write_bytes(b"")
@@ -269,12 +273,12 @@ def test_between_reads_only_its_part(tmp_path):
     ],
     ids=["missing", "empty", "a file", "a root"],
 )
-def test_what_is_no_stream_says_so(tmp_path, make, cause):
+def test_a_path_without_a_stream_is_refused(tmp_path, make, cause):
     with pytest.raises(MisuseError, match=cause):
         open_stream(make(tmp_path))
 
 
-def test_a_raw_drive_without_scans_is_named(tmp_path):
+def test_a_raw_drive_without_scans_is_refused(tmp_path):
     drive = layouts.raw_drive(tmp_path)
     shutil.rmtree(drive / "velodyne_points")
     with pytest.raises(MisuseError, match="velodyne_points"):

@@ -1,4 +1,4 @@
-"""Scan files, good and bad."""
+"""Scan files, valid and invalid."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def write(path, points):
     return path
 
 
-def test_a_good_scan_is_read_as_it_is(tmp_path):
+def test_a_valid_scan_is_unchanged(tmp_path):
     points, flaws = read_scan(write(tmp_path / "0.bin", GOOD))
     assert flaws == []
     assert points.dtype == np.float32
@@ -26,7 +26,7 @@ def test_a_good_scan_is_read_as_it_is(tmp_path):
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("column", range(3))
-def test_points_that_are_not_finite_keep_their_row_at_the_origin(tmp_path, value, column):
+def test_points_that_are_not_finite_are_set_to_the_origin(tmp_path, value, column):
     broken = GOOD.copy()
     broken[0, column] = value
     points, flaws = read_scan(write(tmp_path / "0.bin", broken))
@@ -36,7 +36,7 @@ def test_points_that_are_not_finite_keep_their_row_at_the_origin(tmp_path, value
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("scale", [1, 255])
-def test_points_whose_reflectance_alone_is_not_finite_are_points_without_one(tmp_path, value, scale):
+def test_a_reflectance_that_is_not_finite_counts_as_not_recorded(tmp_path, value, scale):
     scan = np.tile(GOOD, (4, 1)) * np.float32([1, 1, 1, scale])
     scan[:2, 3] = value
     scan[2, [0, 3]] = value
@@ -52,7 +52,7 @@ def test_points_whose_reflectance_alone_is_not_finite_are_points_without_one(tmp
 
 
 @pytest.mark.parametrize("value", [np.nan, UNRECORDED])
-def test_the_scale_is_that_of_the_reflectances_that_there_are(tmp_path, value):
+def test_the_scale_is_that_of_the_recorded_reflectances(tmp_path, value):
     scan = np.tile(GOOD, (100, 1)) * np.float32([1, 1, 1, 255])
     scan[2:, 3] = value
     points, _ = read_scan(write(tmp_path / "0.bin", scan))
@@ -61,14 +61,14 @@ def test_the_scale_is_that_of_the_reflectances_that_there_are(tmp_path, value):
 
 
 @pytest.mark.parametrize("scale", [1, 255])
-def test_a_stray_negative_reflectance_is_none(tmp_path, scale):
+def test_a_negative_reflectance_counts_as_not_recorded(tmp_path, scale):
     scan = np.tile(GOOD, (100, 1)) * np.float32([1, 1, 1, scale])
     scan[7, 3] = -0.2
     points, _ = read_scan(write(tmp_path / "0.bin", scan))
     assert np.flatnonzero(points[:, 3] == UNRECORDED).tolist() == [7]
 
 
-def test_a_scan_without_any_finite_reflectance_keeps_its_points(tmp_path):
+def test_a_scan_without_reflectances_keeps_its_points(tmp_path):
     scan = np.tile(GOOD, (100, 1))
     scan[:, 3] = np.nan
     points, flaws = read_scan(write(tmp_path / "0.bin", scan))
@@ -94,7 +94,7 @@ def test_reflectance_in_bytes_is_scaled(tmp_path):
     ],
     ids=["empty", "truncated", "far", "three columns"],
 )
-def test_a_bad_scan_says_what_is_wrong_with_it(tmp_path, content, cause):
+def test_an_invalid_scan_is_refused_with_its_cause(tmp_path, content, cause):
     path = tmp_path / "0.bin"
     path.write_bytes(content)
     with pytest.raises(ScanError, match=cause) as caught:
@@ -109,7 +109,7 @@ def test_a_missing_scan_is_an_error_of_that_scan(tmp_path):
 
 @given(st.binary(max_size=400))
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
-def test_any_bytes_are_finite_points_or_one_clear_error(tmp_path_factory, content):
+def test_any_bytes_are_finite_points_or_an_error(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "fuzz.bin"
     path.write_bytes(content)
     try:
@@ -122,7 +122,7 @@ def test_any_bytes_are_finite_points_or_one_clear_error(tmp_path_factory, conten
     assert ((points[:, 3] >= 0) | (points[:, 3] == UNRECORDED)).mean() >= 0.98
 
 
-def test_two_infinities_that_cancel_are_found():
+def test_two_infinities_that_cancel_are_detected():
     points = GOOD.copy()
     points[:, 0] = [np.inf, -np.inf]
     with np.errstate(invalid="ignore"):
@@ -131,7 +131,7 @@ def test_two_infinities_that_cancel_are_found():
     assert np.isfinite(clean).all()
 
 
-def test_a_stray_bright_return_does_not_darken_the_others(tmp_path):
+def test_an_outlier_does_not_rescale_the_others(tmp_path):
     scan = np.zeros((1000, 4), np.float32)
     scan[:, 3] = np.linspace(0, 1, 1000)
     scan[7, 3] = 1.5

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from modt import host, profile
-from modt.cli.replay import frames
+from modt.cli.options import frames
 from tools.options import parser
 
 
@@ -17,7 +17,7 @@ def main() -> None:
     options.add_argument("--fov", choices=("camera", "full"), default="full")
     options.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
     arguments = options.parse_args()
-    host.confine(host.last_core())
+    host.pin_to_core(host.last_core())
     from modt import assembly
     from modt.cli import assemble
     from modt.energy.ledger import STAGES, Ledger, NullLedger

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import numpy as np
 
+from modt.classes import ObjectClass
 from modt.cli import track
 from modt.config import OdometryConfig, TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.odometry.odometry import Odometry
-from modt.sources.detections import TYPES, Detections, files, read
+from modt.sources.detections import Detections, files, read
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import Float64, Frame, Proposals
@@ -87,8 +88,8 @@ def traffic(cars: int, count: int, seed: int = 0) -> Detections:
     box[:, 3:6] = [4.2, 1.8, 1.5]
     detected = rng.random(len(frame)) < 0.9
     score = np.where(rng.random(len(frame)) < 0.2, -1.0, 5.0)
-    type_ = np.full(len(frame), TYPES.index("Car"))
-    return Detections("traffic", frame, type_, np.zeros((len(frame), 4)), score, box).take(detected)
+    object_class = np.full(len(frame), ObjectClass.CAR)
+    return Detections("traffic", frame, object_class, np.zeros((len(frame), 4)), score, box).take(detected)
 
 
 def box_frames_per_s(sequences: list[Detections]) -> float:

@@ -19,14 +19,14 @@ from pathlib import Path
 import numpy as np
 
 from modt import assembly
-from modt.cli.replay import frames as frame_range
+from modt.cli.options import frames as frame_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
 from modt.observations import Located, StaticTracks
 from modt.pipeline import Odometry
 from modt.profile import load
 from modt.sources import kitti_calibration, oxts
-from modt.sources.pose_source import NoOdometry, PosedStream
+from modt.sources.pose_source import NoPoses, PosedStream
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 from modt.types import Float64, Frame, Proposals
@@ -89,7 +89,7 @@ def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
     recorder = PoseRecorder(pipeline.odometry)
     pipeline = replace(pipeline, odometry=recorder)
-    for frame in PosedStream(stream, NoOdometry()):
+    for frame in PosedStream(stream, NoPoses()):
         pipeline.step(frame, mode.budget(profile))
     return np.array(recorder.poses)
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt import assembly
-from modt.cli.replay import frames as number_range
+from modt.cli.options import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load

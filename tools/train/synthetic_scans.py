@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.geometry import FieldOfView
 from modt.simulation.simulator import Truth
-from modt.sources.synthetic_stream import SyntheticStream, nominal_camera
+from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 from modt.types import Frame
 from tools.train.labelled_scans import TEST_DRIVE, Scan
 
@@ -29,7 +29,7 @@ def labelled_scan(frame: Frame, truth: Truth, name: str, world: str, *, camera: 
         tuple(objects),
         tuple(kind.object_class for kind in truth.kinds),
         truth.boxes - np.outer(truth.boxes[:, 5] / 2, np.eye(7)[2]),
-        FieldOfView.of_camera(nominal_camera()) if camera else FieldOfView(),
+        FieldOfView.of_camera(CAMERA) if camera else FieldOfView(),
         np.zeros(len(frame.points), np.bool_),
         tuple(truth.bodies.tolist()),
     )

@@ -1,1 +1,1 @@
-"""Tracking of the boxes of another detector, for `modt track`."""
+"""Tracking of classified boxes of another detector, for `modt track`."""

@@ -1,7 +1,7 @@
-"""The linear Kalman filter of a place that keeps its velocity, for all tracks at once.
+"""Linear Kalman filter with a constant-velocity model, for all tracks at once.
 
-State x = [x, y, vx, vy]: m, m/s. Noise is the same in all directions, so the covariance is the same along both axes,
-none lies between them, and three numbers hold it: P = [of the place, of place and velocity, of the velocity].
+State x = [x, y, vx, vy] in m and m/s. Noise is isotropic: the axes are uncorrelated and share one 2 x 2 covariance,
+held as P = [var(position), cov(position, velocity), var(velocity)].
 """
 
 from __future__ import annotations
@@ -11,24 +11,19 @@ import numpy as np
 from modt.types import Float64
 
 
-def predict(x: Float64, P: Float64, acceleration: float, dt_s: float) -> tuple[Float64, Float64]:
-    """States (M, 4) and covariances (M, 3) dt_s later, after an unknown acceleration [m/s2], constant within dt_s."""
-    moved = x.copy()
-    moved[:, :2] += dt_s * x[:, 2:]
-    place, both, velocity = P.T
-    pushed = (acceleration * dt_s) ** 2
-    grown = [
-        place + 2 * dt_s * both + dt_s**2 * velocity + dt_s**2 / 4 * pushed,
-        both + dt_s * velocity + dt_s / 2 * pushed,
-        velocity + pushed,
-    ]
-    return moved, np.stack(grown, axis=1)
+def predict(x: Float64, P: Float64, acceleration_sigma_mps2: float, dt_s: float) -> tuple[Float64, Float64]:
+    """States (M, 4) and covariances (M, 3) after dt_s, with white acceleration constant within dt_s."""
+    predicted = x.copy()
+    predicted[:, :2] += dt_s * x[:, 2:]
+    pp, pv, vv = P.T
+    q = (acceleration_sigma_mps2 * dt_s) ** 2
+    covariance = [pp + 2 * dt_s * pv + dt_s**2 * vv + dt_s**2 / 4 * q, pv + dt_s * vv + dt_s / 2 * q, vv + q]
+    return predicted, np.stack(covariance, axis=1)
 
 
 def update(x: Float64, P: Float64, z: Float64, variance: Float64) -> tuple[Float64, Float64]:
-    """States and covariances after the observed places z (M, 2) of variance (M,) along each axis [m2]."""
-    gain = P[:, :2] / (P[:, 0] + variance)[:, None]  # of the place and of the velocity
+    """States and covariances after measured positions z (M, 2) of variance (M,) [m2] along each axis."""
+    gain = P[:, :2] / (P[:, 0] + variance)[:, None]  # of position and velocity
     nu = z - x[:, :2]
-    after = x + np.concatenate([gain[:, :1] * nu, gain[:, 1:] * nu], axis=1)
-    squeezed = P - np.stack([gain[:, 0] * P[:, 0], gain[:, 0] * P[:, 1], gain[:, 1] * P[:, 1]], axis=1)
-    return after, squeezed
+    updated = x + np.concatenate([gain[:, :1] * nu, gain[:, 1:] * nu], axis=1)
+    return updated, P - np.stack([gain[:, 0] * P[:, 0], gain[:, 0] * P[:, 1], gain[:, 1] * P[:, 1]], axis=1)

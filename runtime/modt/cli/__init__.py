@@ -1,1 +1,1 @@
-"""The command line, and the one place where the parts are put together."""
+"""The command line, and the assembly of the parts."""

@@ -10,14 +10,13 @@ from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT
 from modt.sources.pose_socket import PoseSocket, open_socket
-from modt.sources.pose_source import ListedPoses, NoOdometry, OwnOdometry
-from modt.sources.pose_source import Odometry as PoseSource
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 from modt.sources.synthetic_stream import SyntheticStream
 
 EMBEDDED_SECONDS = 10.0
-OWN, NONE = "own", "none"
+RECORDED, NONE = "recording", "none"
 """Odometries that need no address."""
 
 
@@ -32,7 +31,7 @@ class Request:
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
     labels: bool = False
-    odometry: str = OWN
+    odometry: str = RECORDED
     poses: Path | None = None
 
 
@@ -61,11 +60,11 @@ def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSo
         MisuseError: a file of poses that cannot be used, an address that cannot be bound or is none.
     """
     if request.poses is not None:
-        return ListedPoses(request.poses, stream.info.camera, stream.info.end)
-    if request.odometry == OWN:
-        return OwnOdometry()
+        return PoseFile(request.poses, stream.info.camera, stream.info.end)
+    if request.odometry == RECORDED:
+        return RecordedPoses()
     if request.odometry == NONE:
-        return NoOdometry()
+        return NoPoses()
     return PoseSocket(open_socket(request.odometry), config, request.odometry)
 
 

@@ -1,18 +1,18 @@
-"""What `modt` and `modt-profile` share: subcommands, and every failure as one line."""
+"""Subcommands of `modt` and `modt-profile`, and errors as one line."""
 
 from __future__ import annotations
 
 import argparse
 import logging
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from modt import __version__
 from modt.errors import ModtError
 
 INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it: 128 and the number of SIGINT."""
+"""Exit status after Ctrl-C, as in shells: 128 + SIGINT."""
 
 
 class Command(Protocol):
@@ -24,21 +24,16 @@ class Command(Protocol):
 
 
 def dispatch(name: str, description: str, commands: Sequence[Command], argv: Sequence[str] | None) -> int:
-    """Run a subcommand; returns the exit status: 0 well, 1 failed, 2 misused, 130 interrupted."""
+    """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted."""
     top = argparse.ArgumentParser(prog=name, description=description)
     top.add_argument("--version", action="version", version=f"modt {__version__}")
     choice = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command in commands:
         command.add_parser(choice)
     arguments = top.parse_args(argv)
-    return guarded(lambda: int(arguments.run(arguments)))
-
-
-def guarded(command: Callable[[], int]) -> int:
-    """Run something so that every error a user can act on is one line."""
     logging.basicConfig(level=logging.WARNING, format="modt: %(message)s", stream=sys.stderr)
     try:
-        return command()
+        return int(arguments.run(arguments))
     except ModtError as error:
         print(f"modt: {error}", file=sys.stderr)
         return error.exit_status

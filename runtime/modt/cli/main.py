@@ -1,7 +1,6 @@
 """`modt`: the command line.
 
-Nothing heavy is imported before the process is confined to its core: NumPy and ONNX Runtime size their thread pools
-as they load.
+NumPy and ONNX Runtime size their thread pools when imported: commands import them after the process is pinned.
 """
 
 from __future__ import annotations
@@ -15,8 +14,8 @@ COMMANDS = (replay, simulate, track)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit status: 0 well, 1 failed, 2 misused, 130 interrupted."""
-    return dispatch("modt", "Finds and follows moving objects in a LiDAR stream.", COMMANDS, argv)
+    """Run a command; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted."""
+    return dispatch("modt", "Detect, track and classify objects in a LiDAR stream.", COMMANDS, argv)
 
 
 if __name__ == "__main__":

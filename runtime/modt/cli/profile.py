@@ -1,4 +1,4 @@
-"""`modt-profile`: what it costs, what it saves, and how anybody can know."""
+"""`modt-profile`: the command line of energy accounting."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ COMMANDS = (profile_meters, profile_calibrate, profile_report, profile_compare)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command; returns the exit status: 0 well, 1 failed, 2 misused, 130 interrupted."""
-    return dispatch("modt-profile", "Accounts for the energy of modt.", COMMANDS, argv)
+    """Run a command; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted."""
+    return dispatch("modt-profile", "Account for the energy of modt.", COMMANDS, argv)
 
 
 if __name__ == "__main__":

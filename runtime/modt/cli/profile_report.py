@@ -1,4 +1,4 @@
-"""`modt-profile report`: what a run cost and saved, while it runs or afterwards."""
+"""`modt-profile report`: energy and savings of one run, while it runs or afterwards."""
 
 from __future__ import annotations
 
@@ -6,20 +6,21 @@ import argparse
 import json
 from pathlib import Path
 
+from modt.cli import options
+
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("report", help="say what a run cost and saved; it may still be running")
-    p.add_argument("run_directory", type=Path, metavar="RUN", help="directory that modt replay writes")
-    p.add_argument("--json", action="store_true", help="as JSON")
-    p.add_argument("--html", type=Path, metavar="FILE", help="a page with plots")
+    p = commands.add_parser("report", help="report energy and savings of a run; it may still be running")
+    p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay")
+    options.add_report_options(p)
     p.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Read, and print."""
+    """Report."""
     from modt.reporting.page import save
-    from modt.reporting.quantity import plain
+    from modt.reporting.quantity import to_json
     from modt.reporting.run_page import run_page
     from modt.reporting.run_report import run_tree
     from modt.reporting.run_text import run_text
@@ -27,5 +28,5 @@ def run(arguments: argparse.Namespace) -> int:
     tree = run_tree(arguments.run_directory)
     if arguments.html is not None:
         save(arguments.html, run_page(tree))
-    print(json.dumps(plain(tree), indent=2, allow_nan=False) if arguments.json else run_text(tree))
+    print(json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else run_text(tree))
     return 0

@@ -13,7 +13,7 @@ Tick = Callable[[FrameResult], None]
 
 @contextmanager
 def progress(total: int | None, *, shown: bool) -> Iterator[Tick]:
-    """Something to call after every frame; shows nothing unless asked to."""
+    """Function to call after every frame; without effect unless shown."""
     if not shown:
         yield lambda result: None
         return
@@ -23,7 +23,7 @@ def progress(total: int | None, *, shown: bool) -> Iterator[Tick]:
         print("modt: no progress bar; pip install 'modt[progress]' to see one", file=sys.stderr)
         yield lambda result: None
         return
-    tqdm.monitor_interval = 0  # its monitor would be a thread beside the loop
+    tqdm.monitor_interval = 0  # its monitor would be a second thread
     with tqdm(total=total, unit="frame", file=sys.stderr, leave=False, dynamic_ncols=True) as bar:
 
         def tick(result: FrameResult) -> None:

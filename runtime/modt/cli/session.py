@@ -1,4 +1,4 @@
-"""One replay from its first to its last file."""
+"""One replay: assembly, run, and run directory."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ from modt.sources.pose_source import PosedStream
 from modt.supervisor import Supervisor
 from modt.types import FrameResult, Proposals
 
-HELPER_SHARE = 0.01
-"""CPU time of other threads, as a share of the loop's, up to which the process counts as single-threaded."""
+_MAX_HELPER_SHARE = 0.01
+"""CPU time of other threads over that of the loop, up to which the process counts as single-threaded."""
 
 
 class Session:
-    """Puts a replay together, runs it, and leaves a run directory behind.
+    """A replay and its run directory.
 
     Args:
-        request: what was asked for.
+        request: options of the replay.
         out: the run directory, None for one named after stream and mode.
-        core: the core that the process is confined to, None for any.
-        command: as it was typed.
+        core: to which the process is pinned, None for any.
+        command: the command line.
 
     Raises:
-        MisuseError: a part of the request cannot be met.
+        MisuseError: an invalid request.
         ModtError: the run directory cannot be written.
     """
 
@@ -47,36 +47,32 @@ class Session:
         found = assemble.stream(request)
         self.odometry = assemble.odometry(request, found, self.profile.odometry)
         self.stream = PosedStream(found, self.odometry)
-        self.pipeline = assembly.pipeline(
-            self.mode, self.profile, assemble.field_of_view(request, self.stream), Ledger()
-        )
+        fov = assemble.field_of_view(request, self.stream)
+        self.pipeline = assembly.pipeline(self.mode, self.profile, fov, Ledger())
         self.stop = Stop()
         self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
         self._frames_without_reflectance = 0
-        self.directory = RunDirectory(out or Path("runs") / f"{self._stream_name()}-{request.mode}")
+        stream_name = re.sub(r"[^\w.]+", "-", self.stream.info.name)
+        self.directory = RunDirectory(out or Path("runs") / f"{stream_name}-{request.mode}")
         self._describe(command)
 
     @property
     def notes(self) -> list[str]:
-        """What a user should know before it starts."""
+        """Notes for the user before the start."""
         kept = [f"an earlier run is kept as {self.directory.kept}"] if self.directory.kept else []
-        return [*self._missing, *kept]
-
-    @property
-    def _missing(self) -> list[str]:
-        return [*self.stream.info.notes, *self.stream.info.pose_notes]
+        return [*self.stream.info.notes, *self.stream.info.pose_notes, *kept]
 
     def run(self, tick: Tick, supervisor: Supervisor) -> dict[str, Any]:
-        """Drive the stream through; returns the summary that was written."""
+        """Process the stream; returns the summary, as written."""
         summary = Summary()
         ledger_lines = self.directory.ledger()
-        sinks: list[Sink] = [self.directory.tracks(), *self._further_sinks()]
+        sinks = self._sinks()
         windows = metering.windows(self.profile.energy, self.core)
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_result(result)
             summary.add_ledger(ledger_line)
-            self._frames_without_reflectance += self._lacks_reflectance(result.proposals)
+            self._frames_without_reflectance += self._misses_reflectance(result.proposals)
             window = windows.add(ledger_line)
             if window is not None:
                 ledger_lines.write(window)
@@ -95,21 +91,19 @@ class Session:
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
             ledger_lines.write(windows.close())
         elapsed_s = time.monotonic() - began_s
-        figures = summary.result() | self._circumstances(summary.frames, elapsed_s)
+        figures = summary.result() | self._environment(summary.frames, elapsed_s)
         self.directory.summarise(figures)
         return figures
 
-    def _lacks_reflectance(self, proposals: Proposals) -> bool:
-        """Whether they tell no reflectance, though the profile says that the sensor records it."""
+    def _misses_reflectance(self, proposals: Proposals) -> bool:
+        """Whether they lack reflectance, though the sensor of the profile records it."""
         return self.profile.sensor.reflectance != "none" and len(proposals) > 0 and proposals.reflectance is None
 
-    def _further_sinks(self) -> list[Sink]:
+    def _sinks(self) -> list[Sink]:
         info, path = self.stream.info, self.directory.path
+        kitti = KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera)
         labels: list[Sink] = [PointLabels(path / "labels")] if self.request.labels else []
-        return [KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera), *labels]
-
-    def _stream_name(self) -> str:
-        return re.sub(r"[^\w.]+", "-", self.stream.info.name)
+        return [self.directory.tracks(), kitti, *labels]
 
     def _describe(self, command: list[str]) -> None:
         info = self.stream.info
@@ -123,7 +117,7 @@ class Session:
                 "frames": info.n_frames,
                 "poses": info.has_poses,
                 "odometry": self.odometry.report()["source"],
-                "notes": self._missing,
+                "notes": [*info.notes, *info.pose_notes],
             },
             "mode": self.request.mode,
             "fov": self.request.fov,
@@ -135,11 +129,11 @@ class Session:
         }
         self.directory.describe(profile.to_yaml(facts))
 
-    def _circumstances(self, frames: int, elapsed_s: float) -> dict[str, Any]:
-        """What the figures were taken under."""
+    def _environment(self, frames: int, elapsed_s: float) -> dict[str, Any]:
+        """Timing, pose source, host and faults of the run."""
         threads, faults = host.thread_report(), self.stream.faults
-        idle_beside = threads.others_cpu_s <= HELPER_SHARE * threads.main_cpu_s
-        one_core = self.core is not None and threads.cores == (self.core,) and idle_beside
+        single_threaded = threads.others_cpu_s <= _MAX_HELPER_SHARE * threads.main_cpu_s
+        one_core = self.core is not None and threads.cores == (self.core,) and single_threaded
         return {
             "run": {
                 "stream": self.stream.info.name,

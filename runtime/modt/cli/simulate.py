@@ -1,4 +1,4 @@
-"""`modt simulate`: a synthetic drive on disk, as a KITTI raw drive and with SemanticKITTI labels."""
+"""`modt simulate`: write a synthetic drive as a KITTI raw drive with SemanticKITTI labels."""
 
 from __future__ import annotations
 
@@ -10,19 +10,21 @@ from modt.errors import MisuseError, ModtError
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("simulate", help="write a synthetic drive with its truth")
-    p.add_argument("--scene", default="street", metavar="NAME", help="or a KITTI label file (default: %(default)s)")
-    p.add_argument("--sensor", default="hdl-64e", metavar="NAME", help="default: %(default)s")
-    p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="default: %(default)g")
-    p.add_argument("--seed", type=int, default=0, metavar="K", help="default: %(default)s")
-    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="the drive goes here")
-    p.add_argument("--all-around", action="store_true", help="annotate what is seen on all sides, not in the camera")
-    p.add_argument("--distort", action="store_true", help="leave the motion of the turning head in the scans")
+    p = commands.add_parser("simulate", help="write a synthetic drive with its ground truth")
+    p.add_argument(
+        "--scene", default="street", metavar="NAME", help="scene or KITTI label file (default: %(default)s)"
+    )
+    p.add_argument("--sensor", default="hdl-64e", metavar="NAME", help="sensor (default: %(default)s)")
+    p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration (default: %(default)g)")
+    p.add_argument("--seed", type=int, default=0, metavar="K", help="of the random numbers (default: %(default)s)")
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the drive")
+    p.add_argument("--all-around", action="store_true", help="annotate objects on all sides, not only in the camera")
+    p.add_argument("--distort", action="store_true", help="keep the distortion of scans by the motion of the sensor")
     p.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Simulate and write.
+    """Simulate.
 
     Raises:
         MisuseError: no such scene or sensor, or there is a drive already.
@@ -33,12 +35,12 @@ def run(arguments: argparse.Namespace) -> int:
 
     out: Path = arguments.out
     if (out / DATE).exists() or (out / "sequences").exists():
-        raise MisuseError(out, "holds a drive already", "give an --out of its own")
+        raise MisuseError(out, "contains a drive already", "give another --out")
     stream = SyntheticStream(
         arguments.scene, arguments.sensor, arguments.seconds, arguments.seed, distort=arguments.distort
     )
     try:
-        writer = DriveWriter(out, stream, all_around=arguments.all_around)
+        writer = DriveWriter(out, stream.camera, all_around=arguments.all_around)
         for frame, truth in stream.sweeps():
             writer.write(frame, truth)
         writer.close()

@@ -1,4 +1,4 @@
-"""`modt track`: the tracker alone, on the detections of another detector."""
+"""`modt track`: track the boxes of another detector."""
 
 from __future__ import annotations
 
@@ -7,40 +7,43 @@ import logging
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from modt.cli import options
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
     from modt.sources.detections import Detections
     from modt.types import Float64, Int
 
-PERIOD_S = 0.1
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("track", help="follow the boxes that another detector has found")
-    p.add_argument("detections", type=Path, metavar="DETECTIONS", help="a file a sequence, or a folder of them")
-    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="KITTI tracking results go here")
+    p = commands.add_parser("track", help="track the boxes of another detector")
+    p.add_argument("detections", type=Path, metavar="DETECTIONS", help="file of a sequence, or a folder of files")
+    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the KITTI tracking results")
     motion = p.add_mutually_exclusive_group()
     motion.add_argument(
-        "--poses", type=Path, metavar="FILE", help="camera poses, KITTI odometry; or a folder of them"
+        "--poses", type=Path, metavar="FILE", help="camera poses in KITTI odometry's format, or a folder"
     )
     motion.add_argument("--oxts", type=Path, metavar="DIR", help="OXTS records, KITTI tracking; calib/ beside it")
     p.add_argument(
-        "--period", type=float, default=PERIOD_S, metavar="S", help="between frames (default: %(default)g)"
+        "--period",
+        type=options.real(0.001, 10, "seconds"),
+        default=0.1,
+        metavar="S",
+        help="time between frames (default: %(default)g)",
     )
     p.add_argument(
         "--sure",
-        type=float,
+        type=options.real(-1000, 1000, "a confidence"),
         metavar="CONFIDENCE",
-        help="least of a track that is written (default: by type, for PointRCNN)",
+        help="minimum of the tracks written (default: by type, for PointRCNN)",
     )
     p.add_argument("--quiet", action="store_true", help="no summary")
     p.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Follow each sequence and write its results.
+    """Track each sequence and write its results.
 
     Raises:
         MisuseError: detections or poses cannot be used.
@@ -51,10 +54,6 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import LineFile, writing
     from modt.sources.detections import files, read
 
-    if arguments.sure is not None and not -1000 <= arguments.sure <= 1000:
-        raise MisuseError("--sure", f"{arguments.sure:g} is out of range", "give -1000, for all tracks, to 1000")
-    if not 0.001 <= arguments.period <= 10:
-        raise MisuseError("--period", f"{arguments.period:g} s is no time between frames", "give 0.001 to 10")
     paths = files(arguments.detections)
     sequences = read(paths)
     motions = [_poses(arguments, sequence, len(paths)) for sequence in sequences]
@@ -66,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         text, n = follow(sequence, poses, arguments.period, arguments.sure)
         spent_s += time.process_time() - began
         frames, ids = frames + sequence.n_frames, ids + n
-        lines = LineFile(arguments.out / f"{sequence.name}.txt")
+        lines = LineFile[str](arguments.out / f"{sequence.name}.txt")
         lines.write(text)
         lines.close()
     if not ids and any(map(len, sequences)):
@@ -80,37 +79,41 @@ def run(arguments: argparse.Namespace) -> int:
 def follow(
     detections: Detections, poses: Float64 | None, period_s: float, sure: float | None = None
 ) -> tuple[str, int]:
-    """KITTI tracking results of a sequence, and how many tracks they hold.
+    """KITTI tracking results of a sequence, and the number of its tracks.
 
     Args:
         detections: of the sequence.
-        poses: (n, 4, 4) T_world_camera of its frames, None where no ego-motion is known.
-        period_s: between frames.
-        sure: confidence of a track that is written, None for that of its type.
+        poses: (n, 4, 4) T_world_camera of its frames, None without ego-motion.
+        period_s: time between frames.
+        sure: minimum confidence of the tracks written, None for that of the type.
     """
     from dataclasses import replace
 
     import numpy as np
 
-    from modt.box_tracking.box_tracker import BoxTracker, box_config
+    from modt.box_tracking.box_tracker import BoxTracker
+    from modt.classes import CLASSES
+    from modt.config.box_tracking import box_tracking_config
     from modt.geometry import inverse, transform_boxes
-    from modt.sinks.kitti_detections import result_lines
-    from modt.sources.detections import T_LEVEL_CAMERA, TYPES, kitti
+    from modt.sinks.kitti import box_lines
+    from modt.sources.detections import DETECTED, T_LEVEL_CAMERA, boxes_to_kitti
 
     lines: list[str] = []
     order: list[int] = []
     tracks = 0
-    for type_, name in enumerate(TYPES):
-        own = detections.take(detections.type_ == type_)
-        config = box_config(name)
-        tracker = BoxTracker(config if sure is None else replace(config, sure=sure))
+    for number, object_class in enumerate(DETECTED):
+        own = detections.take(detections.object_class == object_class)
+        config = box_tracking_config(object_class)
+        if sure is not None:
+            config = replace(config, confidence=replace(config.confidence, report_above=sure))
+        tracker = BoxTracker(config)
         last = np.zeros((0, 4))
         reports: list[tuple[Int, Int, Float64, Float64, Float64]] = []
         for frame, rows in own.frames():
             T = None if poses is None else T_LEVEL_CAMERA @ poses[frame] @ inverse(T_LEVEL_CAMERA)
             seen = own.box[rows]
             boxes = seen if T is None else transform_boxes(T, seen)
-            found = tracker.follow(frame * period_s, boxes, own.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
+            found = tracker.step(frame * period_s, boxes, own.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
             if not len(found.id):
                 continue
             if found.id.max() >= len(last):
@@ -121,7 +124,8 @@ def follow(
             reports.append((np.full(len(found.id), frame), found.id, last[found.id], placed, found.confidence))
         if reports:
             frames, ids, image_box, box, score = (np.concatenate(column) for column in zip(*reports, strict=True))
-            lines += result_lines(frames, name, ids * len(TYPES) + type_, image_box, kitti(box), score)
+            name = CLASSES[object_class].kitti[0]
+            lines += box_lines(frames, name, ids * len(DETECTED) + number, image_box, boxes_to_kitti(box), score)
             order += frames.tolist()
             tracks += len(np.unique(ids))
     return "".join(lines[k] for k in np.argsort(order, kind="stable")), tracks

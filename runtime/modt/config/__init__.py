@@ -9,7 +9,7 @@ from modt.config.classification import (
     FusionConfig,
     SchedulerConfig,
 )
-from modt.config.energy import EnergyConfig
+from modt.config.energy import EnergyConfig, WindowConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.profile import ProfileConfig
 from modt.config.registration import LandmarkConfig, RegistrationConfig
@@ -48,4 +48,5 @@ __all__ = [
     "StageConfig",
     "TrackingConfig",
     "ValueRangeError",
+    "WindowConfig",
 ]

@@ -1,1 +1,1 @@
-"""What it costs: ledger, meters, attribution, prediction."""
+"""Energy accounting: ledger, meters, attribution, prediction."""

@@ -1,4 +1,4 @@
-"""Energy of windows to energy of work: least squares over counts, with bootstrap intervals.
+"""Attribution of the energy of windows to work: least squares over counts, with bootstrap intervals.
 
 E_window = P_idle T + e_seg N_seg + e_class N_class + e_point N_point, over windows whose load was varied on purpose.
 """
@@ -14,21 +14,23 @@ from scipy import stats
 
 from modt.types import Float64
 
-SPOILT = frozenset({"suspended", "clock", "lost", "back", "reset", "implausible", "ambiguous"})
-"""Marks of windows that do not enter a fit."""
-COLLINEAR = 1e6
-"""Condition number of the scaled regressors beyond which they cannot be told apart."""
-LEVEL = 0.95
+_REJECTED_MARKS = frozenset({"suspended", "clock", "lost", "back", "reset", "implausible", "ambiguous"})
+_MAX_CONDITION = 1e6
+"""Condition number of the scaled regressors above which they are collinear."""
+_TAILS = (0.025, 0.975)
+"""Quantiles of the intervals at 95 %."""
+
+Line = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Term:
-    """One regressor.
+class Regressor:
+    """One count of a window.
 
     Attributes:
         name: of its coefficient, with the unit.
-        stage: that it counts; empty for the whole window.
-        key: what it counts of the stage; of the window "wall_ns".
+        stage: whose count it is; empty for the whole window.
+        key: of the stage's or the window's entry.
         scale: of the count, so that the coefficient has its unit.
     """
 
@@ -37,22 +39,22 @@ class Term:
     key: str
     scale: float = 1.0
 
-    def count(self, line: dict[str, Any]) -> float:
-        """Of one window."""
+    def count(self, line: Line) -> float:
+        """Count of one window."""
         row = line["stages"].get(self.stage, {}) if self.stage else line
         return self.scale * float(row.get(self.key, 0))
 
 
-IDLE = Term("idle_W", "", "wall_ns", 1e-9)
-SEG = Term("seg_J", "segmentation", "calls")
-CLASS = Term("class_J", "classification", "items")
-POINT = Term("point_J", "classification", "points")
-TERMS = (IDLE, SEG, CLASS, POINT)
+IDLE = Regressor("idle_W", "", "wall_ns", 1e-9)
+SEG = Regressor("seg_J", "segmentation", "calls")
+CLASS = Regressor("class_J", "classification", "items")
+POINT = Regressor("point_J", "classification", "points")
+REGRESSORS = (IDLE, SEG, CLASS, POINT)
 
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """A fitted figure with its interval at 95 %."""
+    """A fitted value with its interval at 95 %."""
 
     name: str
     value: float
@@ -62,13 +64,13 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """What the windows say.
+    """Result of a fit.
 
     Attributes:
-        coefficients: one a term, in their order.
-        windows: that entered.
-        dropped: that did not, for want of a reading or because something happened in them.
-        residual_J: standard deviation of what the fit leaves unexplained [J a window].
+        coefficients: one a regressor, in their order.
+        windows: number used.
+        dropped: number left out, without a reading or with a rejected mark.
+        residual_J: standard deviation of the residual [J a window].
         explained: share of the variance explained, at most 1.
         condition: condition number of the scaled regressors.
     """
@@ -85,47 +87,47 @@ class Fit:
 
 
 class FitError(Exception):
-    """The windows do not determine the coefficients; it says what to vary."""
+    """The windows do not determine the coefficients; the message names the load to vary."""
 
 
-def usable(lines: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Windows with a reading in which nothing untoward happened."""
-    return [line for line in lines if line["energy_J"] is not None and not SPOILT.intersection(line["marks"])]
+def usable_windows(lines: Iterable[Line]) -> list[Line]:
+    """Windows with a reading and without a rejected mark."""
+    return [
+        line for line in lines if line["energy_J"] is not None and not _REJECTED_MARKS.intersection(line["marks"])
+    ]
 
 
-def fit(
-    lines: Sequence[dict[str, Any]],
-    random: np.random.Generator,
-    terms: Sequence[Term] = TERMS,
-    resamples: int = 1000,
-) -> Fit:
-    """Coefficients of the terms over "modt.energy/1" lines.
+def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 1000) -> Fit:
+    """Coefficients of REGRESSORS over "modt.energy/1" lines.
 
     Raises:
-        FitError: too few windows, or terms that always varied together.
+        FitError: too few windows, or collinear regressors.
     """
-    good = usable(lines)
-    X = np.array([[term.count(line) for term in terms] for line in good]).reshape(len(good), len(terms))
-    y = np.array([line["energy_J"] for line in good])
-    n, p = X.shape
+    good = usable_windows(lines)
+    n, p = len(good), len(REGRESSORS)
     if n < 2 * p:
         raise FitError(f"{n} usable windows are too few for {p} coefficients; record at least {2 * p}")
+    X = np.array([[regressor.count(line) for regressor in REGRESSORS] for line in good])
+    y = np.array([line["energy_J"] for line in good])
     scale = np.linalg.norm(X, axis=0)
     if not scale.all():
-        idle = ", ".join(t.name for t, s in zip(terms, scale, strict=True) if not s)
-        raise FitError(f"nothing was counted for {idle}; vary its load")
-    condition = float(np.linalg.cond(X / scale))
-    if condition > COLLINEAR:
+        missing = ", ".join(r.name for r, s in zip(REGRESSORS, scale, strict=True) if not s)
+        raise FitError(f"nothing was counted for {missing}; vary its load")
+    X /= scale
+    condition = float(np.linalg.cond(X))
+    if condition > _MAX_CONDITION:
         raise FitError("the counts always varied together; vary rate and classification load independently")
-    value, *_ = np.linalg.lstsq(X / scale, y, rcond=None)
-    residual = y - X / scale @ value
-    spread = _bootstrap(X / scale, y, random, resamples) - value
-    low, high = value + _wider(n, p) * np.quantile(spread, [(1 - LEVEL) / 2, (1 + LEVEL) / 2], axis=0)
+    value, *_ = np.linalg.lstsq(X, y, rcond=None)
+    residual = y - X @ value
+    spread = _bootstrap(X, y, random, resamples) - value
+    # Resampling few windows underestimates the spread: widen by the ratio of Student's t to the normal quantile.
+    wider = np.sqrt(n / (n - p)) * stats.t.ppf(_TAILS[1], n - p) / stats.norm.ppf(_TAILS[1])
+    low, high = value + wider * np.quantile(spread, _TAILS, axis=0)
     variance = float(np.sum((y - y.mean()) ** 2))
     return Fit(
         coefficients=tuple(
-            Coefficient(t.name, float(v / s), float(a / s), float(b / s))
-            for t, v, a, b, s in zip(terms, value, low, high, scale, strict=True)
+            Coefficient(r.name, float(v / s), float(a / s), float(b / s))
+            for r, v, a, b, s in zip(REGRESSORS, value, low, high, scale, strict=True)
         ),
         windows=n,
         dropped=len(lines) - n,
@@ -145,69 +147,53 @@ def _bootstrap(X: Float64, y: Float64, random: np.random.Generator, resamples: i
     return solved
 
 
-def _wider(n: int, p: int) -> float:
-    """Factor that makes up for the spread that resampling loses when windows are few."""
-    quantile = (1 + LEVEL) / 2
-    return float(np.sqrt(n / (n - p)) * stats.t.ppf(quantile, n - p) / stats.norm.ppf(quantile))
-
-
-def burst(lines: Sequence[dict[str, Any]], idle_W: float, term: Term) -> float | None:
-    """Cross-check by ablation: energy of one unit of work, from windows in which only that work was done.
+def unit_energy_J(lines: Sequence[Line], idle_W: float, work: Regressor) -> float | None:
+    """Energy of one unit of work, from windows of that work alone: a cross-check of the fit.
 
     Args:
-        lines: windows of one stage run alone.
-        idle_W: to be taken off [W].
-        term: the work.
+        lines: windows of one stage.
+        idle_W: idle power, subtracted [W].
+        work: the unit.
 
     Returns:
-        Median over the windows of (energy - idle) / count [J]; None where no window can tell.
+        Median over the windows of (energy - idle) / count [J]; None without a usable window.
     """
     each = [
-        (line["energy_J"] - idle_W * IDLE.count(line)) / term.count(line)
-        for line in usable(lines)
-        if term.count(line) > 0
+        (line["energy_J"] - idle_W * IDLE.count(line)) / work.count(line)
+        for line in usable_windows(lines)
+        if work.count(line) > 0
     ]
     return float(np.median(each)) if each else None
 
 
-class ByCoefficients:
-    """Splits a window's energy by fitted coefficients; what they do not explain stays unattributed."""
+def split_by_coefficients(line: Line, values: dict[str, float]) -> dict[str, float]:
+    """Energy of idling and of each stage of a window by fitted coefficients, and the unattributed remainder [J].
 
-    def __init__(self, values: dict[str, float]) -> None:
-        self._terms = [(term, values[term.name]) for term in TERMS if term.name in values]
-
-    def split(self, line: dict[str, Any]) -> dict[str, float]:
-        """Energy of idling and of each stage [J]; the parts add up to the window's energy where that is known."""
-        parts: dict[str, float] = {}
-        for term, value in self._terms:
-            name = term.stage or "idle"
-            parts[name] = parts.get(name, 0.0) + value * term.count(line)
-        if line["energy_J"] is not None:
-            parts["unattributed"] = line["energy_J"] - sum(parts.values())
-        return parts
-
-
-class ByCpuTime:
-    """Splits what is above idling by CPU time: an assumption, for code differs in power at equal time.
-
-    Attributes:
-        idle_W: drawn by the meter's scope while this process waits [W].
+    The parts sum to the window's energy where it is known.
     """
+    parts: dict[str, float] = {}
+    for regressor in REGRESSORS:
+        name = regressor.stage or "idle"
+        parts[name] = parts.get(name, 0.0) + values.get(regressor.name, 0.0) * regressor.count(line)
+    if line["energy_J"] is not None:
+        parts["unattributed"] = line["energy_J"] - sum(parts.values())
+    return parts
 
-    def __init__(self, idle_W: float) -> None:
-        self.idle_W = idle_W
 
-    def split(self, line: dict[str, Any]) -> dict[str, float]:
-        """Energy of idling and of each stage [J]; the parts add up to the window's energy."""
-        energy_J = line["energy_J"]
-        if energy_J is None:
-            return {}
-        idle_J = min(self.idle_W * IDLE.count(line), energy_J)
-        busy_ns = {stage: row["cpu_ns"] for stage, row in line["stages"].items()}
-        rest_ns = max(line["process_ns"] - sum(busy_ns.values()), 0)
-        total_ns = sum(busy_ns.values()) + rest_ns
-        if not total_ns:
-            return {"idle": energy_J}
-        above_J = energy_J - idle_J
-        parts = {stage: above_J * ns / total_ns for stage, ns in busy_ns.items()}
-        return {"idle": idle_J, **parts, "unattributed": above_J * rest_ns / total_ns}
+def split_by_cpu_time(line: Line, idle_W: float) -> dict[str, float]:
+    """Energy of idling and of each stage of a window by CPU time, under the assumption of equal power in all [J].
+
+    Args:
+        line: the window.
+        idle_W: power within the meter's scope while this process waits [W].
+    """
+    energy_J = line["energy_J"]
+    if energy_J is None:
+        return {}
+    idle_J = min(idle_W * IDLE.count(line), energy_J)
+    busy_ns = {stage: row["cpu_ns"] for stage, row in line["stages"].items()}
+    busy_ns["unattributed"] = max(line["process_ns"] - sum(busy_ns.values()), 0)
+    total_ns = sum(busy_ns.values())
+    if not total_ns:
+        return {"idle": energy_J}
+    return {"idle": idle_J, **{name: (energy_J - idle_J) * ns / total_ns for name, ns in busy_ns.items()}}

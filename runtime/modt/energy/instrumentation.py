@@ -1,4 +1,4 @@
-"""A classifier whose points are booked."""
+"""A classifier that counts the points it processes."""
 
 from __future__ import annotations
 
@@ -14,46 +14,43 @@ class Classifier(Protocol):
     """Points to class likelihoods."""
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(Y|X) of the proposals named."""
+        """(R, 4) P(Y|X) of the R proposals given by index."""
         ...
 
     def facts(self) -> dict[str, str]:
-        """The model's file and hash."""
+        """File and hash of the model."""
         ...
 
 
-class CountedClassifier:
-    """Books the points that the network works on, which the number of its results does not tell.
+class CountingClassifier:
+    """Adds the points processed by the network, padding included, to the ledger's classification entry.
 
     Args:
-        classifier: that does the work.
-        ledger: to book on.
-        max_points: of a proposal that the network is given.
-        batch: proposals of one network call; they are sorted by size and padded to the largest among them.
+        classifier: the classifier it wraps.
+        ledger: the ledger.
+        max_points: points of a proposal passed to the network at most.
+        batch: proposals of one network call; they are sorted by size and padded to the largest of them.
     """
 
     def __init__(self, classifier: Classifier, ledger: StageLedger, max_points: int, batch: int) -> None:
         self._classifier, self._ledger = classifier, ledger
         self._max_points, self._batch = max_points, batch
+        self.facts = classifier.facts
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(Y|X) of the proposals named, in their order."""
+        """(R, 4) P(Y|X) of the R proposals given by index, in their order."""
         self._ledger.count(
             "classification", points=padded_points(proposals.count[which], self._max_points, self._batch)
         )
         return self._classifier.classify(points, proposals, which)
 
-    def facts(self) -> dict[str, str]:
-        """The model's file and hash."""
-        return self._classifier.facts()
-
 
 def padded_points(count: Int, max_points: int, batch: int) -> int:
-    """Points of which the network computes features, padding included, for proposals of (R,) count points.
+    """Points processed by the network, padding included, for R proposals of (R,) count points.
 
     Args:
         count: points of each proposal.
-        max_points: of a proposal that the network is given.
+        max_points: points of a proposal passed to the network at most.
         batch: proposals of one network call.
     """
     size = np.sort(np.minimum(count, max_points))

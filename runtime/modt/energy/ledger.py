@@ -1,7 +1,7 @@
-"""The ledger: times and counts what each stage does, frame by frame.
+"""The ledger: times and counts of each stage, frame by frame.
 
-A span is one call of one stage. Spans do not nest, and all run on the thread that owns the ledger, so the parts of
-a frame add up to it: the stages' spans, the ledger's own overhead and what is left (waiting, and the loop itself).
+A span is one call of one stage. Spans do not nest, and all run on the thread of the ledger, so the parts sum to the
+frame: the spans of the stages, the overhead of the ledger, and the rest (waiting, and the loop itself).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, ParamSpec, Protocol, TypeVar
 
 SCHEMA = "modt.ledger/1"
-STAGES = ("source", "segmentation", "tracking", "scheduling", "classification", "fusion", "sink")
+STAGES = ("source", "segmentation", "odometry", "tracking", "scheduling", "classification", "fusion", "sink")
 
 Clock = Callable[[], int]
 Line = dict[str, Any]
@@ -22,23 +22,23 @@ _CALLS, _ITEMS, _POINTS, _WALL, _CPU = range(5)
 
 
 class StageLedger(Protocol):
-    """What the pipeline asks of a ledger."""
+    """The interface that the pipeline uses."""
 
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Result of function(*args), booked on the stage."""
+        """Result of function(*args), timed as a span of the stage."""
         ...
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
-        """Books work on the stage that the length of its result does not tell."""
+        """Add work to the stage beyond the length of its result."""
         ...
 
     def close_frame(self, index: int) -> Line:
-        """The frame's line; the next frame begins."""
+        """Line of the frame; the next frame begins."""
         ...
 
 
 class Ledger:
-    """Books wall time, CPU time of this thread, calls, items and points of every stage.
+    """Records wall time, CPU time of this thread, calls, items and points of every stage.
 
     Args:
         wall_ns: monotonic clock [ns].
@@ -54,13 +54,13 @@ class Ledger:
         self._wall0, self._cpu0 = wall_ns(), cpu_ns()
 
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Result of function(*args), booked on the stage; its items are len(result) where that has one."""
+        """Result of function(*args), timed as a span of the stage; its items are len(result), if defined."""
         wall0, cpu0 = self._wall_ns(), self._cpu_ns()
         try:
             result = function(*args, **kwargs)
         finally:
             cpu1, wall1 = self._cpu_ns(), self._wall_ns()
-            row = self._stages.get(stage) or self._open(stage)
+            row = self._stages.setdefault(stage, [0, 0, 0, 0, 0])
             row[_CALLS] += 1
             row[_WALL] += wall1 - wall0
             row[_CPU] += cpu1 - cpu0
@@ -70,16 +70,16 @@ class Ledger:
         return result
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
-        """Books work on the stage that the length of its result does not tell."""
-        row = self._stages.get(stage) or self._open(stage)
+        """Add work to the stage beyond the length of its result."""
+        row = self._stages.setdefault(stage, [0, 0, 0, 0, 0])
         row[_ITEMS] += items
         row[_POINTS] += points
 
     def close_frame(self, index: int) -> Line:
-        """The frame's line: its stages, and the parts of the time since the last line.
+        """Line of the frame: its stages, and the parts of the time since the last line.
 
         wall_ns = sum of the stages' wall_ns + overhead_ns + idle_ns holds exactly. A clock that ran backwards is
-        marked "clock" and counts as no time, never as negative time.
+        marked "clock" and counts as zero time.
         """
         wall, cpu = self._wall_ns(), self._cpu_ns()
         frame_wall, frame_cpu = wall - self._wall0, cpu - self._cpu0
@@ -111,13 +111,9 @@ class Ledger:
             "marks": marks,
         }
 
-    def _open(self, stage: str) -> list[int]:
-        row = self._stages[stage] = [0, 0, 0, 0, 0]
-        return row
-
     def _measure_overhead(self, spans: int = 32, rounds: int = 32) -> tuple[int, int]:
-        """What a span costs beyond the call that it times, and a frame beyond its spans [ns]; the least seen."""
-        least_span, least_frame = [], []
+        """Cost of a span beyond the timed call, and of a frame beyond its spans [ns]; minimum over the rounds."""
+        span_ns, frame_ns = [], []
         for _ in range(rounds):
             t0 = self._cpu_ns()
             for _ in range(spans):
@@ -130,23 +126,23 @@ class Ledger:
             t3 = self._cpu_ns()
             self.close_frame(0)
             t4 = self._cpu_ns()
-            least_span.append(max((t2 - t1) - (t1 - t0), 0) // spans)
-            least_frame.append(max(t4 - t3, 0))
-        return min(least_span), min(least_frame)
+            span_ns.append(max((t2 - t1) - (t1 - t0), 0) // spans)
+            frame_ns.append(max(t4 - t3, 0))
+        return min(span_ns), min(frame_ns)
 
 
 class NullLedger:
-    """Books nothing."""
+    """Records nothing."""
 
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args)."""
         return function(*args, **kwargs)
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
-        """Nothing."""
+        """No effect."""
 
     def close_frame(self, index: int) -> Line:
-        """A line without stages."""
+        """Line without stages."""
         return {"schema": SCHEMA, "frame": index, "stages": {}}
 
 

@@ -1,6 +1,6 @@
-"""What tracking saves, as the paper predicts it (section IV-D, Equations 2 and 3).
+"""Energy of tracking-by-detection and of the proposed pipeline (section IV-D, Equations 2 and 3).
 
-All energies share one unit, which cancels in gamma: joules where a meter gave them, CPU seconds otherwise.
+All energies share one unit, which cancels in gamma: joules where a meter was read, CPU seconds otherwise.
 """
 
 from __future__ import annotations
@@ -9,59 +9,64 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class PaperModel:
-    """The quantities of Equations 2 and 3.
+class EnergyModel:
+    """Equations 2 and 3 by their four parameters; the others, neutral by default, are costs that they leave out.
 
     Attributes:
-        e_seg: E(seg), of one segmentation call.
-        e_class: E(class), of the classification of one proposal.
-        n_obj: N_obj, foreground proposals a frame.
-        n_bg: N_bg, background proposals a frame.
-        n_go: N_go, average life of a track in frames.
+        e_seg: E(seg), of one segmentation.
+        e_class: E(class), of one classification by tracking-by-detection.
+        n: N_obj + N_bg, proposals a frame.
+        n_go: N_go, mean life of a track in frames.
+        classified_share: share of the tracks classified at least once.
+        repeats: further classifications a track, without those after a loss.
+        reacquired: further classifications a track after it was lost.
+        view_cost_ratio: E(class) of the views selected over e_class.
+        track: tracking common to both runs, a frame.
+        extra_track1, extra_track2: tracking beyond that, a frame, of tracking-by-detection and of the pipeline.
+        schedule1, schedule2: scheduling and fusion a frame, of tracking-by-detection and of the pipeline.
     """
 
     e_seg: float
     e_class: float
-    n_obj: float
-    n_bg: float
+    n: float
     n_go: float
+    classified_share: float = 1.0
+    repeats: float = 0.0
+    reacquired: float = 0.0
+    view_cost_ratio: float = 1.0
+    track: float = 0.0
+    extra_track1: float = 0.0
+    extra_track2: float = 0.0
+    schedule1: float = 0.0
+    schedule2: float = 0.0
 
     @property
     def a(self) -> float:
         """E(class) / E(seg); infinite where segmentation costs nothing."""
         return self.e_class / self.e_seg if self.e_seg else float("inf")
 
-    def e1(self, m: int) -> float:
-        """E1(M): tracking-by-detection over M frames (Equation 2)."""
-        return m * self.e_seg + m * (self.n_obj + self.n_bg) * self.e_class
+    @property
+    def views(self) -> float:
+        """k: classifications a track; 1 in the paper."""
+        return self.classified_share + self.repeats + self.reacquired
 
-    def e2(self, m: int) -> float:
-        """E2(M): one classification a track over M frames (Equation 2)."""
-        return m * self.e_seg + m / self.n_go * (self.n_obj + self.n_bg) * self.e_class
+    @property
+    def e1(self) -> float:
+        """E1(M) / M: energy a frame of tracking-by-detection (Equation 2)."""
+        return self.e_seg + self.n * self.e_class + self.track + self.extra_track1 + self.schedule1
+
+    @property
+    def e2(self) -> float:
+        """E2(M) / M: energy a frame with n / N_go new tracks, each classified k times (Equation 2)."""
+        selected = self.n / self.n_go * self.views * self.view_cost_ratio * self.e_class
+        return self.e_seg + selected + self.track + self.extra_track2 + self.schedule2
 
     @property
     def gamma(self) -> float:
-        """E1(M) / E2(M), which M does not change (Equation 3, first line); 1 where nothing costs anything."""
-        e2 = self.e2(1)
-        return self.e1(1) / e2 if e2 else 1.0
-
-    @property
-    def gamma_short(self) -> float:
-        """The paper's approximation gamma = N_go."""
-        return self.n_go
+        """E1 / E2 (Equation 3); 1 where nothing costs anything."""
+        return self.e1 / self.e2 if self.e2 else 1.0
 
     @property
     def short_form_error(self) -> float:
-        """Relative error of gamma = N_go at this a, against the full Equation 3."""
-        return self.gamma_short / self.gamma - 1.0
-
-
-def gamma(a: float, n: float, n_go: float) -> float:
-    """Equation 3, second line: gamma of n = N_obj + N_bg proposals a frame.
-
-    Args:
-        a: E(class) / E(seg).
-        n: proposals a frame.
-        n_go: average life of a track in frames.
-    """
-    return (1.0 + n * a) / (1.0 + n * a / n_go)
+        """Relative error of the approximation gamma = N_go."""
+        return self.n_go / self.gamma - 1.0

@@ -1,4 +1,4 @@
-"""Windows of a second or more: the only edges at which meters are read."""
+"""Windows of a second or more: the only times at which meters are read."""
 
 from __future__ import annotations
 
@@ -7,20 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from modt.config import WindowConfig
 from modt.energy.conditions import Conditions
-from modt.energy.meters.meter import Kind, Meter, MeterLostError, Quantity
+from modt.energy.meters.meter import Kind, Measurand, Meter, MeterLostError
 
 SCHEMA = "modt.energy/1"
-SUSPEND_S = 0.2
-"""Time by which the clocks that run on in sleep may lead the one that does not, before it counts as sleep."""
-CLOCK_STEP_S = 0.5
-"""Jump of the wall calendar against the monotonic clock that is reported."""
 
 Line = dict[str, Any]
-
-
-def _boot_ns() -> int:
-    return time.clock_gettime_ns(time.CLOCK_BOOTTIME)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,20 +21,20 @@ class Clocks:
     """The clocks of a machine [ns].
 
     Attributes:
-        monotonic_ns: stands still while the machine is suspended.
-        boot_ns: runs on meanwhile.
+        monotonic_ns: stops while the machine is suspended.
+        boot_ns: includes suspended time.
         calendar_ns: may be set.
         process_ns: CPU time of all threads of this process.
     """
 
     monotonic_ns: Callable[[], int] = time.monotonic_ns
-    boot_ns: Callable[[], int] = _boot_ns
+    boot_ns: Callable[[], int] = lambda: time.clock_gettime_ns(time.CLOCK_BOOTTIME)
     calendar_ns: Callable[[], int] = time.time_ns
     process_ns: Callable[[], int] = time.process_time_ns
 
 
-class Tape:
-    """Turns the readings of one meter into energy between readings; never negative, never silently wrong."""
+class EnergyAccumulator:
+    """Energy between successive readings of one meter, never negative; implausible readings give None and a mark."""
 
     def __init__(self, meter: Meter) -> None:
         self.meter = meter
@@ -49,32 +42,26 @@ class Tape:
         self._lost = False
 
     def advance(self, seconds: float, *, suspended: bool = False) -> tuple[float | None, list[str]]:
-        """Energy since the last reading [J], None where it is not known, and marks that say what happened.
+        """Energy since the last reading [J], None where unknown, and marks.
 
         Marks: "lost" (unreadable), "back" (readable again), "wrap" (counter passed its range), "reset" (counter
-        went back for no known reason), "implausible" (more than the meter could show), "ambiguous" (long enough for
-        a whole turn of the counter), "negative" (power below zero, taken as zero).
+        decreased otherwise), "implausible" (above max_W), "ambiguous" (long enough for a full range of the counter),
+        "negative" (power below zero, taken as zero).
         """
-        before = self._last
+        before, lost = self._last, self._lost
         try:
             now = self.meter.read()
         except MeterLostError:
             self._last, self._lost = None, True
             return None, ["lost"]
-        self._last = now
+        self._last, self._lost = now, False
         if before is None:
-            marks = ["back"] if self._lost else []
-            self._lost = False
-            return None, marks
-        if self.meter.facts.quantity is Quantity.POWER:
-            return self._integrated(before, now, seconds, suspended)
+            return None, ["back"] if lost else []
+        if self.meter.facts.measurand is Measurand.POWER:
+            return (None, []) if suspended else self._integrated(before, now, seconds)
         return self._counted(before, now, seconds)
 
-    def _integrated(
-        self, before: float, now: float, seconds: float, suspended: bool
-    ) -> tuple[float | None, list[str]]:
-        if suspended:
-            return None, []
+    def _integrated(self, before: float, now: float, seconds: float) -> tuple[float | None, list[str]]:
         if max(before, now) > self.meter.facts.max_W:
             return None, ["implausible"]
         marks = ["negative"] if min(before, now) < 0 else []
@@ -95,25 +82,25 @@ class Tape:
 
 
 class Windows:
-    """Adds up the ledger's lines and closes a window over them whenever enough time has passed.
+    """Sums the lines of the ledger, and closes a window over them when enough time has passed.
 
     Args:
-        meters: to be added up; none of them counts what another one counts.
+        meters: to be summed; their scopes do not overlap.
         clocks: of this machine.
         conditions: governor, frequency, temperature.
-        least_s: shortest window [s].
+        config: length of a window and tolerances of the clocks.
     """
 
-    def __init__(self, meters: Sequence[Meter], clocks: Clocks, conditions: Conditions, least_s: float = 1.0) -> None:
-        self._tapes = [Tape(meter) for meter in meters]
-        self._clocks, self._conditions, self._least_ns = clocks, conditions, round(least_s * 1e9)
+    def __init__(self, meters: Sequence[Meter], clocks: Clocks, conditions: Conditions, config: WindowConfig) -> None:
+        self._accumulators = [EnergyAccumulator(meter) for meter in meters]
+        self._clocks, self._conditions, self._config = clocks, conditions, config
         self._index = 0
-        for tape in self._tapes:
-            tape.advance(0.0)
+        for accumulator in self._accumulators:
+            accumulator.advance(0.0)
         self._open()
 
     def add(self, line: Line) -> Line | None:
-        """Books a ledger line; the window's line when it is time to close it, else None."""
+        """Add a ledger line; the window's line if it is time to close it, else None."""
         self._frames.append(line["frame"])
         for stage, row in line["stages"].items():
             total = self._stages.setdefault(stage, dict.fromkeys(row, 0))
@@ -122,30 +109,31 @@ class Windows:
         self._overhead_ns += line["overhead_ns"]
         if "clock" in line["marks"]:
             self._marks.append("clock")
-        return self.close() if self._clocks.monotonic_ns() - self._start_ns >= self._least_ns else None
+        return self.close() if self._clocks.monotonic_ns() - self._start_ns >= 1e9 * self._config.min_s else None
 
     def close(self) -> Line:
-        """The line of the window in hand, however short; the next begins.
+        """Line of the open window, however short; the next begins.
 
         wall_ns = sum of the stages' wall_ns + overhead_ns + idle_ns holds exactly.
         """
-        clocks = self._clocks
+        clocks, marks, frames = self._clocks, self._marks, self._frames
         wall_ns = clocks.monotonic_ns() - self._start_ns
-        slept_ns = clocks.boot_ns() - self._boot0_ns - wall_ns
-        stepped_ns = clocks.calendar_ns() - self._calendar0_ns - wall_ns - max(slept_ns, 0)
-        marks = self._marks
-        suspended = slept_ns > SUSPEND_S * 1e9
+        suspended_ns = clocks.boot_ns() - self._boot0_ns - wall_ns
+        stepped_ns = clocks.calendar_ns() - self._calendar0_ns - wall_ns - max(suspended_ns, 0)
+        suspended = suspended_ns > 1e9 * self._config.suspend_s
         if suspended:
             marks.append("suspended")
-        if abs(stepped_ns) > CLOCK_STEP_S * 1e9:
+        if abs(stepped_ns) > 1e9 * self._config.clock_step_s:
             marks.append("clock-step")
-        seconds = 1e-9 * (wall_ns + max(slept_ns, 0))
-        readings = []
-        for tape in self._tapes:
-            energy_J, said = tape.advance(seconds, suspended=suspended)
-            marks += said
-            facts = tape.meter.facts
+        seconds = 1e-9 * (wall_ns + max(suspended_ns, 0))
+        readings: list[dict[str, Any]] = []
+        resolution_J = 0.0
+        for accumulator in self._accumulators:
+            energy_J, new_marks = accumulator.advance(seconds, suspended=suspended)
+            marks += new_marks
+            facts = accumulator.meter.facts
             readings.append({"name": facts.name, "kind": facts.kind.value, "scope": facts.scope.value, "J": energy_J})
+            resolution_J += facts.resolution * (seconds if facts.measurand is Measurand.POWER else 1.0)
         spans_ns = sum(row["wall_ns"] for row in self._stages.values())
         if wall_ns < spans_ns + self._overhead_ns:
             marks.append("clock")
@@ -155,7 +143,7 @@ class Windows:
         line: Line = {
             "schema": SCHEMA,
             "window": self._index,
-            "frames": [self._frames[0], self._frames[-1], len(self._frames)] if self._frames else [None, None, 0],
+            "frames": [frames[0], frames[-1], len(frames)] if frames else [None, None, 0],
             "wall_ns": wall_ns,
             "process_ns": max(clocks.process_ns() - self._process0_ns, 0),
             "overhead_ns": self._overhead_ns,
@@ -163,7 +151,7 @@ class Windows:
             "stages": self._stages,
             "energy_J": sum(energies) if known else None,
             "kind": readings[0]["kind"] if known else Kind.UNAVAILABLE.value,
-            "resolution_J": self._resolution_J(seconds),
+            "resolution_J": resolution_J,
             "meters": readings,
             "conditions": self._conditions.read(),
             "marks": sorted(set(marks)),
@@ -171,11 +159,6 @@ class Windows:
         self._index += 1
         self._open()
         return line
-
-    def _resolution_J(self, seconds: float) -> float:
-        """Error that the steps of the readings alone can make [J]."""
-        facts = [tape.meter.facts for tape in self._tapes]
-        return sum(f.resolution * (seconds if f.quantity is Quantity.POWER else 1.0) for f in facts)
 
     def _open(self) -> None:
         clocks = self._clocks

@@ -1,8 +1,9 @@
 """Displacement between k-DOPs, and how certain it is.
 
-An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the end that
-moved less is the object's own. The disagreement of the two ends is a variance of the position along that axis, which
-lasts: the next k-DOP is compared with one that was already in doubt.
+An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the object
+moved by the mean of both ends where they agree, else by the displacement of the end that moved less. The disagreement
+of the two ends is a variance of the position along that axis, which lasts: the next k-DOP is compared with one that
+was already in doubt.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from modt.geometry.kdop import AXES, widths
 from modt.types import Float64
 
-_AGREE_M = 0.6
+AGREE_M = 0.6
 """Ends whose displacements differ by less agree, of a k-DOP up to a metre long; the limit falls with the length."""
 _DISAGREEMENT = 0.3
 """Standard deviation of a displacement by ends that disagree, relative to the disagreement or the width, if less."""
@@ -33,7 +34,8 @@ def least(a: Float64, b: Float64) -> Float64:
 
 def shift_between(a: Float64, b: Float64) -> Float64:
     """(K, 2) displacement from k-DOPs a to b [m], all axes weighted alike."""
-    shift: Float64 = (AXES @ least(a, b)).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
+    moved, _, _ = _moved(a, b)
+    shift: Float64 = (AXES @ moved).T / 2  # four axes a quarter turn apart in pairs: A A' = 2 I
     return shift
 
 
@@ -51,15 +53,13 @@ def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tupl
         covariance: (K, 2, 2) of it [m2].
         end_variance: (4, K) variance along each axis by ends that disagree, or did [m2].
     """
-    width, gain = widths(b), b - a
-    apart = gain[:4] + gain[4:]
-    longest = np.maximum(width, width - apart).max(axis=0)
-    unlike = 1 - np.square(np.maximum(1 - np.square(apart * (np.maximum(longest, 1.0) / _AGREE_M)), 0.0))
+    width = widths(b)
+    moved, unlike, apart = _moved(a, b)
     end_variance = np.maximum(_DISAGREEMENT**2 * unlike * np.square(apart), _DECAY * before)
     np.minimum(end_variance, np.square(_DISAGREEMENT * width.max(axis=0)), out=end_variance)
     # The four axes together weigh as much as one measurement in each direction.
     weight = 0.5 / (variance + end_variance)
-    (xx, yy, xy), (x, y) = _PRODUCTS @ weight, AXES @ (weight * least(a, b))
+    (xx, yy, xy), (x, y) = _PRODUCTS @ weight, AXES @ (weight * moved)
     scale = 1.0 / (xx * yy - xy * xy)
     xx, yy, xy = scale * yy, scale * xx, -scale * xy  # the inverse
     shift, covariance = np.empty((len(x), 2)), np.empty((len(x), 2, 2))
@@ -67,6 +67,21 @@ def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tupl
     covariance[:, 0, 0], covariance[:, 1, 1] = xx, yy
     covariance[:, 0, 1] = covariance[:, 1, 0] = xy
     return shift, covariance, end_variance
+
+
+def _moved(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
+    """Displacement along each axis from k-DOPs a to b (8, K).
+
+    Returns:
+        moved: (4, K) mean of both ends where they agree, else that of the end that moved less [m].
+        unlike: (4, K) from 0, where both ends moved alike, to 1.
+        apart: (4, K) difference of their displacements outward [m].
+    """
+    width, gain = widths(b), b - a
+    both, apart = gain[:4] - gain[4:], gain[:4] + gain[4:]
+    longest = np.maximum(width, width - apart).max(axis=0)
+    unlike = 1 - np.square(np.maximum(1 - np.square(apart * (np.maximum(longest, 1.0) / AGREE_M)), 0.0))
+    return (both - unlike * np.copysign(apart, both)) / 2, unlike, apart
 
 
 def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64]:

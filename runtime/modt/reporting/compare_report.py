@@ -1,4 +1,4 @@
-"""What a comparison of the modes says, as a tree of figures: energy, time, counts, gamma predicted and measured."""
+"""A comparison of the modes as a tree of quantities: energy, time, counts, gamma predicted and measured."""
 
 from __future__ import annotations
 
@@ -8,224 +8,177 @@ from typing import Any
 
 import numpy as np
 
-from modt.energy.attribution import usable
-from modt.energy.meters.meter import Kind
-from modt.energy.savings import Beside, UnitCosts, predict
+from modt.config import EnergyConfig
+from modt.energy.attribution import usable_windows
+from modt.energy.meters.meter import Facts, Kind
+from modt.energy.savings import OtherCosts, UnitCosts, predict
 from modt.pipeline import STAGES
-from modt.reporting.comparison import total
-from modt.reporting.gamma import Evidence, Saving, beside_of, interval, mean_interval, saving, unit_costs
-from modt.reporting.quantity import Figure, figure
-from modt.reporting.repetitions import Trial, evidence, pooled, windows_of
+from modt.reporting.comparison import COUNTS, total
+from modt.reporting.gamma import (
+    RunCosts,
+    Saving,
+    interval,
+    mean_interval,
+    other_costs,
+    prediction_tree,
+    saving,
+    unit_costs,
+)
+from modt.reporting.quantity import Quantity, estimate, quantity
+from modt.reporting.repetitions import Repetition, concatenated_run, median_run, windows_of
+from modt.types import Float64
 
 SCHEMA = "modt.compare/1"
-COUNTING = "Energy is watts assumed times CPU time: this tests counts and unit costs, not the physics."
-PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
+_COUNTING = "Energy is assumed power times CPU time: this tests counts and unit costs, not the physics."
+_PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
 
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """What turns CPU time into energy.
+    """The conversion of CPU time to energy: powers and calibration of the board, meter, period of the stream."""
 
-    Attributes:
-        idle_W: drawn while the process waits.
-        busy_W: drawn while it computes.
-        period_s: of the stream, over which idling is counted.
-        meter: name of the meter.
-        kind: of its energy.
-        coefficients: seg_J, class_J and point_J of a calibration, None without one.
-    """
-
-    idle_W: float
-    busy_W: float
+    board: EnergyConfig
+    meter: Facts
     period_s: float
-    meter: str
-    kind: Kind
-    coefficients: tuple[float, float, float] | None = None
-
-    @property
-    def net_W(self) -> float:
-        """What computing adds."""
-        return self.busy_W - self.idle_W
 
 
 def compare_tree(
-    trials: Sequence[Trial], modes: Sequence[str], varied: str, basis: Basis, about: dict[str, Any]
+    repetitions: Sequence[Repetition], modes: Sequence[str], varied: str, basis: Basis, about: dict[str, Any]
 ) -> dict[str, Any]:
-    """Everything a comparison found.
+    """Results of a comparison.
 
     Args:
-        trials: of the same stream.
-        modes: compared, the first of them tracking-by-detection.
-        varied: the contender whose costs price the others.
-        basis: for joules.
-        about: stream, frames, conditions, for the record.
+        repetitions: of the same stream.
+        modes: compared, tracking-by-detection first.
+        varied: name of the run that gives the unit costs.
+        basis: conversion to joules.
+        about: stream, frames, conditions; copied to the tree.
     """
     random = np.random.default_rng(0)
-    runs = {mode: evidence(trials, mode) for mode in modes}
-    priced = pooled(trials, varied)
+    runs = {mode: median_run(repetitions, mode) for mode in modes}
+    varied_run = concatenated_run(repetitions, varied)
     baseline = runs[modes[0]]
-    energy = {mode: _energy(run, windows_of(trials, mode), basis, random) for mode, run in runs.items()}
+    energy = {mode: _energy(run, windows_of(repetitions, mode), basis, random) for mode, run in runs.items()}
     savings = {
-        mode: _saving(
-            saving(baseline, runs[mode], priced, random), baseline, runs[mode], energy, modes[0], mode, basis
-        )
+        mode: _saving(saving(baseline, runs[mode], varied_run, random), energy[modes[0]], energy[mode])
+        | {"gamma_calibrated": estimate(_calibrated(baseline, runs[mode], basis))}
         for mode in modes[1:]
+    }
+    meter = {"name": basis.meter.name, "kind": basis.meter.kind.value} | {
+        key: getattr(basis.board, key) for key in ("idle_W", "busy_W")
     }
     metered = all(e["net_J"].kind is not Kind.ESTIMATED for e in energy.values())
     return {
         "schema": SCHEMA,
         **about,
-        "meter": {"name": basis.meter, "kind": basis.kind.value, "idle_W": basis.idle_W, "busy_W": basis.busy_W},
-        "test": PHYSICS if metered else COUNTING,
-        "modes": {mode: energy[mode] | _work(runs[mode], energy[mode], random) for mode in modes},
-        "unit_costs": _costs(unit_costs(priced), baseline, basis),
+        "meter": meter,
+        "test": _PHYSICS if metered else _COUNTING,
+        "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
+        "unit_costs": _costs(unit_costs(varied_run), baseline, basis.board.active_W),
         "savings": savings,
         "series_kind": Kind.MEASURED.value,
-        "series": {mode: _series(runs[mode], trials[0][mode].lives) for mode in modes},
+        "series": {mode: _series(runs[mode], repetitions[0][mode].lives) for mode in modes},
     }
 
 
 def _energy(
-    run: Evidence, windows: list[dict[str, Any]], basis: Basis, random: np.random.Generator
-) -> dict[str, Figure]:
-    """Joules a frame, with and without idling: the meter's where it read, the model's elsewhere."""
-    good = usable(windows)
-    frames = sum(line["frames"][2] for line in good)
-    if frames:
+    run: RunCosts, windows: list[dict[str, Any]], basis: Basis, random: np.random.Generator
+) -> dict[str, Quantity]:
+    """Energy a frame with and without idling [J]: of the meter where it was read, else of the model."""
+    good = usable_windows(windows)
+    frames = np.array([line["frames"][2] for line in good])
+    if frames.sum():
         gross_J = np.array([line["energy_J"] for line in good])
-        net_J = gross_J - basis.idle_W * 1e-9 * np.array([line["wall_ns"] for line in good])
-        each = np.array([line["frames"][2] for line in good])
-        kind = Kind(good[0]["kind"])
+        net_J = gross_J - basis.board.idle_W * 1e-9 * np.array([line["wall_ns"] for line in good])
 
-        def per_frame(values: Any, rows: Any) -> float:
-            return float(values[rows].sum() / max(each[rows].sum(), 1))
+        def per_frame(energy_J: Float64) -> Quantity:
+            bounds = interval(len(good), lambda k: float(energy_J[k].sum() / max(frames[k].sum(), 1)), random)
+            return quantity(float(energy_J.sum() / frames.sum()), "J", Kind(good[0]["kind"]), bounds)
 
-        return {
-            name: figure(
-                float(values.sum() / frames),
-                "J",
-                kind,
-                interval(len(good), lambda rows, v=values: per_frame(v, rows), random),  # type: ignore[misc]
-            )
-            for name, values in (("net_J", net_J), ("gross_J", gross_J))
-        }
+        return {"net_J": per_frame(net_J), "gross_J": per_frame(gross_J)}
     cpu_s = run.cost.sum(axis=1)
-    low, high = mean_interval(cpu_s, random)
-    net, idle = basis.net_W, basis.idle_W * basis.period_s
-    mean = float(cpu_s.mean())
+    idle_J = basis.board.idle_W * basis.period_s
+    mean, low, high = (basis.board.active_W * s for s in (float(cpu_s.mean()), *mean_interval(cpu_s, random)))
     return {
-        "net_J": figure(net * mean, "J", Kind.ESTIMATED, (net * low, net * high)),
-        "gross_J": figure(idle + net * mean, "J", Kind.ESTIMATED, (idle + net * low, idle + net * high)),
+        "net_J": estimate(mean, "J", (low, high)),
+        "gross_J": estimate(idle_J + mean, "J", (idle_J + low, idle_J + high)),
     }
 
 
-def _work(run: Evidence, energy: dict[str, Figure], random: np.random.Generator) -> dict[str, Any]:
-    counts, cpu_s = total(run.counts), run.cost.sum(axis=1)
-    net_J, total_s = energy["net_J"].value, float(cpu_s.mean())
-    stages = {}
-    for k, stage in enumerate(STAGES):
-        mean = float(run.cost[:, k].mean())
-        share_J = None if net_J is None or not total_s else net_J * mean / total_s
-        stages[stage] = {
-            "cpu_ms": figure(1e3 * mean, "ms", Kind.MEASURED, _scaled(mean_interval(run.cost[:, k], random), 1e3)),
-            "energy_J": figure(share_J, "J", Kind.ESTIMATED),
+def _work(run: RunCosts, net_J: Quantity, random: np.random.Generator) -> dict[str, Any]:
+    def cpu_ms(cpu_s: Float64) -> Quantity:
+        low, high = mean_interval(cpu_s, random)
+        return quantity(1e3 * float(cpu_s.mean()), "ms", Kind.MEASURED, (1e3 * low, 1e3 * high))
+
+    counts, total_s = total(run.counts), float(run.cost.sum(axis=1).mean())
+    share = None if net_J.value is None or not total_s else net_J.value / total_s
+    stages = {
+        stage: {
+            "cpu_ms": cpu_ms(run.cost[:, k]),
+            "energy_J": estimate(None if share is None else share * float(run.cost[:, k].mean()), "J"),
         }
+        for k, stage in enumerate(STAGES)
+    }
     return {
-        "cpu_ms": figure(1e3 * total_s, "ms", Kind.MEASURED, _scaled(mean_interval(cpu_s, random), 1e3)),
+        "cpu_ms": cpu_ms(run.cost.sum(axis=1)),
         "stages": stages,
-        "proposals": figure(counts.n),
-        "foreground": figure(counts.n_obj),
-        "classified": figure(counts.classified / counts.frames),
-        "beta": figure(counts.beta),
-        "N_go": figure(counts.n_go, "frames"),
-        "views": figure(counts.classified / counts.tracks if counts.tracks else None),
+        "proposals": quantity(counts.n),
+        "foreground": quantity(counts.n_obj),
+        "classified": quantity(counts.classified / counts.frames),
+        "beta": quantity(counts.beta),
+        "N_go": quantity(counts.n_go, "frames"),
+        "views": quantity(counts.classified / counts.tracks if counts.tracks else None),
     }
 
 
-def _saving(
-    found: Saving,
-    baseline: Evidence,
-    run: Evidence,
-    energy: dict[str, dict[str, Figure]],
-    base: str,
-    mode: str,
-    basis: Basis,
-) -> dict[str, Any]:
-    p = found.prediction
-    gross1, gross2 = (energy[m]["gross_J"] for m in (base, mode))
-    net1, net2 = (energy[m]["net_J"] for m in (base, mode))
-    return {
-        "a": figure(p.paper.a, "", Kind.ESTIMATED),
-        "gamma_short": figure(p.paper.gamma_short, "", Kind.ESTIMATED),
-        "gamma_equation_3": figure(p.paper.gamma, "", Kind.ESTIMATED),
-        "short_form_error": figure(p.paper.short_form_error, "", Kind.ESTIMATED),
-        "gamma_predicted": figure(found.predicted, "", Kind.ESTIMATED, found.predicted_interval),
-        "gamma_measured_cpu": figure(found.measured, "", Kind.MEASURED, found.measured_interval),
-        "gamma_net": figure(_ratio(net1, net2), "", net1.kind),
-        "gamma_gross": figure(_ratio(gross1, gross2), "", gross1.kind),
-        "deviation_net": figure(_off(found.predicted, _ratio(net1, net2)), "", Kind.ESTIMATED),
-        "gamma_calibrated": figure(_calibrated(baseline, run, basis), "", Kind.ESTIMATED),
-        "deviation": figure(found.deviation, "", Kind.ESTIMATED, found.deviation_interval),
-        "terms": [
-            {
-                "name": t.name,
-                "change": figure(t.change, "", Kind.ESTIMATED),
-                "gamma": figure(t.gamma, "", Kind.ESTIMATED),
-            }
-            for t in p.explain(found.measured)
-        ],
-        "saved_J": figure(_difference(net1, net2), "J", net1.kind),
+def _saving(found: Saving, energy1: dict[str, Quantity], energy2: dict[str, Quantity]) -> dict[str, Any]:
+    net, gross = ((energy1[key].value, energy2[key].value) for key in ("net_J", "gross_J"))
+    gamma_net, gamma_gross = (a / b if a is not None and b else None for a, b in (net, gross))
+    saved_J = None if net[0] is None or net[1] is None else net[0] - net[1]
+    kind = energy1["net_J"].kind
+    return prediction_tree(found.prediction, found.measured) | {
+        "short_form_error": estimate(found.prediction.paper.short_form_error),
+        "gamma_predicted": estimate(found.predicted, "", found.predicted_interval),
+        "gamma_measured_cpu": quantity(found.measured, "", Kind.MEASURED, found.measured_interval),
+        "gamma_net": quantity(gamma_net, "", kind),
+        "gamma_gross": quantity(gamma_gross, "", energy1["gross_J"].kind),
+        "deviation_net": estimate(found.predicted / gamma_net - 1.0 if gamma_net else None),
+        "deviation": estimate(found.deviation, "", found.deviation_interval),
+        "saved_J": quantity(saved_J, "J", kind),
     }
 
 
-def _calibrated(baseline: Evidence, run: Evidence, basis: Basis) -> float | None:
-    """Gamma from a calibration's joules; what was not calibrated is priced by its CPU time."""
-    if basis.coefficients is None:
+def _calibrated(baseline: RunCosts, run: RunCosts, basis: Basis) -> float | None:
+    """Gamma from the joules of a calibration; stages not calibrated count by their CPU time."""
+    if basis.board.coefficients is None:
         return None
-    seg_J, class_J, point_J = basis.coefficients
-    beside1, beside2 = (
-        Beside(basis.net_W * b.track, basis.net_W * b.choose) for b in (beside_of(baseline), beside_of(run))
-    )
-    costs = UnitCosts(seg_J, beside1.track, 0.0, class_J, point_J)
-    return predict(total(baseline.counts), total(run.counts), costs, beside1, beside2).model.gamma
+    seg_J, class_J, point_J = basis.board.coefficients
+    net_W = basis.board.active_W
+    other1, other2 = (OtherCosts(net_W * c.track, net_W * c.schedule) for c in map(other_costs, (baseline, run)))
+    costs = UnitCosts(seg_J, other1.track, 0.0, class_J, point_J)
+    return predict(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
 
 
-def _costs(costs: UnitCosts, baseline: Evidence, basis: Basis) -> dict[str, Figure]:
+def _costs(costs: UnitCosts, baseline: RunCosts, net_W: float) -> dict[str, Quantity]:
     e_class = costs.e_class(total(baseline.counts))
     return {
-        "E_seg": figure(basis.net_W * costs.seg, "J", Kind.ESTIMATED),
-        "E_class": figure(basis.net_W * e_class, "J", Kind.ESTIMATED),
-        "E_track": figure(basis.net_W * costs.track, "J", Kind.ESTIMATED),
-        "seg_cpu_ms": figure(1e3 * costs.seg, "ms"),
-        "class_cpu_ms": figure(1e3 * e_class, "ms", Kind.ESTIMATED),
-        "track_cpu_ms": figure(1e3 * costs.track, "ms"),
-        "class_call_cpu_us": figure(1e6 * costs.class_call, "us", Kind.ESTIMATED),
-        "class_item_cpu_us": figure(1e6 * costs.class_item, "us", Kind.ESTIMATED),
-        "class_point_cpu_us": figure(1e6 * costs.class_point, "us", Kind.ESTIMATED),
-        "a": figure(e_class / costs.seg if costs.seg else None, "", Kind.ESTIMATED),
+        "E_seg": estimate(net_W * costs.seg, "J"),
+        "E_class": estimate(net_W * e_class, "J"),
+        "E_track": estimate(net_W * costs.track, "J"),
+        "seg_cpu_ms": quantity(1e3 * costs.seg, "ms"),
+        "class_cpu_ms": estimate(1e3 * e_class, "ms"),
+        "track_cpu_ms": quantity(1e3 * costs.track, "ms"),
+        "class_call_cpu_us": estimate(1e6 * costs.class_call, "us"),
+        "class_item_cpu_us": estimate(1e6 * costs.class_item, "us"),
+        "class_point_cpu_us": estimate(1e6 * costs.class_point, "us"),
+        "a": estimate(e_class / costs.seg if costs.seg else None),
     }
 
 
-def _series(run: Evidence, lives: list[int]) -> dict[str, Any]:
+def _series(run: RunCosts, lives: list[int]) -> dict[str, Any]:
     return {
         "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
-        "proposals": run.counts[:, 0].tolist(),
-        "classified": run.counts[:, 4].tolist(),
+        "proposals": run.counts[:, COUNTS.index("proposals")].tolist(),
+        "classified": run.counts[:, COUNTS.index("classified")].tolist(),
         "lives": sorted(lives),
     }
-
-
-def _scaled(pair: tuple[float, float], by: float) -> tuple[float, float]:
-    return by * pair[0], by * pair[1]
-
-
-def _ratio(a: Figure, b: Figure) -> float | None:
-    return None if a.value is None or not b.value else a.value / b.value
-
-
-def _off(predicted: float, measured: float | None) -> float | None:
-    return predicted / measured - 1.0 if measured else None
-
-
-def _difference(a: Figure, b: Figure) -> float | None:
-    return None if a.value is None or b.value is None else a.value - b.value

@@ -1,4 +1,4 @@
-"""The modes on the same stream, in turns, so that whatever else the machine does falls on all of them alike."""
+"""The modes on the same stream, interleaved, so that other load of the machine affects all of them equally."""
 
 from __future__ import annotations
 
@@ -15,72 +15,65 @@ from modt.energy.ledger import Ledger
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
-from modt.types import NONE, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
+from modt.types import NONE, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
 
-COUNTS = ("proposals", "foreground", "tracks", "classified_tracks", "classified", "refound", "points", "calls")
+COUNTS = ("proposals", "foreground", "tracks", "classified_tracks", "classified", "reacquired", "points", "calls")
 """Columns of a run's counts, as in energy.savings.Counts."""
 
 
-class Watched:
-    """A classifier that remembers which proposals of the frame it was given."""
+class RecordingClassifier:
+    """A classifier that records the proposals of its last call.
+
+    Attributes:
+        rows: (R,) proposals classified by the last call.
+    """
 
     def __init__(self, classifier: Classifier) -> None:
         self._classifier = classifier
-        self.which: Int = np.zeros(0, np.int64)
+        self.facts = classifier.facts
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the last call."""
+        self.rows: Int = np.zeros(0, np.int64)
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(Y|X) of the proposals named."""
-        self.which = which
+        """(R, 4) P(Y|X) of the R proposals given by index."""
+        self.rows = which
         return self._classifier.classify(points, proposals, which)
-
-    def facts(self) -> dict[str, str]:
-        """The model's file and hash."""
-        return self._classifier.facts()
-
-
-@dataclass(frozen=True, slots=True)
-class Followed:
-    """A track alive.
-
-    Attributes:
-        classified: at least once.
-        seen: in the last frame.
-        life: frames in which it was seen.
-    """
-
-    classified: bool = False
-    seen: bool = True
-    life: int = 0
 
 
 @dataclass
-class Contender:
-    """One mode on its way through the stream.
+class ModeRun:
+    """One pass of one mode through the stream.
 
     Attributes:
-        name: of the mode.
-        pipeline: its stages; the classifier is the one watched.
-        ledger: that the pipeline books on.
-        watched: the classifier.
+        pipeline: its stages, with the recorder as classifier.
+        ledger: of the pipeline.
+        recorder: the classifier.
         budget: of the frame with that index.
-        windows: reads the meters at the edges, None where another contender may work within a window.
+        windows: over the meters, None where modes share a window.
+        lines: ledger lines.
+        energy_lines: windows closed.
+        lives: frames with a proposal, of every track that ended.
     """
 
-    name: str
     pipeline: Pipeline
     ledger: Ledger
-    watched: Watched
+    recorder: RecordingClassifier
     budget: Callable[[int], Budget]
     windows: Windows | None = None
     lines: list[dict[str, Any]] = field(default_factory=list)
     energy_lines: list[dict[str, Any]] = field(default_factory=list)
     lives: list[int] = field(default_factory=list)
     _counts: list[tuple[int, ...]] = field(default_factory=list)
-    _alive: dict[int, Followed] = field(default_factory=dict)
+    _life: dict[int, int] = field(default_factory=dict)
+    _classified: set[int] = field(default_factory=set)
+    _seen: set[int] = field(default_factory=set)
 
     def step(self, frame: Frame) -> None:
-        """One frame; what is counted beside the ledger is counted between its frames."""
-        self.watched.which = self.watched.which[:0]
+        """Process one frame; counting happens between the frames of the ledger."""
+        self.recorder.clear()
         result = self.pipeline.step(frame, self.budget(frame.index))
         line = self.ledger.close_frame(frame.index)
         self.lines.append(line)
@@ -91,22 +84,22 @@ class Contender:
                 self.energy_lines.append(closed)
 
     def begin_turn(self) -> None:
-        """What the others did meanwhile is not this one's time or energy."""
+        """Discard the time and energy of other modes since the last turn."""
         self.ledger.close_frame(-1)
         if self.windows is not None:
             self.windows.close()
 
     def end_turn(self) -> None:
-        """Read the meters before another one begins."""
+        """Read the meters at the end of a turn."""
         if self.windows is not None:
             self.energy_lines.append(self.windows.close())
 
     def finish(self) -> None:
-        """The stream has ended: tracks still alive have lived as long as they were seen."""
-        self.lives += [track.life for track in self._alive.values()]
+        """Count the lives of the tracks still alive at the end of the stream."""
+        self.lives += self._life.values()
 
     def counts(self) -> Int:
-        """(frames, 8) what each frame counted, columns as COUNTS."""
+        """(frames, 8) counts of each frame, columns as COUNTS."""
         return np.array(self._counts, np.int64).reshape(-1, len(COUNTS))
 
     def cpu_s(self) -> Float64:
@@ -115,63 +108,48 @@ class Contender:
         return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
     def _count(self, result: FrameResult, line: dict[str, Any]) -> None:
-        tracks = result.tracks
-        seen = tracks.proposal != NONE
-        asked = np.zeros(len(tracks), np.bool_)
-        asked[tracks.row_of_proposal(len(result.proposals))[self.watched.which]] = True
-        new, first, refound = self._follow(tracks.id, seen, asked)
-        foreground = seen & (tracks.object_class != ObjectClass.BACKGROUND)
-        row = line["stages"].get(CLASSIFICATION, {})
+        tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
+        visible = tracks.proposal != NONE
+        rows = tracks.row_of_proposal(len(result.proposals))[self.recorder.rows]
+        alive, seen, classified = (set(ids.tolist()) for ids in (tracks.id, tracks.id[visible], tracks.id[rows]))
         self._counts.append(
             (
                 len(result.proposals),
-                int(foreground.sum()),
-                new,
-                first,
+                int((visible & (tracks.object_class != ObjectClass.BACKGROUND)).sum()),
+                len(alive - self._life.keys()),
+                len(classified - self._classified),
                 result.n_classified,
-                refound,
+                len((classified & self._classified) - self._seen),
                 row.get("points", 0),
                 row.get("calls", 0),
             )
         )
-
-    def _follow(self, ids: Int, seen: Bool, asked: Bool) -> tuple[int, int, int]:
-        """How many tracks are new, classified for the first time, and classified again after they were lost."""
-        alive: dict[int, Followed] = {}
-        new = first = refound = 0
-        for id_, is_seen, is_asked in zip(ids.tolist(), seen.tolist(), asked.tolist(), strict=True):
-            before = self._alive.get(id_, Followed())
-            new += id_ not in self._alive
-            first += is_asked and not before.classified
-            refound += is_asked and before.classified and not before.seen
-            alive[id_] = Followed(before.classified or is_asked, is_seen, before.life + is_seen)
-        self.lives += [track.life for id_, track in self._alive.items() if id_ not in alive]
-        self._alive = alive
-        return new, first, refound
+        self.lives += [life for id_, life in self._life.items() if id_ not in alive]
+        self._life = {id_: self._life.get(id_, 0) + (id_ in seen) for id_ in alive}
+        self._classified, self._seen = (self._classified | classified) & alive, seen
 
 
-def interleave(stream: Iterable[Frame], contenders: Sequence[Contender], turn: int) -> None:
-    """Every contender works on every frame, turn frames at a time, and each goes first equally often.
+def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> None:
+    """Process every frame by every run, `turn` frames at a time, with the first run rotating.
 
     Args:
         stream: frames, read once.
-        contenders: that share them.
-        turn: frames that one works on before the next one does.
+        runs: of the modes.
+        turn: consecutive frames of one run.
     """
     gc.collect()
     gc.freeze()
     frames = iter(stream)
-    number = 0
+    first = 0
     while block := list(islice(frames, turn)):
-        for k in range(len(contenders)):
-            contender = contenders[(number + k) % len(contenders)]
-            contender.begin_turn()
+        for run in (*runs[first:], *runs[:first]):
+            run.begin_turn()
             for frame in block:
-                contender.step(frame)
-            contender.end_turn()
-        number += 1
-    for contender in contenders:
-        contender.finish()
+                run.step(frame)
+            run.end_turn()
+        first = (first + 1) % len(runs)
+    for run in runs:
+        run.finish()
 
 
 def total(counts: Int) -> Counts:

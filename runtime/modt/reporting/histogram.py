@@ -1,4 +1,4 @@
-"""How long something took, time after time, in bounded memory."""
+"""Quantiles of many values in bounded memory."""
 
 from __future__ import annotations
 
@@ -6,56 +6,56 @@ from collections import Counter
 
 import numpy as np
 
-EXACT = 4096
-"""Different values that are kept as they are."""
-BITS = 8
-"""Leading bits that are kept of each once there are more."""
+MAX_EXACT = 4096
+"""Distinct values held exactly."""
+_BITS = 8
+"""Leading bits held of each value beyond that."""
 
 
-class Spread:
-    """Count, sum, greatest and quantiles of whole numbers from 0 on.
+class Histogram:
+    """Count, sum, maximum and quantiles of non-negative integers.
 
-    Count, sum and greatest are exact. Quantiles are exact up to EXACT different values; from then on they are off by
-    less than 0.4 % (1 / 256), since every value is cut to its BITS leading bits and stands for the middle of what was
-    cut off. There are fewer than 8,000 such numbers in 63 bits, so no more is ever held.
+    Count, sum and maximum are exact. Quantiles are exact up to MAX_EXACT distinct values; then each value is replaced
+    by the middle of those that share its _BITS leading bits, an error below 1 / 256. Integers of 63 bits have fewer
+    than 8,000 such middles, which bounds the memory.
     """
 
     def __init__(self) -> None:
-        self.count = self.total = self.greatest = 0
-        self._times: Counter[int] = Counter()
-        self._cutting = False
+        self.count = self.total = self.maximum = 0
+        self._occurrences: Counter[int] = Counter()
+        self._exact = True
 
     def __len__(self) -> int:
-        """Different values held."""
-        return len(self._times)
+        """Distinct values held."""
+        return len(self._occurrences)
 
     def add(self, value: int) -> None:
-        """One more."""
+        """Add one value."""
         self.count += 1
         self.total += value
-        self.greatest = max(self.greatest, value)
-        self._times[cut(value) if self._cutting else value] += 1
-        if len(self) > EXACT and not self._cutting:
-            self._cutting = True
-            whole, self._times = self._times, Counter()
-            for seen, times in whole.items():
-                self._times[cut(seen)] += times
+        self.maximum = max(self.maximum, value)
+        self._occurrences[value if self._exact else bucket_middle(value)] += 1
+        if len(self) > MAX_EXACT and self._exact:
+            self._exact = False
+            exact, self._occurrences = self._occurrences, Counter()
+            for each, occurrences in exact.items():
+                self._occurrences[bucket_middle(each)] += occurrences
 
     @property
     def mean(self) -> float:
-        """Of all."""
+        """Mean of all values."""
         return self.total / self.count
 
     def quantile(self, share: float) -> float:
-        """Value below which that share of all lies, interpolated between the two around it."""
-        values = np.array(sorted(self._times))
-        ends = np.cumsum([self._times[value] for value in values.tolist()])
+        """Quantile at that share, interpolated between neighbouring values."""
+        values = np.array(sorted(self._occurrences))
+        ends = np.cumsum([self._occurrences[value] for value in values.tolist()])
         below, part = divmod(share * (self.count - 1), 1.0)
         low, high = values[np.searchsorted(ends, [below, min(below + 1, self.count - 1)], side="right")]
-        return min(float(low + part * (high - low)), float(self.greatest))
+        return min(float(low + part * (high - low)), float(self.maximum))
 
 
-def cut(value: int) -> int:
-    """The middle of all whole numbers that share the BITS leading bits of this one, and its length."""
-    lost = max(value.bit_length() - BITS, 0)
-    return (value >> lost << lost) + (1 << lost >> 1)
+def bucket_middle(value: int) -> int:
+    """Middle of all integers of this length that share its leading bits."""
+    dropped = max(value.bit_length() - _BITS, 0)
+    return (value >> dropped << dropped) + (1 << dropped >> 1)

@@ -1,4 +1,4 @@
-"""One self-contained page: text, tables and plots; it reads on a screen, light or dark, and on paper."""
+"""A self-contained HTML page of text, tables and plots, for light and dark screens and for print."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 
 from modt.sinks.output import writing
 
-COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a")
-STYLE = """
+_COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a")
+_STYLE = """
 :root{--ink:#1c2430;--soft:#5d6876;--line:#d8dde4;--paper:#fff;--panel:#f6f8fa}
 @media (prefers-color-scheme:dark){:root{--ink:#e4e8ee;--soft:#9aa6b5;--line:#38424f;--paper:#151a21;--panel:#1d242d}}
 *{box-sizing:border-box}
@@ -41,21 +41,25 @@ svg text{font-size:11px;fill:var(--soft)}.end{text-anchor:end}.mid{text-anchor:m
 """
 
 
+Plot = tuple[str, str, str]
+"""Title, SVG and note of a plot."""
+
+
 def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
-    """The whole page."""
+    """HTML of a page."""
     colours = "".join(
-        f".l{k}{{stroke:{c}}}.c{k},.a{k}{{fill:{c}}}.b{k}{{background:{c}}}" for k, c in enumerate(COLOURS)
+        f".l{k}{{stroke:{c}}}.c{k},.a{k}{{fill:{c}}}.b{k}{{background:{c}}}" for k, c in enumerate(_COLOURS)
     )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{STYLE}{colours}</style></head><body>"
+        f"<title>{escape(title)}</title><style>{_STYLE}{colours}</style></head><body>"
         f'<h1>{escape(title)}</h1><p class="sub">{escape(subtitle)}</p>{"".join(blocks)}</body></html>\n'
     )
 
 
 def tiles(items: Sequence[tuple[str, str, str]]) -> str:
-    """The answers: name, value, what is to be known of it."""
+    """Main results: name, value, note."""
     cells = (
         f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
         for name, value, note in items
@@ -64,15 +68,15 @@ def tiles(items: Sequence[tuple[str, str, str]]) -> str:
 
 
 def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
-    """A table under a heading; a cell "12 (estimated)" shows the bracket small."""
+    """A table under a heading; in a cell "12 (estimated)" the bracket is small."""
     top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
     body = "".join("<tr>" + "".join(f"<td>{_cell(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     foot = f'<p class="legend">{escape(note)}</p>' if note else ""
     return f"<section><h2>{escape(title)}</h2><table><tr>{top}</tr>{body}</table>{foot}</section>"
 
 
-def plots(items: Sequence[tuple[str, str, str]]) -> str:
-    """Plots side by side: title, SVG, what is to be seen."""
+def plots(items: Iterable[Plot]) -> str:
+    """Plots side by side."""
     cells = (
         f'<section><h2>{escape(title)}</h2>{svg}<p class="legend">{escape(note)}</p></section>'
         for title, svg, note in items

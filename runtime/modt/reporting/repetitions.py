@@ -1,42 +1,34 @@
-"""What several trials of the same modes add up to."""
+"""Several repetitions of the same modes, combined."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from modt.reporting.comparison import Contender
-from modt.reporting.gamma import Evidence
+from modt.reporting.comparison import ModeRun
+from modt.reporting.gamma import RunCosts
 from modt.types import Float64
 
-
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """Every contender once through the stream."""
-
-    contenders: Sequence[Contender]
-
-    def __getitem__(self, name: str) -> Contender:
-        return next(c for c in self.contenders if c.name == name)
+Repetition = dict[str, ModeRun]
+"""One pass of every mode through the stream, by the name of the mode."""
 
 
-def evidence(trials: Sequence[Trial], name: str) -> Evidence:
-    """Of one mode: what it counts is the same each time, what it costs is the median over the trials [CPU s]."""
-    cost: Float64 = np.median([trial[name].cpu_s() for trial in trials], axis=0)
-    return Evidence(trials[0][name].counts(), cost)
+def median_run(repetitions: Sequence[Repetition], name: str) -> RunCosts:
+    """Counts of one mode, equal in all repetitions, and the median of its costs [CPU s]."""
+    cost: Float64 = np.median([repetition[name].cpu_s() for repetition in repetitions], axis=0)
+    return RunCosts(repetitions[0][name].counts(), cost)
 
 
-def pooled(trials: Sequence[Trial], name: str) -> Evidence:
-    """Of a mode whose load differs from trial to trial: frame by frame, one trial after another [CPU s]."""
-    return Evidence(
-        np.concatenate([trial[name].counts() for trial in trials]),
-        np.concatenate([trial[name].cpu_s() for trial in trials]),
+def concatenated_run(repetitions: Sequence[Repetition], name: str) -> RunCosts:
+    """Counts and costs [CPU s] of a mode whose load differs between repetitions, one repetition after another."""
+    return RunCosts(
+        np.concatenate([repetition[name].counts() for repetition in repetitions]),
+        np.concatenate([repetition[name].cpu_s() for repetition in repetitions]),
     )
 
 
-def windows_of(trials: Sequence[Trial], name: str) -> list[dict[str, Any]]:
-    """Windows of one mode over all trials."""
-    return [line for trial in trials for line in trial[name].energy_lines]
+def windows_of(repetitions: Sequence[Repetition], name: str) -> list[dict[str, Any]]:
+    """Windows of one mode over all repetitions."""
+    return [line for repetition in repetitions for line in repetition[name].energy_lines]

@@ -1,36 +1,33 @@
-"""What a run cost and what it saved, from its records alone: live while it runs, or afterwards from its files."""
+"""The summary of a run, accumulated frame by frame in bounded memory."""
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
-from modt.classes import CLASS_NAMES, ObjectClass
-from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
+from modt.classes import ObjectClass
 from modt.pipeline import CLASSIFICATION, SEGMENTATION
-from modt.reporting.histogram import Spread
-from modt.sinks.records import read_records
-from modt.sinks.run_directory import LEDGER, TRACKS
-from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
+from modt.reporting.histogram import Histogram
 from modt.types import NONE, FrameResult
 
-SCHEMA = "modt.summary/1"
-LEDGER_SCHEMA = "modt.ledger/1"
-QUANTILES = {"p50": 0.5, "p95": 0.95, "p99": 0.99}
-BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
+_SCHEMA = "modt.summary/1"
+_QUANTILES = {"p50": 0.5, "p95": 0.95, "p99": 0.99}
 
 
 class TrackLives:
-    """Counts tracks and the frames in which they were seen; remembers only those alive."""
+    """Number of tracks and of the frames in which they had a proposal; holds only the tracks alive."""
 
     def __init__(self) -> None:
         self._alive: dict[int, tuple[int, bool]] = {}
-        self._ended = {True: [0, 0], False: [0, 0]}  # foreground: tracks, frames seen
+        self._ended = {True: [0, 0], False: [0, 0]}  # foreground: tracks, frames with a proposal
+
+    def __len__(self) -> int:
+        """Tracks held."""
+        return len(self._alive)
 
     def add(self, tracks: Iterable[tuple[int, bool, bool]]) -> None:
-        """The tracks of one frame: id, whether it is seen, whether it is foreground."""
+        """Add the tracks of one frame: id, whether it has a proposal, whether it is foreground."""
         present: dict[int, tuple[int, bool]] = {}
         for id_, visible, foreground in tracks:
             seen, _ = self._alive.pop(id_, (0, False))
@@ -41,58 +38,49 @@ class TrackLives:
         self._alive = present
 
     def totals(self, *, foreground_only: bool) -> tuple[int, int]:
-        """Number of tracks, and the frames in which they were seen, added up; a track's class is its last."""
+        """Number of tracks and of their frames with a proposal; the class of a track is its last."""
         groups = (True,) if foreground_only else (True, False)
-        tracks = sum(self._ended[g][0] for g in groups)
-        frames = sum(self._ended[g][1] for g in groups)
-        living = [seen for seen, foreground in self._alive.values() if foreground in groups]
-        return tracks + len(living), frames + sum(living)
+        alive = [seen for seen, foreground in self._alive.values() if foreground in groups]
+        tracks, frames = (sum(self._ended[g][k] for g in groups) for k in (0, 1))
+        return tracks + len(alive), frames + sum(alive)
 
 
 class Summary:
-    """Adds up the records of a run, however long it lasts: what is held is bounded (`Spread`, `TrackLives`)."""
+    """Totals of a run of any length; memory is bounded (`Histogram`, `TrackLives`)."""
 
     def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
         self.lives = TrackLives()
-        self._span: dict[str, dict[str, Spread]] = defaultdict(lambda: {"wall_ns": Spread(), "cpu_ns": Spread()})
-        self._calls: dict[str, int] = defaultdict(int)
-        self._items: dict[str, int] = defaultdict(int)
-
-    def add_frame(self, record: dict[str, Any]) -> None:
-        """A line of tracks.jsonl."""
-        self._add_counts(record["proposals"], record["classifications"], record["deferred"])
-        self.lives.add((t["id"], t["proposal"] is not None, t["class"] != BACKGROUND) for t in record["tracks"])
+        self._calls: Counter[str] = Counter()
+        self._items: Counter[str] = Counter()
+        self._times: dict[str, dict[str, Histogram]] = defaultdict(lambda: {"wall": Histogram(), "cpu": Histogram()})
 
     def add_result(self, result: FrameResult) -> None:
-        """What add_frame reads in the line of this result."""
+        """Add the result of a frame."""
         tracks = result.tracks
-        self._add_counts(len(result.proposals), result.n_classified, result.n_deferred)
+        self.frames += 1
+        self.proposals += len(result.proposals)
+        self.classified += result.n_classified
+        self.deferred += result.n_deferred
         seen, foreground = tracks.proposal != NONE, tracks.object_class != ObjectClass.BACKGROUND
         self.lives.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))
 
-    def _add_counts(self, proposals: int, classified: int, deferred: int) -> None:
-        self.frames += 1
-        self.proposals += proposals
-        self.classified += classified
-        self.deferred += deferred
-
-    def add_ledger(self, record: dict[str, Any]) -> None:
-        """A line of ledger.jsonl."""
-        for stage, entry in record["stages"].items():
-            self._calls[stage] += entry["calls"]
-            self._items[stage] += entry["items"]
-            for quantity, spread in self._span[stage].items():
-                spread.add(entry[quantity])
+    def add_ledger(self, line: dict[str, Any]) -> None:
+        """Add the ledger line of a frame."""
+        for stage, row in line["stages"].items():
+            self._calls[stage] += row["calls"]
+            self._items[stage] += row["items"]
+            for clock, histogram in self._times[stage].items():
+                histogram.add(row[f"{clock}_ns"])
 
     def result(self) -> dict[str, Any]:
-        """The figures; a ratio without a denominator is null.
+        """The summary as plain data; a ratio without a denominator is None.
 
-        beta is classifications over those that tracking-by-detection would run (section V-A); N_go the frames in
-        which a track is seen, averaged over tracks (section IV-C).
+        beta is classifications over those of tracking-by-detection (section V-A); N_go the number of frames in which
+        a track has a proposal, averaged over tracks (section IV-C).
         """
         return {
-            "schema": SCHEMA,
+            "schema": _SCHEMA,
             "frames": self.frames,
             "proposals": self.proposals,
             "proposals_per_frame": _ratio(self.proposals, self.frames),
@@ -102,11 +90,8 @@ class Summary:
             "beta": _ratio(self.classified, self.proposals),
             "tracks": self._life(foreground_only=False),
             "foreground_tracks": self._life(foreground_only=True),
-            "energy_counts": {
-                "E_seg": self._calls.get(SEGMENTATION, 0),
-                "E_class": self._items.get(CLASSIFICATION, 0),
-            },
-            "stages": {stage: self._stage(stage) for stage in self._span},
+            "energy_counts": {"E_seg": self._calls[SEGMENTATION], "E_class": self._items[CLASSIFICATION]},
+            "stages": {stage: self._stage(stage) for stage in self._times},
         }
 
     def _life(self, *, foreground_only: bool) -> dict[str, Any]:
@@ -115,28 +100,14 @@ class Summary:
 
     def _stage(self, stage: str) -> dict[str, Any]:
         times = {
-            quantity.replace("_ns", "_ms"): {
-                "mean": spread.mean / 1e6,
-                **{name: spread.quantile(q) / 1e6 for name, q in QUANTILES.items()},
-                "max": spread.greatest / 1e6,
+            f"{clock}_ms": {
+                "mean": histogram.mean / 1e6,
+                **{name: histogram.quantile(q) / 1e6 for name, q in _QUANTILES.items()},
+                "max": histogram.maximum / 1e6,
             }
-            for quantity, spread in self._span[stage].items()
+            for clock, histogram in self._times[stage].items()
         }
         return {"calls": self._calls[stage], "items": self._items[stage], **times}
-
-
-def summarise(run: Path) -> dict[str, Any]:
-    """Summary of a run directory from its records, whether the run ended well, was killed or still goes on.
-
-    Raises:
-        MisuseError: there are no such records.
-    """
-    summary = Summary()
-    for record in read_records(run / TRACKS, FRAME_SCHEMA):
-        summary.add_frame(record)
-    for record in read_records(run / LEDGER, LEDGER_SCHEMA, beside={ENERGY_SCHEMA}):
-        summary.add_ledger(record)
-    return summary.result()
 
 
 def _ratio(a: float, b: float) -> float | None:

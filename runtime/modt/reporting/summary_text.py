@@ -1,4 +1,4 @@
-"""The summary as a short table a person can read."""
+"""The summary of a run as text."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 from modt.pipeline import SOURCE
 
 
-def summary_table(summary: dict[str, Any]) -> str:
-    """A few lines: what was done, what it cost, what it saved."""
+def summary_text(summary: dict[str, Any]) -> str:
+    """Counts, time by stage, and the state of the host."""
     run = summary.get("run", {})
     tracks, objects = summary["tracks"], summary["foreground_tracks"]
     lines = [
@@ -21,7 +21,7 @@ def summary_table(summary: dict[str, Any]) -> str:
         f"  classified         {summary['classifications']:>9}   of "
         f"{summary['classifications_by_tracking_by_detection']} by tracking-by-detection: "
         f"beta {_percent(summary['beta'])}",
-        f"  deferred           {summary['deferred']:>9}   by the budget, asked again a frame later",
+        f"  deferred           {summary['deferred']:>9}   by the budget, to a later frame",
         "",
         f"  {'stage':<16}{'calls':>8}{'items':>9}{'cpu ms':>9}{'wall ms':>9}{'p95':>8}{'p99':>8}{'max':>8}   a frame",
     ]
@@ -31,15 +31,13 @@ def summary_table(summary: dict[str, Any]) -> str:
             f"  {name:<16}{stage['calls']:>8}{stage['items']:>9}{cpu['mean']:>9.2f}{wall['mean']:>9.2f}"
             f"{wall['p95']:>8.2f}{wall['p99']:>8.2f}{wall['max']:>8.2f}"
         )
-    total_cpu = sum(s["cpu_ms"]["mean"] for s in summary["stages"].values())
-    total_wall = sum(s["wall_ms"]["mean"] for s in summary["stages"].values())
+    total_cpu, total_wall = (sum(s[key]["mean"] for s in summary["stages"].values()) for key in ("cpu_ms", "wall_ms"))
     lines += [f"  {'all':<16}{'':>8}{'':>9}{total_cpu:>9.2f}{total_wall:>9.2f}", ""]
     if "frames_per_s" in run:
         source_ms = summary["stages"].get(SOURCE, {}).get("wall_ms", {}).get("mean", 0.0)
-        own_ms = total_wall - source_ms
         lines.append(
             f"  {run['frames_per_s']:.1f} frames/s, {run['real_time_factor']:.1f} x real time; "
-            f"{own_ms:.1f} ms a frame without the source"
+            f"{total_wall - source_ms:.1f} ms a frame without the source"
         )
     if run.get("missed_deadlines"):
         lines.append(
@@ -61,8 +59,8 @@ def summary_table(summary: dict[str, Any]) -> str:
 def _host_line(host: dict[str, Any]) -> str:
     core = "any core" if host["core"] is None else f"core {host['core']}"
     verified = "verified" if host["one_core_verified"] else "NOT kept to one core"
-    beside = f"{host['threads']} threads, {host['other_threads_cpu_s']:.2f} s of CPU beside the loop"
-    return f"  {core} ({verified}; {beside}), peak memory {host['peak_rss_mb']:.0f} MB"
+    others = f"{host['threads']} threads, {host['other_threads_cpu_s']:.2f} s of CPU in other threads"
+    return f"  {core} ({verified}; {others}), peak memory {host['peak_rss_mb']:.0f} MB"
 
 
 def _number(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""A few plots as SVG text: areas, lines and bars over plain axes. Colours are the page's."""
+"""Plots as SVG text: areas, lines and bars. Colours come from the style sheet of the page."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from html import escape
 
 import numpy as np
 
-from modt.reporting.quantity import brief
+from modt.reporting.quantity import format_number
 from modt.types import Float64
 
 WIDTH, HEIGHT = 520, 230
 LEFT, RIGHT, TOP, BOTTOM = 58, 14, 12, 44
-MOST_POINTS = 400
-"""Points drawn of a longer line; the page stays small."""
+_MAX_POINTS = 400
+"""Points drawn of a line at most, to keep the page small."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,8 +25,8 @@ class Trace:
     Attributes:
         name: in the legend.
         x, y: (n,) values.
-        dots: marks instead of a line.
-        dashed: a dashed line.
+        dots: draw marks instead of a line.
+        dashed: draw a dashed line.
     """
 
     name: str
@@ -37,7 +37,7 @@ class Trace:
 
 
 def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = False) -> str:
-    """Lines and marks over common axes; logarithmic in both on request."""
+    """Lines and marks over common axes, both logarithmic if log."""
     scale = _Scale.around(traces, log)
     body = []
     for k, trace in enumerate(traces):
@@ -45,7 +45,7 @@ def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = Fa
         if trace.dots:
             body += [
                 f'<circle class="c{k}" cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{escape(trace.name)}: '
-                f"{brief(float(u))}, {brief(float(v))}</title></circle>"
+                f"{format_number(float(u))}, {format_number(float(v))}</title></circle>"
                 for a, b, u, v in zip(x, y, trace.x, trace.y, strict=True)
             ]
         else:
@@ -55,7 +55,7 @@ def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = Fa
 
 
 def areas(x: Float64, parts: dict[str, Float64], x_label: str, y_label: str) -> str:
-    """Parts stacked on one another, the first at the bottom."""
+    """Parts stacked, the first at the bottom."""
     x, drawn = _thin(x), {name: _thin(y) for name, y in parts.items()}
     tops = np.cumsum([*drawn.values()], axis=0) if drawn else np.zeros((0, len(x)))
     whole = Trace("", x, tops[-1] if len(tops) else np.zeros(len(x)))
@@ -76,7 +76,7 @@ def bars(edges: Float64, heights: Float64, x_label: str, y_label: str) -> str:
     x, y, floor = scale.x(edges), scale.y(heights), scale.y(np.zeros(1))[0]
     body = "".join(
         f'<rect class="a0" x="{a + 0.5:.1f}" y="{top:.1f}" width="{max(b - a - 1, 0.5):.1f}" '
-        f'height="{floor - top:.1f}"><title>{brief(float(u))} to {brief(float(v))}: {h:g}</title></rect>'
+        f'height="{floor - top:.1f}"><title>{format_number(u)} to {format_number(v)}: {h:g}</title></rect>'
         for a, b, top, u, v, h in zip(x[:-1], x[1:], y, edges[:-1], edges[1:], heights, strict=True)
     )
     return _frame(scale, body, x_label, y_label, [])
@@ -95,13 +95,11 @@ class _Scale:
         xs = np.concatenate([t.x for t in traces]) if traces else np.zeros(1)
         ys = np.concatenate([t.y for t in traces]) if traces else np.zeros(1)
         if log:
-            positive_x, positive_y = xs[xs > 0], ys[ys > 0]
-            x0, x1 = (float(positive_x.min()), float(positive_x.max())) if len(positive_x) else (1.0, 10.0)
-            y0, y1 = (float(positive_y.min()), float(positive_y.max())) if len(positive_y) else (1.0, 10.0)
+            x0, x1 = _limits(xs[xs > 0], 1.0, 10.0)
+            y0, y1 = _limits(ys[ys > 0], 1.0, 10.0)
             return cls(x0, max(x1, 1.1 * x0), y0 / 1.1, max(1.1 * y1, 1.3 * y0), True)
-        x0, x1 = (float(xs.min()), float(xs.max())) if len(xs) else (0.0, 1.0)
-        y1 = 1.05 * float(ys.max()) if len(ys) and ys.max() > 0 else 1.0
-        return cls(x0, x1 if x1 > x0 else x0 + 1.0, min(0.0, float(ys.min()) if len(ys) else 0.0), y1, False)
+        (x0, x1), (y0, y1) = _limits(xs, 0.0, 1.0), _limits(ys, 0.0, 0.0)
+        return cls(x0, x1 if x1 > x0 else x0 + 1.0, min(0.0, y0), 1.05 * y1 if y1 > 0 else 1.0, False)
 
     def x(self, value: Float64) -> Float64:
         return LEFT + (WIDTH - LEFT - RIGHT) * self._part(value, self.x0, self.x1)
@@ -148,10 +146,14 @@ def _frame(scale: _Scale, body: str, x_label: str, y_label: str, legend: Sequenc
     return "".join(parts) + (f'<p class="legend">{keys}</p>' if keys else "")
 
 
+def _limits(values: Float64, low: float, high: float) -> tuple[float, float]:
+    return (float(values.min()), float(values.max())) if len(values) else (low, high)
+
+
 def _thin(values: Float64) -> Float64:
-    if len(values) <= MOST_POINTS:
+    if len(values) <= _MAX_POINTS:
         return values
-    kept: Float64 = values[np.linspace(0, len(values) - 1, MOST_POINTS).astype(int)]
+    kept: Float64 = values[np.linspace(0, len(values) - 1, _MAX_POINTS).astype(int)]
     return kept
 
 

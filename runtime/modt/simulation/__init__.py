@@ -1,1 +1,1 @@
-"""The synthetic LiDAR world."""
+"""Simulator of a LiDAR in synthetic scenes."""

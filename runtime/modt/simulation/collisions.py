@@ -1,4 +1,4 @@
-"""Keeps bodies out of one another."""
+"""Removal of colliding bodies from a scene."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STEP_S = 0.25
 
 
 class Occupant(Protocol):
-    """Something that takes up room."""
+    """A body with a footprint on the ground."""
 
     @property
     def path(self) -> Path: ...  # noqa: D102
@@ -24,16 +24,17 @@ class Occupant(Protocol):
     def footprint(self) -> tuple[float, float]: ...  # noqa: D102
 
 
-def keep_apart(occupants: Sequence[Occupant], seconds: float, margin_m: float = 0.1) -> Bool:
-    """(n,) which may stay: of two that meet at any time, the one listed later goes.
+def without_collisions(occupants: Sequence[Occupant], seconds: float, margin_m: float = 0.1) -> Bool:
+    """(n,) which occupants stay: of two that collide at any time, the one listed first.
 
-    Those without a footprint meet nothing; two that never move are compared once.
+    Occupants of zero footprint do not collide. Pairs at rest are tested once.
     """
     n = len(occupants)
-    kept = np.array([min(o.footprint) > 0 for o in occupants])
-    free = ~kept
+    footprint = np.array([o.footprint for o in occupants]).reshape(-1, 2)
+    solid = footprint.min(axis=1) > 0
+    kept = solid.copy()
     boxes = np.zeros((n, 7))
-    boxes[:, 3:5] = np.array([o.footprint for o in occupants]).reshape(-1, 2) + 2 * margin_m
+    boxes[:, 3:5] = footprint + 2 * margin_m
     moving = np.array([len(o.path.xy) > 1 for o in occupants], np.bool_)
     for row, o in enumerate(occupants):
         boxes[row, [0, 1, 6]] = o.path.at(0.0)
@@ -41,17 +42,16 @@ def keep_apart(occupants: Sequence[Occupant], seconds: float, margin_m: float = 
         for row in np.flatnonzero(moving & kept).tolist():
             boxes[row, [0, 1, 6]] = occupants[row].path.at(step * STEP_S)
         first = np.flatnonzero(kept & moving) if step else np.flatnonzero(kept)
-        pairs = _close(boxes, first, np.flatnonzero(kept))
-        met = pairs[overlapping(boxes[pairs[:, 0]], boxes[pairs[:, 1]])]
-        for a, b in met[np.argsort(met[:, 0], kind="stable")].tolist():
-            if kept[a]:
-                kept[b] = False
-    stay: Bool = kept | free
+        pairs = _close_pairs(boxes, first, np.flatnonzero(kept))
+        colliding = pairs[overlapping(boxes[pairs[:, 0]], boxes[pairs[:, 1]])]
+        for a, b in colliding[np.argsort(colliding[:, 0], kind="stable")].tolist():
+            kept[b] &= not kept[a]
+    stay: Bool = kept | ~solid
     return stay
 
 
 def overlapping(a: Float64, b: Float64) -> Bool:
-    """(n,) whether boxes (n, 7) and (n, 7) overlap seen from above: no side of either parts them."""
+    """(n,) whether boxes a (n, 7) and b (n, 7) overlap in the plane, by the separating axis theorem."""
     ca, cb = corners(a), corners(b)
     apart = np.zeros(len(a), np.bool_)
     for yaw in (a[:, 6], b[:, 6], a[:, 6] + np.pi / 2, b[:, 6] + np.pi / 2):
@@ -61,8 +61,8 @@ def overlapping(a: Float64, b: Float64) -> Bool:
     return ~apart
 
 
-def _close(boxes: Float64, some: Int, others: Int) -> Int:
-    """(p, 2) pairs, the earlier first, whose circles meet."""
+def _close_pairs(boxes: Float64, some: Int, others: Int) -> Int:
+    """(p, 2) ascending pairs of rows whose circumscribed circles overlap."""
     radius = np.hypot(boxes[:, 3], boxes[:, 4]) / 2
     gap = np.hypot(*(boxes[some, None, :2] - boxes[None, others, :2]).transpose(2, 0, 1))
     i, j = np.nonzero(gap < radius[some, None] + radius[others])

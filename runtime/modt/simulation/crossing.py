@@ -1,4 +1,4 @@
-"""A crossing of two streets at which the ego vehicle turns."""
+"""A crossing of two streets with the ego vehicle turning."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import itertools
 import numpy as np
 
 from modt.simulation import roadside
-from modt.simulation.builder import Builder
-from modt.simulation.layout import Road, terrain
+from modt.simulation.builder import SceneBuilder
 from modt.simulation.motion import Path, timetable
-from modt.simulation.street import dress
+from modt.simulation.road import Road, terrain
+from modt.simulation.street import furnish
 from modt.simulation.world import World
 from modt.types import Float64
 
@@ -18,7 +18,7 @@ REACH_M = 110.0
 
 
 def crossing(rng: np.random.Generator, seconds: float, height_m: float) -> World:
-    """Two straight streets; the ego vehicle slows, turns left or right and drives on."""
+    """Two straight streets; the ego vehicle slows down, turns left or right and drives on."""
     halves = rng.uniform(3.8, 5.5, 2)
     pavement, front = rng.uniform(2.0, 3.2), rng.uniform(11.0, 15.0)
     speed = rng.uniform(6.0, 9.0)
@@ -37,25 +37,25 @@ def crossing(rng: np.random.Generator, seconds: float, height_m: float) -> World
         for i in range(2)
     ]
     line, corner_m = _turn(rng, roads)
-    builder = Builder(rng, seconds)
+    builder = SceneBuilder(rng, seconds)
     for road in roads:
         stop = float(road.gaps[0][1]) + 1.5
-        roadside.crossers(builder, road, -stop, int(rng.integers(2, 6)))
-        roadside.crossers(builder, road, stop, int(rng.integers(2, 6)))
+        roadside.crossing_pedestrians(builder, road, -stop, int(rng.integers(2, 6)))
+        roadside.crossing_pedestrians(builder, road, stop, int(rng.integers(2, 6)))
         roadside.cyclists(builder, road, 0.0, 2)
         roadside.traffic(builder, road, 15.0, rng.uniform(4.0, 7.0))
         share = rng.uniform(0.2, 0.6)
         for side in (-1, 1):
-            roadside.people(builder, road, side, apart_m=14.0)
+            roadside.pedestrians(builder, road, side, apart_m=14.0)
             roadside.parked(builder, road, side, share)
-        dress(builder, road, wild=0.5)
+        furnish(builder, road, vegetation=0.5)
     pace = np.interp(np.linspace(0, 1, 200), [0.0, 0.35, 0.5, 0.65, 1.0], speed * np.array([1.0, 0.6, 0.4, 0.7, 1.0]))
     ego = Path(line, *timetable(seconds, pace, max(corner_m - approach, 0.0)))
     return builder.world(terrain(rng, roads, (-reach, -reach), (reach, reach)), ego, height_m)
 
 
 def _turn(rng: np.random.Generator, roads: list[Road]) -> tuple[Float64, float]:
-    """Way points of a drive in along the first road and out along the second, and how far along it the corner is."""
+    """Way points in along the first road and out along the second, and the distance to the corner [m]."""
     right = bool(rng.random() < 0.5)
     y_in = -roads[0].half_m * roadside.LANE
     x_out = (-1 if right else 1) * roads[1].half_m * roadside.LANE
@@ -71,6 +71,6 @@ def _turn(rng: np.random.Generator, roads: list[Road]) -> tuple[Float64, float]:
 
 
 def _densified(line: Float64) -> Float64:
-    """The same line with a way point at least every 3 m, so that headings change where the line bends."""
+    """The line with a way point at least every 3 m: headings are interpolated between segments."""
     parts = [np.linspace(a, b, max(2, int(np.linalg.norm(b - a) / 3) + 1))[:-1] for a, b in itertools.pairwise(line)]
     return np.concatenate([*parts, line[-1:]])

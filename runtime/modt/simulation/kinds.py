@@ -1,33 +1,41 @@
-"""Kinds of bodies, as the data sets name them."""
+"""Kinds of bodies, by the names of the data sets."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.classes import ObjectClass
+from modt.classes import CLASSES, ObjectClass
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A sort of body.
+    """A kind of body.
 
     Attributes:
-        name: KITTI's object type; empty for scenery, which is not annotated.
-        semantic, moving: SemanticKITTI class standing still and moving; 0 leaves it to the material.
-        object_class: what a classifier should say.
+        name: KITTI object type; empty for what is not annotated.
+        semantic, moving: SemanticKITTI labels at rest and in motion; 0: that of the material.
+        object_class: true class.
     """
 
     name: str
     semantic: int
     moving: int
-    object_class: ObjectClass
+    object_class: ObjectClass = ObjectClass.BACKGROUND
 
 
-CAR = Kind("Car", 10, 252, ObjectClass.CAR)
-VAN = Kind("Van", 10, 252, ObjectClass.CAR)
-TRUCK = Kind("Truck", 18, 258, ObjectClass.BACKGROUND)
-PEDESTRIAN = Kind("Pedestrian", 30, 254, ObjectClass.PEDESTRIAN)
-SITTER = Kind("Person_sitting", 30, 254, ObjectClass.PEDESTRIAN)
-CYCLIST = Kind("Cyclist", 31, 253, ObjectClass.CYCLIST)
-BICYCLE = Kind("", 11, 11, ObjectClass.BACKGROUND)
-SCENERY = Kind("", 0, 0, ObjectClass.BACKGROUND)
+def _of_class(object_class: ObjectClass, row: int = 0) -> Kind:
+    """The kind of a KITTI object type of the class table."""
+    spec = CLASSES[object_class]
+    semantic, moving = spec.semantic_kitti
+    return Kind(spec.kitti[row], semantic, moving, object_class)
+
+
+CAR, VAN = (_of_class(ObjectClass.CAR, row) for row in (0, 1))
+PEDESTRIAN, SITTER = (_of_class(ObjectClass.PEDESTRIAN, row) for row in (0, 1))
+CYCLIST = _of_class(ObjectClass.CYCLIST)
+TRUCK = Kind("Truck", 18, 258)
+BICYCLE = Kind("", 11, 11)
+SCENERY = Kind("", 0, 0)
+
+KINDS = {kind.name: kind for kind in (CAR, VAN, TRUCK, PEDESTRIAN, SITTER, CYCLIST)} | {"Tram": TRUCK}
+"""Kind that a KITTI object type is simulated by."""

@@ -1,4 +1,4 @@
-"""What surfaces are made of: what they return of a pulse, how bright that reads, what SemanticKITTI calls them."""
+"""Optical properties and labels of surface materials."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Material(IntEnum):
-    """Row in the tables below."""
+    """Row of the table below."""
 
     ASPHALT = 0
     PAVING = 1
@@ -33,48 +33,40 @@ class Material(IntEnum):
     LAMP = 20
 
 
-REFLECTIVITY = np.array(
+_TABLE = np.array(
     [
-        *(0.34, 0.42, 0.45, 0.6, 0.4, 0.4, 0.3, 0.35, 0.98, 0.4, 0.12),
-        *(0.1, 0.08, 0.3, 0.45, 0.35, 0.35, 0.04, 0.15, 0.98, 0.6),
-    ],
-    np.float32,
-)
-"""Share of the light returned: it says whether a return is heard."""
-
-LOSS = np.array(
-    [0, 0, 0, 0, 0.01, 0.02, 0, 0.04, 0, 0.05, 0.12, 0.72, 0.1, 0.02, 0.01, 0.01, 0.02, 0.2, 0.65, 0, 0], np.float32
-)
-"""Share of pulses that never come back: mirrored away, let through, or lost in a window on the way."""
-
-LEVEL, SHADE, TEXTURE, GLOSS = np.array(
-    [
-        (0.30, 0.00, 0.09, 0.00),  # asphalt
-        (0.32, 0.00, 0.09, 0.00),  # paving
-        (0.36, 0.00, 0.11, 0.00),  # grass
-        (0.55, 0.00, 0.12, 0.00),  # paint
-        (0.40, 0.10, 0.10, 0.15),  # wall
-        (0.38, 0.07, 0.15, 0.10),  # foliage
-        (0.28, 0.08, 0.11, 0.15),  # bark
-        (0.32, 0.14, 0.12, 0.30),  # metal
-        (1.05, 0.20, 0.15, 0.00),  # sign
-        (0.41, 0.08, 0.13, 0.50),  # car paint
-        (0.21, 0.06, 0.13, 0.45),  # car, dark
-        (0.02, 0.00, 0.10, 0.20),  # glass
-        (0.05, 0.04, 0.10, 0.10),  # rubber
-        (0.43, 0.06, 0.15, 0.25),  # cloth
-        (0.40, 0.04, 0.12, 0.15),  # skin
-        (0.38, 0.08, 0.12, 0.15),  # wood
-        (0.35, 0.00, 0.08, 0.00),  # floor
-        (0.14, 0.05, 0.13, 0.35),  # car, black
-        (0.00, 0.00, 0.10, 0.00),  # interior
-        (1.00, 0.08, 0.15, 0.00),  # retroreflector
-        (0.60, 0.20, 0.20, 0.00),  # lamp
+        # reflectivity, dropout, intensity, its sigma by body and by point, grazing loss, label
+        (0.34, 0.00, 0.30, 0.00, 0.09, 0.00, 40),  # asphalt
+        (0.42, 0.00, 0.32, 0.00, 0.09, 0.00, 48),  # paving
+        (0.45, 0.00, 0.36, 0.00, 0.11, 0.00, 72),  # grass
+        (0.60, 0.00, 0.55, 0.00, 0.12, 0.00, 60),  # paint
+        (0.40, 0.01, 0.40, 0.10, 0.10, 0.15, 50),  # wall
+        (0.40, 0.02, 0.38, 0.07, 0.15, 0.10, 70),  # foliage
+        (0.30, 0.00, 0.28, 0.08, 0.11, 0.15, 71),  # bark
+        (0.35, 0.04, 0.32, 0.14, 0.12, 0.30, 80),  # metal
+        (0.98, 0.00, 1.05, 0.20, 0.15, 0.00, 81),  # sign
+        (0.40, 0.05, 0.41, 0.08, 0.13, 0.50, 0),  # car paint
+        (0.12, 0.12, 0.21, 0.06, 0.13, 0.45, 0),  # car dark
+        (0.10, 0.72, 0.02, 0.00, 0.10, 0.20, 0),  # glass
+        (0.08, 0.10, 0.05, 0.04, 0.10, 0.10, 0),  # rubber
+        (0.30, 0.02, 0.43, 0.06, 0.15, 0.25, 0),  # cloth
+        (0.45, 0.01, 0.40, 0.04, 0.12, 0.15, 0),  # skin
+        (0.35, 0.01, 0.38, 0.08, 0.12, 0.15, 51),  # wood
+        (0.35, 0.02, 0.35, 0.00, 0.08, 0.00, 48),  # floor
+        (0.04, 0.20, 0.14, 0.05, 0.13, 0.35, 0),  # car black
+        (0.15, 0.65, 0.00, 0.00, 0.10, 0.00, 0),  # interior
+        (0.98, 0.00, 1.00, 0.08, 0.15, 0.00, 0),  # retro
+        (0.60, 0.00, 0.60, 0.20, 0.20, 0.00, 0),  # lamp
     ],
     np.float32,
 ).T.copy()
-"""What a sensor reports: its level head-on and in focus, its spread from body to body and from point to point, and
-what is lost of it until a ray grazes. Fitted to the labelled frames of KITTI's object benchmark."""
 
-SEMANTIC = np.array([40, 48, 72, 60, 50, 70, 71, 80, 81, 0, 0, 0, 0, 0, 0, 51, 48, 0, 0, 0, 0], np.uint32)
-"""SemanticKITTI class of the material where the body it belongs to has none of its own."""
+REFLECTIVITY, DROPOUT = _TABLE[:2]
+"""Share of the light returned, which decides on detection; share of pulses reflected away or transmitted."""
+
+INTENSITY, BODY_SIGMA, POINT_SIGMA, GRAZING_LOSS = _TABLE[2:6]
+"""Reported intensity at normal incidence in the focus, its standard deviation from body to body and from point to
+point, and what is subtracted at grazing incidence. Fitted to the labelled frames of KITTI's object benchmark."""
+
+SEMANTIC = _TABLE[6].astype(np.uint32)
+"""SemanticKITTI label of the material of bodies without one of their own."""

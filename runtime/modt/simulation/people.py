@@ -1,4 +1,4 @@
-"""People: walking, standing, sitting and riding figures whose limbs move."""
+"""Articulated people: walking, standing, sitting and cycling."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from enum import IntEnum
 import numpy as np
 
 from modt.simulation.materials import Material
-from modt.simulation.solids import NO_CUTS, SOLID, Pieces
+from modt.simulation.solids import Solids
 from modt.types import Bool, Float64, Int
 
 
 class Posture(IntEnum):
-    """What a figure is doing."""
+    """What a person does."""
 
     STAND = 0
     WALK = 1
@@ -21,24 +21,25 @@ class Posture(IntEnum):
     SIT = 3
 
 
-SEAT_M, CRANK = 0.93, np.array([0.08, 0.0, 0.3])
+SADDLE_M, CRANK_M = 0.93, np.array([0.08, 0.0, 0.3])
+"""Height of the saddle and position of the crank of a bicycle."""
 
 
 @dataclass(frozen=True)
-class Figures:
+class People:
     """n people.
 
     Attributes:
-        body: (n,) row in the table of bodies.
-        posture: (n,) what they do.
+        body: (n,) index of the body.
+        posture: (n,) Posture.
         height: (n,) standing height [m].
-        girth: (n,) breadth relative to the average.
+        girth: (n,) breadth relative to the mean.
         phase: (n,) of the gait at time 0 [rad].
         rate: (n,) of the gait [rad/s].
-        stride: (n,) reach of a step to either side [m].
-        coat: (n,) breadth of a coat or skirt about the hips [m]; next to nothing without one.
-        pack: (n,) depth of a bag on the back [m]; likewise.
-        strip: (n,) height of a strip about the chest that throws light back [m]; zero without one.
+        stride: (n,) amplitude of a foot along the walk [m].
+        coat: (n,) breadth of a coat or skirt at the hips [m]; about zero for none.
+        pack: (n,) depth of a backpack [m]; about zero for none.
+        strip: (n,) height of a retroreflective strip around the chest [m]; zero for none.
     """
 
     body: Int
@@ -52,19 +53,19 @@ class Figures:
     pack: Float64
     strip: Float64
 
-    def take(self, rows: Int | Bool) -> Figures:
-        """The figures given, by index or mask."""
-        return Figures(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+    def take(self, rows: Int | Bool) -> People:
+        """The people at some rows."""
+        return People(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
 
-    def pieces(self, time_s: float) -> Pieces:
-        """Their pieces at a time, each figure in its own frame (x ahead, z up, origin on the ground)."""
+    def solids(self, time_s: float) -> Solids:
+        """Their solids at a time, body frames (x ahead, z up, origin on the ground)."""
         n = len(self.body)
         if not n:
-            return Pieces.none()
+            return Solids.none()
         H, g = self.height, self.girth
         swing = self.phase + self.rate * time_s
         ride, walk, sit = (self.posture == p for p in (Posture.RIDE, Posture.WALK, Posture.SIT))
-        hip_z = np.where(ride, SEAT_M, np.where(sit, 0.47, 0.52 * H))
+        hip_z = np.where(ride, SADDLE_M, np.where(sit, 0.47, 0.52 * H))
         hip_x = np.where(ride, -0.22, 0.0)
         lean = np.where(ride, 0.55, np.where(walk, 0.06, 0.02))
         spine = 0.30 * H
@@ -77,7 +78,7 @@ class Figures:
             hip = hips + _points(0.0, side * 0.085 * g, 0.0)
             foot_walk = _points(self.stride * np.sin(turn), 0.0, 0.05 + 0.10 * np.maximum(np.cos(turn), 0))
             foot_stand = _points(0.05 * np.sin(self.phase), 0.0, 0.05)
-            foot_ride = CRANK + 0.17 * _points(np.cos(turn), 0.0, -np.sin(turn))
+            foot_ride = CRANK_M + 0.17 * _points(np.cos(turn), 0.0, -np.sin(turn))
             foot_sit = _points(0.42, 0.0, 0.06)
             foot = _choose(self.posture, foot_stand, foot_walk, foot_ride, foot_sit)
             foot[:, 1] = side * 0.09 * g
@@ -98,20 +99,21 @@ class Figures:
                 (shoulder, elbow, 0.052 * g, 0.052 * g, Material.CLOTH),
                 (elbow, hand, 0.04 * g, 0.04 * g, Material.SKIN),
             ]
-        bars.append((hips - _points(0.0, 0.0, 0.06), neck, 0.125 * g, 0.19 * g, Material.CLOTH))
         hem = hips + _points(np.where(ride | sit, 0.05, 0.0), 0.0, -0.22 * H * np.where(ride | sit, 0.3, 1.0))
-        bars.append((hem, hips + _points(0.02, 0.0, 0.1), 0.8 * self.coat, self.coat, Material.CLOTH))
         back = (hips + 2 * neck) / 3 - _points(0.13 * g, 0.0, 0.0)
         up = 0.2 * (neck - hips) / spine[:, None]
-        bars.append((back - up, back + up, self.pack, np.minimum(1.6 * self.pack, 0.16), Material.CLOTH))
-        bars.append((neck - _points(0.0, 0.0, 0.02), head, 0.055 + 0 * g, 0.055 + 0 * g, Material.SKIN))
+        bars += [
+            (hips - _points(0.0, 0.0, 0.06), neck, 0.125 * g, 0.19 * g, Material.CLOTH),
+            (hem, hips + _points(0.02, 0.0, 0.1), 0.8 * self.coat, self.coat, Material.CLOTH),
+            (back - up, back + up, self.pack, np.minimum(1.6 * self.pack, 0.16), Material.CLOTH),
+            (neck - _points(0.0, 0.0, 0.02), head, 0.055 + 0 * g, 0.055 + 0 * g, Material.SKIN),
+        ]
         skull = np.tile([0.1, 0.08, 0.12], (n, 1))
         worn = self.strip > 0
         chest, half = (0.45 * hips + 0.55 * neck)[worn], (2.5 * up * self.strip[:, None])[worn]
         strip = _bars(chest - half, chest + half, 0.135 * g[worn], 0.2 * g[worn], Material.RETRO, self.body[worn])
-        return Pieces.join(
-            [_bars(*bar, body=self.body) for bar in bars] + [_balls(head, skull, Material.SKIN, self.body), strip]
-        )
+        skulls = Solids.make(head, skull, skull**-2.0, Material.SKIN, body=self.body)
+        return Solids.join([*(_bars(*bar, body=self.body) for bar in bars), skulls, strip])
 
 
 def _points(x: Float64 | float, y: Float64 | float, z: Float64 | float) -> Float64:
@@ -124,49 +126,25 @@ def _choose(posture: Int, *options: Float64) -> Float64:
 
 
 def _bend(root: Float64, tip: Float64, upper: Float64, lower: Float64, side: float) -> tuple[Float64, Float64]:
-    """Middle joint of a limb of two bars, bent forward (+1) or backward (-1), and the tip brought within reach."""
+    """Middle joint of a limb of two bars, bent forward (+1) or backward (-1), and its tip limited to the reach."""
     along = tip - root
     length = np.linalg.norm(along, axis=1)
     reach = np.minimum(length, 0.995 * (upper + lower))
     unit = along / length[:, None]
-    foot = (upper**2 - lower**2 + reach**2) / (2 * reach)
-    rise = np.sqrt(np.maximum(upper**2 - foot**2, 0.0))
+    part = (upper**2 - lower**2 + reach**2) / (2 * reach)
+    rise = np.sqrt(np.maximum(upper**2 - part**2, 0.0))
     normal = np.cross([0.0, 1.0, 0.0], unit) * -side
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return root + foot[:, None] * unit + rise[:, None] * normal, root + reach[:, None] * unit
+    return root + part[:, None] * unit + rise[:, None] * normal, root + reach[:, None] * unit
 
 
-def _bars(start: Float64, end: Float64, depth: Float64, breadth: Float64, material: int, body: Int) -> Pieces:
-    """Elliptic bars between points."""
-    n = len(body)
+def _bars(start: Float64, end: Float64, depth: Float64, breadth: Float64, material: int, body: Int) -> Solids:
+    """Elliptic cylinders between points."""
     along = end - start
     length = np.linalg.norm(along, axis=1)
     z = along / length[:, None]
     y = np.array([0.0, 1.0, 0.0]) - z[:, 1:2] * z
     y /= np.linalg.norm(y, axis=1, keepdims=True)
     semi = np.stack([depth, breadth], axis=1)
-    return Pieces(
-        rotation=np.stack([np.cross(y, z), y, z], axis=2).astype(np.float32),
-        centre=((start + end) / 2).astype(np.float32),
-        half=np.column_stack([semi, length / 2]).astype(np.float32),
-        quadric=np.column_stack([semi**-2.0, np.zeros(n)]).astype(np.float32),
-        cuts=NO_CUTS.repeat(n, axis=0),
-        density=np.full(n, SOLID, np.float32),
-        material=np.full(n, material, np.int64),
-        body=body,
-    )
-
-
-def _balls(centre: Float64, semi: Float64, material: int, body: Int) -> Pieces:
-    """Ellipsoids."""
-    n = len(body)
-    return Pieces(
-        rotation=np.tile(np.eye(3, dtype=np.float32), (n, 1, 1)),
-        centre=centre.astype(np.float32),
-        half=semi.astype(np.float32),
-        quadric=(semi**-2.0).astype(np.float32),
-        cuts=NO_CUTS.repeat(n, axis=0),
-        density=np.full(n, SOLID, np.float32),
-        material=np.full(n, material, np.int64),
-        body=body,
-    )
+    half, quadric = np.column_stack([semi, length / 2]), np.column_stack([semi**-2.0, np.zeros(len(body))])
+    return Solids.make((start + end) / 2, half, quadric, material, np.stack([np.cross(y, z), y, z], axis=2), body)

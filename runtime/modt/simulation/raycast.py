@@ -1,4 +1,4 @@
-"""Ray casting of convex pieces into a range image with a depth buffer."""
+"""Ray casting of convex solids into a range image with a depth buffer (slab and quadric tests)."""
 
 from __future__ import annotations
 
@@ -11,42 +11,41 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modt.simulation.sensors import SensorModel
-from modt.simulation.solids import Pieces
+from modt.simulation.solids import Solids
 from modt.types import Bool, Float32, Int
 
-NOTHING = -1
-"""Piece met by a ray that meets none."""
-
+NO_SOLID = -1
+"""Index of the solid hit by a ray that hits none."""
 NEAREST_M = np.float32(0.05)
-
 BATCH_RAYS, CHUNK_RAYS = 1000, 16_384
+"""Largest window that is cast in a batch, and rays of a batch that fit the cache."""
 
 
 @dataclass(frozen=True, slots=True)
 class RangeImage:
-    """What the rays of a sweep meet.
+    """First hits of the rays of a sweep.
 
     Attributes:
         distance: (B, A) horizontal distance to the first surface [m]; infinite where there is none.
-        piece: (B, A) piece met, NOTHING for the ground or the sky.
+        solid: (B, A) index of the solid hit, NO_SOLID for the ground or the sky.
     """
 
     distance: Float32
-    piece: NDArray[np.int32]
+    solid: NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """The part of the range image that each piece can touch; a piece across the seam has two.
+    """Bounds of each solid in the range image; a solid across the seam has two windows.
 
     Attributes:
-        piece: (W,) which piece, nearest first.
-        rows, columns: (W, 2) first and one past the last.
-        near: (W,) least horizontal distance of the piece [m].
-        n_columns: columns of the whole image.
+        solid: (W,) index of the solid, nearest first.
+        rows, columns: (W, 2) first, and one past the last.
+        near: (W,) least horizontal distance of the solid [m].
+        n_columns: of the image.
     """
 
-    piece: Int
+    solid: Int
     rows: Int
     columns: Int
     near: Float32
@@ -54,14 +53,14 @@ class Windows:
 
     @property
     def area(self) -> Int:
-        """(W,) rays in each."""
+        """(W,) number of rays."""
         rays: Int = np.diff(self.rows, axis=1)[:, 0] * np.diff(self.columns, axis=1)[:, 0]
         return rays
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
-    """What bounds a piece, and where rays cross it.
+class Shape:
+    """Kinds of surfaces that bound a solid, and their intersection with rays.
 
     Attributes:
         code: 1 for a box, plus 2 for a quadric, plus 4 for foliage, plus 8 times the number of cutting planes.
@@ -70,22 +69,22 @@ class Form:
     code: int
 
     @classmethod
-    def codes(cls, pieces: Pieces) -> Int:
-        """(n,) code of each piece."""
-        rounded = (pieces.quadric > 0).any(axis=1)
-        boxed = (pieces.quadric * np.square(pieces.half) < np.float32(0.999)).any(axis=1)
-        cut = pieces.cuts[:, :, :3].any(axis=2).sum(axis=1)
-        codes: Int = boxed + 2 * rounded + 4 * np.isfinite(pieces.density) + 8 * cut
+    def codes(cls, solids: Solids) -> Int:
+        """(n,) code of each solid."""
+        rounded = (solids.quadric > 0).any(axis=1)
+        boxed = (solids.quadric * np.square(solids.half) < np.float32(0.999)).any(axis=1)
+        cut = solids.cuts[:, :, :3].any(axis=2).sum(axis=1)
+        codes: Int = boxed + 2 * rounded + 4 * np.isfinite(solids.density) + 8 * cut
         return codes
 
     @property
     def foliage(self) -> bool:
-        """Rays end somewhere inside."""
+        """Whether rays end inside rather than on the surface."""
         return bool(self.code & 4)
 
     @property
     def cuts(self) -> int:
-        """Cutting planes."""
+        """Number of cutting planes."""
         return self.code >> 3
 
     def cross(
@@ -96,12 +95,12 @@ class Form:
         quadric: Float32,
         cuts: Iterable[Float32],
     ) -> tuple[Float32, Float32]:
-        """Where rays enter and leave a piece [m, horizontal]; a ray that misses does not enter before it leaves.
+        """Horizontal distances at which rays enter and leave a solid [m]; enter >= leave, or NaN, for a miss.
 
         Args:
-            direction: of the rays, three components in the piece's own frame, of shapes that broadcast.
+            direction: of the rays, three components in the frame of the solid, broadcastable.
             start: of the rays, likewise.
-            half: sides of the piece, or of each ray's piece, by axis.
+            half: half sides of the solid, or of each ray's solid, by axis.
             quadric: likewise.
             cuts: cutting planes, likewise.
         """
@@ -118,7 +117,7 @@ class Form:
             middle = -_sum(quadric[i] * direction[i] * start[i] for i in range(3)) / a
             # Squared distance of the ray's nearest point: float32 holds it where b^2 - ac would cancel.
             outside: Float32 = _sum(quadric[i] * np.square(start[i] + middle * direction[i]) for i in range(3))
-            reach = np.sqrt((1 - outside) / a)  # not a number, hence no hit, where the ray misses
+            reach = np.sqrt((1 - outside) / a)  # NaN where the ray misses
             enter, leave = np.maximum(enter, middle - reach), np.minimum(leave, middle + reach)
         for cut, _ in zip(cuts, range(self.cuts), strict=False):
             slope = cut[0] * direction[0] + cut[1] * direction[1] + cut[2] * direction[2]
@@ -133,24 +132,24 @@ def _sum(terms: Iterable[Float32]) -> Float32:
 
 
 class _Columns:
-    """Pieces by component, each contiguous, so that what a ray needs is gathered fast."""
+    """Columns of the solids by component, contiguous for fast gathering."""
 
-    def __init__(self, pieces: Pieces) -> None:
-        self.rotation: Float32 = np.ascontiguousarray(pieces.rotation.transpose(1, 2, 0))
-        self.shift: Float32 = np.ascontiguousarray(-np.einsum("nji,nj->in", pieces.rotation, pieces.centre))
-        self.half: Float32 = np.ascontiguousarray(pieces.half.T)
-        self.quadric: Float32 = np.ascontiguousarray(pieces.quadric.T)
+    def __init__(self, solids: Solids) -> None:
+        self.rotation: Float32 = np.ascontiguousarray(solids.rotation.transpose(1, 2, 0))
+        self.shift: Float32 = np.ascontiguousarray(-np.einsum("nji,nj->in", solids.rotation, solids.centre))
+        self.half: Float32 = np.ascontiguousarray(solids.half.T)
+        self.quadric: Float32 = np.ascontiguousarray(solids.quadric.T)
 
 
 class RayCaster:
     """Casts the rays of one sensor.
 
     A ray is a point (0, 0, origin) and a direction (cos azimuth, sin azimuth, tangent): its parameter is the
-    horizontal distance. Each piece is met only by the rays of the window that it subtends.
+    horizontal distance. Each solid is tested with the rays of its window alone.
 
     Args:
-        sensor: the beams.
-        batch_rays: windows of at most so many rays are cast together.
+        sensor: its beams.
+        batch_rays: largest window that is cast in a batch.
     """
 
     def __init__(self, sensor: SensorModel, batch_rays: int = BATCH_RAYS) -> None:
@@ -158,90 +157,89 @@ class RayCaster:
         self.cos = np.cos(sensor.azimuth_rad).astype(np.float32)
         self.sin = np.sin(sensor.azimuth_rad).astype(np.float32)
         self.tangent = sensor.tangent[:, None]
-        self.origin = sensor.origin_m.astype(np.float32)[:, None]
+        self.origin = np.broadcast_to(np.asarray(sensor.origin_m, np.float32), sensor.shape[0])[:, None]
 
-    def cast(self, pieces: Pieces, ground: Float32, depth: Float32) -> RangeImage:
-        """The first surface that each ray meets.
+    def cast(self, solids: Solids, ground: Float32, depth: Float32) -> RangeImage:
+        """First hit of each ray.
 
-        Large windows are cast one by one, nearest first, so that what is hidden is skipped; the many small ones
-        are cast together, ray by ray.
+        Large windows are cast one by one, nearest first, so that hidden ones are skipped; small ones in batches.
 
         Args:
-            pieces: in the sensor frame.
+            solids: in the sensor frame.
             ground: (B, A) horizontal distance to the ground [m], infinite where a ray misses it.
             depth: (B, A) optical depth at which each ray ends in foliage, exponentially distributed.
         """
-        image = RangeImage(ground.copy(), np.full(ground.shape, NOTHING, np.int32))
-        windows = self.windows(pieces)
+        image = RangeImage(ground.copy(), np.full(ground.shape, NO_SOLID, np.int32))
+        windows = self.windows(solids)
         large = windows.area > self.batch_rays
-        codes = Form.codes(pieces)
+        codes = Shape.codes(solids)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             for w in np.flatnonzero(large).tolist():
-                self._cast_window(pieces, Form(int(codes[windows.piece[w]])), windows, w, depth, image)
-            self._cast_rays(pieces, codes, windows, np.flatnonzero(~large), depth, image)
+                self._cast_window(solids, Shape(int(codes[windows.solid[w]])), windows, w, depth, image)
+            self._cast_rays(solids, codes, windows, np.flatnonzero(~large), depth, image)
         return image
 
     def _cast_window(
-        self, pieces: Pieces, form: Form, windows: Windows, w: int, depth: Float32, image: RangeImage
+        self, solids: Solids, shape: Shape, windows: Windows, w: int, depth: Float32, image: RangeImage
     ) -> None:
-        k, rows, columns = int(windows.piece[w]), slice(*windows.rows[w]), slice(*windows.columns[w])
-        seen = image.distance[rows, columns]
-        if windows.near[w] > seen.max():
+        k, rows, columns = int(windows.solid[w]), slice(*windows.rows[w]), slice(*windows.columns[w])
+        nearest = image.distance[rows, columns]
+        if windows.near[w] > nearest.max():
             return
-        R = pieces.rotation[k]
+        R = solids.rotation[k]
         across = R[0][:, None] * self.cos[columns] + R[1][:, None] * self.sin[columns]
         direction = [across[i] + R[2, i] * self.tangent[rows] for i in range(3)]
-        start = [R[2, i] * self.origin[rows] - pieces.centre[k] @ R[:, i] for i in range(3)]
-        enter, leave = form.cross(direction, start, pieces.half[k], pieces.quadric[k], pieces.cuts[k])
-        if form.foliage:
-            enter = np.maximum(enter, NEAREST_M) + depth[rows, columns] / pieces.density[k]
-        hit = (enter < leave) & (enter < seen) & (enter > NEAREST_M)
-        np.copyto(seen, enter, where=hit)
-        np.copyto(image.piece[rows, columns], k, where=hit)
+        start = [R[2, i] * self.origin[rows] - solids.centre[k] @ R[:, i] for i in range(3)]
+        enter, leave = shape.cross(direction, start, solids.half[k], solids.quadric[k], solids.cuts[k])
+        if shape.foliage:
+            enter = np.maximum(enter, NEAREST_M) + depth[rows, columns] / solids.density[k]
+        hit = (enter < leave) & (enter < nearest) & (enter > NEAREST_M)
+        np.copyto(nearest, enter, where=hit)
+        np.copyto(image.solid[rows, columns], k, where=hit)
 
     def _cast_rays(
-        self, pieces: Pieces, codes: Int, windows: Windows, which: Int, depth: Float32, image: RangeImage
+        self, solids: Solids, codes: Int, windows: Windows, which: Int, depth: Float32, image: RangeImage
     ) -> None:
-        """Cast windows by form, as many at a time as the cache holds."""
-        table = _Columns(pieces)
-        form_of, area = codes[windows.piece[which]], windows.area[which]
-        for form in np.unique(form_of).tolist():
-            mine = form_of == form
+        """Cast windows in batches of the same shape."""
+        table = _Columns(solids)
+        shape_of, area = codes[windows.solid[which]], windows.area[which]
+        for code in np.unique(shape_of).tolist():
+            mine = shape_of == code
             group = which[mine]
             part = np.cumsum(area[mine]) // CHUNK_RAYS
             for chunk in np.split(group, np.flatnonzero(np.diff(part)) + 1):
-                self._cast_chunk(pieces, table, Form(form), windows, chunk, depth, image)
+                self._cast_chunk(solids, table, Shape(code), windows, chunk, depth, image)
 
     def _cast_chunk(
         self,
-        pieces: Pieces,
+        solids: Solids,
         table: _Columns,
-        form: Form,
+        shape: Shape,
         windows: Windows,
         chunk: Int,
         depth: Float32,
         image: RangeImage,
     ) -> None:
-        nearest, met = image.distance.reshape(-1), image.piece.reshape(-1)
+        nearest, solid = image.distance.reshape(-1), image.solid.reshape(-1)
         ray, row, column, k = self._pairs(windows, chunk, nearest)
         cos, sin, tangent, origin = self.cos[column], self.sin[column], self.tangent[row, 0], self.origin[row, 0]
         R = table.rotation
         up = [R[2][i][k] for i in range(3)]
         direction = [R[0][i][k] * cos + R[1][i][k] * sin + up[i] * tangent for i in range(3)]
         start = [up[i] * origin + table.shift[i][k] for i in range(3)]
-        cuts = pieces.cuts[k].transpose(1, 2, 0) if form.cuts else ()
-        enter, leave = form.cross(direction, start, table.half[:, k], table.quadric[:, k], cuts)
-        if form.foliage:
-            enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / pieces.density[k]
+        cuts = solids.cuts[k].transpose(1, 2, 0) if shape.cuts else ()
+        enter, leave = shape.cross(direction, start, table.half[:, k], table.quadric[:, k], cuts)
+        if shape.foliage:
+            enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / solids.density[k]
         hit = np.flatnonzero((enter < leave) & (enter > NEAREST_M) & (enter < nearest[ray]))
         at, enter = ray[hit], enter[hit]
         np.minimum.at(nearest, at, enter)
         first = np.flatnonzero(enter == nearest[at])
-        met[at[first]] = k[hit[first]]
+        solid[at[first]] = k[hit[first]]
 
     @staticmethod
     def _pairs(windows: Windows, chunk: Int, nearest: Float32) -> tuple[Int, Int, Int, Int]:
-        """Ray, row, column and piece of everything in some windows that is not behind what is known already."""
+        """Ray, row, column and solid of every pair in some windows that is not occluded by an earlier hit."""
         area, n_columns = windows.area[chunk], np.diff(windows.columns[chunk], axis=1)[:, 0]
         which = np.repeat(np.arange(len(chunk)), area)
         step = np.arange(len(which)) - (np.cumsum(area) - area)[which]
@@ -250,16 +248,16 @@ class RayCaster:
         column = windows.columns[chunk, 0][which] + step - down * n_columns[which]
         ray = row * windows.n_columns + column
         open_ = np.flatnonzero(windows.near[chunk][which] < nearest[ray])
-        return ray[open_], row[open_], column[open_], windows.piece[chunk][which[open_]]
+        return ray[open_], row[open_], column[open_], windows.solid[chunk][which[open_]]
 
-    def windows(self, pieces: Pieces) -> Windows:
-        """The window of each piece that lies within the sensor's reach and field of view."""
+    def windows(self, solids: Solids) -> Windows:
+        """Windows of the solids within range and field of view."""
         signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], np.float32)
-        arm = (signs * pieces.half[:, None]) @ pieces.rotation.transpose(0, 2, 1)
-        corner = (pieces.centre[:, None] + arm).astype(np.float32, copy=False)
+        arm = (signs * solids.half[:, None]) @ solids.rotation.transpose(0, 2, 1)
+        corner = (solids.centre[:, None] + arm).astype(np.float32, copy=False)
         far = np.hypot(corner[..., 0], corner[..., 1]).max(axis=1)
-        near = self._nearest(pieces)
-        azimuth = np.arctan2(pieces.centre[:, 1], pieces.centre[:, 0]).astype(np.float64)
+        near = self._nearest(solids)
+        azimuth = np.arctan2(solids.centre[:, 1], solids.centre[:, 0]).astype(np.float64)
         c, s = np.cos(azimuth)[:, None], np.sin(azimuth)[:, None]
         x = c * corner[..., 0] + s * corner[..., 1]
         y = c * corner[..., 1] - s * corner[..., 0]
@@ -281,7 +279,7 @@ class RayCaster:
         return Windows(part[:, 0], part[:, 1:3], part[:, 3:5], near[part[:, 0]], self.sensor.shape[1])
 
     def _row_range(self, bottom: Float32, top: Float32, near: Float32, far: Float32) -> tuple[Int, Int]:
-        """Rows whose beams can pass between two heights at those distances."""
+        """First row, and one past the last, whose beams pass between two heights at some distances."""
         lowest, highest = self.origin.min(), self.origin.max()
         rise, fall = top - lowest, bottom - highest
         steepest = np.where(rise > 0, rise / near, rise / far)
@@ -289,14 +287,14 @@ class RayCaster:
         falling = -self.tangent[:, 0]
         return np.searchsorted(falling, -steepest), np.searchsorted(falling, -deepest, side="right")
 
-    def _nearest(self, pieces: Pieces) -> Float32:
-        """(n,) least horizontal distance, a lower bound where a piece is tilted."""
-        upright: Bool = np.abs(pieces.rotation[:, 2, 2]) > 0.99
-        R = pieces.rotation
-        u = np.abs(np.einsum("nji,nj->ni", R[:, :2, :2], pieces.centre[:, :2]))
-        gap = np.maximum(u - pieces.half[:, :2] - 0.15 * pieces.half[:, 2:], 0)
+    def _nearest(self, solids: Solids) -> Float32:
+        """(n,) least horizontal distance [m], a lower bound for tilted solids."""
+        upright: Bool = np.abs(solids.rotation[:, 2, 2]) > 0.99
+        R = solids.rotation
+        u = np.abs(np.einsum("nji,nj->ni", R[:, :2, :2], solids.centre[:, :2]))
+        gap = np.maximum(u - solids.half[:, :2] - 0.15 * solids.half[:, 2:], 0)
         exact = np.hypot(gap[:, 0], gap[:, 1])
-        radius = np.linalg.norm(pieces.half, axis=1)
-        loose = np.maximum(np.hypot(pieces.centre[:, 0], pieces.centre[:, 1]) - radius, 0)
+        radius = np.linalg.norm(solids.half, axis=1)
+        loose = np.maximum(np.hypot(solids.centre[:, 0], solids.centre[:, 1]) - radius, 0)
         nearest: Float32 = np.where(upright, exact, loose).astype(np.float32)
         return nearest

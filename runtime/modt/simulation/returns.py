@@ -1,24 +1,24 @@
-"""From what the rays meet to what a sensor reports: noise, losses, partial returns and brightness."""
+"""Returns of a sweep: noise, losses, mixed pixels and intensity."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.simulation.materials import GLOSS, LEVEL, LOSS, REFLECTIVITY, TEXTURE
+from modt.simulation.materials import DROPOUT, GRAZING_LOSS, INTENSITY, POINT_SIGMA, REFLECTIVITY
 from modt.simulation.sensors import SensorModel
 from modt.types import Bool, Float32, Int
 
-SHINY = np.float32(0.25)
-"""Loss towards grazing from which on the slope from beam to beam counts as well: roofs and bonnets."""
+GLOSSY = np.float32(0.25)
+"""Grazing loss above which the slope between beams counts as well: roofs and bonnets."""
 
 
 class Receiver:
-    """The receiving half of a sensor.
+    """The receiver of a sensor.
 
     Args:
         sensor: its model.
-        rng: for the constant errors of its beams.
+        rng: of the constant errors of its beams.
     """
 
     def __init__(self, sensor: SensorModel, rng: np.random.Generator) -> None:
@@ -31,86 +31,76 @@ class Receiver:
         self,
         distance: Float32,
         material: NDArray[np.uint8],
-        group: NDArray[np.int32],
-        shade: Float32,
+        solid: NDArray[np.int32],
+        offset: Float32,
         rng: np.random.Generator,
     ) -> tuple[Float32, Float32, Int]:
-        """Distance [m, horizontal] of every ray, brightness of those that return [0, 1], and which (flat) these are.
+        """(B, A) measured horizontal distances [m], (n,) intensities [0, 1] and (n,) flat indices of the n returns.
 
         Args:
-            distance: (B, A) horizontal distance met [m], infinite where nothing was.
-            material: (B, A) of the surface met.
-            group: (B, A) which surface it is, to tell an edge from a slope.
-            shade: (P + 1,) how much brighter than others of its material each surface is; the last is the ground.
-            rng: of this sweep.
+            distance: (B, A) true horizontal distance [m], infinite without a surface.
+            material: (B, A) of the surface.
+            solid: (B, A) which surface it is, negative for the ground.
+            offset: (P + 1,) intensity of each surface relative to its material; the last is the ground's.
+            rng: of the sweep.
         """
         sensor = self.sensor
         chance = rng.random(distance.shape, dtype=np.float32)
         noise = rng.standard_normal(distance.shape, dtype=np.float32)
-        met = np.isfinite(distance)
-        near = np.where(met, distance, np.float32(1e4))
-        head_on = self._incidence(near, group)
+        hit = np.isfinite(distance)
+        near = np.where(hit, distance, np.float32(1e4))
+        cosine = self._cos_incidence(near, solid)
         grain = noise[:, ::-1]
         reflectivity = REFLECTIVITY.take(material) * self.gain * (1 + np.float32(0.15) * grain)
         slant = near * self.secant
-        signal = reflectivity * head_on * np.float32(10 * sensor.detect_m**2) / (slant * slant)
-        lost = LOSS.take(material) + np.float32(sensor.misfire)
-        heard = met & (chance > lost + (1 - lost) / (1 + signal * signal))
-        heard &= (slant > sensor.min_range_m) & (slant < sensor.max_range_m)
-        ranged: Float32 = (
-            near + (self.bias + np.float32(sensor.range_sigma_m) * noise).astype(np.float32) / self.secant
-        )
-        self._smear(ranged, near, heard, chance)
-        strength = self._strength(near, material, group, shade, head_on)
-        strength += TEXTURE.take(material) * grain
-        ray = np.flatnonzero(heard)
-        return ranged, sensor.response.report(strength.ravel().take(ray), slant.ravel().take(ray)), ray
+        signal = reflectivity * cosine * np.float32(10 * sensor.detect_m**2) / (slant * slant)
+        lost = DROPOUT.take(material) + np.float32(sensor.dropout)
+        detected = hit & (chance > lost + (1 - lost) / (1 + signal * signal))
+        detected &= (slant > sensor.min_range_m) & (slant < sensor.max_range_m)
+        error = (self.bias + np.float32(sensor.range_sigma_m) * noise).astype(np.float32)
+        measured: Float32 = near + error / self.secant
+        self._mix_edges(measured, near, detected, chance)
+        intensity: Float32 = INTENSITY.take(material) * self.gain
+        intensity += offset.take(solid, mode="wrap")
+        loss = GRAZING_LOSS.take(material)
+        intensity -= loss * (1 - self._cos_glossy(near, solid, cosine, loss > GLOSSY))
+        intensity += POINT_SIGMA.take(material) * grain
+        ray = np.flatnonzero(detected)
+        return measured, sensor.response.report(intensity.ravel().take(ray), slant.ravel().take(ray)), ray
 
-    def _strength(
-        self, near: Float32, material: NDArray[np.uint8], group: NDArray[np.int32], shade: Float32, head_on: Float32
-    ) -> Float32:
-        """(B, A) brightness of every surface as it is met, in focus."""
-        strength: Float32 = LEVEL.take(material)
-        strength *= self.gain
-        strength += shade.take(group, mode="wrap")
-        gloss = GLOSS.take(material)
-        strength -= gloss * (1 - self._from_above(near, group, head_on, gloss > SHINY))
-        return strength
-
-    def _incidence(self, near: Float32, group: NDArray[np.int32]) -> Float32:
-        """Cosine of the angle at which each surface is met, from the slope of the range image along the beam."""
+    def _cos_incidence(self, near: Float32, solid: NDArray[np.int32]) -> Float32:
+        """(B, A) cosine of the angle of incidence, by the slope of the range image along a beam."""
         step = np.float32(self.sensor.azimuth_rad[1] - self.sensor.azimuth_rad[0])
         slope = np.zeros_like(near)
         np.subtract(near[:, 1:], near[:, :-1], out=slope[:, 1:])
         same = np.zeros(near.shape, np.bool_)
-        np.equal(group[:, 1:], group[:, :-1], out=same[:, 1:])
+        np.equal(solid[:, 1:], solid[:, :-1], out=same[:, 1:])
         slope /= near * step
         level = 1 / np.sqrt(1 + slope * slope)
-        ground = group < 0
-        tangent = np.abs(self.sensor.tangent[:, None]) / self.secant
-        return np.where(ground, tangent + np.float32(0.05), np.where(same, level, np.float32(0.7))).astype(np.float32)
+        ground = np.abs(self.sensor.tangent[:, None]) / self.secant + np.float32(0.05)
+        return np.where(solid < 0, ground, np.where(same, level, np.float32(0.7))).astype(np.float32)
 
-    def _from_above(self, near: Float32, group: NDArray[np.int32], head_on: Float32, shiny: Bool) -> Float32:
-        """The same cosine, that of shiny surfaces with the slope from beam to beam as well."""
-        here = np.flatnonzero(shiny[:-1])
+    def _cos_glossy(self, near: Float32, solid: NDArray[np.int32], cosine: Float32, glossy: Bool) -> Float32:
+        """(B, A) the same cosine, with the slope between beams where the surface is glossy."""
+        here = np.flatnonzero(glossy[:-1])
         below = here + near.shape[1]
-        s, part, cosine = near.ravel(), group.ravel(), head_on.flatten()
+        s, part, out = near.ravel(), solid.ravel(), cosine.flatten()
         fall = np.diff(self.sensor.tangent)[here // near.shape[1]]
         slope = np.where(part[below] == part[here], (s[below] / s[here] - 1) / fall, 0)
-        cosine[here] /= np.sqrt(1 + np.square(slope * cosine[here]))
-        return cosine.reshape(near.shape)
+        out[here] /= np.sqrt(1 + np.square(slope * out[here]))
+        return out.reshape(near.shape)
 
-    def _smear(self, ranged: Float32, near: Float32, heard: Bool, chance: Float32) -> None:
-        """Where a beam is split by an edge, some returns mix both surfaces and some of the nearer one come late."""
+    def _mix_edges(self, measured: Float32, near: Float32, detected: Bool, chance: Float32) -> None:
+        """Mixed pixels: at edges some returns lie between the surfaces, some of the nearer surface are late."""
         gap = near[:, 1:] - near[:, :-1]
-        share = np.float32(self.sensor.smear)
-        split = np.flatnonzero((np.abs(gap) > 0.2) & heard[:, 1:] & heard[:, :-1])
+        share = np.float32(self.sensor.mixed_share)
+        split = np.flatnonzero((np.abs(gap) > 0.2) & detected[:, 1:] & detected[:, :-1])
         row, column = np.divmod(split, gap.shape[1])
         gap, luck = gap[row, column], chance[row, column + 1]
         mixed = (np.abs(gap) < 2.5) & (luck > 1 - share)
         mix = (luck[mixed] - (1 - share)) / share
-        ranged[row[mixed], column[mixed] + 1] -= mix * gap[mixed]
-        behind = luck < 1 - share
-        row, front = row[behind], (column + (gap < 0))[behind]
-        late = -np.log(np.maximum(1 - chance[row, front], np.float32(1e-3)))
-        ranged[row, front] += np.float32(self.sensor.late_m) * late
+        measured[row[mixed], column[mixed] + 1] -= mix * gap[mixed]
+        delayed = luck < 1 - share
+        row, front = row[delayed], (column + (gap < 0))[delayed]
+        delay = -np.log(np.maximum(1 - chance[row, front], np.float32(1e-3)))
+        measured[row, front] += np.float32(self.sensor.edge_delay_m) * delay

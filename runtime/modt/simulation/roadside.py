@@ -1,20 +1,20 @@
-"""What stands, parks and moves along a road."""
+"""Houses, furniture, parked vehicles, traffic and pedestrians along a road."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from modt.simulation import kinds, scenery
-from modt.simulation.builder import Builder
-from modt.simulation.layout import Road
+from modt.simulation.builder import SceneBuilder
 from modt.simulation.motion import Path
+from modt.simulation.road import Road
 
 LANE = 0.45
-"""Middle of a lane, as a share of half the carriageway."""
+"""Centre of a lane, as a share of half the carriageway."""
 
 
-def houses(builder: Builder, road: Road, side: int, density: float, wild: float) -> None:
-    """A row of houses behind gardens, more or less overgrown, and what stands in their second row."""
+def houses(builder: SceneBuilder, road: Road, side: int, density: float, vegetation: float) -> None:
+    """Add a row of houses with gardens, and a second row of houses and trees behind."""
     rng, x = builder.rng, road.start_m
     while x < road.end_m:
         length, depth = rng.uniform(8.0, 18.0), rng.uniform(8.0, 12.0)
@@ -25,7 +25,7 @@ def houses(builder: Builder, road: Road, side: int, density: float, wild: float)
             spot = road.place(x + length / 2, side * (set_back + depth / 2), 0.0 if side > 0 else np.pi)
             builder.scenery(scenery.building(rng, length, depth, rng.uniform(5.5, 11.0)), *spot)
         if open_:
-            _garden(builder, road, side, x, length, set_back if built else set_back + 12.0, wild)
+            _garden(builder, road, side, x, length, set_back if built else set_back + 12.0, vegetation)
             behind = side * (set_back + depth + rng.uniform(6.0, 22.0))
             spot = road.place(x + rng.uniform(0, length), behind, rng.uniform(-0.2, 0.2))
             if rng.random() < 0.5:
@@ -35,8 +35,10 @@ def houses(builder: Builder, road: Road, side: int, density: float, wild: float)
         x += length + rng.choice([0.5, 3.0, 6.0, 12.0], p=[0.3, 0.3, 0.25, 0.15])
 
 
-def _garden(builder: Builder, road: Road, side: int, x: float, length: float, set_back: float, wild: float) -> None:
-    """What lies between pavement and house: a border with a gate, bushes, low plants, a tree."""
+def _garden(
+    builder: SceneBuilder, road: Road, side: int, x: float, length: float, set_back: float, vegetation: float
+) -> None:
+    """Add a border with a gate, bushes, plants and trees between pavement and house."""
     rng = builder.rng
     edge = road.half_m + road.pavement_m + 0.4
     run = length - rng.uniform(1.2, 3.5)
@@ -45,21 +47,21 @@ def _garden(builder: Builder, road: Road, side: int, x: float, length: float, se
         border = (scenery.fence, scenery.hedge, scenery.wall)[make]
         builder.scenery(border(rng, run), *road.place(x + run / 2, side * edge))
     deep = max(set_back - 0.5 - edge, 1.5)
-    for _ in range(int(rng.poisson(2.5 * wild))):
+    for _ in range(int(rng.poisson(2.5 * vegetation))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(0.8, deep)))
         builder.scenery(scenery.shrub(rng, rng.uniform(0.5, 1.6)), *spot)
     for _ in range(int(rng.choice(3, p=[0.65, 0.27, 0.08]))):
         off = edge + rng.uniform(0.8, deep)
         builder.scenery(scenery.thicket(rng), *road.place(x + rng.uniform(0, length), side * off, rng.normal(0, 0.5)))
     middle = road.place(x + length / 2, side * (edge + deep / 2))
-    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.06 * wild * length * deep))), *middle)
+    builder.scenery(scenery.plants(rng, length, deep, int(rng.poisson(0.06 * vegetation * length * deep))), *middle)
     for _ in range(int(rng.choice(3, p=[0.5, 0.35, 0.15]))):
         spot = road.place(x + rng.uniform(0, length), side * (edge + rng.uniform(1.0, deep)))
         builder.scenery(scenery.tree(rng), *spot)
 
 
-def furniture(builder: Builder, road: Road, side: int) -> None:
-    """Trees, lamps, signs, bins and bicycles at the edge of the pavement."""
+def furniture(builder: SceneBuilder, road: Road, side: int) -> None:
+    """Add trees, lamps, signs, bins and bicycles on the pavement."""
     rng = builder.rng
     x = road.start_m + rng.uniform(0.0, 8.0)
     while x < road.end_m:
@@ -74,8 +76,8 @@ def furniture(builder: Builder, road: Road, side: int) -> None:
         x += rng.uniform(3.0, 11.0)
 
 
-def parked(builder: Builder, road: Road, side: int, share: float) -> None:
-    """Cars, vans and a few lorries along the kerb, the given share of the room taken."""
+def parked(builder: SceneBuilder, road: Road, side: int, share: float) -> None:
+    """Add vehicles along the kerb, on a share of the parking spaces."""
     rng, x = builder.rng, road.start_m
     while x < road.end_m:
         if rng.random() < share and road.free(x - 3) and road.free(x + 3):
@@ -87,8 +89,8 @@ def parked(builder: Builder, road: Road, side: int, share: float) -> None:
         x += rng.uniform(5.2, 7.2)
 
 
-def people(builder: Builder, road: Road, side: int, apart_m: float) -> None:
-    """People on a pavement, walking alone or beside one another or standing in groups."""
+def pedestrians(builder: SceneBuilder, road: Road, side: int, apart_m: float) -> None:
+    """Add pedestrians on a pavement, walking alone or in pairs or standing in groups."""
     rng, x = builder.rng, road.start_m
     walk = road.half_m + 0.9
     while x < road.end_m:
@@ -97,8 +99,8 @@ def people(builder: Builder, road: Road, side: int, apart_m: float) -> None:
         if rng.random() < 0.65:
             backwards = bool(rng.random() < 0.5)
             speed = float(np.clip(rng.normal(1.35, 0.2), 0.7, 2.2))
-            for beside in range(int(rng.choice([1, 1, 1, 2]))):
-                line = road.lane(left + side * 0.75 * beside, backwards)
+            for row in range(int(rng.choice([1, 1, 1, 2]))):
+                line = road.lane(left + side * 0.75 * row, backwards)
                 start = (road.end_m - x) if backwards else (x - road.start_m)
                 builder.pedestrian(Path.steady(line, start, speed, builder.seconds), speed)
         elif road.free(x):
@@ -107,8 +109,8 @@ def people(builder: Builder, road: Road, side: int, apart_m: float) -> None:
                 builder.pedestrian(Path.standing(*spot))
 
 
-def crossers(builder: Builder, road: Road, x: float, n: int) -> None:
-    """People who cross the road around x."""
+def crossing_pedestrians(builder: SceneBuilder, road: Road, x: float, n: int) -> None:
+    """Add pedestrians that cross the road around x."""
     rng, far = builder.rng, road.half_m + 1.5
     for _ in range(n):
         side, at = rng.choice([-1, 1]), x + rng.normal(0, 1.5)
@@ -118,8 +120,8 @@ def crossers(builder: Builder, road: Road, x: float, n: int) -> None:
         builder.pedestrian(Path.steady(np.array(ends), start, speed, builder.seconds), speed)
 
 
-def cyclists(builder: Builder, road: Road, near_m: float, n: int) -> None:
-    """Cyclists at both edges of the carriageway, about a place on the road."""
+def cyclists(builder: SceneBuilder, road: Road, near_m: float, n: int) -> None:
+    """Add cyclists at both edges of the carriageway, around near_m."""
     rng = builder.rng
     for side in (-1, 1):
         line = road.lane(side * (road.half_m - 1.35), backwards=side > 0)
@@ -131,8 +133,8 @@ def cyclists(builder: Builder, road: Road, near_m: float, n: int) -> None:
             s += rng.uniform(8.0, 40.0)
 
 
-def traffic(builder: Builder, road: Road, near_m: float, pace_mps: float) -> None:
-    """Moving cars, vans and lorries in both lanes; those ahead of near_m in the right lane go at a pace."""
+def traffic(builder: SceneBuilder, road: Road, near_m: float, pace_mps: float) -> None:
+    """Add moving vehicles in both lanes; those in the right lane start ahead of near_m at about pace_mps."""
     rng, seconds = builder.rng, builder.seconds
     ahead, oncoming = road.lane(-road.half_m * LANE), road.lane(road.half_m * LANE, backwards=True)
     s = near_m - road.start_m + rng.uniform(14.0, 30.0)

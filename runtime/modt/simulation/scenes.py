@@ -1,4 +1,4 @@
-"""The scenes there are."""
+"""Table of the scenes."""
 
 from __future__ import annotations
 
@@ -12,9 +12,6 @@ from modt.simulation.world import World
 from modt.simulation.yard import hall, yard
 
 SCENES: dict[str, Callable[[np.random.Generator, float, float], World]] = {
-    "street": street,
-    "crossing": crossing,
-    "yard": yard,
-    "hall": hall,
+    scene.__name__: scene for scene in (street, crossing, yard, hall)
 }
-"""Scene by name: made of a random generator, a duration [s] and the height of the sensor [m]."""
+"""Scene by name: a function of a random generator, a duration [s] and the height of the sensor [m]."""

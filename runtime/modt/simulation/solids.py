@@ -1,4 +1,4 @@
-"""Convex pieces: what every body of the synthetic world is made of."""
+"""Convex solids: the parts of every body."""
 
 from __future__ import annotations
 
@@ -7,35 +7,35 @@ from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from modt.types import Bool, Float32, Float64, Int
 
-CUTS = 4
-"""Cutting planes a piece may have beside its box."""
-
+N_CUTS = 4
+"""Cutting planes of a solid."""
 NARROW_M = 0.3
-"""Half the least side of a piece that a beam may graze on both sides."""
-
-SOLID = np.float32(np.inf)
-NO_CUTS: Float32 = np.tile(np.array([0, 0, 0, 1], np.float32), (1, CUTS, 1))
+"""Half the least side below which the width of the beam matters."""
+EYE: Float32 = np.eye(3, dtype=np.float32)
+OPAQUE = np.float32(np.inf)
+NO_CUTS: Float32 = np.tile(np.array([0, 0, 0, 1], np.float32), (1, N_CUTS, 1))
 
 
 @dataclass(frozen=True, slots=True)
-class Pieces:
-    """n convex pieces, each a box, shaved by cutting planes, inside a quadric.
+class Solids:
+    """n convex solids: each the intersection of a box, half-spaces and a quadric.
 
-    A point u of a piece's own frame belongs to it where |u| <= half on every axis, sum(quadric * u^2) <= 1 and
-    cut[:3] . u <= cut[3] for every cut. That makes boxes, wedges, ellipsoids, cylinders and limbs.
+    A point u in the frame of a solid belongs to it where |u| <= half on every axis, sum(quadric * u^2) <= 1 and
+    cut[:3] . u <= cut[3] for every cut: boxes, wedges, ellipsoids, cylinders.
 
     Attributes:
-        rotation: (n, 3, 3) own frame to the body's, the world's or the sensor's.
+        rotation: (n, 3, 3) from the frame of the solid to that of the body, the world or the sensor.
         centre: (n, 3) of the box, in that frame [m].
-        half: (n, 3) half sides of the box [m].
-        quadric: (n, 3) inverse squared semi-axes [1/m2]; zero where an axis is not bounded by it.
-        cuts: (n, CUTS, 4) outward normal and distance of the cutting planes; normal zero where there is none.
-        density: (n,) extinction [1/m]: infinite for a solid surface, finite for foliage.
-        material: (n,) row in the table of materials.
-        body: (n,) row in the table of bodies.
+        half: (n, 3) half the sides of the box [m].
+        quadric: (n, 3) inverse squared semi-axes [1/m2]; zero along unbounded axes.
+        cuts: (n, N_CUTS, 4) outward normal and distance of the cutting planes; normal zero for none.
+        density: (n,) extinction [1/m]: infinite for a surface, finite for foliage.
+        material: (n,) its Material.
+        body: (n,) index of its body.
     """
 
     rotation: Float32
@@ -51,28 +51,23 @@ class Pieces:
         return len(self.centre)
 
     def take(self, rows: Int | Bool) -> Self:
-        """The pieces given, by index or mask."""
+        """The solids at some rows."""
         return type(self)(*(getattr(self, f.name)[rows] for f in fields(self)))
 
     def of(self, body: int) -> Self:
-        """The same pieces as parts of that body."""
+        """The same solids as parts of a body."""
         return self._with(body=np.full(len(self), body, np.int64))
 
-    def moved(self, rotation: Float32 | Float64, translation: Float32 | Float64) -> Self:
-        """The pieces taken by a rigid motion, one for all or one each."""
-        R = np.asarray(rotation, np.float32)
-        t = np.asarray(translation, np.float32)
-        centre = (R @ self.centre[:, :, None])[:, :, 0] + t
-        return self._with(rotation=R @ self.rotation, centre=centre)
+    def transformed(self, rotation: Float32 | Float64, translation: Float32 | Float64) -> Self:
+        """The solids after a rigid transform, one for all or one each."""
+        R, t = np.asarray(rotation, np.float32), np.asarray(translation, np.float32)
+        return self._with(rotation=R @ self.rotation, centre=(R @ self.centre[:, :, None])[:, :, 0] + t)
 
-    def as_met(self, spot_m: float, divergence_rad: float) -> Self:
-        """The pieces, in the sensor frame, as a beam of some breadth meets them.
-
-        A beam returns from what it only grazes: narrow solid pieces look broader by the radius of the beam.
-        """
-        away = np.linalg.norm(self.centre, axis=1)
+    def widened_by_beam(self, radius_m: float, divergence_rad: float) -> Self:
+        """Solids, sensor frame, narrow opaque ones wider by the radius of the beam, which returns from edges."""
         narrow = (self.half.min(axis=1) < NARROW_M) & ~np.isfinite(self.density)
-        more = np.where(narrow, np.float32(spot_m) + np.float32(divergence_rad) * away, 0)[:, None]
+        beam_m = np.float32(radius_m) + np.float32(divergence_rad) * np.linalg.norm(self.centre, axis=1)
+        more = np.where(narrow, beam_m, 0)[:, None]
         with np.errstate(divide="ignore"):
             semi = 1 / np.sqrt(self.quadric)
         quadric = np.where(self.quadric > 0, 1 / np.square(semi + more), 0)
@@ -85,84 +80,85 @@ class Pieces:
 
     @classmethod
     def join(cls, groups: Iterable[Self]) -> Self:
-        """All of them, in order."""
+        """All groups, in order."""
         listed = list(groups) or [cls.none()]
         return cls(*(np.concatenate([getattr(g, f.name) for g in listed]) for f in fields(cls)))
 
     @classmethod
     def none(cls) -> Self:
-        """No pieces."""
-        return cls._make(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0, 0.0)
+        """No solids."""
+        return cls.make(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), 0)
 
     @classmethod
-    def _make(cls, centre: Float64, half: Float64, quadric: Float64, material: int, yaw: float) -> Self:
+    def make(
+        cls,
+        centre: Float64,
+        half: Float64,
+        quadric: Float64,
+        material: int,
+        rotation: ArrayLike = EYE,
+        body: ArrayLike = 0,
+    ) -> Self:
+        """Opaque solids without cuts; columns (n, 3), one material, one rotation and body for all or each."""
         n = len(centre)
-        R = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]], np.float32)
         return cls(
-            rotation=R[None].repeat(n, axis=0),
+            rotation=np.tile(np.asarray(rotation, np.float32), (n if np.ndim(rotation) == 2 else 1, 1, 1)),
             centre=centre.astype(np.float32),
             half=half.astype(np.float32),
             quadric=quadric.astype(np.float32),
             cuts=NO_CUTS.repeat(n, axis=0),
-            density=np.full(n, SOLID, np.float32),
+            density=np.full(n, OPAQUE, np.float32),
             material=np.full(n, material, np.int64),
-            body=np.zeros(n, np.int64),
+            body=np.broadcast_to(np.asarray(body, np.int64), n).copy(),
         )
 
 
 Triple = tuple[float, float, float]
 
 
-def box(centre: Triple, size: Triple, material: int, yaw: float = 0.0) -> Pieces:
-    """An upright box of (length, width, height) [m]."""
-    return Pieces._make(np.array([centre]), np.array([size]) / 2, np.zeros((1, 3)), material, yaw)
+def box(centre: Triple, size: Triple, material: int, yaw: float = 0.0, density: float = np.inf) -> Solids:
+    """An upright box of (length, width, height) [m]; of foliage where the density [1/m] is finite."""
+    R = [[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]]
+    solid = Solids.make(np.array([centre]), np.array([size]) / 2, np.zeros((1, 3)), material, R)
+    solid.density[:] = density
+    return solid
 
 
-def wedge(centre: Triple, size: Triple, material: int, cuts: list[tuple[float, float, float, float]]) -> Pieces:
-    """A box shaved by planes a u_x + b u_y + c u_z <= d of its own frame."""
-    made = box(centre, size, material)
+def wedge(centre: Triple, size: Triple, material: int, cuts: list[tuple[float, float, float, float]]) -> Solids:
+    """A box cut by planes a u_x + b u_y + c u_z <= d in its frame."""
+    solid = box(centre, size, material)
     for i, (a, b, c, d) in enumerate(cuts):
-        norm = float(np.sqrt(a * a + b * b + c * c))
-        made.cuts[0, i] = np.array([a, b, c, d]) / norm
-    return made
+        solid.cuts[0, i] = np.array([a, b, c, d]) / float(np.sqrt(a * a + b * b + c * c))
+    return solid
 
 
-def rounded(made: Pieces, semi: Triple) -> Pieces:
-    """The same pieces inside an ellipsoid about their middle; an infinite semi-axis [m] does not bound them."""
-    made.quadric[:] = np.array(semi) ** -2.0
-    return made
+def rounded(solids: Solids, semi: Triple) -> Solids:
+    """The solids, in place, inside an ellipsoid about their centre; unbounded along infinite semi-axes [m]."""
+    solids.quadric[:] = np.array(semi) ** -2.0
+    return solids
 
 
-def ellipsoid(centre: Triple, semi: Triple, material: int, density: float | None = None) -> Pieces:
-    """An ellipsoid by its semi-axes [m]; of foliage where a density [1/m] is given."""
+def ellipsoid(centre: Triple, semi: Triple, material: int, density: float = np.inf) -> Solids:
+    """An ellipsoid by its semi-axes [m]; of foliage where the density [1/m] is finite."""
     axes = np.array([semi])
-    made = Pieces._make(np.array([centre]), axes, axes**-2.0, material, 0.0)
-    if density is not None:
-        made.density[:] = density
-    return made
+    solid = Solids.make(np.array([centre]), axes, axes**-2.0, material)
+    solid.density[:] = density
+    return solid
 
 
-def cylinder(centre: Triple, radius: float, length: float, material: int, axis: int = 2) -> Pieces:
+def cylinder(centre: Triple, radius: float, length: float, material: int, axis: int = 2) -> Solids:
     """A round cylinder along an axis of the body."""
     half, quadric = np.full((1, 3), radius), np.full((1, 3), radius**-2.0)
     half[0, axis], quadric[0, axis] = length / 2, 0.0
-    return Pieces._make(np.array([centre]), half, quadric, material, 0.0)
+    return Solids.make(np.array([centre]), half, quadric, material)
 
 
-def bush(centre: Triple, size: Triple, material: int, density: float, yaw: float = 0.0) -> Pieces:
-    """A box of foliage: a hedge."""
-    made = box(centre, size, material, yaw)
-    made.density[:] = density
-    return made
-
-
-def limb(start: Triple, end: Triple, radius: float, material: int) -> Pieces:
-    """A round bar between two points."""
+def rod(start: Triple, end: Triple, radius: float, material: int) -> Solids:
+    """A round cylinder between two points."""
     a, b = np.array(start), np.array(end)
-    along = b - a
-    length = float(np.linalg.norm(along))
-    z = along / length
+    length = float(np.linalg.norm(b - a))
+    z = (b - a) / length
     x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
     x /= np.linalg.norm(x)
-    made = cylinder((0.0, 0.0, 0.0), radius, length, material)
-    return made.moved(np.stack([x, np.cross(z, x), z], axis=1), (a + b) / 2)
+    solid = cylinder((0.0, 0.0, 0.0), radius, length, material)
+    return solid.transformed(np.stack([x, np.cross(z, x), z], axis=1), (a + b) / 2)

@@ -1,45 +1,44 @@
-"""A residential street that the ego vehicle drives along."""
+"""A residential street with the ego vehicle driving along it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from modt.simulation import roadside
-from modt.simulation.builder import Builder
-from modt.simulation.layout import BESIDE_M, Road, terrain
+from modt.simulation.builder import SceneBuilder
 from modt.simulation.motion import Path, timetable
+from modt.simulation.road import Road, terrain_along
 from modt.simulation.world import World
 
-MARGIN_M = 95.0
-"""Road behind the ego vehicle's start and ahead of its end."""
+LEAD_IN_M = 95.0
+"""Length of the road behind the ego vehicle's start."""
 
 
 def street(rng: np.random.Generator, seconds: float, height_m: float) -> World:
-    """Houses, gardens, trees, parked and moving traffic and people along a gently winding street."""
+    """A winding street with houses, gardens, trees, parked and moving traffic and pedestrians."""
     knots = rng.uniform(4.0, 8.0, max(3, round(seconds / 2.5) + 1))
     if seconds >= 8:
         knots[len(knots) // 2] = rng.uniform(0.5, 2.5)
     speed = np.interp(np.linspace(0, 1, 200), np.linspace(0, 1, len(knots)), knots)
-    time, travelled = timetable(seconds, speed, MARGIN_M)
+    time, travelled = timetable(seconds, speed, LEAD_IN_M)
     road = residential(rng, float(travelled[-1]))
-    builder = Builder(rng, seconds)
+    builder = SceneBuilder(rng, seconds)
     roadside.cyclists(builder, road, 0.0, 2)
-    roadside.crossers(builder, road, rng.uniform(20.0, 50.0), int(rng.integers(0, 4)))
+    roadside.crossing_pedestrians(builder, road, rng.uniform(20.0, 50.0), int(rng.integers(0, 4)))
     roadside.traffic(builder, road, 0.0, float(speed.mean()))
     share = rng.uniform(0.3, 0.75)
     for side in (-1, 1):
-        roadside.people(builder, road, side, apart_m=16.0)
+        roadside.pedestrians(builder, road, side, apart_m=16.0)
         roadside.parked(builder, road, side, share)
-    dress(builder, road)
+    furnish(builder, road)
     ego = Path(road.lane(-road.half_m * roadside.LANE), time, travelled)
-    low, high = (road.start_m, -BESIDE_M), (road.end_m, BESIDE_M)
-    return builder.world(terrain(rng, [road], low, high), ego, height_m)
+    return builder.world(terrain_along(rng, road), ego, height_m)
 
 
 def residential(rng: np.random.Generator, travelled_m: float) -> Road:
-    """A road of a quarter where people live."""
+    """A road of random width and bend, with room ahead of travelled_m."""
     return Road(
-        start_m=-MARGIN_M,
+        start_m=-LEAD_IN_M,
         end_m=travelled_m + 40.0,
         half_m=rng.uniform(3.6, 4.6),
         pavement_m=rng.uniform(1.8, 2.8),
@@ -49,9 +48,9 @@ def residential(rng: np.random.Generator, travelled_m: float) -> Road:
     )
 
 
-def dress(builder: Builder, road: Road, wild: float = 1.0) -> None:
-    """Houses, gardens, more or less overgrown, and street furniture on both sides."""
+def furnish(builder: SceneBuilder, road: Road, vegetation: float = 1.0) -> None:
+    """Add houses, gardens and street furniture on both sides."""
     density = builder.rng.uniform(0.5, 0.95)
     for side in (-1, 1):
-        roadside.houses(builder, road, side, density, wild)
+        roadside.houses(builder, road, side, density, vegetation)
         roadside.furniture(builder, road, side)

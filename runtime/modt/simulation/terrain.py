@@ -1,4 +1,4 @@
-"""The ground: a map of heights and surfaces, and where the rays meet it."""
+"""The ground: a grid of heights and materials, and its intersection with rays."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from modt.types import Float32, Float64, Int
 
 UInt8 = NDArray[np.uint8]
 
-STEPS = 3
-"""Fixed-point steps from a ray to the ground it meets."""
+N_ITERATIONS = 3
+"""Fixed-point iterations of the intersection of a ray with the ground."""
 
 
 @dataclass(frozen=True)
 class Terrain:
-    """Heights and surfaces on a square grid; beyond its edge the border goes on.
+    """Heights and materials on a square grid, constant beyond its border.
 
     Attributes:
-        corner: (2,) world coordinates of the first cell [m].
+        corner: (2,) of the first cell [m, world].
         cell_m: side of a cell.
         height: (X, Y) height of the ground [m, world].
-        surface: (X, Y) its material.
+        surface: (X, Y) its Material.
     """
 
     corner: Float64
@@ -44,18 +44,13 @@ class Terrain:
 
     def heights(self, x: Float64, y: Float64) -> Float64:
         """(n,) height of the ground under each point [m, world]."""
-        at: Float64 = self.height.ravel()[self.cells(x.astype(np.float32), y.astype(np.float32))].astype(np.float64)
-        return at
-
-    def height_at(self, x: float, y: float) -> float:
-        """Height of the ground [m, world]."""
-        cell = self.cells(np.array([x], np.float32), np.array([y], np.float32))
-        return float(self.height.ravel()[cell[0]])
+        cell = self.cells(x.astype(np.float32), y.astype(np.float32))
+        return np.asarray(self.height.ravel()[cell], np.float64)
 
     def cast(self, caster: RayCaster, T_world_sensor: Float64) -> tuple[Float32, UInt8]:
-        """(B, A) horizontal distance to the ground [m], infinite where a ray misses it, and the surface met.
+        """(B, A) horizontal distance to the ground [m], infinite where a ray misses it, and its material.
 
-        Raised ground beside the road is reached by stepping each ray to the height last found beneath its end.
+        Fixed-point iteration: each ray is intersected with the plane at the height below its last intersection.
         """
         sensor = caster.sensor
         distance = np.full(sensor.shape, np.inf, np.float32)
@@ -69,12 +64,12 @@ class Terrain:
         d = [(R[i, 0] * caster.cos + R[i, 1] * caster.sin) + R[i, 2] * tangent for i in range(3)]
         start = [np.float32(t[i]) + R[i, 2] * origin for i in range(3)]
         fall = np.minimum(d[2], np.float32(-1e-4))
-        height = np.float32(self.height_at(float(t[0]), float(t[1])))
+        height = np.float32(self.heights(t[:1], t[1:2])[0])
         reach = np.float32(sensor.max_range_m)
         inverse = 1 / fall
         s = (height - start[2]) * inverse
         flat = self.height.ravel()
-        for _ in range(STEPS):
+        for _ in range(N_ITERATIONS):
             s = np.minimum(s, reach)
             cell = self.cells(start[0] + s * d[0], start[1] + s * d[1])
             s = (flat[cell] - start[2]) * inverse

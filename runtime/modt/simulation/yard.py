@@ -1,30 +1,31 @@
-"""A yard and a hall, for small robots."""
+"""A yard and a hall for small robots."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from modt.simulation import kinds, scenery
-from modt.simulation.builder import Builder
+from modt.simulation.builder import SceneBuilder
 from modt.simulation.materials import Material
 from modt.simulation.motion import Path, timetable
-from modt.simulation.solids import Pieces, box, cylinder, limb
+from modt.simulation.road import CELL_M
+from modt.simulation.solids import Solids, box, cylinder, rod
 from modt.simulation.terrain import Terrain
 from modt.simulation.world import World
 from modt.types import Float64
 
-CELL_M = 0.25
 ROBOT_MPS = (0.6, 1.4)
+"""Range of the robot's speed."""
 
 
 def yard(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     """A walled yard with a few cars, pallets, bins, bicycles and people."""
     half = (rng.uniform(18.0, 30.0), rng.uniform(14.0, 24.0))
-    builder = Builder(rng, seconds)
-    ego = _loop(rng, seconds, (half[0] - 6, half[1] - 6))
+    builder = SceneBuilder(rng, seconds)
+    ego = _round_trip(rng, seconds, (half[0] - 6, half[1] - 6))
     _walkers(builder, half, 8)
     for _ in range(3):
-        line = _stroll(rng, (half[0] - 2, half[1] - 2))
+        line = _way_points(rng, (half[0] - 2, half[1] - 2))
         builder.cyclist(Path.steady(line, 0.0, 2.5, seconds), 2.5)
     for _ in range(int(rng.integers(2, 6))):
         x, y = rng.uniform(-half[0] + 3, half[0] - 3), float(rng.choice([-1, 1])) * (half[1] - 3)
@@ -48,8 +49,8 @@ def yard(rng: np.random.Generator, seconds: float, height_m: float) -> World:
 def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     """A hall with pillars, tables, shelves, a ceiling and people."""
     half = (rng.uniform(9.0, 16.0), rng.uniform(7.0, 11.0))
-    builder = Builder(rng, seconds)
-    ego = _loop(rng, seconds, (half[0] - 3.5, half[1] - 3.5))
+    builder = SceneBuilder(rng, seconds)
+    ego = _round_trip(rng, seconds, (half[0] - 3.5, half[1] - 3.5))
     _walkers(builder, half, 6)
     ceiling = max(rng.uniform(2.7, 4.0), height_m + 0.8)
     for x in np.arange(-half[0] + 3, half[0], 6.0):
@@ -65,7 +66,7 @@ def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     return builder.world(_floor(rng, half, Material.FLOOR, 0.002), ego, height_m, sway_rad=0.003)
 
 
-def pallets(rng: np.random.Generator) -> Pieces:
+def pallets(rng: np.random.Generator) -> Solids:
     """A stack of pallets or crates."""
     layers, z = int(rng.integers(1, 5)), 0.0
     parts = []
@@ -76,30 +77,27 @@ def pallets(rng: np.random.Generator) -> Pieces:
             box((shift[0], shift[1], z + height / 2), (1.2, 0.8, height), Material.WOOD, rng.normal(0, 0.05))
         )
         z += height
-    return Pieces.join(parts)
+    return Solids.join(parts)
 
 
-def table(rng: np.random.Generator) -> Pieces:
+def table(rng: np.random.Generator) -> Solids:
     """A table on four legs."""
     long, deep, tall = rng.uniform(1.0, 2.0), rng.uniform(0.6, 0.9), rng.uniform(0.7, 0.78)
     legs = [(i * (long / 2 - 0.05), j * (deep / 2 - 0.05)) for i in (-1, 1) for j in (-1, 1)]
     top = box((0, 0, tall), (long, deep, 0.04), Material.WOOD)
-    return Pieces.join([top, *(cylinder((x, y, tall / 2), 0.03, tall, Material.METAL) for x, y in legs)])
+    return Solids.join([top, *(cylinder((x, y, tall / 2), 0.03, tall, Material.METAL) for x, y in legs)])
 
 
-def chair(rng: np.random.Generator) -> Pieces:
+def chair(rng: np.random.Generator) -> Solids:
     """A chair."""
-    legs = [
-        limb((i * 0.2, j * 0.2, 0.0), (i * 0.18, j * 0.18, 0.45), 0.018, Material.METAL)
-        for i in (-1, 1)
-        for j in (-1, 1)
-    ]
+    corners = [(i, j) for i in (-1, 1) for j in (-1, 1)]
+    legs = [rod((i * 0.2, j * 0.2, 0.0), (i * 0.18, j * 0.18, 0.45), 0.018, Material.METAL) for i, j in corners]
     back = box((-0.21, 0, 0.75), (0.04, 0.42, 0.35), Material.WOOD)
-    return Pieces.join([box((0, 0, 0.46), (0.45, 0.45, 0.05), Material.WOOD), back, *legs])
+    return Solids.join([box((0, 0, 0.46), (0.45, 0.45, 0.05), Material.WOOD), back, *legs])
 
 
-def shelf(rng: np.random.Generator) -> Pieces:
-    """Shelves with things on them."""
+def shelf(rng: np.random.Generator) -> Solids:
+    """Shelves with boxes on them."""
     long, tall = rng.uniform(1.0, 2.5), rng.uniform(1.4, 2.2)
     boards = [box((0, 0, z), (long, 0.4, 0.03), Material.METAL) for z in np.arange(0.1, tall, 0.4)]
     sides = [box((s * long / 2, 0, tall / 2), (0.04, 0.4, tall), Material.METAL) for s in (-1, 1)]
@@ -107,16 +105,16 @@ def shelf(rng: np.random.Generator) -> Pieces:
         box((rng.uniform(-0.4, 0.4) * long, 0, z + 0.13), (rng.uniform(0.1, 0.5), 0.3, 0.25), Material.WOOD)
         for z in np.arange(0.1, tall, 0.4)
     ]
-    return Pieces.join([*boards, *sides, *things])
+    return Solids.join([*boards, *sides, *things])
 
 
-def _stroll(rng: np.random.Generator, half: tuple[float, float]) -> Float64:
-    """A line through a few places."""
+def _way_points(rng: np.random.Generator, half: tuple[float, float]) -> Float64:
+    """(6, 2) random way points."""
     return rng.uniform(-1, 1, (6, 2)) * half
 
 
-def _loop(rng: np.random.Generator, seconds: float, half: tuple[float, float]) -> Path:
-    """A round trip that the robot makes, stopping once."""
+def _round_trip(rng: np.random.Generator, seconds: float, half: tuple[float, float]) -> Path:
+    """Round trips of the robot with one stop."""
     angle = np.linspace(0, 2 * np.pi, 60) + rng.uniform(0, 2 * np.pi)
     line = np.stack([half[0] * 0.8 * np.cos(angle), half[1] * 0.8 * np.sin(angle)], axis=1)
     knots = rng.uniform(*ROBOT_MPS, 6)
@@ -126,17 +124,19 @@ def _loop(rng: np.random.Generator, seconds: float, half: tuple[float, float]) -
     return Path(np.concatenate([line[:1], *([line[1:]] * laps)]), *timetable(seconds, speed))
 
 
-def _walkers(builder: Builder, half: tuple[float, float], n: int) -> None:
+def _walkers(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
     rng = builder.rng
     for _ in range(n):
         speed = float(np.clip(rng.normal(1.2, 0.2), 0.6, 1.8))
-        builder.pedestrian(Path.steady(_stroll(rng, (half[0] - 1, half[1] - 1)), 0.0, speed, builder.seconds), speed)
+        builder.pedestrian(
+            Path.steady(_way_points(rng, (half[0] - 1, half[1] - 1)), 0.0, speed, builder.seconds), speed
+        )
     for _ in range(n // 2):
         x, y = rng.uniform(-1, 1, 2) * (half[0] - 1, half[1] - 1)
         builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)))
 
 
-def _enclose(builder: Builder, half: tuple[float, float], height: float) -> None:
+def _enclose(builder: SceneBuilder, half: tuple[float, float], height: float) -> None:
     for long, across, turn in ((half[0], half[1], 0.0), (half[1], half[0], np.pi / 2)):
         for side in (-1, 1):
             wall = box((0.0, 0.0, height / 2), (2 * long + 0.6, 0.3, height), Material.WALL)
@@ -144,7 +144,7 @@ def _enclose(builder: Builder, half: tuple[float, float], height: float) -> None
             builder.scenery(wall, x, y, turn)
 
 
-def _floor(rng: np.random.Generator, half: tuple[float, float], material: int, rough_m: float) -> Terrain:
+def _floor(rng: np.random.Generator, half: tuple[float, float], material: int, roughness_m: float) -> Terrain:
     shape = (int(2 * (half[0] + 5) / CELL_M), int(2 * (half[1] + 5) / CELL_M))
-    height = rng.standard_normal(shape, np.float32) * np.float32(rough_m)
+    height = rng.standard_normal(shape, np.float32) * np.float32(roughness_m)
     return Terrain(np.array([-half[0] - 5, -half[1] - 5]), CELL_M, height, np.full(shape, material, np.uint8))

@@ -1,1 +1,1 @@
-"""Where results go."""
+"""Sinks: formats and files of results."""

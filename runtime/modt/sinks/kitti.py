@@ -1,4 +1,4 @@
-"""KITTI tracking results: foreground objects in the camera's coordinates."""
+"""KITTI tracking results, in camera coordinates."""
 
 from __future__ import annotations
 
@@ -6,39 +6,39 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.classes import ObjectClass
-from modt.geometry import Camera, corners, transform
+from modt.classes import CLASSES, ObjectClass
+from modt.geometry import Camera, corners, transform, wrap
 from modt.sinks.output import LineFile, writing
-from modt.types import NONE, FrameResult
+from modt.types import NONE, Float64, FrameResult, Int
 
-NAMES = {ObjectClass.CAR: "Car", ObjectClass.PEDESTRIAN: "Pedestrian", ObjectClass.CYCLIST: "Cyclist"}
+KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
 
-NOMINAL = Camera(
+NO_CAMERA = Camera(
     P_image_sensor=np.zeros((3, 4)),
     T_camera_sensor=np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]),
     width_px=0.0,
     height_px=0.0,
 )
-"""Stands in where there is no camera: its axes at the sensor's place, no image."""
+"""Camera axes at the origin of the sensor, without an image."""
 
 
 class KittiResults:
-    """Writes kitti/NNNN.txt: frame, id, type, box in the image, size, place, heading, score.
+    """Writes kitti/NNNN.txt: frame, id, type, image box, size, position, heading, score.
 
     Args:
         path: of the file.
-        camera: that the results refer to; without one the axes are a camera's at the place of the sensor, and the
-            box in the image is -1 throughout.
+        camera: reference of the coordinates; without one they are camera axes at the sensor's origin, and image boxes
+            are -1.
     """
 
     def __init__(self, path: Path, camera: Camera | None) -> None:
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-        self._lines = LineFile(path)
-        self._camera = camera or NOMINAL
+        self._lines = LineFile[str](path)
+        self._camera = camera or NO_CAMERA
 
     def write(self, result: FrameResult) -> None:
-        """Append the frame's objects: tracks of a foreground class that are seen.
+        """Append the frame's objects: tracks of a foreground class that have a proposal.
 
         Raises:
             ModtError: the file cannot be written.
@@ -49,46 +49,33 @@ class KittiResults:
         if not len(rows):
             return
         boxes = result.proposals.box[tracks.proposal[rows]]
-        cut = result.proposals.truncated[tracks.proposal[rows]]
+        truncated = result.proposals.truncated[tracks.proposal[rows]].astype(np.int64)
         T = self._camera.T_camera_sensor
-        foot = transform(T, boxes[:, :3] - np.array([0, 0, 0.5]) * boxes[:, 5:6])
+        bottom = transform(T, boxes[:, :3] - np.array([0, 0, 0.5]) * boxes[:, 5:6])
         ahead = np.stack([np.cos(boxes[:, 6]), np.sin(boxes[:, 6]), np.zeros(len(boxes))], axis=1) @ T[:3, :3].T
-        turn = np.arctan2(-ahead[:, 2], ahead[:, 0])
-        alpha = turn - np.arctan2(foot[:, 0], foot[:, 2])
-        alpha = (alpha + np.pi) % (2 * np.pi) - np.pi
+        ry = np.arctan2(-ahead[:, 2], ahead[:, 0])
+        alpha = wrap(ry - np.arctan2(bottom[:, 0], bottom[:, 2]))
         score = tracks.posterior[rows, class_[rows]]
-        columns = (
-            tracks.id[rows],
-            class_[rows],
-            cut,
-            alpha,
-            self._image_boxes(boxes),
-            boxes[:, 3:6],
-            foot,
-            turn,
-            score,
-        )
+        image_box = self._image_boxes(boxes)
+        columns = (tracks.id[rows], class_[rows], truncated, alpha, image_box, boxes[:, 3:6], bottom, ry, score)
         text = "".join(
-            f"{result.frame.index} {id_} {NAMES[ObjectClass(kind)]} {int(cut_)} -1 {alpha_:.4f} "
+            f"{result.frame.index} {id_} {KITTI_TYPES[c]} {cut} -1 {a:.4f} "
             f"{i[0]:.2f} {i[1]:.2f} {i[2]:.2f} {i[3]:.2f} {lwh[2]:.3f} {lwh[1]:.3f} {lwh[0]:.3f} "
-            f"{at[0]:.3f} {at[1]:.3f} {at[2]:.3f} {turn_:.4f} {score_:.6f}\n"
-            for id_, kind, cut_, alpha_, i, lwh, at, turn_, score_ in zip(*(c.tolist() for c in columns), strict=True)
+            f"{at[0]:.3f} {at[1]:.3f} {at[2]:.3f} {r:.4f} {s:.6f}\n"
+            for id_, c, cut, a, i, lwh, at, r, s in zip(*(c.tolist() for c in columns), strict=True)
         )
         self._lines.write(text)
 
     def close(self) -> None:
-        """No more will come."""
+        """Close the file."""
         self._lines.close()
 
-    def _image_boxes(self, boxes: np.ndarray) -> np.ndarray:
-        """(n, 4) left, top, right, bottom [pixel]; -1 for what lies behind the camera."""
-        ground = corners(boxes)
+    def _image_boxes(self, boxes: Float64) -> Float64:
+        """(n, 4) left, top, right, bottom [pixel]; -1 for boxes behind the camera."""
         z = boxes[:, 2, None] + np.array([-0.5, 0.5]) * boxes[:, 5, None]
-        eight = np.concatenate(
-            [np.concatenate([ground, np.repeat(z[:, k, None, None], 4, axis=1)], axis=2) for k in (0, 1)], axis=1
-        )
+        xyz = np.dstack([corners(boxes).repeat(2, axis=1), np.tile(z, 4)])
         P = self._camera.P_image_sensor
-        uvw = eight @ P[:, :3].T + P[:, 3]
+        uvw = xyz @ P[:, :3].T + P[:, 3]
         out = np.full((len(boxes), 4), -1.0)
         ahead = (uvw[..., 2] > 0.1).all(axis=1)
         uv = uvw[ahead, :, :2] / uvw[ahead, :, 2:]
@@ -96,3 +83,25 @@ class KittiResults:
         out[ahead, :2] = np.clip(uv.min(axis=1), 0, limit)
         out[ahead, 2:] = np.clip(uv.max(axis=1), 0, limit)
         return out
+
+
+def box_lines(
+    frame: Int, kitti_type: str, ids: Int, image_box: Float64, hwlxyzry: Float64, score: Float64
+) -> list[str]:
+    """Lines of KITTI's tracking format with a score, for boxes of another detector.
+
+    Args:
+        frame: (n,) index of the frame.
+        kitti_type: object type.
+        ids: (n,) of the tracks.
+        image_box: (n, 4) left, top, right, bottom [pixel].
+        hwlxyzry: (n, 7) h, w, l, x, y, z [m], ry [rad] in camera coordinates.
+        score: (n,).
+    """
+    alpha = wrap(hwlxyzry[:, 6] - np.arctan2(hwlxyzry[:, 3], hwlxyzry[:, 5]))
+    columns = (frame, ids, alpha, image_box, hwlxyzry, score)
+    return [
+        f"{f} {i} {kitti_type} 0 0 {a:.4f} {b[0]:.2f} {b[1]:.2f} {b[2]:.2f} {b[3]:.2f} "
+        f"{d[0]:.4f} {d[1]:.4f} {d[2]:.4f} {d[3]:.4f} {d[4]:.4f} {d[5]:.4f} {d[6]:.4f} {s:.4f}\n"
+        for f, i, a, b, d, s in zip(*(column.tolist() for column in columns), strict=True)
+    ]

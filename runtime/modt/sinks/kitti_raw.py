@@ -1,4 +1,4 @@
-"""Writes a synthetic stream as a KITTI raw drive and as a SemanticKITTI sequence."""
+"""Synthetic drives as a KITTI raw drive and a SemanticKITTI sequence."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from modt.geometry import Camera, FieldOfView, inverse, se3
 from modt.simulation.simulator import Truth
 from modt.sinks.kitti_tracklets import Tracklets
-from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Float64, Frame
 
 DATE, START = "2020_01_01", datetime(2020, 1, 1, 12)
@@ -23,22 +22,20 @@ UInt32 = NDArray[np.uint32]
 
 
 class DriveWriter:
-    """A raw drive DIR/DATE/DATE_drive_0000_sync and a sequence DIR/sequences/00, frame by frame.
+    """Writes a raw drive DIR/DATE/DATE_drive_0000_sync and a sequence DIR/sequences/00.
 
-    The scans of the sequence are the drive's (hard links where the file system has them).
+    The scans of the sequence are hard links to those of the drive, copies where the file system has no links.
 
     Args:
         folder: DIR.
-        stream: what is written.
-        all_around: annotate every body that is seen, not only what the camera sees.
+        camera: of the stream; the calibration files describe it.
+        all_around: annotate every visible body, not only those in the camera's view.
 
     Raises:
         OSError: a file cannot be written.
     """
 
-    def __init__(self, folder: Path, stream: SyntheticStream, *, all_around: bool = False) -> None:
-        camera = stream.info.camera
-        assert camera is not None
+    def __init__(self, folder: Path, camera: Camera, *, all_around: bool = False) -> None:
         self.drive = folder / DATE / f"{DATE}_drive_0000_sync"
         self.sequence = folder / "sequences" / "00"
         self._scans, self._oxts = self.drive / "velodyne_points", self.drive / "oxts"
@@ -53,7 +50,7 @@ class DriveWriter:
         self._poses: list[Float64] = []
 
     def write(self, frame: Frame, truth: Truth) -> None:
-        """One frame."""
+        """Write one frame."""
         assert frame.T_world_sensor is not None
         name = f"{frame.index:010d}"
         scan = self._scans / "data" / f"{name}.bin"
@@ -71,15 +68,15 @@ class DriveWriter:
         self._tracklets.add(frame.index, truth)
 
     def close(self) -> None:
-        """What can only be written at the end: poses, times, tracklets."""
+        """Write poses, times and tracklets."""
         stamp_s, half_s = np.array(self._stamps), np.array(self._turns) / 2
-        for place, times_s in (
+        for path, times_s in (
             (self._scans / "timestamps.txt", stamp_s),
             (self._scans / "timestamps_start.txt", stamp_s - half_s),
             (self._scans / "timestamps_end.txt", stamp_s + half_s),
             (self._oxts / "timestamps.txt", stamp_s),
         ):
-            place.write_text("".join(_time(s) for s in times_s.tolist()), encoding="ascii")
+            path.write_text("".join(_time(s) for s in times_s.tolist()), encoding="ascii")
         for i, record in enumerate(oxts_records(np.array(self._poses), stamp_s)):
             text = " ".join(f"{v:.14g}" for v in record[:25]) + " 4 10 4 4 0\n"
             (self._oxts / "data" / f"{i:010d}.txt").write_text(text, encoding="ascii")
@@ -92,7 +89,7 @@ class DriveWriter:
 
 
 def label(truth: Truth) -> UInt32:
-    """(N,) SemanticKITTI labels: instance in the upper 16 bits, 0 for none, class in the lower."""
+    """(N,) SemanticKITTI labels: class in the lower 16 bits, instance in the upper, 0 for none."""
     number = np.minimum(np.searchsorted(truth.bodies, truth.instance), len(truth.bodies) - 1)
     named = len(truth.bodies) > 0 and truth.bodies[number] == truth.instance
     instance = np.where(named, number + 1, 0).astype(np.uint32)
@@ -101,11 +98,11 @@ def label(truth: Truth) -> UInt32:
 
 
 def oxts_records(T_world_sensor: Float64, stamp_s: Float64) -> Float64:
-    """(n, 30) OXTS records of sensor poses (n, 4, 4): place, attitude and velocities; what is not known is zero."""
+    """(n, 30) OXTS records of sensor poses (n, 4, 4): position, attitude and velocities; other fields are zero."""
     T = T_world_sensor @ T_SENSOR_IMU
     lat0, lon0 = np.deg2rad(ORIGIN_DEG)
     north0, scale = np.log(np.tan(np.pi / 4 + lat0 / 2)), np.cos(lat0)
-    for _ in range(4):  # readers scale by the latitude of the first record, which lies a little off the origin
+    for _ in range(4):  # readers scale by the latitude of the first record, not by that of the origin
         lat = 2 * np.arctan(np.exp(north0 + T[:, 1, 3] / (scale * EARTH_RADIUS_M))) - np.pi / 2
         scale = np.cos(lat[0])
     lon = lon0 + T[:, 0, 3] / (scale * EARTH_RADIUS_M)

@@ -1,4 +1,4 @@
-"""KITTI's tracklet file: where every annotated body was, frame by frame."""
+"""KITTI's tracklet file: poses of the annotated bodies, frame by frame."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ HEADER = """<?xml version="1.0" encoding="UTF-8" standalone="yes" ?>
 <boost_serialization signature="serialization::archive" version="9">
 <tracklets class_id="0" tracking_level="0" version="0">
 """
-UNSEEN, VISIBLE, PARTLY, LARGELY = -1, 0, 1, 2
-SPARSE = 20
-"""A body of fewer points counts as largely occluded."""
+VISIBLE, LARGELY_OCCLUDED = 0, 2
+MIN_VISIBLE_POINTS = 20
+"""Bodies of fewer points are annotated as largely occluded."""
 
 
 @dataclass
@@ -28,10 +28,10 @@ class _Track:
 
 
 class Tracklets:
-    """Gathers the truth of a drive; a body's tracklet runs from the first frame that shows it to the last.
+    """Tracklets of a drive; a tracklet runs from the first frame with points of the body in view to the last.
 
     Args:
-        fov: what is annotated; KITTI annotates what its left colour camera sees.
+        fov: annotated field of view; KITTI's is that of its left colour camera.
     """
 
     def __init__(self, fov: FieldOfView) -> None:
@@ -39,7 +39,7 @@ class Tracklets:
         self._tracks: dict[int, _Track] = {}
 
     def add(self, frame: int, truth: Truth) -> None:
-        """One frame's truth."""
+        """Add the truth of one frame."""
         inside = self.fov.depth(truth.boxes[:, :3])
         for row, (body, kind) in enumerate(zip(truth.bodies.tolist(), truth.kinds, strict=True)):
             x, y, z, length, width, height, yaw = truth.boxes[row].tolist()
@@ -49,7 +49,7 @@ class Tracklets:
                     continue
                 self._tracks[body] = _Track(kind.name, (height, width, length))
             track = self._tracks[body]
-            hidden = LARGELY if truth.points[row] < SPARSE else VISIBLE
+            hidden = LARGELY_OCCLUDED if truth.points[row] < MIN_VISIBLE_POINTS else VISIBLE
             truncated = 1 if abs(inside[row]) < length / 2 else 0
             track.poses[frame] = (x, y, z - height / 2, yaw, hidden, truncated)
             if shown:

@@ -1,4 +1,4 @@
-"""Point labels in SemanticKITTI's encoding: which proposal and class each point of the input scan belongs to."""
+"""Point labels in SemanticKITTI's format: proposal and class of each point of the input scan."""
 
 from __future__ import annotations
 
@@ -9,14 +9,13 @@ import numpy as np
 from modt.sinks.output import writing
 from modt.types import NONE, FrameResult
 
-HIGHEST = 0xFFFF
+MAX_INSTANCE = 0xFFFF
 
 
 class PointLabels:
-    """Writes NNNNNN.label, one u32 a point in the order of the input scan.
+    """Writes NNNNNN.label, one u32 per point in the order of the input scan.
 
-    The upper 16 bits hold the proposal's number in the frame plus one (0: none), the lower 16 bits the class of the
-    track that owns it.
+    Upper 16 bits: index of the proposal in the frame plus one, 0 for none. Lower 16 bits: class of its track.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -35,14 +34,14 @@ class PointLabels:
             path.write_bytes(encode(result).tobytes())
 
     def close(self) -> None:
-        """Nothing stays open."""
+        """No file is open."""
 
 
 def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
     """(N,) label of each point of the frame."""
     rows = result.tracks.row_of_proposal(len(result.proposals))
     classes = result.tracks.object_class[rows]
-    code = np.minimum(np.arange(len(rows)) + 1, HIGHEST) << 16 | np.where(rows == NONE, 0, classes)
+    code = np.minimum(np.arange(len(rows)) + 1, MAX_INSTANCE) << 16 | np.where(rows == NONE, 0, classes)
     out = np.zeros(len(result.frame.points), np.uint32)
     out[result.proposals.members] = np.repeat(code, result.proposals.count).astype(np.uint32)
     return out

@@ -1,18 +1,20 @@
-"""Files that results go to: every write reaches the system before it returns, every failure is one clear error."""
+"""Output files: unbuffered writes, and failures as errors with a remedy."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Generic, TypeVar
 
 from modt.errors import ModtError
+
+T = TypeVar("T")
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn a failure of the file system into an error that says what to do.
+    """Convert a failure of the file system to an error with a remedy.
 
     Raises:
         ModtError: the file cannot be written.
@@ -21,25 +23,31 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         cause = f"cannot be written ({error.strerror or error})"
-        remedy = "free or unlock the disk, or give another --out; what was recorded before is whole"
+        remedy = "free or unlock the disk, or give another --out; what was recorded before is intact"
         raise ModtError(path, cause, remedy) from None
 
 
-class LineFile:
-    """A text file that grows by whole lines, each handed to the system at once."""
+class LineFile(Generic[T]):
+    """An unbuffered text file of whole lines.
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    Args:
+        path: of the file.
+        encode: lines of an item.
+    """
+
+    def __init__(self, path: Path, encode: Callable[[T], str] = str) -> None:
+        self.path, self._encode = path, encode
         with writing(path):
             self._file: BinaryIO = path.open("wb", buffering=0)
 
-    def write(self, text: str) -> None:
-        """Append lines; a partial line left by a full disk is taken back.
+    def write(self, item: T, /) -> None:
+        """Append the lines of an item; a partial line on a full disk is removed.
 
         Raises:
             ModtError: the file cannot be written.
+            ValueError: the item cannot be encoded.
         """
-        data = text.encode()
+        data = self._encode(item).encode()
         with writing(self.path):
             whole = self._file.tell()
             try:
@@ -52,6 +60,6 @@ class LineFile:
                 raise
 
     def close(self) -> None:
-        """No more will come."""
+        """Close the file."""
         with writing(self.path):
             self._file.close()

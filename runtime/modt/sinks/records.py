@@ -1,4 +1,4 @@
-"""Records as JSON Lines: one object a line, each with its schema's name."""
+"""JSON Lines: one record per line, each with the name of its schema."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ log = logging.getLogger(__name__)
 
 
 def line(record: dict[str, Any]) -> str:
-    """The line of a record.
+    """Line of a record.
 
     Raises:
         ValueError: a number is not finite.
@@ -23,35 +23,23 @@ def line(record: dict[str, Any]) -> str:
     return json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-class JsonLines:
+class JsonLines(LineFile[dict[str, Any]]):
     """A growing file of records."""
 
     def __init__(self, path: Path) -> None:
-        self._lines = LineFile(path)
-
-    def write(self, record: dict[str, Any]) -> None:
-        """Append one record.
-
-        Raises:
-            ModtError: the file cannot be written.
-        """
-        self._lines.write(line(record))
-
-    def close(self) -> None:
-        """No more will come."""
-        self._lines.close()
+        super().__init__(path, line)
 
 
-def read_records(path: Path, schema: str, beside: Collection[str] = ()) -> Iterator[dict[str, Any]]:
-    """Records of a file, in order; a last line cut short by a killed run is left out.
+def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iterator[dict[str, Any]]:
+    """Records of a file, in order, without an incomplete last line of an aborted run.
 
     Args:
-        path: a file that JsonLines wrote, complete or still growing.
-        schema: the schema's name that every record must bear.
-        beside: schemas of other records in the file, which are passed over.
+        path: a file written by JsonLines, possibly still growing.
+        schema: required of every record.
+        ignored: schemas of other records, which are skipped.
 
     Raises:
-        MisuseError: missing, unreadable, or not of this schema; it names the line.
+        MisuseError: missing, unreadable, or of another schema; the error names the line.
     """
     try:
         with path.open(encoding="utf-8") as lines:
@@ -61,10 +49,10 @@ def read_records(path: Path, schema: str, beside: Collection[str] = ()) -> Itera
                 except json.JSONDecodeError:
                     if text.endswith("\n"):
                         raise MisuseError(f"{path}:{number}", "no JSON", "give a file that modt wrote") from None
-                    log.warning("%s:%d: last line cut short, left out", path, number)
+                    log.warning("%s:%d: incomplete last line ignored", path, number)
                     return
                 found = record.get("schema") if isinstance(record, dict) else None
-                if found in beside:
+                if found in ignored:
                     continue
                 if found != schema:
                     remedy = f"this version reads {schema}"

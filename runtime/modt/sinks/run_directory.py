@@ -15,14 +15,14 @@ RUN, TRACKS, LEDGER, SUMMARY = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summ
 
 
 class RunDirectory:
-    """Creates DIR; an earlier run that lies there is kept under another name.
+    """Creates DIR; an earlier run at that path is renamed.
 
     Attributes:
         path: the directory.
-        kept: where the earlier run went, None if there was none.
+        kept: new path of the earlier run, None if there was none.
 
     Raises:
-        MisuseError: the path is a file, or holds something that is no run.
+        MisuseError: the path is a file, or a directory that is no run.
         ModtError: it cannot be written.
     """
 
@@ -38,27 +38,27 @@ class RunDirectory:
                 )
                 path.rename(self.kept)
             elif path.is_dir() and any(path.iterdir()):
-                raise MisuseError(path, "holds something that is no run of modt", "give an empty or a new directory")
+                raise MisuseError(path, "holds files but no run", "give an empty or a new directory")
             path.mkdir(parents=True, exist_ok=True)
 
     def describe(self, text: str) -> None:
-        """Write run.yaml: what this run was made with."""
-        self._whole(RUN, text)
+        """Write run.yaml, the configuration of the run."""
+        self._write(RUN, text)
 
     def tracks(self) -> TrackLines:
-        """A fresh tracks.jsonl."""
+        """A new tracks.jsonl."""
         return TrackLines(self.path / TRACKS)
 
     def ledger(self) -> JsonLines:
-        """A fresh ledger.jsonl."""
+        """A new ledger.jsonl."""
         return JsonLines(self.path / LEDGER)
 
     def summarise(self, summary: dict[str, Any]) -> None:
         """Write summary.json."""
-        self._whole(SUMMARY, json.dumps(summary, indent=2) + "\n")
+        self._write(SUMMARY, json.dumps(summary, indent=2) + "\n")
 
-    def _whole(self, name: str, text: str) -> None:
-        """Write a file so that it is there whole or not at all."""
+    def _write(self, name: str, text: str) -> None:
+        """Write a file atomically."""
         path, partial = self.path / name, self.path / f".{name}.part"
         with writing(path):
             partial.write_text(text, encoding="utf-8")

@@ -1,31 +1,25 @@
-"""What every sink offers."""
+"""Interface of the sinks."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from modt.types import FrameResult
 
+T_contra = TypeVar("T_contra", contravariant=True)
 
-class Sink(Protocol):
-    """Takes results, frame by frame."""
 
-    def write(self, result: FrameResult) -> None:
-        """Keep one result; it is on its way to the disk when this returns."""
+class Writer(Protocol[T_contra]):
+    """Takes items one by one."""
+
+    def write(self, item: T_contra, /) -> None:
+        """Write one item; it has reached the operating system on return."""
         ...
 
     def close(self) -> None:
-        """No more will come."""
+        """Close the files."""
         ...
 
 
-class LineSink(Protocol):
-    """Takes records, line by line."""
-
-    def write(self, record: dict[str, Any]) -> None:
-        """Keep one record."""
-        ...
-
-    def close(self) -> None:
-        """No more will come."""
-        ...
+Sink = Writer[FrameResult]
+LineSink = Writer[dict[str, Any]]

@@ -1,7 +1,6 @@
-"""tracks.jsonl: what was known after every frame.
+"""tracks.jsonl: the tracks after every frame.
 
-`frame_record` says what a line holds. `frame_line` writes the same line at a fraction of the cost: nearly all of it
-is numbers, and those of all tracks are looked up at once.
+`frame_record` defines a line. `frame_line` writes the same line at a fraction of the cost, by table look-up.
 """
 
 from __future__ import annotations
@@ -14,7 +13,17 @@ from typing import Any
 import numpy as np
 
 from modt.classes import CLASS_NAMES
-from modt.sinks.fast_json import LIMIT, Words, beside, probabilities, table, text, thousandths, whole, words
+from modt.sinks.json_columns import (
+    LIMIT,
+    Text,
+    decode,
+    encode,
+    encode_table,
+    integers,
+    join_columns,
+    probabilities,
+    rounded_to_3,
+)
 from modt.sinks.output import LineFile
 from modt.sinks.records import line
 from modt.types import NONE, FrameResult
@@ -25,49 +34,34 @@ WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 
 
 def frame_record(result: FrameResult) -> dict[str, Any]:
-    """One result as plain data: lengths to the millimetre, probabilities to six digits."""
-    tracks, boxes = result.tracks, result.proposals.box
-    seen = tracks.proposal != NONE
-    shown = np.zeros((len(tracks), len(BOX_KEYS)))
-    shown[seen] = boxes[tracks.proposal[seen]]
-    columns = zip(
-        tracks.id.tolist(),
-        tracks.state.tolist(),
-        tracks.object_class.tolist(),
-        np.round(tracks.posterior, 6).tolist(),
-        tracks.viewed.tolist(),
-        tracks.final.tolist(),
-        tracks.proposal.tolist(),
-        tracks.points.tolist(),
-        tracks.age.tolist(),
-        tracks.missed.tolist(),
-        np.round(shown, 3).tolist(),
-        np.round(tracks.x, 3).tolist(),
-        strict=True,
-    )
-    return _around(result) | {
-        "tracks": [
-            {
-                "id": id_,
-                "state": result.state_names[state],
-                "class": CLASS_NAMES[class_],
-                "posterior": posterior,
-                "viewed": viewed,
-                "final": final,
-                "proposal": None if proposal == NONE else proposal,
-                "points": points,
-                "age": age,
-                "missed": missed,
-                "box": None if proposal == NONE else dict(zip(BOX_KEYS, box, strict=True)),
-                "world": dict(zip(WORLD_KEYS, world, strict=True)),
-            }
-            for id_, state, class_, posterior, viewed, final, proposal, points, age, missed, box, world in columns
+    """One result as plain data: lengths rounded to 1e-3, probabilities to 1e-6."""
+    tracks = result.tracks
+    tracked = tracks.proposal != NONE
+    box = np.zeros((len(tracks), len(BOX_KEYS)))
+    box[tracked] = result.proposals.box[tracks.proposal[tracked]]
+    columns = {
+        "id": tracks.id.tolist(),
+        "state": [result.state_names[state] for state in tracks.state.tolist()],
+        "class": [CLASS_NAMES[class_] for class_ in tracks.object_class.tolist()],
+        "posterior": np.round(tracks.posterior, 6).tolist(),
+        "viewed": tracks.viewed.tolist(),
+        "final": tracks.final.tolist(),
+        "proposal": [None if proposal == NONE else proposal for proposal in tracks.proposal.tolist()],
+        "points": tracks.points.tolist(),
+        "age": tracks.age.tolist(),
+        "missed": tracks.missed.tolist(),
+        "box": [
+            dict(zip(BOX_KEYS, row, strict=True)) if shown else None
+            for row, shown in zip(np.round(box, 3).tolist(), tracked.tolist(), strict=True)
         ],
+        "world": [dict(zip(WORLD_KEYS, row, strict=True)) for row in np.round(tracks.x, 3).tolist()],
     }
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+    return _frame_fields(result) | {"tracks": rows}
 
 
-def _around(result: FrameResult) -> dict[str, Any]:
-    """What a record says of the frame itself."""
+def _frame_fields(result: FrameResult) -> dict[str, Any]:
+    """Fields of a record other than its tracks."""
     return {
         "schema": SCHEMA,
         "frame": result.frame.index,
@@ -78,91 +72,74 @@ def _around(result: FrameResult) -> dict[str, Any]:
     }
 
 
-CLASSES = table([json.dumps(name) for name in CLASS_NAMES])
-TRUTH = table(["false", "true"])
-NULL = words("null")[0]
+CLASSES = encode_table([json.dumps(name) for name in CLASS_NAMES])
+BOOLEANS = encode_table(["false", "true"])
+NULL = encode("null")[0]
 
 
 def frame_line(result: FrameResult) -> str:
-    """The line of frame_record(result), the same to the last character.
+    """The line of frame_record(result), character by character.
 
     Raises:
-        ValueError: something is not finite.
+        ValueError: a number is not finite.
     """
     if not _in_tables(result):
         return line(frame_record(result))
-    tracks, n = result.tracks, len(result.tracks)
-    seen = tracks.proposal != NONE
+    tracks = result.tracks
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
-    id_, proposal, points, age, missed = whole(np.stack(counts))
-    box = _keyed(BOX_KEYS, thousandths(result.proposals.box[tracks.proposal]))
+    id_, proposal, points, age, missed = integers(np.stack(counts))
+    box = _objects(BOX_KEYS, rounded_to_3(result.proposals.box[tracks.proposal]))
     for value in (proposal, box):
-        value[~seen], value[~seen, 0] = 0, NULL
-    lines = beside(
-        n,
-        *(
-            ',{"id":',
-            id_,
-            ',"state":',
-            _states(result.state_names)[tracks.state],
-            ',"class":',
-            CLASSES[tracks.object_class],
-        ),
-        *(
-            ',"posterior":',
-            _listed(probabilities(tracks.posterior)),
-            ',"viewed":',
-            TRUTH[tracks.viewed.astype(np.int64)],
-            ',"final":',
-            TRUTH[tracks.final.astype(np.int64)],
-        ),
-        *(',"proposal":', proposal, ',"points":', points, ',"age":', age, ',"missed":', missed),
-        *(',"box":', box, ',"world":', _keyed(WORLD_KEYS, thousandths(tracks.x)), "}"),
-    )
-    around = line(_around(result) | {"tracks": []})
-    return around.replace('"tracks":[]', f'"tracks":[{text(lines)[1:]}]')
+        value[tracks.proposal == NONE] = 0
+        value[tracks.proposal == NONE, 0] = NULL
+    columns = {
+        "id": id_,
+        "state": _states(result.state_names)[tracks.state],
+        "class": CLASSES[tracks.object_class],
+        "posterior": _lists(probabilities(tracks.posterior)),
+        "viewed": BOOLEANS[tracks.viewed.astype(np.int64)],
+        "final": BOOLEANS[tracks.final.astype(np.int64)],
+        "proposal": proposal,
+        "points": points,
+        "age": age,
+        "missed": missed,
+        "box": box,
+        "world": _objects(WORLD_KEYS, rounded_to_3(tracks.x)),
+    }
+    keyed = [part for key, column in columns.items() for part in (f',"{key}":', column)]
+    keyed[0] = ',{"id":'
+    rows = decode(join_columns(len(tracks), *keyed, "}"))
+    return line(_frame_fields(result) | {"tracks": []}).replace('"tracks":[]', f'"tracks":[{rows[1:]}]')
 
 
 @lru_cache
-def _states(names: tuple[str, ...]) -> Words:
-    """(S, w) words of the states' names."""
-    return table([json.dumps(name) for name in names])
+def _states(names: tuple[str, ...]) -> Text:
+    """(S, w) text of the names of the states."""
+    return encode_table([json.dumps(name) for name in names])
 
 
 def _in_tables(result: FrameResult) -> bool:
-    """Whether every number can be looked up."""
+    """Whether the tables hold every number."""
     tracks, boxes = result.tracks, result.proposals.box
-    near = all((np.abs(lengths) < LIMIT - 1).all() for lengths in (tracks.x, boxes))
-    few = all((numbers < LIMIT).all() for numbers in (tracks.id, tracks.points, tracks.age, tracks.missed))
-    return bool(len(boxes) and near and few and (np.abs(tracks.posterior - 0.5) <= 0.5).all())
+    lengths = all((np.abs(values) < LIMIT - 1).all() for values in (tracks.x, boxes))
+    counts = all((values < LIMIT).all() for values in (tracks.id, tracks.points, tracks.age, tracks.missed))
+    return bool(len(boxes) and lengths and counts and (np.abs(tracks.posterior - 0.5) <= 0.5).all())
 
 
-def _keyed(keys: tuple[str, ...], values: Words) -> Words:
-    """(n, w) words of objects with these keys and values (n, k, v)."""
-    marks = [f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)]
-    return beside(len(values), *(piece for k, mark in enumerate(marks) for piece in (mark, values[:, k])), "}")
+def _objects(keys: tuple[str, ...], values: Text) -> Text:
+    """(n, w) text of JSON objects with some keys and values (n, k, v)."""
+    prefixes = [f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)]
+    return join_columns(len(values), *(p for k, prefix in enumerate(prefixes) for p in (prefix, values[:, k])), "}")
 
 
-def _listed(values: Words) -> Words:
-    """(n, w) words of lists of values (n, k, v)."""
-    marks = ["," if k else "[" for k in range(values.shape[1])]
-    return beside(len(values), *(piece for k, mark in enumerate(marks) for piece in (mark, values[:, k])), "]")
+def _lists(values: Text) -> Text:
+    """(n, w) text of JSON lists of values (n, k, v)."""
+    prefixes = ["," if k else "[" for k in range(values.shape[1])]
+    return join_columns(len(values), *(p for k, prefix in enumerate(prefixes) for p in (prefix, values[:, k])), "]")
 
 
-class TrackLines:
+class TrackLines(LineFile[FrameResult]):
     """Writes tracks.jsonl."""
 
     def __init__(self, path: Path) -> None:
-        self._lines = LineFile(path)
-
-    def write(self, result: FrameResult) -> None:
-        """Append one frame.
-
-        Raises:
-            ModtError: the file cannot be written.
-        """
-        self._lines.write(frame_line(result))
-
-    def close(self) -> None:
-        """No more will come."""
-        self._lines.close()
+        super().__init__(path, frame_line)

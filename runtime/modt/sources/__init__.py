@@ -1,1 +1,1 @@
-"""Streams of frames: KITTI layouts, bare scans, the synthetic world."""
+"""Sources of frames (KITTI layouts, folders of scans, the simulator) and of poses."""

@@ -1,10 +1,10 @@
-"""Detections that somebody else has made, one file a sequence.
+"""Boxes of another detector, one file a sequence.
 
-Two formats are recognised: AB3DMOT's 15 comma-separated columns (frame; type 1 Pedestrian, 2 Car, 3 Cyclist; left,
-top, right, bottom [pixel]; score; h, w, l, x, y, z [m], ry [rad]; alpha) and KITTI's tracking labels (frame, id,
-type, truncated, occluded, alpha, box, h, w, l, x, y, z, ry and a score; what has none is sure). Both are in the
-coordinates of the camera: x right, y down, z forward, the place being the middle of the foot. Scores are on the scale
-of PointRCNN's; where all of a detector's lie between 0 and 1 they are probabilities, and taken there.
+Two formats are recognised: AB3DMOT's 15 comma-separated columns (frame; type; left, top, right, bottom [pixel];
+score; h, w, l, x, y, z [m], ry [rad]; alpha) and KITTI's tracking labels (frame, id, type, truncated, occluded,
+alpha, image box, h, w, l, x, y, z, ry, optional score). Coordinates are the camera's: x right, y down, z forward,
+position of a box in the middle of its bottom face. Scores are on the scale of PointRCNN; where all scores of a
+detector lie between 0 and 1 they are probabilities and are converted to that scale.
 """
 
 from __future__ import annotations
@@ -15,39 +15,40 @@ from pathlib import Path
 
 import numpy as np
 
+from modt.classes import CLASSES, ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import wrap
 from modt.types import Bool, Float64, Int
 
-TYPES = ("Pedestrian", "Car", "Cyclist")
-"""In AB3DMOT's order, which counts from 1."""
-COLUMNS = 15
-UNSCORED = 10.0
-"""Score of what has none: somebody is sure of it."""
-EVEN = 5.0
-"""PointRCNN's score of cars at 20 m of which every other is one."""
-LEAST_DOUBT = 1e-3
-"""No probability is nearer to 0 or 1."""
+DETECTED = (ObjectClass.PEDESTRIAN, ObjectClass.CAR, ObjectClass.CYCLIST)
+"""Classes in the order of AB3DMOT's types, which count from 1."""
+N_COLUMNS = 15
+DEFAULT_SCORE = 10.0
+"""Score of a label without one: certain."""
+LOGIT_OFFSET = 5.0
+"""PointRCNN's score of cars at 20 m at which half of them are true."""
+MIN_PROBABILITY = 1e-3
+"""Probabilities are clipped to this distance from 0 and 1."""
 T_LEVEL_CAMERA = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
-"""Camera coordinates to x forward, y left, z up."""
+"""Camera axes to the level frame: x forward, y left, z up, origin in the camera."""
 
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """The detections of a sequence; D rows in the order of their frames.
+    """The D detections of a sequence, ordered by frame.
 
     Attributes:
         name: of the sequence.
         frame: (D,) index of the frame.
-        type_: (D,) index in TYPES.
+        object_class: (D,) class.
         image_box: (D, 4) left, top, right, bottom [pixel].
-        score: (D,) the higher the surer.
-        box: (D, 7) x, y, z of the centre, l, w, h [m], yaw [rad]; x forward, y left, z up from the camera.
+        score: (D,) increasing with confidence.
+        box: (D, 7) x, y, z of the centre, l, w, h [m], yaw [rad], level frame of the camera.
     """
 
     name: str
     frame: Int
-    type_: Int
+    object_class: Int
     image_box: Float64
     score: Float64
     box: Float64
@@ -57,26 +58,31 @@ class Detections:
 
     @property
     def n_frames(self) -> int:
-        """Frames up to the last one with a detection."""
+        """Number of frames up to the last detection."""
         return int(self.frame[-1]) + 1 if len(self) else 0
 
     def take(self, rows: Bool | Int) -> Detections:
-        """Some of them."""
+        """The detections at some rows."""
         return Detections(
-            self.name, self.frame[rows], self.type_[rows], self.image_box[rows], self.score[rows], self.box[rows]
+            self.name,
+            self.frame[rows],
+            self.object_class[rows],
+            self.image_box[rows],
+            self.score[rows],
+            self.box[rows],
         )
 
     def frames(self) -> Iterator[tuple[int, slice]]:
-        """Every frame from 0 on, those without a detection too, and its rows."""
+        """Every frame from 0, empty ones included, and its rows."""
         ends = np.searchsorted(self.frame, np.arange(self.n_frames + 1))
         return ((i, slice(int(ends[i]), int(ends[i + 1]))) for i in range(self.n_frames))
 
 
 def files(path: Path) -> list[Path]:
-    """The sequences of a folder, or the one file.
+    """The .txt files of a folder, or the one file.
 
     Raises:
-        MisuseError: there are none.
+        MisuseError: the folder has none.
     """
     found = sorted(path.glob("*.txt")) if path.is_dir() else [path]
     if not found:
@@ -85,76 +91,79 @@ def files(path: Path) -> list[Path]:
 
 
 def read(paths: Sequence[Path]) -> list[Detections]:
-    """The detections of files that are one detector's: whether its scores are probabilities, all of them tell.
+    """Detections of all files of one detector; together they show whether its scores are probabilities.
 
     Raises:
-        MisuseError: one cannot be read, or a line is of neither format; it names the line.
+        MisuseError: a file is unreadable, or a line has neither format; the error names it.
     """
     tables = [_table(path) for path in paths]
     score = np.concatenate([table[:, 6] for table in tables])
-    probable = bool(((score >= 0) & (score <= 1)).all())
+    probabilities = bool(((score >= 0) & (score <= 1)).all())
     return [
         Detections(
             name=path.stem,
             frame=table[:, 0].astype(np.int64),
-            type_=table[:, 1].astype(np.int64) - 1,
+            object_class=np.array(DETECTED)[table[:, 1].astype(np.int64) - 1],
             image_box=table[:, 2:6],
-            score=_log_odds(table[:, 6]) if probable else table[:, 6],
-            box=level(table[:, 7:14]),
+            score=_log_odds(table[:, 6]) if probabilities else table[:, 6],
+            box=boxes_from_kitti(table[:, 7:14]),
         )
         for path, table in zip(paths, tables, strict=True)
     ]
 
 
 def _table(path: Path) -> Float64:
-    """(n, 15) AB3DMOT's columns of a file, in the order of their frames."""
+    """(n, 15) AB3DMOT columns of a file, ordered by frame."""
     try:
         lines = path.read_text(encoding="ascii").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(path, f"cannot be read ({error})", "give a text file of detections") from None
     rows = [_row(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
-    table = np.array([r for r in rows if r is not None]).reshape(-1, COLUMNS)
+    table = np.array([r for r in rows if r is not None]).reshape(-1, N_COLUMNS)
     return table[np.argsort(table[:, 0], kind="stable")]
 
 
 def _log_odds(probability: Float64) -> Float64:
-    """(n,) probabilities as log odds about EVEN."""
-    p = np.clip(probability, LEAST_DOUBT, 1 - LEAST_DOUBT)
-    log_odds: Float64 = EVEN + np.log(p / (1 - p))
+    """(n,) log odds of probabilities, plus LOGIT_OFFSET."""
+    p = np.clip(probability, MIN_PROBABILITY, 1 - MIN_PROBABILITY)
+    log_odds: Float64 = LOGIT_OFFSET + np.log(p / (1 - p))
     return log_odds
 
 
-def level(hwlxyzry: Float64) -> Float64:
-    """(n, 7) boxes x, y, z, l, w, h, yaw (x forward, y left, z up) of KITTI's h, w, l, x, y, z, ry."""
+def boxes_from_kitti(hwlxyzry: Float64) -> Float64:
+    """(n, 7) x, y, z, l, w, h, yaw in the level frame of h, w, l, x, y, z, ry (n, 7) in the camera frame."""
     h, w, l, x, y, z, ry = hwlxyzry.T  # noqa: E741
     return np.stack([z, -x, h / 2 - y, l, w, h, wrap(-ry - np.pi / 2)], axis=1)
 
 
-def kitti(boxes: Float64) -> Float64:
-    """(n, 7) KITTI's h, w, l, x, y, z, ry of boxes x, y, z, l, w, h, yaw: undoes level."""
+def boxes_to_kitti(boxes: Float64) -> Float64:
+    """(n, 7) h, w, l, x, y, z, ry in the camera frame: the inverse of boxes_from_kitti."""
     x, y, z, l, w, h, yaw = boxes.T  # noqa: E741
     return np.stack([h, w, l, -y, h / 2 - z, x, wrap(-yaw - np.pi / 2)], axis=1)
 
 
-def _row(line: str, place: str) -> list[float] | None:
-    """AB3DMOT's columns of a line, None for a type that is not followed."""
+def _row(line: str, location: str) -> list[float] | None:
+    """AB3DMOT columns of a line, None for other types."""
     try:
         numbers = [float(v) for v in line.split(",")] if "," in line else _label(line.split())
     except (ValueError, IndexError):
-        raise MisuseError(place, "no detection", "write 15 comma-separated columns or a KITTI label") from None
+        raise MisuseError(location, "is no detection", "write 15 comma-separated columns or a KITTI label") from None
     if numbers is None:
         return None
-    if len(numbers) != COLUMNS or not np.isfinite(numbers).all() or numbers[0] < 0:
-        raise MisuseError(place, f"{len(numbers)} columns of finite numbers expected, {COLUMNS} in all", "mend it")
-    return numbers if numbers[1] in (1, 2, 3) else None
+    if len(numbers) != N_COLUMNS or not np.isfinite(numbers).all() or numbers[0] < 0:
+        raise MisuseError(
+            location, f"{len(numbers)} columns of finite numbers expected, {N_COLUMNS} in all", "correct the line"
+        )
+    return numbers if numbers[1] in range(1, len(DETECTED) + 1) else None
 
 
-def _label(words: list[str]) -> list[float] | None:
-    """AB3DMOT's columns of a KITTI label's words."""
-    if words[2] not in TYPES:
+def _label(fields: list[str]) -> list[float] | None:
+    """AB3DMOT columns of the fields of a KITTI label."""
+    types = [CLASSES[c].kitti[0] for c in DETECTED]
+    if fields[2] not in types:
         return None
-    alpha, *box = (float(v) for v in words[5:17])
+    alpha, *box = (float(v) for v in fields[5:17])
     if len(box) != 11:
-        raise ValueError(words)
-    score = float(words[17]) if len(words) > 17 else UNSCORED
-    return [float(words[0]), TYPES.index(words[2]) + 1.0, *box[:4], score, *box[4:], alpha]
+        raise ValueError(fields)
+    score = float(fields[17]) if len(fields) > 17 else DEFAULT_SCORE
+    return [float(fields[0]), types.index(fields[2]) + 1.0, *box[:4], score, *box[4:], alpha]

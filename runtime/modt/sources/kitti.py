@@ -1,7 +1,8 @@
-"""KITTI's folder layouts: raw drives, tracking and odometry sequences, bare folders of scans."""
+"""KITTI's folder layouts: raw drives, tracking and odometry sequences, folders of scans."""
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
@@ -20,10 +21,10 @@ from modt.sources.stream import StreamInfo
 from modt.types import Float64
 
 PERIOD_S = 0.1
-LONGEST_TURN = 2
-"""A sweep that lasts more periods than this does not."""
-AT_ONCE = "sweeps are taken for seen at once"
-NO_POSES = "no odometry, the proposals must tell how the sensor moves"
+MAX_SWEEP_PERIODS = 2
+"""Longer sweeps are taken for wrong time stamps."""
+NO_SWEEP_TIMES = "sweeps are not deskewed"
+NO_POSES = "no odometry, ego-motion is estimated from the proposals"
 
 Poses = dict[int, Float64]
 """T_world_sensor by frame."""
@@ -31,17 +32,17 @@ Poses = dict[int, Float64]
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """What is missing: of the stream, and of its poses, which may come from elsewhere."""
+    """Missing files and their consequences; those of the poses do not matter with another pose source."""
 
     of_stream: list[str] = field(default_factory=list)
     of_poses: list[str] = field(default_factory=list)
 
 
 def raw_drive(drive: Path) -> ScanStream:
-    """A raw drive, .../2011_09_26_drive_0005_sync, its day's calibration beside it.
+    """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder.
 
     Raises:
-        MisuseError: it holds no scans, or a file that is there is broken.
+        MisuseError: there are no scans, or a file is invalid.
     """
     notes = Notes()
     camera = _camera(kitti_calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
@@ -54,12 +55,12 @@ def raw_drive(drive: Path) -> ScanStream:
 
 
 def tracking_sequence(scans: Path) -> ScanStream:
-    """A sequence of the tracking layout, .../training/velodyne/0005, with calib/, oxts/ beside velodyne/.
+    """A sequence of the tracking layout, .../training/velodyne/0005, with calib/ and oxts/ next to velodyne/.
 
-    Its sweeps are those of raw drives, without their times: a turn of the head is taken to last the period.
+    Its sweeps are those of raw drives without their time stamps: each is taken to last the period.
 
     Raises:
-        MisuseError: it holds no scans, or a file that is there is broken.
+        MisuseError: there are no scans, or a file is invalid.
     """
     root, number = scans.parent.parent, scans.name
     notes = Notes()
@@ -79,12 +80,12 @@ def tracking_sequence(scans: Path) -> ScanStream:
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
-    """A sequence of the odometry layout, .../sequences/00, with calib.txt, times.txt and poses where there are.
+    """A sequence of the odometry layout, .../sequences/00, with optional calib.txt, times.txt and poses.
 
-    Its sweeps are published as seen at once.
+    Its sweeps are published deskewed.
 
     Raises:
-        MisuseError: it holds no scans, or a file that is there is broken.
+        MisuseError: there are no scans, or a file is invalid.
     """
     notes = Notes()
     calib = sequence / "calib.txt"
@@ -106,24 +107,24 @@ def odometry_sequence(sequence: Path) -> ScanStream:
 
 
 def scan_folder(folder: Path) -> ScanStream:
-    """A bare folder of .bin scans, in the order of their names.
+    """A folder of .bin scans, ordered by name.
 
     Raises:
-        MisuseError: it holds none.
+        MisuseError: there are none.
     """
-    notes = Notes([f"a bare folder: no calibration, frames {PERIOD_S} s apart"], [f"a bare folder: {NO_POSES}"])
+    notes = Notes([f"folder of scans: no calibration, frames {PERIOD_S} s apart"], [f"folder of scans: {NO_POSES}"])
     return _stream(folder.name, "folder of scans", folder, None, {}, {}, notes)
 
 
 def _scans(data: Path) -> tuple[list[int], list[Path]]:
-    """Numbers and files of a folder's scans, in the order of their names.
+    """Indices and files of the scans of a folder, ordered by name.
 
     Raises:
-        MisuseError: it holds none.
+        MisuseError: there are none.
     """
     files = sorted(data.glob("*.bin"))
     if not files:
-        raise MisuseError(data, "no .bin scans", "give a folder that holds them")
+        raise MisuseError(data, "no .bin scans", "give a folder of scans")
     numbered = all(f.stem.isdigit() for f in files)
     return [int(f.stem) for f in files] if numbered else list(range(len(files))), files
 
@@ -148,15 +149,15 @@ def _stream(
     if poses:
         lost = [i for i in indices if i not in poses]
         if lost:
-            held = f"{len(lost)} frames without a pose keep the pose before them (the first is {lost[0]})"
-            notes.of_poses.append(held)
-        poses = _held(poses, indices)
+            cost = "have the pose of the frame before"
+            notes.of_poses.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
+        poses = _filled(poses, indices)
     scans = [
         ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, turn_s))
         for i, f in zip(indices, files, strict=True)
     ]
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
-        notes.of_stream.append(f"time stamps run backwards: frames {PERIOD_S} s apart instead")
+        notes.of_stream.append(f"time stamps decrease: frames {PERIOD_S} s apart instead")
         scans = [replace(s, stamp_s=s.index * PERIOD_S) for s in scans]
     info = StreamInfo(
         name=name,
@@ -172,11 +173,10 @@ def _stream(
     return ScanStream(info, scans)
 
 
-def _held(poses: Poses, indices: list[int]) -> Poses:
-    """A pose for every frame: its own, or the last one before it, or else the first there is."""
-    known = np.array(sorted(poses))
-    at = np.maximum(np.searchsorted(known, indices, side="right") - 1, 0)
-    return {i: poses[int(known[k])] for i, k in zip(indices, at, strict=True)}
+def _filled(poses: Poses, indices: list[int]) -> Poses:
+    """A pose for every frame: its own, else the last one before, else the first."""
+    known = sorted(poses)
+    return {i: poses[known[max(bisect_right(known, i) - 1, 0)]] for i in indices}
 
 
 def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
@@ -191,8 +191,8 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
 
 
 def _raw_stamps(path: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
-    """Seconds since scan 0, by frame."""
-    times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "those lie evenly between the others")
+    """Seconds since scan 0, by frame; interpolated where missing."""
+    times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "theirs are interpolated")
     if not times:
         return {}
     known, began = sorted(times), min(times.values())
@@ -207,28 +207,29 @@ def _raw_stamps(path: Path, frames: Sequence[int], notes: Notes) -> dict[int, fl
 
 
 def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
-    """Time that the head took to turn [s], by frame; nothing where that is not known, or cannot be."""
-    starts = _times_ns(folder / "timestamps_start.txt", frames, AT_ONCE, notes)
-    ends = _times_ns(folder / "timestamps_end.txt", frames, AT_ONCE, notes) if starts else {}
+    """Duration of the sweep [s], by frame; empty where the time stamps are missing or wrong."""
+    starts = _times_ns(folder / "timestamps_start.txt", frames, NO_SWEEP_TIMES, notes)
+    ends = _times_ns(folder / "timestamps_end.txt", frames, NO_SWEEP_TIMES, notes) if starts else {}
     turns = {i: (ends[i] - starts[i]) / 1e9 for i in frames if i in starts and i in ends}
     period_s = float(np.median(np.diff(list(starts.values())))) / 1e9 if len(starts) > 1 else PERIOD_S
-    odd = [i for i, turn_s in turns.items() if not 0.0 <= turn_s <= LONGEST_TURN * period_s]
+    odd = [i for i, turn_s in turns.items() if not 0.0 <= turn_s <= MAX_SWEEP_PERIODS * period_s]
     if odd:
-        impossible = f"less than nothing or more than {LONGEST_TURN} periods"
-        notes.of_stream.append(f"{len(odd)} sweeps of {folder} last {impossible} (the first is {odd[0]}): {AT_ONCE}")
+        impossible = f"a negative time or more than {MAX_SWEEP_PERIODS} periods"
+        bad = f"{len(odd)} sweeps of {folder} last {impossible} (the first is {odd[0]})"
+        notes.of_stream.append(f"{bad}: {NO_SWEEP_TIMES}")
         return {}
     return turns
 
 
-def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, of_few: str = "") -> dict[int, int]:
-    """Times of a list of KITTI's, by frame [ns]: line i is that of scan i, or blank where that is missing.
+def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_of_few: str = "") -> dict[int, int]:
+    """Times of a KITTI list, by frame [ns]: line i is that of scan i, blank where it is missing.
 
     Args:
         path: of the list.
-        frames: numbers of the scans that there are.
-        cost: what becomes of frames if none has a time.
-        notes: take what is wrong with it.
-        of_few: what becomes of few without one, by default the same.
+        frames: indices of the scans.
+        cost: consequence of a missing list.
+        notes: receives the defects of the list.
+        cost_of_few: consequence for single frames without a time, by default the same.
     """
     if not path.is_file():
         notes.of_stream.append(f"{path} is missing: {cost}")
@@ -240,17 +241,17 @@ def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, of_few
         return {}
     n_scans = max(frames) + 1
     if len(lines) != n_scans:
-        unlike = f"{path} holds {len(lines)} lines where the last scan is number {n_scans - 1}"
-        notes.of_stream.append(f"{unlike}: line i is taken for that of scan i, from 0; restore what is missing")
+        unlike = f"{path} has {len(lines)} lines, the last scan is number {n_scans - 1}"
+        notes.of_stream.append(f"{unlike}: line i is used for scan i, from 0; restore the missing lines")
     without = [i for i in frames if i not in times]
     if without:
         lacking = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
-        notes.of_stream.append(f"{lacking}: {of_few or f'those {cost}'}")
+        notes.of_stream.append(f"{lacking}: {cost_of_few or cost}")
     return times
 
 
 def _time_ns(line: str) -> int | None:
-    """A time as KITTI writes it [ns]; None where it is none."""
+    """A time in KITTI's format [ns], None if invalid."""
     second, _, fraction = line.partition(".")
     try:
         whole = int(datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp())
@@ -261,7 +262,7 @@ def _time_ns(line: str) -> int | None:
 
 def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera | None:
     if not calib.is_file():
-        notes.of_stream.append(f"{calib} is missing: no camera, hence no --fov camera")
+        notes.of_stream.append(f"{calib} is missing: no camera, no --fov camera")
         return None
     return read(calib)
 
@@ -270,7 +271,7 @@ def _numbers(path: Path, columns: int) -> Float64:
     try:
         table = np.loadtxt(path, dtype=np.float64, ndmin=2)
     except (OSError, ValueError) as error:
-        raise MisuseError(path, f"no table of numbers ({error})", "restore it, or remove it") from None
+        raise MisuseError(path, f"is no table of numbers ({error})", "restore it, or remove it") from None
     if table.shape[1] != columns:
         raise MisuseError(path, f"{table.shape[1]} columns, not {columns}", "restore it, or remove it")
     return table

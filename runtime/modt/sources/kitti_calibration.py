@@ -1,4 +1,4 @@
-"""KITTI calibration files: the left colour camera and the inertial unit, as seen from the sensor."""
+"""KITTI calibration files: left colour camera and inertial unit, relative to the sensor."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from modt.geometry import Camera, inverse, se3
 from modt.types import Float64
 
 IMAGE_PX = (1242.0, 375.0)
-"""Size of the rectified image where the calibration does not say."""
+"""Size of the rectified image where the calibration has none."""
 
 
 def read_table(path: Path) -> dict[str, Float64]:
-    """Rows of numbers by their key; rows that hold no numbers are left out.
+    """Numeric rows by key.
 
     Raises:
-        MisuseError: the file cannot be read.
+        MisuseError: the file is unreadable.
     """
     table: dict[str, Float64] = {}
     try:
@@ -35,7 +35,7 @@ def read_table(path: Path) -> dict[str, Float64]:
 
 
 def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys: str) -> Float64:
-    """The matrix under the first of the keys that is there.
+    """Matrix of the first key found.
 
     Raises:
         MisuseError: there is none, or it has another size.
@@ -50,25 +50,25 @@ def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys:
 
 
 def rigid(table: dict[str, Float64], path: Path) -> Float64:
-    """(4, 4) transform of a raw calibration's R and T."""
+    """(4, 4) transform of R and T of a raw calibration."""
     return se3(matrix(table, path, (3, 3), "R"), matrix(table, path, (3, 1), "T")[:, 0])
 
 
 def homogeneous(top: Float64) -> Float64:
-    """(4, 4) of a (3, 3) or (3, 4) matrix."""
+    """(4, 4) homogeneous matrix of a (3, 3) or (3, 4) one."""
     out = np.eye(4)
     out[:3, : top.shape[1]] = top
     return out
 
 
 def camera(P: Float64, R_rect: Float64, T_camera_sensor: Float64, size_px: tuple[float, float] = IMAGE_PX) -> Camera:
-    """The camera with projection P (3, 4), rectifying rotation R_rect (3, 3) and pose T_camera_sensor (4, 4)."""
+    """Camera of projection P (3, 4), rectification R_rect (3, 3) and pose T_camera_sensor (4, 4)."""
     T = homogeneous(R_rect) @ T_camera_sensor
     return Camera(P @ T, T, size_px[0], size_px[1])
 
 
 def camera_of_raw(path: Path) -> Camera:
-    """Left colour camera of a recording day, from its calib_cam_to_cam.txt and the calib_velo_to_cam.txt beside it.
+    """Left colour camera by calib_cam_to_cam.txt and the calib_velo_to_cam.txt in the same folder.
 
     Raises:
         MisuseError: a file or a row is missing.
@@ -85,13 +85,13 @@ def camera_of_raw(path: Path) -> Camera:
 
 
 def camera_of_sequence(path: Path) -> Camera:
-    """Left colour camera of one calibration file of the tracking, object or odometry layout.
+    """Left colour camera by a calibration file of the tracking, object or odometry layout.
 
     Raises:
         MisuseError: the file or a row is missing.
     """
     table = read_table(path)
-    R_rect = np.eye(3)  # odometry's Tr leads to the rectified camera already
+    R_rect = np.eye(3)  # Tr of the odometry layout includes the rectification
     if "R0_rect" in table or "R_rect" in table:
         R_rect = matrix(table, path, (3, 3), "R0_rect", "R_rect")
     T = homogeneous(matrix(table, path, (3, 4), "Tr_velo_to_cam", "Tr_velo_cam", "Tr"))
@@ -99,7 +99,7 @@ def camera_of_sequence(path: Path) -> Camera:
 
 
 def T_imu_sensor_of_raw(folder: Path) -> Float64:
-    """(4, 4) sensor to inertial unit, from calib_imu_to_velo.txt.
+    """(4, 4) T_imu_sensor by calib_imu_to_velo.txt.
 
     Raises:
         MisuseError: the file or a row is missing.
@@ -109,7 +109,7 @@ def T_imu_sensor_of_raw(folder: Path) -> Float64:
 
 
 def T_imu_sensor_of_sequence(path: Path) -> Float64:
-    """(4, 4) sensor to inertial unit of a tracking or object calibration file.
+    """(4, 4) T_imu_sensor by a calibration file of the tracking or object layout.
 
     Raises:
         MisuseError: the file or the row is missing.

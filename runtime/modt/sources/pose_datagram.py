@@ -1,7 +1,7 @@
-"""One pose as a datagram of JSON.
+"""A pose as a JSON datagram.
 
-Either {"stamp": s, "x": m, "y": m, "yaw": rad}, or {"stamp": s, "pose": [...]} with the 16 numbers of T_world_sensor
-row by row, or the first 12 of them. Further keys are left alone.
+Either {"stamp": s, "x": m, "y": m, "yaw": rad}, or {"stamp": s, "pose": [...]} with the 16 elements of T_world_sensor
+in row-major order, or the first 12 of them. Other keys are ignored.
 """
 
 from __future__ import annotations
@@ -13,29 +13,29 @@ from typing import Any
 import numpy as np
 
 from modt.geometry import rotation_zyx, se3
-from modt.sources.pose_file import fault
+from modt.sources.pose_file import pose_defect
 from modt.types import Float64
 
-LARGEST_BYTES = 4096
+MAX_BYTES = 4096
 PLANAR = ("x", "y", "yaw")
 
 
 class DatagramError(ValueError):
-    """No pose; kind is the counter that it belongs to."""
+    """A refused datagram, with the reason that it is counted by."""
 
-    def __init__(self, kind: str, cause: str) -> None:
+    def __init__(self, reason: str, cause: str) -> None:
         super().__init__(cause)
-        self.kind = kind
+        self.reason = reason
 
 
 def read_datagram(raw: bytes) -> tuple[float, Float64]:
     """Stamp [s] and (4, 4) T_world_sensor.
 
     Raises:
-        DatagramError: anything else, whatever the bytes are.
+        DatagramError: any other bytes.
     """
-    if len(raw) > LARGEST_BYTES:
-        raise DatagramError("malformed", f"more than {LARGEST_BYTES} bytes")
+    if len(raw) > MAX_BYTES:
+        raise DatagramError("malformed", f"more than {MAX_BYTES} bytes")
     try:
         message = json.loads(raw)
     except (ValueError, RecursionError):
@@ -50,9 +50,9 @@ def read_datagram(raw: bytes) -> tuple[float, Float64]:
     else:
         x, y, yaw = (_number(message, key) for key in PLANAR)
         T = se3(rotation_zyx(0.0, 0.0, math.remainder(yaw, 2 * math.pi)), np.array([x, y, 0.0]))
-    wrong = fault(T)
-    if wrong:
-        raise DatagramError("malformed", f"pose is {wrong}")
+    defect = pose_defect(T)
+    if defect:
+        raise DatagramError("malformed", f"pose is {defect}")
     return stamp, T
 
 

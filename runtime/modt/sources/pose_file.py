@@ -1,4 +1,4 @@
-"""Poses in KITTI's odometry format: a line a frame, the twelve numbers of a (3, 4) transform, row by row."""
+"""Poses in KITTI's odometry format: per frame a line of the twelve elements of a (3, 4) transform, row-major."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from modt.errors import MisuseError
 from modt.geometry import inverse
 from modt.types import Float64
 
-NUMBERS = 12
-FARTHEST_M = 1e5
-"""Places farther from the origin are refused: float32, in which outlines are paired, would lose the centimetres."""
-SKEW = 0.01
-"""How far R R' of a rotation may be from one: files hold six digits or more."""
+N_ELEMENTS = 12
+MAX_DISTANCE_M = 1e5
+"""Greatest coordinate: beyond it float32, used in the association, is coarser than a centimetre."""
+MAX_SKEW = 0.01
+"""Greatest element of R R' - I of a rotation; files hold at least six digits."""
 
 
 def read_poses(path: Path) -> Float64:
-    """(n, 4, 4) poses of a file, one a line.
+    """(n, 4, 4) poses of a file, one per line.
 
     Raises:
-        MisuseError: it cannot be read, holds none, or a line is no pose; it names the line.
+        MisuseError: the file is unreadable or empty, or a line is no pose; the error names the line.
     """
     try:
         lines = path.read_text(encoding="ascii").splitlines()
@@ -36,34 +36,34 @@ def read_poses(path: Path) -> Float64:
     return np.stack([_pose(line, f"{path}:{number}") for number, line in enumerate(lines, 1)])
 
 
-def fault(T: Float64) -> str | None:
-    """What keeps a (4, 4) matrix from being a pose, None if nothing does."""
+def pose_defect(T: Float64) -> str | None:
+    """Reason why a (4, 4) matrix is no pose, None if it is one."""
     if not np.isfinite(T).all():
         return "not finite"
-    if np.abs(T[:3, 3]).max() > FARTHEST_M:
-        return f"farther than {FARTHEST_M / 1000:g} km from its origin"
+    if np.abs(T[:3, 3]).max() > MAX_DISTANCE_M:
+        return f"farther than {MAX_DISTANCE_M / 1000:g} km from its origin"
     R = T[:3, :3]
-    if np.abs(R).max() > 2 or np.abs(R @ R.T - np.eye(3)).max() > SKEW or np.linalg.det(R) < 0:
+    if np.abs(R).max() > 2 or np.abs(R @ R.T - np.eye(3)).max() > MAX_SKEW or np.linalg.det(R) < 0:
         return "no rotation"
     return None
 
 
 def sensor_poses(T_start_camera: Float64, T_camera_sensor: Float64) -> Float64:
-    """(n, 4, 4) T_world_sensor of camera poses (n, 4, 4); the world is the sensor at the camera's start."""
-    moved: Float64 = inverse(T_camera_sensor) @ T_start_camera @ T_camera_sensor
-    return moved
+    """(n, 4, 4) T_world_sensor of camera poses (n, 4, 4); the world frame is that of the sensor at the start."""
+    poses: Float64 = inverse(T_camera_sensor) @ T_start_camera @ T_camera_sensor
+    return poses
 
 
-def _pose(line: str, place: str) -> Float64:
+def _pose(line: str, location: str) -> Float64:
     T = np.eye(4)
-    words = line.split()
-    if len(words) != NUMBERS:
-        raise MisuseError(place, f"{len(words)} numbers, not {NUMBERS}", "write the rows of a 3 x 4 pose")
+    numbers = line.split()
+    if len(numbers) != N_ELEMENTS:
+        raise MisuseError(location, f"{len(numbers)} numbers, not {N_ELEMENTS}", "write the rows of a 3 x 4 pose")
     try:
-        T[:3] = np.array(words, dtype=np.float64).reshape(3, 4)
+        T[:3] = np.array(numbers, dtype=np.float64).reshape(3, 4)
     except ValueError:
-        raise MisuseError(place, "no numbers", "write the rows of a 3 x 4 pose") from None
-    wrong = fault(T)
-    if wrong:
-        raise MisuseError(place, f"{wrong}", "write the rows of a rigid 3 x 4 pose [m]")
+        raise MisuseError(location, "no numbers", "write the rows of a 3 x 4 pose") from None
+    defect = pose_defect(T)
+    if defect:
+        raise MisuseError(location, defect, "write the rows of a rigid 3 x 4 pose [m]")
     return T

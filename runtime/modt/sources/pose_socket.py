@@ -1,7 +1,7 @@
-"""Poses that another process sends, a datagram each.
+"""Poses received from another process, one per datagram.
 
-Stamps of poses and of frames are seconds of one clock, the stream's: the `stamp_s` of `tracks.jsonl`. No other clock
-is read here, so a replay is the same again if it is sent the same poses before the same frames.
+Stamps of poses and frames are on the clock of the stream, `stamp_s` of `tracks.jsonl`. No other clock is read: a
+replay is reproducible if it receives the same poses before the same frames.
 """
 
 from __future__ import annotations
@@ -18,74 +18,74 @@ from urllib.parse import urlsplit
 
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.sources.pose_datagram import LARGEST_BYTES, DatagramError, read_datagram
-from modt.sources.pose_ring import PoseRing
+from modt.sources.pose_buffer import PoseBuffer
+from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.stream import StreamInfo
 from modt.types import Float64, Frame
 
 log = logging.getLogger(__name__)
 
-FORM = "write own, none, udp://HOST:PORT or unix:///PATH"
+FORM = "write recording, none, udp://HOST:PORT or unix:///PATH"
 
 
 class PoseSocket:
-    """Drained once a frame, never waited for; what cannot be used is counted, and logged once of each kind.
+    """Reads the socket once a frame without blocking; refused poses are counted, and logged once of each kind.
 
-    A pose that the sensor cannot have come to at any speed it has is the first of a sender begun anew, whose world is
-    another one: what it sent before is forgotten, and the frame says so (`Frame.restarts`).
+    A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
+    are removed and the restart is passed on in `Frame.restarts`.
 
     Args:
-        bound: where the datagrams arrive; it is made non-blocking.
-        config: how old a pose may be, how fast the sensor, and how many are kept.
-        name: of the socket, for people.
+        bound: bound socket; it is made non-blocking.
+        config: limits of age and speed, capacity.
+        name: of the socket, in reports and messages.
     """
 
-    KINDS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")
-    """Counters of what was refused."""
+    REASONS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")
+    """Reasons of a refusal; each has a counter."""
 
     def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
         bound.setblocking(False)
         self.name, self.config, self._socket = name, config, bound
-        self._ring = PoseRing(config.capacity, config.max_age_s)
+        self._buffer = PoseBuffer(config)
         self.received = self.used = self.restarts = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Some frames at least have one, if poses are sent."""
+        """With poses, though frames may lack one."""
         return replace(info, has_poses=True, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
-        """With T_world_sensor at the frame's stamp, None where the poses sent so far do not tell."""
+        """The frame with T_world_sensor at its stamp, None where the poses received are too old."""
         self._drain(frame.stamp_s)
-        T = self._ring.at(frame.stamp_s)
+        T = self._buffer.at(frame.stamp_s)
         self.posed, self.unposed = self.posed + (T is not None), self.unposed + (T is None)
         return replace(frame, T_world_sensor=T, restarts=self.restarts)
 
     def report(self) -> dict[str, Any]:
-        """Datagrams received, used and refused, restarts of the sender, frames with and without a pose."""
+        """Counts of datagrams received, used and refused, of restarts, and of frames with and without a pose."""
         return {
             "source": self.name,
             "received": self.received,
             "used": self.used,
-            "refused": {kind: self.refused[kind] for kind in self.KINDS},
+            "refused": {reason: self.refused[reason] for reason in self.REASONS},
             "restarts": self.restarts,
             "frames_posed": self.posed,
             "frames_unposed": self.unposed,
         }
 
     def close(self) -> None:
-        """Give the socket back, and its file away."""
-        place = self._socket.getsockname()
+        """Close the socket and remove its file."""
+        address = self._socket.getsockname()
         self._socket.close()
-        if isinstance(place, str) and place:
-            Path(place).unlink(missing_ok=True)
+        if isinstance(address, str) and address:
+            Path(address).unlink(missing_ok=True)
 
     def _drain(self, now_s: float) -> None:
-        """Take what has arrived, at most a ringful: a flood must not hold up the frame."""
+        """Read what has arrived, at most `capacity` datagrams: a flood must not delay the frame."""
         for _ in range(self.config.capacity):
             try:
-                raw = self._socket.recv(LARGEST_BYTES + 1)
-            except OSError:  # nothing there, or an error of the last sender's that is none of ours
+                raw = self._socket.recv(MAX_BYTES + 1)
+            except OSError:  # nothing to read, or an error caused by the last sender
                 return
             self.received += 1
             try:
@@ -99,26 +99,26 @@ class PoseSocket:
         if stamp_s > now_s + self.config.max_ahead_s:
             cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s: is it the stream's clock?"
             raise DatagramError("ahead", cause)
-        newest_s = self._ring.newest_s
-        speed_mps = self._ring.speed_to(stamp_s, T)
+        newest_s = self._buffer.newest_s
+        speed_mps = self._buffer.speed_to(stamp_s, T)
         if speed_mps > self.config.max_speed_mps:
-            self._begin_anew(f"{speed_mps:.0f} m/s from the pose before, at stamp {stamp_s:.3f} s")
-        if not self._ring.add(stamp_s, T):
+            self._restart(f"{speed_mps:.0f} m/s from the pose before, at stamp {stamp_s:.3f} s")
+        if not self._buffer.add(stamp_s, T):
             raise DatagramError("out_of_order", f"stamp {stamp_s:.3f} s after {newest_s:.3f} s")
         self.used += 1
 
-    def _begin_anew(self, cause: str) -> None:
-        self._ring.clear()
+    def _restart(self, cause: str) -> None:
+        self._buffer.clear()
         self.restarts += 1
         if self.restarts == 1:
-            meaning = "taken for a sender begun anew, tracks stay where they are"
-            remedy = "have it keep its origin, or raise odometry.max_speed_mps if the robot is that fast"
-            log.warning("%s: %s: %s; %s; more of them are only counted", self.name, cause, meaning, remedy)
+            meaning = "the sender seems to have restarted, tracks keep their positions"
+            remedy = "let it keep its origin, or raise odometry.max_speed_mps for a faster robot"
+            log.warning("%s: %s: %s; %s; later ones are only counted", self.name, cause, meaning, remedy)
 
     def _refuse(self, error: DatagramError) -> None:
-        self.refused[error.kind] += 1
-        if self.refused[error.kind] == 1:
-            log.warning("%s: pose refused (%s): %s; more of them are only counted", self.name, error.kind, error)
+        self.refused[error.reason] += 1
+        if self.refused[error.reason] == 1:
+            log.warning("%s: pose refused (%s): %s; later ones are only counted", self.name, error.reason, error)
 
 
 def open_socket(url: str) -> socket.socket:
@@ -136,7 +136,7 @@ def open_socket(url: str) -> socket.socket:
         return _bound_udp(url, host, port)
     if scheme == "unix" and not parts.netloc and len(path) > 1:
         return _bound_unix(url, path)
-    raise MisuseError(url, "no address of a socket", FORM)
+    raise MisuseError(url, "is no address of a socket", FORM)
 
 
 def _bound_udp(url: str, host: str, port: int) -> socket.socket:
@@ -149,12 +149,12 @@ def _bound_udp(url: str, host: str, port: int) -> socket.socket:
 
 def _bound_unix(url: str, path: str) -> socket.socket:
     try:
-        if _abandoned(path):
+        if _stale(path):
             Path(path).unlink()
         return _bound(socket.AF_UNIX, path)
     except OSError as error:
         cause = error.strerror or str(error)
-        raise MisuseError(url, f"cannot be bound ({cause})", "give a free path in a folder of yours") from None
+        raise MisuseError(url, f"cannot be bound ({cause})", "give a free path in a writable folder") from None
 
 
 def _bound(family: int, address: Any) -> socket.socket:
@@ -167,10 +167,9 @@ def _bound(family: int, address: Any) -> socket.socket:
     return made
 
 
-def _abandoned(path: str) -> bool:
-    """Whether a socket lies there that nobody listens to: what a killed run leaves behind."""
-    place = Path(path)
-    if not place.exists() or not stat.S_ISSOCK(place.stat().st_mode):
+def _stale(path: str) -> bool:
+    """Whether the path is a socket without a listener, left by an aborted run."""
+    if not Path(path).exists() or not stat.S_ISSOCK(Path(path).stat().st_mode):
         return False
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as knock:
-        return knock.connect_ex(path) == errno.ECONNREFUSED
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as probe:
+        return probe.connect_ex(path) == errno.ECONNREFUSED

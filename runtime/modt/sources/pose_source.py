@@ -1,4 +1,4 @@
-"""Where the sensor was, from elsewhere than the stream itself."""
+"""Sources of the poses of a stream."""
 
 from __future__ import annotations
 
@@ -14,50 +14,52 @@ from modt.sources.stream import Faults, Stream, StreamInfo
 from modt.types import Frame
 
 
-class Odometry(Protocol):
-    """Places frames."""
+class PoseSource(Protocol):
+    """Sets the poses of frames."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """What is known of a stream whose poses are these: whether it has any, and what is missing of them."""
+        """Properties of a stream with these poses: has_poses and pose_notes."""
         ...
 
     def place(self, frame: Frame) -> Frame:
-        """The frame with its pose, None where it is not known. Frames come in their order."""
+        """The frame with its pose, None where unknown; frames come in order."""
         ...
 
     def report(self) -> dict[str, Any]:
-        """What there was, and what could not be used."""
+        """Name of the source, and statistics."""
         ...
 
     def close(self) -> None:
-        """No more will be asked."""
+        """Release what the source holds."""
         ...
 
 
-class OwnOdometry:
-    """The stream's own."""
+class _WithoutResources:
+    def close(self) -> None:
+        """Nothing is held."""
+
+
+class RecordedPoses(_WithoutResources):
+    """The poses of the recording."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """What was known already."""
+        """Unchanged."""
         return info
 
     def place(self, frame: Frame) -> Frame:
-        """As it is."""
+        """Unchanged."""
         return frame
 
     def report(self) -> dict[str, Any]:
-        """Which one it was."""
-        return {"source": "own"}
-
-    def close(self) -> None:
-        """Nothing to be done."""
+        """Name of the source."""
+        return {"source": "recording"}
 
 
-class NoOdometry:
-    """Nobody knows: the proposals must tell."""
+class NoPoses(_WithoutResources):
+    """No poses: ego-motion is estimated from the proposals."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """No frame has one, as was asked for."""
+        """Without poses."""
         return replace(info, has_poses=False, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
@@ -65,20 +67,17 @@ class NoOdometry:
         return replace(frame, T_world_sensor=None)
 
     def report(self) -> dict[str, Any]:
-        """Which one it was."""
+        """Name of the source."""
         return {"source": "none"}
 
-    def close(self) -> None:
-        """Nothing to be done."""
 
-
-class ListedPoses:
-    """Poses of a file in KITTI's odometry format: line k, from 0, is that of frame number k.
+class PoseFile(_WithoutResources):
+    """Poses of a file in KITTI's odometry format: line k, from 0, belongs to frame k.
 
     Args:
-        path: the file.
-        camera: if the stream has one, the poses are its (KITTI's rectified left camera); else they are the sensor's.
-        end: one more than the number of the last frame, None where it is not known.
+        path: of the file.
+        camera: of the stream: the poses are this camera's (KITTI's rectified left one); None: they are the sensor's.
+        end: index of the last frame plus one, None where unknown.
 
     Raises:
         MisuseError: the file is missing, a line is no pose, or there are too few.
@@ -92,25 +91,22 @@ class ListedPoses:
             raise self._too_few(end - 1)
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Every frame has one."""
+        """With a pose for every frame."""
         return replace(info, has_poses=True, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
-        """With the pose of its number.
+        """The frame with the pose of its index.
 
         Raises:
-            MisuseError: there are fewer.
+            MisuseError: there are too few.
         """
         if frame.index >= len(self._poses):
             raise self._too_few(frame.index)
         return replace(frame, T_world_sensor=self._poses[frame.index])
 
     def report(self) -> dict[str, Any]:
-        """Which file it was."""
+        """Path of the file."""
         return {"source": str(self.path)}
-
-    def close(self) -> None:
-        """Nothing to be done."""
 
     def _too_few(self, frame: int) -> MisuseError:
         cause = f"{len(self._poses)} poses, too few for frame {frame}"
@@ -118,20 +114,20 @@ class ListedPoses:
 
 
 class PosedStream:
-    """A stream whose frames carry the poses of another odometry.
+    """A stream with the poses of a source.
 
     Args:
-        stream: the frames.
-        odometry: their poses.
+        stream: of the frames.
+        odometry: source of their poses.
     """
 
-    def __init__(self, stream: Stream, odometry: Odometry) -> None:
+    def __init__(self, stream: Stream, odometry: PoseSource) -> None:
         self._stream, self.odometry = stream, odometry
         self.info: StreamInfo = odometry.of_stream(stream.info)
         self.faults: Faults = stream.faults
 
     def __iter__(self) -> Iterator[Frame]:
-        """The frames, posed."""
+        """The frames with their poses."""
         return (self.odometry.place(frame) for frame in self._stream)
 
     def between(self, first: int, last: int | None) -> Self:

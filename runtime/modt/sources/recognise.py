@@ -1,4 +1,4 @@
-"""Which layout a path holds, told from what lies there."""
+"""Recognition of the layout at a path."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from modt.errors import MisuseError
 from modt.sources import kitti
 from modt.sources.scan_stream import ScanStream
 
-LISTED = 5
-"""Candidates named in an error at most."""
+MAX_LISTED = 5
+"""Greatest number of candidates in an error message."""
 
 
 def _raw(path: Path) -> bool:
@@ -53,32 +53,34 @@ LAYOUTS: tuple[tuple[Callable[[Path], bool], Callable[[Path], ScanStream]], ...]
 
 
 def open_stream(path: Path) -> ScanStream:
-    """The stream that lies at a path.
+    """The stream at a path.
 
     Raises:
-        MisuseError: nothing there, or nothing that is a stream; the error names streams found nearby.
+        MisuseError: the path does not exist or holds no stream; the error names streams below it.
     """
     if not path.exists():
         raise MisuseError(
             path, "no such file or directory", "give a KITTI drive, a sequence or a folder of .bin scans"
         )
     path = path.resolve()
-    for holds, read in LAYOUTS:
-        if path.is_dir() and holds(path):
+    for matches, read in LAYOUTS:
+        if path.is_dir() and matches(path):
             return read(path)
     if (path / "oxts").is_dir():
         raise MisuseError(
-            path / "velodyne_points", "missing from this raw drive", "unpack the drive's synced data whole"
+            path / "velodyne_points", "missing from this raw drive", "unpack all synced data of the drive"
         )
     nearby = _nearby(path)
     if nearby:
-        more = f" (and {len(nearby) - LISTED} more)" if len(nearby) > LISTED else ""
-        raise MisuseError(path, "holds several streams", f"give one: {', '.join(map(str, nearby[:LISTED]))}{more}")
+        more = f" (and {len(nearby) - MAX_LISTED} more)" if len(nearby) > MAX_LISTED else ""
+        raise MisuseError(
+            path, "holds several streams", f"give one: {', '.join(map(str, nearby[:MAX_LISTED]))}{more}"
+        )
     raise MisuseError(path, "no stream of scans", "give a KITTI drive, a sequence or a folder of .bin scans")
 
 
 def _nearby(path: Path) -> list[Path]:
-    """Streams up to three folders below."""
+    """Streams up to three levels below."""
     if not path.is_dir():
         return []
     below = [p for depth in ("*", "*/*", "*/*/*") for p in sorted(path.glob(depth)) if p.is_dir()]

@@ -1,4 +1,4 @@
-"""A stream of scan files, whatever folder layout they came from."""
+"""A stream of scan files of any layout."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Self
 
 from modt.errors import ModtError, ScanError
 from modt.sources.scan_file import read_scan
-from modt.sources.stream import FIRST, Fault, Faults, StreamInfo
+from modt.sources.stream import MAX_KEPT_FAULTS, Fault, Faults, StreamInfo
 from modt.types import Float64, Frame
 
 log = logging.getLogger(__name__)
@@ -18,14 +18,14 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class ScanReference:
-    """A scan still on disk.
+    """A scan on disk.
 
     Attributes:
         index: frame number.
         path: the file.
         stamp_s: its time [s].
         T_world_sensor: (4, 4) pose, None where unknown.
-        turn_s: of its head [s], as in Frame.
+        turn_s: duration of the sweep [s], as in Frame.
     """
 
     index: int
@@ -36,11 +36,11 @@ class ScanReference:
 
 
 class ScanStream:
-    """Frames from scan files; a scan that cannot be used is counted and skipped, the first few are logged.
+    """Frames of scan files; unusable scans are counted and skipped, the first ones are logged.
 
     Args:
-        info: what is known beforehand.
-        scans: the files in the order of time.
+        info: of the stream.
+        scans: the files, ordered by time.
     """
 
     def __init__(self, info: StreamInfo, scans: list[ScanReference]) -> None:
@@ -65,10 +65,10 @@ class ScanStream:
             raise ModtError(self.info.name, cause, "give a stream of float32 x, y, z, reflectance scans")
 
     def between(self, first: int, last: int | None) -> Self:
-        """The scans with first <= index < last, none of the others is read."""
+        """The scans with first <= index < last; others are not read."""
         return type(self)(self.info, [s for s in self.scans if s.index >= first and (last is None or s.index < last)])
 
     def _fault(self, scan: ScanReference, cause: str, *, skipped: bool) -> None:
         if self.faults.add(Fault(scan.index, str(scan.path), cause, skipped)):
-            more = "; more faults are only counted" if self.faults.count == FIRST else ""
+            more = "; later faults are only counted" if self.faults.count == MAX_KEPT_FAULTS else ""
             log.warning("%s: %s%s%s", scan.path, cause, "; frame skipped" if skipped else "", more)

@@ -1,4 +1,4 @@
-"""What every source offers."""
+"""Interface of the sources of frames."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from modt.types import Frame
 
 @dataclass(frozen=True, slots=True)
 class StreamInfo:
-    """What is known of a stream before its first frame.
+    """Properties of a stream known before its first frame.
 
     Attributes:
-        name: of the stream, for people.
-        layout: kind of source it was recognised as.
-        sequence: its KITTI tracking sequence number, 0 where it has none.
-        n_frames: frames to expect, None for an endless stream.
+        name: of the stream.
+        layout: recognised kind of source.
+        sequence: KITTI tracking sequence number, 0 for none.
+        n_frames: number of frames, None for a live stream.
         period_s: nominal time between frames [s].
-        camera: camera that the annotations and KITTI results refer to, None where there is none.
+        camera: reference of annotations and KITTI results, None without one.
         has_poses: frames carry T_world_sensor.
-        notes: what is missing, and what that costs.
-        pose_notes: the same of its own poses; of no account where they come from elsewhere.
-        end: one more than the number of the last frame, None where it is not known.
+        notes: missing files and their consequences.
+        pose_notes: the same of its poses, irrelevant with another pose source.
+        end: index of the last frame plus one, None where unknown.
     """
 
     name: str
@@ -41,13 +41,13 @@ class StreamInfo:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A scan, or part of one, that could not be used.
+    """An unusable scan, or unusable points of one.
 
     Attributes:
-        frame: its index.
+        frame: index of the frame.
         subject: file or device.
-        cause: what was wrong.
-        skipped: the whole scan was left out.
+        cause: of the fault.
+        skipped: the whole scan is skipped.
     """
 
     frame: int
@@ -56,18 +56,18 @@ class Fault:
     skipped: bool
 
 
-FIRST = 20
-"""Faults that are kept; of those after them only the number is."""
+MAX_KEPT_FAULTS = 20
+"""Faults kept; later ones are only counted."""
 
 
 @dataclass(slots=True)
 class Faults:
-    """Scans, or parts of some, that could not be used.
+    """Faults of a stream.
 
     Attributes:
-        count: of all.
-        skipped: scans left out.
-        first: the FIRST of them.
+        count: of all faults.
+        skipped: number of skipped scans.
+        first: the first MAX_KEPT_FAULTS faults.
     """
 
     count: int = 0
@@ -75,25 +75,25 @@ class Faults:
     first: list[Fault] = field(default_factory=list)
 
     def add(self, fault: Fault) -> bool:
-        """One more; whether it is among the first."""
+        """Count a fault; whether it is kept."""
         self.count += 1
         self.skipped += fault.skipped
-        early = self.count <= FIRST
-        if early:
+        kept = self.count <= MAX_KEPT_FAULTS
+        if kept:
             self.first.append(fault)
-        return early
+        return kept
 
 
 class Stream(Protocol):
-    """A source of frames, in the order of time."""
+    """A source of frames, ordered by time."""
 
     info: StreamInfo
     faults: Faults
 
     def __iter__(self) -> Iterator[Frame]:
-        """The frames; what had to be left out is added to faults meanwhile."""
+        """The frames; faults are added to `faults` on the way."""
         ...
 
     def between(self, first: int, last: int | None) -> Self:
-        """The stream cut to the frames with first <= index < last."""
+        """The stream of the frames with first <= index < last."""
         ...

@@ -1,4 +1,4 @@
-"""The synthetic world as a source of frames."""
+"""The simulator as a source of frames."""
 
 from __future__ import annotations
 
@@ -19,31 +19,27 @@ from modt.simulation.simulator import Simulator, Truth
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Frame
 
-FOCAL_PX, CENTRE_PX = 721.5, (609.5, 172.9)
-
-
-def nominal_camera() -> Camera:
-    """A camera beside the sensor as KITTI's left colour camera: 0.27 m ahead, 0.08 m below, level."""
-    T_camera_sensor = np.array(
-        [[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, -0.08], [1.0, 0.0, 0.0, -0.27], [0.0, 0.0, 0.0, 1.0]]
-    )
-    K = np.array([[FOCAL_PX, 0.0, CENTRE_PX[0], 0.0], [0.0, FOCAL_PX, CENTRE_PX[1], 0.0], [0.0, 0.0, 1.0, 0.0]])
-    return Camera(K @ T_camera_sensor, T_camera_sensor, 1242.0, 375.0)
+T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
+K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0, 0.0]])
+CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
+"""Intrinsics and mount of KITTI's left colour camera: level, 0.27 m ahead of the sensor, 0.08 m below it."""
 
 
 class SyntheticStream:
-    """A drive through a synthetic scene; the same bytes for the same arguments.
+    """A drive through a synthetic scene; the same arguments give the same bytes.
 
     Args:
-        scene: name of the scene, or a KITTI label file (.txt) whose objects are placed as they stood.
+        scene: name of the scene, or a KITTI label file (.txt) whose objects are placed where it states.
         sensor: name of the sensor model.
-        seconds: how long it takes.
-        seed: of the scene, what happens in it and the noise.
-        distort: leave the motion of a turning head in the scans.
+        seconds: duration [s].
+        seed: of the scene, its traffic and the noise.
+        distort: leave the motion during a sweep in the scans.
 
     Raises:
-        MisuseError: an unknown scene or sensor, or a duration that is none.
+        MisuseError: an unknown scene or sensor, or an invalid duration or seed.
     """
+
+    camera = CAMERA
 
     def __init__(
         self,
@@ -59,7 +55,7 @@ class SyntheticStream:
         if not 0 < seconds <= 3600:
             raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
         if seed < 0:
-            raise MisuseError(seed, "no seed", "give a whole number from 0 on")
+            raise MisuseError(seed, "no seed", "give an integer of at least 0")
         model = sensor_model(sensor)
         rng = np.random.default_rng([seed, 0])
         if scene in SCENES:
@@ -75,7 +71,7 @@ class SyntheticStream:
             sequence=0,
             n_frames=len(self._indices),
             period_s=model.period_s,
-            camera=nominal_camera(),
+            camera=self.camera,
             has_poses=True,
             end=self._indices.stop,
         )
@@ -85,13 +81,13 @@ class SyntheticStream:
         return (frame for frame, _ in self.sweeps())
 
     def sweeps(self) -> Iterator[tuple[Frame, Truth]]:
-        """The frames, each with the truth about it."""
+        """The frames with their ground truth."""
         return (self.simulator.sweep(i) for i in self._indices)
 
     def between(self, first: int, last: int | None) -> Self:
-        """The frames with first <= index < last; the others are not rendered."""
-        part, whole = copy.copy(self), self._indices
+        """The frames with first <= index < last; others are not rendered."""
+        part, indices = copy.copy(self), self._indices
         part.faults = Faults()
-        part._indices = range(max(first, whole.start), whole.stop if last is None else min(last, whole.stop))
+        part._indices = range(max(first, indices.start), indices.stop if last is None else min(last, indices.stop))
         part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
         return part

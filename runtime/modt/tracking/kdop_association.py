@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import KdopAssociationConfig
-from modt.geometry.kdop import AXES, overlapping_pairs, width_sum
+from modt.geometry.kdop import AXES, DIRECTIONS, overlapping_pairs, width_sum
 from modt.geometry.kdop_displacement import least, measured, shape_similarity
 from modt.observations import Observations
 from modt.tracking import kalman
@@ -52,11 +52,11 @@ class KdopAssociation:
         near = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
         kept = near[assign(rows[near], columns[near], cost[near], weight.max_cost)]
         rows, columns = rows[kept], columns[kept]
+        x = tracks.x.take(rows, axis=0)[:, :2]
+        mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
         before = tracks.end_variance.T.take(rows, axis=1)
-        shift, covariance, end_variance = measured(
-            a.take(kept, axis=1), b.take(kept, axis=1), variance[columns], before
-        )
-        return Matches(rows, columns, tracks.x.take(rows, axis=0)[:, :2] + shift, covariance, end_variance.T)
+        shift, covariance, end_variance = measured(mean, b.take(kept, axis=1), variance[columns], before)
+        return Matches(rows, columns, x + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:
         """Centre of the k-DOP."""

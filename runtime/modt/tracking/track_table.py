@@ -19,6 +19,7 @@ class TrackTable(Tracks):
         last_class: class when the frame began.
         kdop: (M, 8) last observed, see geometry/kdop.py [m, world].
         envelope: (M, 8) k-DOP of all that was observed, slowly decaying, about the position [m].
+        mean_kdop: (M, 8) mean k-DOP about the position; an end that jumped begins anew [m].
         end_variance: (M, 4) variance of the position along each axis by ends of the k-DOP that disagreed [m2].
         bottom, top: lowest and highest point last observed [m, world].
         anchor: (M, 2) position that the last k-DOP was assigned [m, world].
@@ -29,6 +30,7 @@ class TrackTable(Tracks):
     last_class: Int
     kdop: Float64
     envelope: Float64
+    mean_kdop: Float64
     end_variance: Float64
     bottom: Float64
     top: Float64
@@ -45,6 +47,7 @@ class TrackTable(Tracks):
             last_class=np.zeros(m, np.int64),
             kdop=np.zeros((m, 8)),
             envelope=np.full((m, 8), -np.inf),
+            mean_kdop=np.zeros((m, 8)),
             end_variance=np.zeros((m, 4)),
             bottom=np.zeros(m),
             top=np.zeros(m),

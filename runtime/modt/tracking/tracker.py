@@ -7,6 +7,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.config import TrackingConfig
 from modt.geometry.kdop import DIRECTIONS, widths
+from modt.geometry.kdop_displacement import AGREE_M
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
@@ -155,6 +156,9 @@ class Tracker:
         merged = _oversized(t.last_class[rows], about)
         envelope[merged] = known[merged]
         t.envelope[rows] = envelope
+        off = t.mean_kdop.take(rows, axis=0) - about
+        weight = np.minimum(1.0 - 1.0 / t.hits[rows], self.config.mean_kdop_decay)[:, None]
+        t.mean_kdop[rows] = about + (np.abs(off) < AGREE_M) * weight * off
 
     def _record(self, rows: Int, proposals: Int, observations: Observations, position: Float64) -> Float64:
         """Record what is observed of tracks (R,) at positions (R, 2); returns (R, 8) their k-DOPs about these [m]."""
@@ -213,7 +217,7 @@ class Tracker:
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
-        t.envelope[new] = self._record(new, proposals, observations, position)
+        t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
 
 
 def _oversized(object_class: Int, kdop: Float64) -> Int:

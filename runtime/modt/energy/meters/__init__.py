@@ -1,1 +1,1 @@
-"""Energy meters: what a machine can say about the power it draws."""
+"""Energy meters: power and energy readings of a machine."""

@@ -1,4 +1,4 @@
-"""What discovery found, usable or not."""
+"""A result of discovery, usable or not."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from modt.energy.meters.meter import Facts, Meter, MeterLostError
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Meters that may be added up, because none of them counts what another one counts.
+    """Meters whose readings may be summed, since their scopes do not overlap.
 
     Attributes:
-        name: for people.
-        meters: one a socket or rail; empty where there is none of this sort.
-        why_not: what stands against using it, empty where nothing does.
-        remedy: what would make it usable.
+        name: for display.
+        meters: one per socket or rail; empty where none of this type exists.
+        why_not: reason against its use, empty where there is none.
+        remedy: action that makes it usable.
     """
 
     name: str
@@ -30,12 +30,12 @@ class Candidate:
 
     @property
     def facts(self) -> Facts | None:
-        """Of the first meter; all of one candidate are alike."""
+        """Facts of the first meter; those of one candidate are alike."""
         return self.meters[0].facts if self.meters else None
 
 
-def tried(name: str, meters: tuple[Meter, ...], remedy: str) -> Candidate:
-    """A candidate that has been read once, so that it is known whether it can be."""
+def probe(name: str, meters: tuple[Meter, ...], remedy: str) -> Candidate:
+    """A candidate, read once to find out whether it can be."""
     try:
         for meter in meters:
             meter.read()

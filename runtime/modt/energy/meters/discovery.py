@@ -1,4 +1,4 @@
-"""Finds every meter there is, and picks one."""
+"""Discovery of the meters of a machine, and the choice of one."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from modt.energy.meters.pmic import find_pmic
 from modt.energy.meters.powercap import find_powercap
 from modt.errors import MisuseError
 
-KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
-SCOPES = (Scope.CPU, Scope.SOC, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
-"""The narrower the scope, the larger this program's share of what it shows."""
+_KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
+_SCOPES = (Scope.CPU, Scope.SOC, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
+"""Order of preference: the narrower the scope, the larger the share of this program."""
 
 
 @dataclass(frozen=True, slots=True)
 class Discovery:
-    """What this machine offers.
+    """The meters of a machine.
 
     Attributes:
-        candidates: all, the best first, the unusable last with the reason.
+        candidates: usable ones first, the best before all; then the others, with the reason.
     """
 
     candidates: tuple[Candidate, ...]
@@ -35,25 +35,24 @@ class Discovery:
         return next(c for c in self.candidates if c.usable)
 
     def choose(self, name: str | None) -> Candidate:
-        """The best, or the one whose name holds the text.
+        """The best, or the first usable one whose name contains the text.
 
         Raises:
             MisuseError: none does, or it is not usable.
         """
         if name is None:
             return self.best
-        for candidate in self.candidates:
-            if name.lower() in candidate.name.lower() and candidate.usable:
-                return candidate
-        unusable = next((c for c in self.candidates if name.lower() in c.name.lower()), None)
-        if unusable is not None:
-            raise MisuseError(f"meter {unusable.name}", unusable.why_not, unusable.remedy)
+        named = [c for c in self.candidates if name.lower() in c.name.lower()]  # usable ones come first
+        if named and named[0].usable:
+            return named[0]
+        if named:
+            raise MisuseError(f"meter {named[0].name}", named[0].why_not, named[0].remedy)
         names = ", ".join(c.name for c in self.candidates if c.usable)
         raise MisuseError(f"meter {name}", "not on this machine", f"use one of: {names}")
 
 
 def discover(model: ModelMeter, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
-    """Look for every sort of meter; the model stands last among the usable."""
+    """Search every type of meter; the model is the last of the usable ones."""
     found = [*find_powercap(sys), *find_hwmon(sys), *find_pmic(vcgencmd), *find_batteries(sys)]
     found.append(Candidate(model.facts.name, (model,)))
     return Discovery(tuple(sorted(found, key=_rank)))
@@ -63,4 +62,4 @@ def _rank(candidate: Candidate) -> tuple[int, int, int]:
     facts = candidate.facts
     if facts is None or not candidate.usable:
         return (1, 0 if facts else 1, 0)
-    return (0, KINDS.index(facts.kind), SCOPES.index(facts.scope))
+    return (0, _KINDS.index(facts.kind), _SCOPES.index(facts.scope))

@@ -1,7 +1,8 @@
-"""What a meter declares and how it is read."""
+"""The interface of a meter, and readings of files of sysfs."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -9,29 +10,29 @@ from typing import Protocol
 
 
 class Kind(StrEnum):
-    """How far a figure can be trusted; every figure shown carries one."""
+    """Reliability of a figure; every figure shown carries one."""
 
     MEASURED = "measured"
     """Counted by hardware or by this program."""
     INTEGRATED = "integrated"
-    """Power samples, added up over time."""
+    """Power samples integrated over time."""
     ESTIMATED = "estimated"
     """Computed from assumptions."""
     UNAVAILABLE = "unavailable"
-    """Nobody knows."""
+    """Not known."""
 
 
-class Quantity(StrEnum):
-    """What one reading is."""
+class Measurand(StrEnum):
+    """The physical quantity of a reading."""
 
     ENERGY = "energy"
-    """Counts up [J]."""
+    """A counter [J]."""
     POWER = "power"
-    """Of this moment [W]."""
+    """A momentary value [W]."""
 
 
 class Scope(StrEnum):
-    """What a meter's figure covers, from the narrowest."""
+    """The consumers a meter covers, from the narrowest."""
 
     PROCESS = "this process, by a model"
     CPU = "CPU packages"
@@ -45,33 +46,31 @@ class MeterLostError(Exception):
     """The meter cannot be read now."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """What is known of a meter without reading it.
+    """Static properties of a meter.
 
     Attributes:
-        name: for people.
-        quantity: what a reading is.
-        unit: of the device's own figure.
+        name: for display.
+        measurand: energy or power.
+        unit: of the device's own readings.
         resolution: smallest step of a reading [J or W].
-        update_s: time between the device's own updates [s].
-        wrap_J: an energy counter starts again at 0 after this much [J]; None where it never does, or nobody knows.
-        max_W: no reading can honestly exceed this power [W].
-        scope: what it covers.
-        kind: what the energy taken from it is.
+        max_W: upper bound of plausible power [W].
+        scope: consumers covered.
+        kind: reliability of the energy derived from it.
+        wrap_J: range of an energy counter [J]; None where it never wraps, or the range is unknown.
         privilege: needed to read it.
     """
 
     name: str
-    quantity: Quantity
+    measurand: Measurand
     unit: str
     resolution: float
-    update_s: float
-    wrap_J: float | None
     max_W: float
     scope: Scope
     kind: Kind
-    privilege: str
+    wrap_J: float | None = None
+    privilege: str = "none"
 
 
 class Meter(Protocol):
@@ -79,11 +78,11 @@ class Meter(Protocol):
 
     @property
     def facts(self) -> Facts:
-        """What it declares."""
+        """Static properties."""
         ...
 
     def read(self) -> float:
-        """The figure now [J or W, by its quantity].
+        """Present value [J or W, by its measurand].
 
         Raises:
             MeterLostError: it cannot be read now.
@@ -91,11 +90,30 @@ class Meter(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class FileMeter:
+    """A value of sysfs: the product of the integers in some files.
+
+    Attributes:
+        facts: static properties.
+        paths: of one file, or of a voltage and a current.
+        scale: of the product, to [J or W].
+    """
+
+    facts: Facts
+    paths: tuple[Path, ...]
+    scale: float = 1e-6
+
+    def read(self) -> float:
+        """Present value [J or W]."""
+        return self.scale * math.prod(read_number(path) for path in self.paths)
+
+
 def read_text(path: Path) -> str:
-    """First line of a small file.
+    """Content of a small file, stripped.
 
     Raises:
-        MeterLostError: missing or unreadable; it says why.
+        MeterLostError: missing or unreadable, with the reason.
     """
     try:
         return path.read_text(encoding="ascii", errors="replace").strip()
@@ -104,21 +122,29 @@ def read_text(path: Path) -> str:
 
 
 def read_number(path: Path) -> float:
-    """A whole number that the kernel wrote.
+    """An integer written by the kernel.
 
     Raises:
-        MeterLostError: missing, unreadable or no number.
+        MeterLostError: missing, unreadable or not a number.
     """
     text = read_text(path)
     try:
         return float(int(text))
     except ValueError:
-        raise MeterLostError(f"{path}: {text!r} is no number") from None
+        raise MeterLostError(f"{path}: {text!r} is not a number") from None
 
 
-def known(path: Path) -> str | None:
-    """First line of a small file, None where it cannot be read."""
+def text_or_none(path: Path) -> str | None:
+    """Content of a small file, None where it cannot be read."""
     try:
         return read_text(path)
+    except MeterLostError:
+        return None
+
+
+def number_or_none(path: Path) -> float | None:
+    """An integer written by the kernel, None where it cannot be read."""
+    try:
+        return read_number(path)
     except MeterLostError:
         return None

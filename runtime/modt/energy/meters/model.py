@@ -1,16 +1,16 @@
-"""A model where nothing can be read: idle and busy watts, times time."""
+"""The power model used where no meter can be read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from modt.energy.meters.meter import Facts, Kind, Quantity, Scope
+from modt.energy.meters.meter import Facts, Kind, Measurand, Scope
 
 
 @dataclass(frozen=True, slots=True)
 class ModelMeter:
-    """Energy = idle watts x wall time + (busy - idle) watts x CPU time of this process.
+    """Energy = idle_W x wall time + (busy_W - idle_W) x CPU time of this process.
 
     Attributes:
         idle_W: drawn while this process waits.
@@ -26,20 +26,22 @@ class ModelMeter:
 
     @property
     def facts(self) -> Facts:
-        """It is an assumption and says so."""
+        """Its kind is estimated."""
         return Facts(
-            name=f"model {self.idle_W:g} W idle, {self.busy_W:g} W busy",
-            quantity=Quantity.ENERGY,
+            name=model_name(self.idle_W, self.busy_W),
+            measurand=Measurand.ENERGY,
             unit="J",
             resolution=1e-9,
-            update_s=0.0,
-            wrap_J=None,
             max_W=max(self.idle_W, self.busy_W) * 1024,
             scope=Scope.PROCESS,
             kind=Kind.ESTIMATED,
-            privilege="none",
         )
 
     def read(self) -> float:
-        """Energy since the clocks' beginning [J]."""
+        """Energy since the epoch of the clocks [J]."""
         return 1e-9 * (self.idle_W * self.wall_ns() + (self.busy_W - self.idle_W) * self.cpu_ns())
+
+
+def model_name(idle_W: float, busy_W: float) -> str:
+    """Display name of the model of a board."""
+    return f"model {idle_W:g} W idle, {busy_W:g} W busy"

@@ -1,4 +1,4 @@
-"""The Raspberry Pi 5's power management chip, through the firmware's own command."""
+"""The power management chip of the Raspberry Pi 5, through the firmware's command."""
 
 from __future__ import annotations
 
@@ -7,31 +7,29 @@ import shutil
 import subprocess
 from dataclasses import dataclass
 
-from modt.energy.meters.candidate import Candidate, tried
-from modt.energy.meters.meter import Facts, Kind, MeterLostError, Quantity, Scope
+from modt.energy.meters.candidate import Candidate, probe
+from modt.energy.meters.meter import Facts, Kind, Measurand, MeterLostError, Scope
 
-VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=([0-9.]+)[AV]")
+_RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=([0-9.]+)[AV]")
 
 
 @dataclass(frozen=True, slots=True)
 class Pmic:
-    """Sum over the rails whose voltage and current are both known.
+    """Power summed over the rails with both voltage and current.
 
-    What hangs on the 5 V rail itself (USB, HATs, the fan) and the chip's own loss are not in it.
+    Loads on the 5 V rail itself (USB, HATs, the fan) and the loss of the chip are not included.
     """
 
     command: str
 
     @property
     def facts(self) -> Facts:
-        """Declared from the converter's width; a reading takes a few milliseconds of another process."""
+        """Resolution from the width of the converter; a reading takes a few milliseconds of another process."""
         return Facts(
             name="Raspberry Pi 5 PMIC",
-            quantity=Quantity.POWER,
+            measurand=Measurand.POWER,
             unit="V x A",
             resolution=0.02,
-            update_s=0.01,
-            wrap_J=None,
             max_W=50.0,
             scope=Scope.BOARD,
             kind=Kind.INTEGRATED,
@@ -39,7 +37,7 @@ class Pmic:
         )
 
     def read(self) -> float:
-        """The power now [W]."""
+        """Present power [W]."""
         try:
             done = subprocess.run(
                 [self.command, "pmic_read_adc"], capture_output=True, text=True, timeout=2.0, check=False
@@ -47,8 +45,8 @@ class Pmic:
         except (OSError, subprocess.TimeoutExpired) as error:
             raise MeterLostError(f"{self.command}: {error}") from None
         if done.returncode:
-            said = (done.stderr or done.stdout).strip().splitlines()
-            raise MeterLostError(f"{self.command}: {said[0] if said else f'exit status {done.returncode}'}")
+            output = (done.stderr or done.stdout).strip().splitlines()
+            raise MeterLostError(f"{self.command}: {output[0] if output else f'exit status {done.returncode}'}")
         return rail_power_W(done.stdout)
 
 
@@ -60,7 +58,7 @@ def rail_power_W(text: str) -> float:
     """
     amperes: dict[str, float] = {}
     volts: dict[str, float] = {}
-    for rail, quantity, value in VALUE.findall(text):
+    for rail, quantity, value in _RAIL_VALUE.findall(text):
         (amperes if quantity == "A" else volts)[rail] = float(value)
     rails = amperes.keys() & volts.keys()
     if not rails:
@@ -74,4 +72,4 @@ def find_pmic(command: str = "vcgencmd") -> list[Candidate]:
     name = "Raspberry Pi 5 PMIC"
     if path is None:
         return [Candidate(name, (), f"no {command} here", "on a Raspberry Pi 5, install raspi-utils")]
-    return [tried(name, (Pmic(path),), "on a Raspberry Pi 5, add the user to group video")]
+    return [probe(name, (Pmic(path),), "on a Raspberry Pi 5, add the user to group video")]

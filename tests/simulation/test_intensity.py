@@ -1,11 +1,20 @@
-"""The fourth column: read as a real HDL-64E reads it, and nothing else depends on it."""
+"""Reported intensities: as a real HDL-64E reports them, without effect on anything else."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.simulation.materials import GLOSS, LEVEL, LOSS, REFLECTIVITY, SEMANTIC, SHADE, TEXTURE, Material
+from modt.simulation.materials import (
+    BODY_SIGMA,
+    DROPOUT,
+    GRAZING_LOSS,
+    INTENSITY,
+    POINT_SIGMA,
+    REFLECTIVITY,
+    SEMANTIC,
+    Material,
+)
 from modt.simulation.raycast import RayCaster
 from modt.simulation.returns import Receiver
 from modt.simulation.sensors import sensor
@@ -16,18 +25,18 @@ from modt.sources.synthetic_stream import SyntheticStream
 HDL = sensor("hdl-64e")
 
 
-def read(piece, shade=0.0):
-    """Brightness of the returns of one piece before nothing else, by an HDL-64E."""
+def received(solid, offset=0.0):
+    """Distances, intensities and rays of the returns of one solid, by an HDL-64E."""
     sky = np.full(HDL.shape, np.inf, np.float32)
-    image = RayCaster(HDL).cast(piece, sky, np.ones_like(sky))
-    material = np.full(HDL.shape, piece.material[0], np.uint8)
+    image = RayCaster(HDL).cast(solid, sky, np.ones_like(sky))
+    material = np.full(HDL.shape, solid.material[0], np.uint8)
     receiver = Receiver(HDL, np.random.default_rng(0))
-    shades = np.array([shade, 0], np.float32)
-    return receiver.receive(image.distance, material, image.piece, shades, np.random.default_rng(1))
+    offsets = np.array([offset, 0], np.float32)
+    return receiver.receive(image.distance, material, image.solid, offsets, np.random.default_rng(1))
 
 
 def test_every_material_has_a_row_in_every_table():
-    for table in (REFLECTIVITY, LOSS, SEMANTIC, LEVEL, SHADE, TEXTURE, GLOSS):
+    for table in (REFLECTIVITY, DROPOUT, SEMANTIC, INTENSITY, BODY_SIGMA, POINT_SIGMA, GRAZING_LOSS):
         assert table.shape == (len(Material),)
 
 
@@ -36,22 +45,22 @@ def test_every_material_has_a_row_in_every_table():
     st.floats(1, 120, width=32),
     st.sampled_from(["hdl-64e", "vlp-16"]),
 )
-def test_what_is_read_is_a_step_of_the_scale_and_grows_with_strength(strength, slant_m, name):
+def test_reported_intensities_are_steps_of_the_scale_and_increase(intensity, slant_m, name):
     response = sensor(name).response
-    got = response.report(np.sort(np.array(strength, np.float32)), np.full(len(strength), slant_m, np.float32))
+    got = response.report(np.sort(np.array(intensity, np.float32)), np.full(len(intensity), slant_m, np.float32))
     assert 0 <= got.min() <= got.max() <= np.float32(response.most)
     np.testing.assert_allclose(got, np.rint(got * response.steps) / response.steps, atol=1e-6)
     assert (np.diff(got) >= 0).all()
 
 
 @given(st.floats(0, 1.25, width=32), st.floats(17, 80, width=32), st.floats(0, 40, width=32))
-def test_an_hdl_64e_reads_the_same_surface_darker_beyond_its_focus(strength, slant_m, farther_m):
+def test_an_hdl_64e_reports_less_beyond_its_focus(intensity, slant_m, farther_m):
     slant = np.array([slant_m, slant_m + farther_m], np.float32)
-    near, far = HDL.response.report(np.full(2, strength, np.float32), slant)
+    near, far = HDL.response.report(np.full(2, intensity, np.float32), slant)
     assert far <= near
 
 
-def test_a_sweep_reads_0_to_99_hundredths_and_more_zeros_the_farther():
+def test_a_sweep_reports_0_to_0_99_with_more_zeros_at_range():
     frame, truth = next(SyntheticStream(seconds=0.1, seed=3).sweeps())
     value, away = frame.points[:, 3], np.linalg.norm(frame.points[:, :3], axis=1)
     assert value.min() == 0
@@ -65,21 +74,21 @@ def test_a_sweep_reads_0_to_99_hundredths_and_more_zeros_the_farther():
     assert dark[0] < 0.15 < 0.3 < dark[2] < 0.7 < dark[3]
 
 
-def test_the_shade_of_a_surface_changes_its_brightness_alone():
+def test_an_intensity_offset_changes_the_intensity_alone():
     wall = box((15.0, 0.0, 0.0), (0.2, 6.0, 3.0), Material.WALL)
-    (distance, plain, ray), (same_distance, bright, same_ray) = read(wall), read(wall, 0.2)
+    (distance, plain, ray), (same_distance, bright, same_ray) = received(wall), received(wall, 0.2)
     np.testing.assert_array_equal(distance, same_distance)
     np.testing.assert_array_equal(ray, same_ray)
     assert np.mean(bright - plain) == pytest.approx(0.2, abs=0.02)
 
 
-def test_paint_is_darker_the_less_it_faces_the_sensor():
-    turned = [read(box((14.0, 0.0, 0.0), (0.1, 3.0, 1.0), Material.CAR_PAINT, yaw))[1] for yaw in (0.0, 0.8, 1.3)]
+def test_paint_is_darker_at_grazing_incidence():
+    turned = [received(box((14.0, 0.0, 0.0), (0.1, 3.0, 1.0), Material.CAR_PAINT, yaw))[1] for yaw in (0.0, 0.8, 1.3)]
     c, s = np.cos(1.2), np.sin(1.2)
     lean = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
     centre = np.array([14.0, 0.0, 0.0])
     upright = box((0.0, 0.0, 0.0), (0.1, 3.0, 1.0), Material.CAR_PAINT)
-    leant = read(upright.moved(lean, centre))[1]
+    leant = received(upright.transformed(lean, centre))[1]
     means = [v.mean() for v in turned]
     assert means == sorted(means, reverse=True)
     assert means[2] < 0.6 * means[0]
@@ -88,7 +97,7 @@ def test_paint_is_darker_the_less_it_faces_the_sensor():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_number_plates_saturate(tmp_path, seed):
+def test_number_plates_saturate_the_intensity(tmp_path, seed):
     path = tmp_path / "000000.txt"
     path.write_text("Car 0 0 0 0 0 9 9 1.5 1.6 4.0 0.0 1.7 13.0 -1.57\n")
     frame, truth = SyntheticStream(str(path), "hdl-64e", 0.1, seed=seed).simulator.sweep(0)
@@ -101,7 +110,7 @@ def test_number_plates_saturate(tmp_path, seed):
 
 
 @pytest.mark.parametrize(("make", "size"), [(car, car_size), (van, van_size)])
-def test_plates_and_lamps_sit_on_the_ends_of_a_vehicle_and_inside_its_box(make, size):
+def test_plates_and_lamps_lie_at_the_ends_of_a_vehicle_inside_its_box(make, size):
     for seed in range(20):
         rng = np.random.default_rng(seed)
         length, width, height = size(rng)
@@ -112,7 +121,7 @@ def test_plates_and_lamps_sit_on_the_ends_of_a_vehicle_and_inside_its_box(make, 
         assert (np.abs(part.centre[:, 0]) > 0.4 * length).all()
 
 
-def test_a_body_keeps_its_shade():
+def test_a_body_keeps_its_intensity_offset():
     stream = SyntheticStream(seconds=1.0, seed=3)
     seen = [stream.simulator.sweep(i) for i in (0, 3)]
     mean = []

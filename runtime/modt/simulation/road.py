@@ -1,4 +1,4 @@
-"""The lie of a road and the ground around it."""
+"""Roads and the terrain around them."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from modt.simulation.materials import Material
 from modt.simulation.terrain import Terrain
 from modt.types import Float32, Float64
 
-CELL_M, BESIDE_M = 0.25, 80.0
-KERB_M, CAMBER, ROUGH_M = 0.12, 0.02, 0.012
+CELL_M, MARGIN_M = 0.25, 80.0
+KERB_M, CAMBER, ROUGHNESS_M = 0.12, 0.02, 0.012
 
 
 @dataclass(frozen=True)
 class Road:
-    """A gently winding road; its own x runs along it, left is positive.
+    """A sinusoidal road; the x axis of its frame runs along it, positive offsets are to the left.
 
     Attributes:
-        start_m, end_m: where it begins and ends along its x.
+        start_m, end_m: ends along x.
         half_m: half the width of the carriageway.
         pavement_m: width of each pavement.
-        front_m: distance of the house fronts from the middle.
-        bend_m, wave_m: how far it swings to the sides, and over what length.
-        turn_rad: direction of its x in the world.
-        gaps: stretches (from, to) along it that other roads take up.
+        front_m: distance of the house fronts from the centre line.
+        bend_m, wave_m: amplitude and wavelength of the centre line.
+        turn_rad: direction of x in the world.
+        gaps: stretches (from, to) along x occupied by other roads.
     """
 
     start_m: float
@@ -39,35 +39,31 @@ class Road:
     turn_rad: float = 0.0
     gaps: tuple[tuple[float, float], ...] = ()
 
-    def free(self, x: float, left_m: float = 0.0) -> bool:
-        """Whether no other road takes up this stretch."""
+    def free(self, x: float) -> bool:
+        """Whether no other road occupies x [m]."""
         return not any(a <= x <= b for a, b in self.gaps)
 
     def middle(self, x: Float64) -> Float64:
-        """Swing of the middle of the road at x [m]."""
+        """Offset of the centre line at x [m]."""
         return np.asarray(self.bend_m * np.sin(2 * np.pi * x / self.wave_m))
 
     def heading(self, x: Float64) -> Float64:
-        """Direction of the road at x, from its own x axis [rad]."""
+        """Direction of the centre line at x, from the x axis [rad]."""
         return np.asarray(np.arctan(self.bend_m * 2 * np.pi / self.wave_m * np.cos(2 * np.pi * x / self.wave_m)))
 
     def place(self, x: float, left_m: float, turn: float = 0.0) -> tuple[float, float, float]:
-        """World x, y and heading of a place left of the middle of the road, turned from its direction."""
-        yaw = float(self.heading(np.array(x)))
-        spot = self._world(
-            np.array([[x - left_m * np.sin(yaw), float(self.middle(np.array(x))) + left_m * np.cos(yaw)]])
-        )
-        return float(spot[0, 0]), float(spot[0, 1]), yaw + turn + self.turn_rad
+        """World x, y and heading of a place left of the centre line, turned from its direction."""
+        along = np.array([x])
+        spot = self._left_of_centre(along, left_m)
+        return float(spot[0, 0]), float(spot[0, 1]), float(self.heading(along)[0]) + turn + self.turn_rad
 
     def lane(self, left_m: float, backwards: bool = False) -> Float64:
-        """(n, 2) line along the road, left of its middle, world."""
-        x = np.arange(self.start_m, self.end_m, 4.0)
-        yaw = self.heading(x)
-        line = self._world(np.stack([x - left_m * np.sin(yaw), self.middle(x) + left_m * np.cos(yaw)], axis=1))
+        """(n, 2) line along the road, left of the centre line, world."""
+        line = self._left_of_centre(np.arange(self.start_m, self.end_m, 4.0), left_m)
         return line[::-1] if backwards else line
 
-    def beside(self, x: Float32, y: Float32) -> Float32:
-        """Distance of world points from the middle of the road [m]."""
+    def distance_to_centre(self, x: Float32, y: Float32) -> Float32:
+        """Distance of world points from the centre line [m]."""
         c, s = np.float32(np.cos(self.turn_rad)), np.float32(np.sin(self.turn_rad))
         along, across = c * x + s * y, c * y - s * x
         if not self.bend_m:
@@ -78,28 +74,31 @@ class Road:
         apart: Float32 = np.abs((across - swing) * slant)
         return apart
 
-    def _world(self, xy: Float64) -> Float64:
-        c, s = np.cos(self.turn_rad), np.sin(self.turn_rad)
-        turned: Float64 = xy @ np.array([[c, s], [-s, c]])
-        return turned
+    def _left_of_centre(self, x: Float64, left_m: float) -> Float64:
+        """(n, 2) world points at x (n,), left of the centre line."""
+        yaw, c, s = self.heading(x), np.cos(self.turn_rad), np.sin(self.turn_rad)
+        xy = np.stack([x - left_m * np.sin(yaw), self.middle(x) + left_m * np.cos(yaw)], axis=1)
+        return np.asarray(xy @ np.array([[c, s], [-s, c]]))
+
+
+def terrain_along(rng: np.random.Generator, road: Road) -> Terrain:
+    """Terrain along one road, MARGIN_M to both sides."""
+    return terrain(rng, [road], (road.start_m, -MARGIN_M), (road.end_m, MARGIN_M))
 
 
 def terrain(
     rng: np.random.Generator, roads: list[Road], low: tuple[float, float], high: tuple[float, float]
 ) -> Terrain:
-    """Cambered carriageways, kerbs, pavements and rough ground behind, between two corners of the world."""
+    """Cambered carriageways, kerbs, pavements and rough ground behind, between two corners [m, world]."""
     x = np.arange(low[0], high[0], CELL_M, dtype=np.float32)
     y = np.arange(low[1], high[1], CELL_M, dtype=np.float32)
-    if roads[0].bend_m:
-        side = [r.beside(x[:, None], y[None]) for r in roads]
-    else:
-        side = [np.broadcast_to(r.beside(x[:, None], y[None]), (len(x), len(y))) for r in roads]
+    side = [np.broadcast_to(r.distance_to_centre(x[:, None], y[None]), (len(x), len(y))) for r in roads]
     carriage = np.logical_or.reduce([s < r.half_m for s, r in zip(side, roads, strict=True)])
     walk = np.logical_or.reduce([s < r.half_m + r.pavement_m for s, r in zip(side, roads, strict=True)])
     nearest = np.minimum.reduce([s - r.half_m for s, r in zip(side, roads, strict=True)])
     half = roads[0].half_m
     behind = np.maximum(nearest - roads[0].pavement_m, 0)
-    rough = _lumps(rng, len(x), len(y)) * np.minimum(behind, 1.0)
+    rough = _roughness(rng, len(x), len(y)) * np.minimum(behind, 1.0)
     bank = np.float32(rng.uniform(-0.02, 0.05)) * np.minimum(behind, 15.0)
     road_height = np.where(len(roads) > 1, np.float32(0), -np.float32(CAMBER) * (nearest + half)).astype(np.float32)
     edge = KERB_M - (CAMBER * half if len(roads) == 1 else 0.0)
@@ -111,13 +110,13 @@ def terrain(
         lift, bearing = rng.uniform(0.0, 0.5), rng.uniform(-0.5, 0.5)
         along = np.float32(k * np.cos(bearing)) * x[:, None] + np.float32(k * np.sin(bearing)) * y
         height += np.float32(lift) * np.sin(along + np.float32(phase))
-    height += rng.standard_normal(height.shape, np.float32) * np.float32(ROUGH_M)
+    height += rng.standard_normal(height.shape, np.float32) * np.float32(ROUGHNESS_M)
     surface = np.where(carriage, Material.ASPHALT, np.where(walk, Material.PAVING, Material.GRASS))
     return Terrain(np.array(low, np.float64), CELL_M, height, surface.astype(np.uint8))
 
 
-def _lumps(rng: np.random.Generator, rows: int, columns: int) -> Float32:
-    """Unevenness of open ground [m]: swells of metres and tussocks of a cell."""
+def _roughness(rng: np.random.Generator, rows: int, columns: int) -> Float32:
+    """(X, Y) unevenness of open ground [m], smooth over metres plus tussocks of one cell."""
     coarse = rng.standard_normal((rows // 8 + 2, columns // 8 + 2), np.float32)
     swell = ndimage.zoom(coarse, 8, order=1)[:rows, :columns]
     fine = rng.standard_normal((rows, columns), np.float32)

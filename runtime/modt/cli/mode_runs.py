@@ -1,0 +1,98 @@
+"""Assembly of the runs of a comparison, by the same parts as a replay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import chain, islice
+
+import numpy as np
+
+from modt import assembly
+from modt.cli import assemble, metering
+from modt.config import ProfileConfig
+from modt.energy.ledger import Ledger
+from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
+from modt.reporting.repetitions import Repetition
+from modt.types import Budget, Frame
+
+BASELINE = "conventional"
+MODES = (BASELINE, "efficient", "accurate")
+VARIED = "varied"
+"""Tracking-by-detection with a random classification load: its costs are the unit costs of the prediction."""
+_LOADS = (0, 1, 2, 3, 5, 8, 12, 16, 20, 30, 45, 60)
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Parameters of a comparison.
+
+    Attributes:
+        request: stream, field of view, frames.
+        profile: of sensor and board.
+        core: the process is pinned to.
+        meter: name of the meter to read, None for the best.
+        turn: consecutive frames of one mode; None: 1, or all frames where a meter is read.
+    """
+
+    request: assemble.Request
+    profile: ProfileConfig
+    core: int | None
+    meter: str | None = None
+    turn: int | None = None
+
+    @property
+    def metered(self) -> bool:
+        """Whether a meter is read, rather than the model."""
+        return not metering.is_estimated(self.profile.energy, self.meter)
+
+    @property
+    def turn_frames(self) -> int:
+        """Consecutive frames of one mode.
+
+        A meter needs a second or more of one mode; CPU time is compared frame by frame, which spreads other load of
+        the machine evenly.
+        """
+        return self.turn or (10**9 if self.metered else 1)
+
+    def repetition(self, seed: int) -> Repetition:
+        """Every mode once through the stream, from its initial state."""
+        runs = {name: self._mode_run(name, seed) for name in (*MODES, VARIED)}
+        frames = iter(assemble.stream(self.request))
+        first = list(islice(frames, 1))
+        for frame in first:
+            for mode_run in runs.values():
+                _warm_up(mode_run, frame)
+        interleave(chain(first, frames), [*runs.values()], self.turn_frames)
+        return runs
+
+    def _mode_run(self, name: str, seed: int) -> ModeRun:
+        mode = assembly.MODES[BASELINE if name == VARIED else name]
+        ledger = Ledger()
+        fov = assemble.field_of_view(self.request, assemble.stream(self.request))
+        pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
+        recorder = RecordingClassifier(pipeline.classifier)
+        budget = mode.budget(self.profile)
+        return ModeRun(
+            pipeline=replace(pipeline, classifier=recorder),
+            ledger=ledger,
+            recorder=recorder,
+            budget=varied_load(seed) if name == VARIED else lambda _frame: budget,
+            windows=metering.windows(self.profile.energy, self.core, self.meter) if self.metered else None,
+        )
+
+
+def _warm_up(mode_run: ModeRun, frame: Frame) -> None:
+    """Run the two stages without a state once: first calls allocate and load."""
+    parts = mode_run.pipeline
+    proposals = parts.segmenter.segment(frame.points)
+    parts.classifier.classify(frame.points, proposals, np.arange(len(proposals)))
+
+
+def varied_load(seed: int) -> Callable[[int], Budget]:
+    """A random budget for each frame, reproducible by the seed."""
+
+    def budget(frame: int) -> Budget:
+        return Budget(calls=int(np.random.default_rng([seed, frame]).choice(_LOADS)))
+
+    return budget
