@@ -17,10 +17,11 @@ import numpy as np
 
 from modt import profile
 from modt.classes import CLASS_NAMES
+from modt.evaluation.overlap import FOOT_M
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from tools.options import parser
-from tools.train.labelled_scans import FOOT_M, Scan, object_scans
+from tools.train.labelled_scans import Scan, object_scans
 from tools.train.synthetic_scans import simulated_scans
 
 RINGS = (5, 10, 15, 20, 30, 50)

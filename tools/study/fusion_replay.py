@@ -12,10 +12,10 @@ from modt.classification.prior import Prior
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import SchedulerConfig
 from modt.energy.ledger import NullLedger
+from modt.evaluation.class_score import average_precision
 from modt.pipeline import Fusion, Pipeline
 from modt.types import Bool, Float64, Frame, Int, Proposals, Tracks
 from tools.study.recording import Playback, Recording
-from tools.train.scores import average_precision
 
 CALLS = ("first views", "first key views", "further views", "reviews")
 

@@ -3,38 +3,24 @@
 from __future__ import annotations
 
 import csv
-import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from modt.classes import ObjectClass
-from modt.geometry import Camera, FieldOfView, inverse, se3, transform
+from modt.classes import CLASSES, ObjectClass, class_of_kitti
+from modt.evaluation import overlap
+from modt.evaluation.truth import Regions
+from modt.geometry import FieldOfView
+from modt.sources.kitti_calibration import camera_of_raw, camera_of_sequence
+from modt.sources.kitti_labels import DONT_CARE, read_labels, read_tracklets
 from modt.types import Bool, Float32, Float64, Int
 
-CLASS_OF = {
-    "Car": ObjectClass.CAR,
-    "Van": ObjectClass.CAR,
-    "Pedestrian": ObjectClass.PEDESTRIAN,
-    "Person_sitting": ObjectClass.PEDESTRIAN,
-    "Cyclist": ObjectClass.CYCLIST,
-}
-"""Other labelled types count as background, as in the paper."""
-IMAGE_PX = (1242.0, 375.0)
-PAD_M, FOOT_M = 0.15, 0.25
-"""Margin around a box, and height above its bottom from which points belong to the object and not to the ground."""
-SEMANTIC_CLASS = {
-    10: ObjectClass.CAR,
-    252: ObjectClass.CAR,
-    30: ObjectClass.PEDESTRIAN,
-    254: ObjectClass.PEDESTRIAN,
-    31: ObjectClass.CYCLIST,
-    253: ObjectClass.CYCLIST,
-    18: ObjectClass.BACKGROUND,
-    258: ObjectClass.BACKGROUND,
-}
+SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.semantic_kitti} | dict.fromkeys(
+    (18, 258), ObjectClass.BACKGROUND
+)
+"""Trucks are labelled objects of no class."""
 SEMANTIC_UNKNOWN = (0, 1, 13, 15, 16, 20, 32, 99, 255, 256, 257, 259)
 """Labels without a known class: unlabelled, and vehicles that KITTI's object labels classify differently."""
 ARGOVERSE_CLASS = {"REGULAR_VEHICLE": "Car", "PEDESTRIAN": "Pedestrian", "BICYCLIST": "Cyclist"}
@@ -73,16 +59,22 @@ class Scan:
 
 
 def points_in_box(points: Float32, box: Float64) -> Bool:
-    """(N,) points of the object in a box: at most PAD_M beyond its faces, at least FOOT_M above its bottom."""
-    c, s = np.cos(box[6]), np.sin(box[6])
-    x, y, z = points[:, 0] - box[0], points[:, 1] - box[1], points[:, 2] - box[2]
-    within: Bool = (
-        (np.abs(c * x + s * y) < box[3] / 2 + PAD_M)
-        & (np.abs(c * y - s * x) < box[4] / 2 + PAD_M)
-        & (z > FOOT_M)
-        & (z < box[5] + PAD_M)
-    )
-    return within
+    """(N,) points of the object in a box: a little beyond its faces, and clear of the ground."""
+    return overlap.inside(points, centred(box))
+
+
+def centred(boxes: Float64) -> Float64:
+    """(..., 7) boxes about their centres, of boxes about the centres of their bottom faces."""
+    out = boxes.copy()
+    out[..., 2] += boxes[..., 5] / 2
+    return out
+
+
+def on_bottom(boxes: Float64) -> Float64:
+    """(..., 7) boxes about the centres of their bottom faces, of boxes about their centres."""
+    out = boxes.copy()
+    out[..., 2] -= boxes[..., 5] / 2
+    return out
 
 
 def scan_from_boxes(
@@ -97,7 +89,7 @@ def scan_from_boxes(
     """A scan with the points of each object taken from its box."""
     table = np.array(boxes).reshape(-1, 7)
     objects = tuple(np.flatnonzero(points_in_box(points, box)) for box in table)
-    classes = tuple(CLASS_OF.get(kind, ObjectClass.BACKGROUND) for kind in kinds)
+    classes = tuple(class_of_kitti(kind) for kind in kinds)
     return Scan(name, drive, points, objects, classes, table, fov, unlabelled | ~fov.contains(points))
 
 
@@ -114,59 +106,29 @@ def object_scans(folder: Path) -> Iterator[Scan]:
 
 def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
     """One scan of the object benchmark."""
-    camera = object_camera(calib)
+    camera = camera_of_sequence(calib)
     points = np.fromfile(path, np.float32).reshape(-1, 4)
-    boxes: list[list[float]] = []
-    kinds: list[str] = []
-    regions: list[Float64] = []
-    for line in label.read_text(encoding="utf-8").splitlines():
-        kind, *text = line.split()
-        v = np.array([float(t) for t in text])
-        if kind == "DontCare":
-            regions.append(v[3:7])
-            continue
-        foot = transform(inverse(camera.T_camera_sensor), v[None, 10:13])[0]
-        boxes.append([*foot, v[9], v[8], v[7], -v[13] - np.pi / 2])
-        kinds.append(kind)
-    fov = FieldOfView.of_camera(camera)
-    unlabelled = _in_regions(points, camera, np.array(regions).reshape(-1, 4))
-    return scan_from_boxes(path.stem, drive, points, boxes, kinds, fov, unlabelled)
-
-
-def object_camera(calib: Path) -> Camera:
-    """The left colour camera of a calibration file of the object benchmark."""
-    lines = (line.split(":") for line in calib.read_text(encoding="utf-8").splitlines() if ":" in line)
-    value = {key: np.array([float(t) for t in rest.split()]) for key, rest in lines}
-    T_rect = se3(value["R0_rect"].reshape(3, 3), np.zeros(3))
-    T_camera_sensor = T_rect @ np.vstack([value["Tr_velo_to_cam"].reshape(3, 4), [0, 0, 0, 1]])
-    return Camera(value["P2"].reshape(3, 4) @ T_camera_sensor, T_camera_sensor, *IMAGE_PX)
-
-
-def _in_regions(points: Float32, camera: Camera, regions: Float64) -> Bool:
-    uvw = np.c_[points[:, :3], np.ones(len(points))] @ camera.P_image_sensor.T
-    hit = np.zeros(len(points), np.bool_)
-    ahead = np.flatnonzero(uvw[:, 2] > 1)
-    u, v = (uvw[ahead, :2] / uvw[ahead, 2:]).T
-    for left, top, right, bottom in regions:
-        hit[ahead] |= (u > left) & (u < right) & (v > top) & (v < bottom)
-    return hit
+    labels = read_labels(label, camera, tracking=False)
+    objects = [item for item in labels if item.type_ != DONT_CARE]
+    edges = np.array([item.image_box for item in labels if item.type_ == DONT_CARE]).reshape(-1, 4)
+    unlabelled = Regions(edges, camera).contains(points)
+    boxes, kinds = [on_bottom(item.box).tolist() for item in objects], [item.type_ for item in objects]
+    return scan_from_boxes(path.stem, drive, points, boxes, kinds, FieldOfView.of_camera(camera), unlabelled)
 
 
 def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
     """Scans of a KITTI raw drive with tracklets; of the test drive only with `confirm`."""
     assert confirm or drive.name != TEST_DRIVE, drive
-    camera = _raw_camera(drive.parent)
-    tracklets = _tracklets(drive / "tracklet_labels.xml")
+    camera = camera_of_raw(drive.parent / "calib_cam_to_cam.txt")
+    tracklets = read_tracklets(drive / "tracklet_labels.xml")
     for path in sorted((drive / "velodyne_points" / "data").glob("*.bin")):
         frame = int(path.stem)
-        ids = [k for k, (_, _, first, poses) in enumerate(tracklets) if first <= frame < first + len(poses)]
-        present = [(kind, hwl, poses[frame - first]) for kind, hwl, first, poses in (tracklets[k] for k in ids)]
+        present = [label for label in tracklets if label.frame == frame]
         points = np.fromfile(path, np.float32).reshape(-1, 4)
-        boxes = [[*pose[:3], hwl[2], hwl[1], hwl[0], pose[3]] for _, hwl, pose in present]
+        boxes, kinds = [on_bottom(label.box).tolist() for label in present], [label.type_ for label in present]
         name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
-        kinds = [kind for kind, _, _ in present]
         scan = scan_from_boxes(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
-        yield replace(scan, track_ids=tuple(ids))
+        yield replace(scan, track_ids=tuple(label.id for label in present))
 
 
 def semantic_scans(folder: Path) -> Iterator[Scan]:
@@ -210,25 +172,3 @@ def argoverse_scans(folder: Path) -> Iterator[Scan]:
         drive = f"argoverse2/{path.stem.split('_')[0]}"
         none = np.zeros(len(points), np.bool_)
         yield scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
-
-
-def _raw_camera(date: Path) -> Camera:
-    def read(name: str) -> dict[str, Float64]:
-        lines = (line.split(":", 1) for line in (date / name).read_text(encoding="utf-8").splitlines())
-        return {
-            k: np.array([float(t) for t in v.split()]) for k, v in lines if k not in ("calib_time", "corner_dist")
-        }
-
-    cam, velo = read("calib_cam_to_cam.txt"), read("calib_velo_to_cam.txt")
-    T_camera_sensor = se3(cam["R_rect_00"].reshape(3, 3), np.zeros(3)) @ se3(velo["R"].reshape(3, 3), velo["T"])
-    return Camera(cam["P_rect_02"].reshape(3, 4) @ T_camera_sensor, T_camera_sensor, *IMAGE_PX)
-
-
-def _tracklets(path: Path) -> list[tuple[str, Float64, int, Float64]]:
-    found = []
-    for item in ET.parse(path).getroot().iterfind("tracklets/item"):
-        hwl = np.array([float(item.findtext(k, "nan")) for k in "hwl"])
-        poses = [[float(p.findtext(k, "nan")) for k in ("tx", "ty", "tz", "rz")] for p in item.iterfind("poses/item")]
-        first = int(item.findtext("first_frame", "0"))
-        found.append((item.findtext("objectType", ""), hwl, first, np.array(poses)))
-    return found

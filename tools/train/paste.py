@@ -14,10 +14,11 @@ import numpy as np
 from numpy.random import Generator
 
 from modt.classes import ObjectClass
+from modt.evaluation.overlap import PAD_M
 from modt.geometry import FieldOfView
 from modt.types import Bool, Float32, Float64, Int
 from tools.train.augment import Beams
-from tools.train.labelled_scans import PAD_M, Scan
+from tools.train.labelled_scans import Scan
 
 MIN_POINTS, CLEARANCE_M, OCCLUSION_MARGIN_M = 8, 0.4, 0.4
 CLASS_SHARE = {ObjectClass.CAR: 0.36, ObjectClass.PEDESTRIAN: 0.36, ObjectClass.CYCLIST: 0.28}

@@ -65,12 +65,3 @@ def fit_calibration(logits: Float64, label: Int, base: Float64 | float = 0.0) ->
 
     found = minimize(loss, np.zeros(N_CLASSES), method="L-BFGS-B")
     return Calibration(float(np.exp(found.x[0])), np.append(0.0, found.x[1:]))
-
-
-def expected_calibration_error(probability: Float64, label: Int, bins: int = 15) -> float:
-    """Expected calibration error of the top class: mean gap between confidence and accuracy over equal bins."""
-    confidence, right = probability.max(axis=1), probability.argmax(axis=1) == label
-    which = np.minimum((confidence * bins).astype(np.int64), bins - 1)
-    n = np.bincount(which, minlength=bins)
-    gap = np.bincount(which, confidence, bins) - np.bincount(which, right, bins)
-    return round(float(np.abs(gap).sum() / max(n.sum(), 1)), 4)

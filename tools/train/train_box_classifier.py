@@ -17,6 +17,7 @@ import torch
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.mlp import Layers, logits
+from modt.evaluation.class_score import average_precision
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train.augment import Beams, augment, subsample
@@ -25,7 +26,6 @@ from tools.train.box_features import crop_features, dataset_features
 from tools.train.dataset import Dataset, load
 from tools.train.held_out import Model, out_of_fold
 from tools.train.mlp_training import Batch, train_mlp
-from tools.train.scores import average_precision
 from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
 

@@ -24,6 +24,7 @@ import torch
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.crops import Crops, canonical
 from modt.classification.mlp import logits as layer_logits
+from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier, train_reflectance_classifier
@@ -33,8 +34,7 @@ from tools.train.dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
 from tools.train.distillation import EnsembleTargets, LabelTargets, TargetSource
 from tools.train.held_out import HeldOut, Model, out_of_fold
 from tools.train.network import PointNet
-from tools.train.scores import average_precision, confusion
-from tools.train.temperature_scaling import Calibration, expected_calibration_error
+from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
 
 POINTS, MAX_POINTS = 128, 400
@@ -159,8 +159,8 @@ def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) 
         "average_precision": average_precision(probability, held.label, held.truth),
         "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], held.truth[1:], strict=True)},
         "confusion": confusion(probability[clear], label),
-        "ece": expected_calibration_error(probability[clear], label),
-        "ece_uncalibrated": expected_calibration_error(Calibration.identity().apply(held.logits[clear]), label),
+        "ece": top_calibration_error(probability[clear], label),
+        "ece_uncalibrated": top_calibration_error(Calibration.identity().apply(held.logits[clear]), label),
     }
 
 

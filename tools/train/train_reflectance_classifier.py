@@ -19,6 +19,7 @@ from scipy.optimize import minimize
 from scipy.special import softmax
 
 from modt.classification.mlp import Layers, logits
+from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier
@@ -27,8 +28,7 @@ from tools.train.box_features import dataset_features
 from tools.train.dataset import Dataset, load
 from tools.train.held_out import Model, out_of_fold
 from tools.train.mlp_training import Batch, train_mlp
-from tools.train.scores import average_precision, confusion
-from tools.train.temperature_scaling import Calibration, expected_calibration_error, fit_calibration
+from tools.train.temperature_scaling import Calibration, fit_calibration
 from tools.train.weights import load_layers, save_layers
 
 STEPS = 1500
@@ -115,7 +115,7 @@ def cross_validate(
         "network": {
             "average_precision": average_precision(pool, held.label, held.truth),
             "confusion": confusion(pool[clear], label),
-            "ece": expected_calibration_error(pool[clear], label),
+            "ece": top_calibration_error(pool[clear], label),
             "log_loss": round(log_loss(pool[clear], label), 4),
             "log_loss_without": round(log_loss(network[clear], label), 4),
         },

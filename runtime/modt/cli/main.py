@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import replay, simulate, track
+from modt.cli import evaluate, replay, simulate, track
 from modt.cli.command import dispatch
 
-COMMANDS = (replay, simulate, track)
+COMMANDS = (replay, evaluate, simulate, track)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tools.train.temperature_scaling import Calibration, expected_calibration_error, fit_calibration
+from modt.evaluation.class_score import top_calibration_error
+from tools.train.temperature_scaling import Calibration, fit_calibration
 
 
 def test_calibration_recovers_temperature_and_class_offsets() -> None:
@@ -17,8 +18,8 @@ def test_calibration_recovers_temperature_and_class_offsets() -> None:
     found = fit_calibration(distorted, label)
     assert found.temperature == pytest.approx(3.0, rel=0.1)
     assert found.offset[1:] == pytest.approx(np.full(3, -2.0), abs=0.2)
-    assert expected_calibration_error(found.apply(distorted), label) < 0.02
-    assert expected_calibration_error(Calibration.identity().apply(distorted), label) > 0.1
+    assert top_calibration_error(found.apply(distorted), label) < 0.02
+    assert top_calibration_error(Calibration.identity().apply(distorted), label) > 0.1
 
 
 def test_calibration_folds_into_the_last_layer() -> None:

@@ -1,0 +1,69 @@
+"""`modt evaluate`: recorded runs against labels."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from modt.errors import MisuseError
+from modt.evaluation.rules import IGNORABLE
+
+DIGITS = 6
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("evaluate", help="judge recorded runs against labels")
+    p.add_argument(
+        "pairs",
+        nargs="+",
+        type=Path,
+        metavar="RUN TRUTH",
+        help="run directories (of replay --labels) and their labels",
+    )
+    p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
+    p.add_argument(
+        "--classes", choices=("all", "paper"), default="all", help="KITTI's vans as cars (all), or ignored (paper)"
+    )
+    what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
+    p.add_argument("--count", action="append", choices=IGNORABLE, default=[], metavar="WHAT", help=what)
+    p.add_argument("--sector", type=float, metavar="DEG", help="half the labelled sector (KITTI: 40; cuboids: 180)")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Evaluate and print.
+
+    Raises:
+        MisuseError: a run or its labels cannot be used, or do not belong together.
+    """
+    import json
+    from dataclasses import asdict, replace
+
+    from modt.evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
+    from modt.evaluation.report import report
+    from modt.evaluation.run_record import RunRecord
+    from modt.evaluation.truth_files import open_truth
+
+    paths: list[Path] = arguments.pairs
+    if len(paths) % 2:
+        raise MisuseError("RUN TRUTH", f"{len(paths)} paths are no pairs", "give each run followed by its labels")
+    if arguments.sector is not None and not 0 < arguments.sector <= 180:
+        raise MisuseError("--sector", f"{arguments.sector:g} is no half sector", "give more than 0 and at most 180")
+    by_sensor: dict[str, list[DriveRows]] = {}
+    for drive, (path, labels) in enumerate(zip(paths[::2], paths[1::2], strict=True)):
+        record = RunRecord.open(path)
+        truth = open_truth(labels, record.stream, paper=arguments.classes == "paper")
+        sector_deg = truth.rules.sector_deg if arguments.sector is None else arguments.sector
+        ignored = truth.rules.ignored - set(arguments.count)
+        rules = replace(truth.rules, sector_deg=sector_deg, ignored=ignored)
+        by_sensor.setdefault(record.sensor, []).append(collect(record.frames(truth), rules, drive))
+    sensors = {name: evaluation(found) for name, found in by_sensor.items()}
+    if len(sensors) > 1:
+        sensors["all sensors"] = evaluation([rows for found in by_sensor.values() for rows in found])
+    if arguments.json:
+        text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(found) for name, found in sensors.items()}})
+        print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))
+    else:
+        print(report(sensors))
+    return 0

@@ -1,0 +1,36 @@
+"""What counts in a judgement (docs/evaluation.md)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+IGNORABLE = ("cut", "few", "parked", "dontcare")
+
+
+@dataclass(frozen=True, slots=True)
+class Rules:
+    """Thresholds of a judgement.
+
+    Attributes:
+        min_points: least points of an object that must be segmented.
+        min_points_followed: least points of an object that must be followed, and of one for average precision.
+        by_iou: an object has a proposal for average precision if their intersection over union of points exceeds
+            one half; otherwise if each holds more than half of the other.
+        sector_deg: half the sector about x in which proposals are judged: where everything is labelled.
+        max_range_m: of objects and proposals that are judged.
+        ignored: of IGNORABLE, what counts neither for nor against: objects `cut` by the view, objects of `few`
+            points, proposals on `parked` cars outside their labels, proposals in DontCare regions.
+    """
+
+    min_points: int = 20
+    min_points_followed: int = 10
+    by_iou: bool = False
+    sector_deg: float = 40.0
+    max_range_m: float = float("inf")
+    ignored: frozenset[str] = frozenset(IGNORABLE)
+
+
+KITTI_RULES = Rules()
+"""Labels cover what the left colour camera sees."""
+CUBOID_RULES = Rules(min_points_followed=20, by_iou=True, sector_deg=180.0, max_range_m=60.0)
+"""Labels all round."""

@@ -1,0 +1,121 @@
+"""A recorded run, read back frame by frame beside its truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES
+from modt.errors import MisuseError, ModtError
+from modt.evaluation.frame import JudgedFrame
+from modt.evaluation.truth import Truth
+from modt.geometry import FieldOfView
+from modt.profile import DEFAULT, from_yaml
+from modt.sinks.records import read_records
+from modt.sinks.run_directory import RUN, TRACKS
+from modt.sinks.tracks import SCHEMA
+from modt.sources.scan_file import read_scan
+from modt.types import Float32, Float64, Int
+
+LABELS = "labels"
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """The directory of a run.
+
+    Attributes:
+        path: of the directory.
+        stream: where its scans lay, None for the embedded stream.
+        fov: `camera` or `full`.
+        sensor: name of its profile.
+    """
+
+    path: Path
+    stream: Path | None
+    fov: str
+    sensor: str
+
+    @classmethod
+    def open(cls, path: Path) -> RunRecord:
+        """The run of a directory.
+
+        Raises:
+            MisuseError: it is none, or was made without --labels.
+        """
+        described = path / RUN
+        try:
+            facts = from_yaml(described.read_text(encoding="utf-8"), described)
+            stream, fov, command = facts["stream"]["path"], facts["fov"], facts["command"]
+        except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
+            raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
+        if not (path / LABELS).is_dir():
+            raise MisuseError(path, "holds no labels of points", "run it again with `modt replay --labels`")
+        words = [word for argument in command for word in argument.split("=", 1)]
+        sensor = Path(words[words.index("--profile") + 1]).stem if "--profile" in words else DEFAULT
+        return cls(path, Path(stream) if stream else None, fov, sensor)
+
+    def frames(self, truth: Truth) -> Iterator[JudgedFrame]:
+        """Every recorded frame beside its truth.
+
+        Raises:
+            MisuseError: the run is of another recording or empty, or a record is broken.
+        """
+        if truth.scans is None:
+            raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
+        camera = truth.scans.info.camera
+        if self.fov == "camera" and camera is None:
+            raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
+        fov = FieldOfView.of_camera(camera) if self.fov == "camera" and camera is not None else FieldOfView()
+        scans = {scan.index: scan.path for scan in truth.scans.scans}
+        number = 0
+        for number, record in enumerate(read_records(self.path / TRACKS, SCHEMA), 1):
+            place = f"{self.path / TRACKS}:{number}"
+            try:
+                index = int(record["frame"])
+                track, of_track, said, posterior = _track_columns(record)
+                counts = int(record["proposals"]), int(record["classifications"])
+            except (KeyError, TypeError, ValueError, IndexError) as error:
+                raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
+            labels, scan = truth.frames.get(index), scans.get(index)
+            if labels is None or scan is None:
+                cause = f"frame {index} is not in the truth, which has {len(truth.frames)} frames"
+                raise MisuseError(place, cause, "give the truth of the run's own recording")
+            try:
+                points, _ = read_scan(scan)
+            except ModtError as error:
+                raise MisuseError(scan, error.cause, "restore the scan") from None
+            yield JudgedFrame(
+                index, points, self._proposals(index, points), *counts, track, of_track, said, posterior, labels, fov
+            )
+
+        if not number:
+            raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
+
+    def _proposals(self, index: int, points: Float32) -> Int:
+        """(N,) proposal of each point."""
+        path = self.path / LABELS / f"{index:06d}.label"
+        try:
+            labels = np.fromfile(path, np.uint32)
+        except OSError as error:
+            cause = f"cannot be read ({error.strerror})"
+            raise MisuseError(path, cause, "run it again with `modt replay --labels`") from None
+        if len(labels) != len(points):
+            cause = f"{len(labels)} labels for a scan of {len(points)} points"
+            raise MisuseError(path, cause, "give the truth of the run's own recording")
+        return (labels >> 16).astype(np.int64) - 1
+
+
+def _track_columns(record: dict[str, Any]) -> tuple[Int, Int, Int, Float64]:
+    """Identity, proposal, class and posterior of the tracks that are seen: all that is read of tracks.jsonl."""
+    seen = [track for track in record["tracks"] if track["proposal"] is not None]
+    said = [CLASS_NAMES.index(track["class"]) for track in seen]
+    posterior = np.array([track["posterior"] for track in seen], np.float64).reshape(-1, len(CLASS_NAMES))
+    ids, proposals = (np.array([track[key] for track in seen], np.int64) for key in ("id", "proposal"))
+    if len(proposals) and not 0 <= proposals.min() <= proposals.max() < record["proposals"]:
+        raise ValueError("a track's proposal is none of the frame's")
+    return ids, proposals, np.array(said, np.int64), posterior

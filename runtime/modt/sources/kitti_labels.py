@@ -1,0 +1,84 @@
+"""KITTI's annotations: tracklets of raw drives, label files of the tracking and the object benchmark."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.geometry import Camera, inverse, transform
+from modt.types import NONE, Float64
+
+DONT_CARE = "DontCare"
+REMEDY = "restore the label file"
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """An object in a frame.
+
+    Attributes:
+        frame, id: 0 and NONE in the object benchmark.
+        type_: as labelled.
+        box: (7,) x, y, z of the centre, l, w, h [m], yaw [rad], sensor frame.
+        image_box: (4,) left, top, right, bottom [pixel], None where it is not labelled.
+    """
+
+    frame: int
+    id: int
+    type_: str
+    box: Float64
+    image_box: Float64 | None = None
+
+
+def read_tracklets(path: Path) -> list[Label]:
+    """The labels of a tracklet_labels.xml; an object's identity is its place in the file.
+
+    Raises:
+        MisuseError: it cannot be read, or an item of it is no tracklet; it names the item.
+    """
+    try:
+        root = ET.parse(path).getroot()
+    except (OSError, ET.ParseError) as error:
+        raise MisuseError(path, f"cannot be read ({error})", REMEDY) from None
+    labels = []
+    for number, item in enumerate(root.iterfind("tracklets/item")):
+        try:
+            height, width, length = (float(item.findtext(key, "")) for key in "hwl")
+            first, type_ = int(item.findtext("first_frame", "")), item.findtext("objectType", "")
+            for frame, pose in enumerate(item.iterfind("poses/item"), first):
+                x, y, foot, yaw = (float(pose.findtext(key, "")) for key in ("tx", "ty", "tz", "rz"))
+                box = np.array([x, y, foot + height / 2, length, width, height, yaw])
+                labels.append(Label(frame, number, type_, box))
+        except ValueError:
+            raise MisuseError(path, f"item {number} is no tracklet", REMEDY) from None
+    return labels
+
+
+def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
+    """The labels of a file of the tracking or the object benchmark, as the sensor beside the camera sees them.
+
+    Raises:
+        MisuseError: it cannot be read, or a line is no label; it names the line.
+    """
+    try:
+        lines = path.read_text(encoding="ascii").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise MisuseError(path, f"cannot be read ({error})", REMEDY) from None
+    T_sensor_camera = inverse(camera.T_camera_sensor)
+    labels = []
+    for number, line in enumerate(lines, 1):
+        words = line.split()
+        try:
+            frame, id_ = (int(words.pop(0)), int(words.pop(0))) if tracking else (0, NONE)
+            values = np.array(words[1:15], np.float64)
+            height, width, length, *foot, turn = values[7:].tolist()
+            x, y, z = transform(T_sensor_camera, np.array(foot)).tolist()
+        except (ValueError, IndexError):
+            raise MisuseError(f"{path}:{number}", "no label of KITTI's", REMEDY) from None
+        box = np.array([x, y, z + height / 2, length, width, height, -turn - np.pi / 2])
+        labels.append(Label(frame, id_, words[0], box, values[3:7]))
+    return labels
