@@ -114,9 +114,12 @@ def test_what_did_not_change_keeps_its_columns(scene):
 
 
 @given(scenes())
-def test_observations_are_those_of_the_new_proposals_deskewed_as_their_sources(scene):
+def test_observations_of_changed_proposals_are_deskewed_at_their_positions_and_others_kept(scene):
     after, observations = scene.grouping.apply(scene.frame, scene.placement)
-    expected = observe(after, scene.placement.T_world_sensor).moved(scene.deskew[scene.grouping.source])
+    fresh = observe(after, scene.placement.T_world_sensor)
+    step = scene.deskew[scene.grouping.source]
+    step[scene.grouping.changed] = scene.placement.deskew(fresh.centroid[scene.grouping.changed])
+    expected = fresh.moved(step)
     expected.partial[scene.grouping.partial] = True
     for column in dataclasses.fields(expected):
         found, want = getattr(observations, column.name), getattr(expected, column.name)

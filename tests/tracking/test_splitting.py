@@ -258,6 +258,7 @@ def test_a_piece_is_expected_where_the_head_saw_it_not_at_the_middle_of_the_wall
     assert len(follower.proposals) == 2
     assert np.count_nonzero(members < 80) > 0.95 * 80
     np.testing.assert_allclose(follower.tracks.x[0, :2], person[:2], atol=0.1)
+    np.testing.assert_allclose(follower.tracks.box[0, :2], person[:2], atol=0.1)
 
 
 def test_the_piece_lies_where_the_filter_expects_its_track():
