@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -49,7 +49,17 @@ class Observations:
         """The same, each displaced by a step (P, 2) [m, world]."""
         box = self.box.copy()
         box[:, :2] += step
-        return replace(self, box=box, centroid=self.centroid + step, kdop=self.kdop + DIRECTIONS.T @ step.T)
+        return Observations(
+            box=box,
+            centroid=self.centroid + step,
+            kdop=self.kdop + DIRECTIONS.T @ step.T,
+            bottom=self.bottom,
+            top=self.top,
+            count=self.count,
+            range_m=self.range_m,
+            partial=self.partial,
+            sensor_xy=self.sensor_xy,
+        )
 
     def take(self, rows: Int) -> Observations:
         """A copy of the rows given."""

@@ -7,7 +7,7 @@ number of proposals in a frame, M the number of tracks alive, N the number of po
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cache
 from operator import attrgetter
 from typing import Any, Self
@@ -96,8 +96,7 @@ class Proposals:
         """
         offsets = np.zeros(len(count) + 1, np.int64)
         count.cumsum(out=offsets[1:])
-        return replace(
-            self,
+        return Proposals(
             members=np.concatenate([self.members[:0], *(self.members[run] for run in runs)]),
             offsets=offsets,
             coordinates=np.concatenate(
@@ -106,6 +105,7 @@ class Proposals:
             centroid=self.centroid.take(source, axis=0),
             box=self.box.take(source, axis=0),
             truncated=self.truncated[source],
+            sensor_height_m=self.sensor_height_m,
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
 

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig
-from modt.geometry import upright_box
-from modt.segmentation.box_fitting import HEADINGS, fit_headings, upright_boxes
+from modt.geometry import upright_boxes
+from modt.segmentation.box_fitting import HEADINGS, fit_headings
 from modt.segmentation.groups import Groups
 from tests.segmentation import reference
 
@@ -14,6 +14,17 @@ NOISE_M = SegmentationConfig().boxes.noise_m
 
 def groups_of(sizes):
     return Groups.from_labels(np.repeat(np.arange(len(sizes)), sizes), len(sizes))
+
+
+def slow_upright_box(xyz, yaw):
+    """(7,) box of one cluster of (3, n) points."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    sides = np.stack([xyz[0] * c + xyz[1] * s, xyz[1] * c - xyz[0] * s, xyz[2]])
+    low, high = sides.min(axis=1), sides.max(axis=1)
+    (u, v, w), (length, width, height) = (low + high) / 2, high - low
+    if length < width:
+        length, width, yaw = width, length, yaw - np.pi / 2
+    return np.array([u * c - v * s, u * s + v * c, w, length, width, height, yaw])
 
 
 def l_shape(length, width, yaw, centre, n=60):
@@ -41,7 +52,7 @@ def test_headings_equal_those_of_each_cluster_alone(seed, sizes):
 def test_a_box_contains_its_points_and_touches_them_on_every_side(seed, sizes):
     x, y, z = np.random.default_rng(seed).normal(0, 2, (3, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    box = upright_boxes(x, y, z, groups, fit_headings(x, y, groups, NOISE_M))
+    box = upright_boxes(np.stack([x, y, z]), groups.offsets, fit_headings(x, y, groups, NOISE_M))
     assert (box[:, 3] >= box[:, 4]).all()
     own = np.repeat(box, sizes, axis=0)
     c, s = np.cos(own[:, 6]), np.sin(own[:, 6])
@@ -57,9 +68,9 @@ def test_boxes_equal_those_of_each_cluster_alone(seed, sizes):
     rng = np.random.default_rng(seed)
     (x, y, z), yaw = rng.normal(0, 2, (3, sum(sizes))).astype(np.float32), rng.uniform(-3, 3, len(sizes))
     groups = groups_of(sizes)
-    many = upright_boxes(x, y, z, groups, yaw)
+    many = upright_boxes(np.stack([x, y, z]), groups.offsets, yaw)
     for i, (start, end) in enumerate(zip(groups.offsets[:-1], groups.offsets[1:], strict=True)):
-        one = upright_box(np.stack([x, y, z])[:, start:end].astype(np.float64), yaw[i])
+        one = slow_upright_box(np.stack([x, y, z])[:, start:end].astype(np.float64), yaw[i])
         np.testing.assert_allclose(many[i], one, atol=1e-4)
 
 
@@ -68,7 +79,9 @@ def test_heading_and_size_of_an_l_of_points(yaw_deg):
     xy = l_shape(4.2, 1.7, np.deg2rad(yaw_deg), [12.0, 5.0]) + np.random.default_rng(0).normal(0, 0.02, (120, 2))
     x, y = xy.T.astype(np.float32)
     groups = groups_of([120])
-    box = upright_boxes(x, y, np.zeros(120, np.float32), groups, fit_headings(x, y, groups, NOISE_M))[0]
+    box = upright_boxes(
+        np.stack([x, y, np.zeros(120, np.float32)]), groups.offsets, fit_headings(x, y, groups, NOISE_M)
+    )[0]
     error = (box[6] - np.deg2rad(yaw_deg) + np.pi / 2) % np.pi - np.pi / 2
     assert abs(error) < np.deg2rad(2.6)
     assert box[:2] == pytest.approx([12.0, 5.0], abs=0.15)

@@ -56,7 +56,12 @@ def test_a_pair_above_the_highest_cost_is_not_matched():
     """A car of which most disappeared."""
     tracks, part = tracks_at([box(10, 3)], points=300), observed([box(9.0, 3, 0.5, 1.8, 0.4, z=-1.5)], points=8)
     assert matched(tracks, part, max_cost=20.0)[0] == [(0, 0)]
-    assert matched(tracks, part, max_cost=2.0)[0] == []
+    assert matched(tracks, part, max_cost=2.0, min_coverage=1.0)[0] == []
+
+
+def test_what_changed_its_shape_is_matched_by_coverage_among_the_rest():
+    tracks, part = tracks_at([box(10, 3)], points=300), observed([box(9.0, 3, 0.5, 1.8, 0.4, z=-1.5)], points=8)
+    assert matched(tracks, part, max_cost=2.0, min_coverage=0.3)[0] == [(0, 0)]
 
 
 def test_the_noise_grows_with_range_extent_and_occlusion():

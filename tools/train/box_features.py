@@ -7,7 +7,8 @@ import numpy as np
 from modt.classification.box_classifier import beam_solid_angle_sr, box_features
 from modt.classification.crops import Crops
 from modt.config.segmentation import BoxConfig
-from modt.segmentation.box_fitting import fit_headings, upright_boxes
+from modt.geometry import upright_boxes
+from modt.segmentation.box_fitting import fit_headings
 from modt.segmentation.groups import Groups
 from modt.types import Float64, Int
 from tools.train.augment import Beams
@@ -21,7 +22,7 @@ def crop_features(crops: Crops) -> Float64:
     """(R, 7) features of the boxes fitted to crops."""
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
-    box = upright_boxes(x, y, z, groups, fit_headings(x, y, groups, BoxConfig().noise_m))
+    box = upright_boxes(np.stack([x, y, z]), groups.offsets, fit_headings(x, y, groups, BoxConfig().noise_m))
     beams = Beams()
     beam_sr = beam_solid_angle_sr(beams.azimuth_deg, beams.elevation_deg)
     return box_features(crops.count, box, SENSOR_HEIGHT_M, beam_sr)

@@ -1,6 +1,6 @@
 """Transforms, boxes, k-DOPs and the field of view."""
 
-from modt.geometry.boxes import corners, transform_boxes, upright_box
+from modt.geometry.boxes import corners, transform_boxes, upright_boxes
 from modt.geometry.field_of_view import Camera, FieldOfView
 from modt.geometry.transforms import inverse, rotation_zyx, se3, transform, wrap, yaw_of
 
@@ -13,7 +13,7 @@ __all__ = [
     "se3",
     "transform",
     "transform_boxes",
-    "upright_box",
+    "upright_boxes",
     "wrap",
     "yaw_of",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.geometry.transforms import transform, wrap, yaw_of
-from modt.types import Float64
+from modt.types import Float32, Float64, Int
 
 
 def transform_boxes(T: Float64, boxes: Float64) -> Float64:
@@ -16,15 +16,27 @@ def transform_boxes(T: Float64, boxes: Float64) -> Float64:
     return out
 
 
-def upright_box(xyz: Float64, yaw: float) -> Float64:
-    """(7,) x, y, z of the centre, l >= w, h [m], yaw [rad] of the box about (3, n) points, at a heading or across."""
+def upright_boxes(xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
+    """(G, 7) boxes at headings or across them, so that l >= w, about groups of points.
+
+    Args:
+        xyz: (3, K) points sorted by group [m].
+        offsets: (G + 1,) group i owns the columns from offsets[i] to offsets[i + 1]; none is empty.
+        yaw: (G,) headings [rad].
+    """
+    starts, count = offsets[:-1], offsets[1:] - offsets[:-1]
     c, s = np.cos(yaw), np.sin(yaw)
-    sides = np.stack([xyz[0] * c + xyz[1] * s, xyz[1] * c - xyz[0] * s, xyz[2]])
-    low, high = sides.min(axis=1), sides.max(axis=1)
-    (u, v, w), (length, width, tall) = (low + high) / 2, high - low
-    if length < width:
-        length, width, yaw = width, length, yaw - np.pi / 2
-    return np.array([u * c - v * s, u * s + v * c, w, length, width, tall, yaw])
+    c_each, s_each = np.repeat(c.astype(np.float32), count), np.repeat(s.astype(np.float32), count)
+    x, y, z = xyz
+    sides = (x * c_each + y * s_each, y * c_each - x * s_each, z)
+    low = np.stack([np.minimum.reduceat(side, starts) for side in sides]).astype(np.float64)
+    high = np.stack([np.maximum.reduceat(side, starts) for side in sides]).astype(np.float64)
+    (u, v, w), (length, width, height) = (low + high) / 2, high - low
+    turn = length < width
+    longer, shorter = np.where(turn, width, length), np.where(turn, length, width)
+    return np.stack(
+        [u * c - v * s, u * s + v * c, w, longer, shorter, height, yaw - np.where(turn, np.pi / 2, 0.0)], axis=1
+    )
 
 
 def corners(boxes: Float64) -> Float64:

@@ -31,17 +31,3 @@ def fit_headings(x: Float32, y: Float32, groups: Groups, noise_m: float) -> Floa
     closeness = np.add.reduceat(1 / np.maximum(nearest, np.float32(noise_m)), groups.offsets[:-1], axis=1)
     best: Float64 = HEADINGS[np.argmax(closeness, axis=0)]
     return best
-
-
-def upright_boxes(x: Float32, y: Float32, z: Float32, groups: Groups, yaw: Float64) -> Float64:
-    """(G, 7) boxes at (G,) headings around (K,) points sorted by group, turned so that l >= w."""
-    c, s = np.cos(yaw), np.sin(yaw)
-    c_each, s_each = groups.broadcast(c.astype(np.float32)), groups.broadcast(s.astype(np.float32))
-    sides = (x * c_each + y * s_each, y * c_each - x * s_each, z)
-    low = np.stack([groups.min(side) for side in sides]).astype(np.float64)
-    high = np.stack([groups.max(side) for side in sides]).astype(np.float64)
-    (u, v, w), (length, width, height) = (low + high) / 2, high - low
-    turn = length < width
-    longer, shorter = np.where(turn, width, length), np.where(turn, length, width)
-    yaw = yaw - np.where(turn, np.pi / 2, 0.0)
-    return np.stack([u * c - v * s, u * s + v * c, w, longer, shorter, height, yaw], axis=1)

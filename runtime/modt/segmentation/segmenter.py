@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.geometry import FieldOfView
-from modt.segmentation.box_fitting import fit_headings, upright_boxes
+from modt.geometry import FieldOfView, upright_boxes
+from modt.segmentation.box_fitting import fit_headings
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.ground import GroundEstimator
@@ -77,7 +77,7 @@ class Segmenter:
         few = by_cell.subsample(self.config.boxes.max_cells)
         yaw = fit_headings(cells.x[few.rows], cells.y[few.rows], few, self.config.boxes.noise_m)
         groups = Groups.from_labels(clusters.of_cell.take(clusters.cell), clusters.n)
-        x, y, z = own = np.stack([column.take(groups.rows) for column in (points.x, points.y, points.z)])
+        own = np.stack([column.take(groups.rows) for column in (points.x, points.y, points.z)])
         truncated, statistics, offsets = np.zeros(clusters.n, np.bool_), None, groups.offsets
         if depth is not None:
             truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m
@@ -88,7 +88,7 @@ class Segmenter:
             offsets=offsets,
             coordinates=own,
             centroid=np.stack([groups.mean(v) for v in own], axis=1),
-            box=upright_boxes(x, y, z, groups, yaw),
+            box=upright_boxes(own, offsets, yaw),
             truncated=truncated,
             reflectance=statistics,
         )

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.geometry import upright_box
+from modt.geometry import upright_boxes
 from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
@@ -68,11 +68,13 @@ class Grouping:
     def apply(self, frame: Associated, placement: Placement) -> tuple[Proposals, Observations]:
         """Proposals and observations in the new grouping; boxes and k-DOPs of what changed come from its points."""
         proposals = frame.proposals.regrouped(self.runs, self.count, self.source)
-        for row, yaw in zip(self.changed.tolist(), self.yaw.tolist(), strict=True):  # one to three a frame
-            xyz = proposals.coordinates[:, slice(*proposals.offsets[row : row + 2])].astype(np.float64)
-            proposals.box[row], proposals.centroid[row] = upright_box(xyz, yaw), xyz.mean(axis=1)
+        few = proposals.take(self.changed)
+        box = upright_boxes(few.coordinates, few.offsets, self.yaw)
+        sums = np.add.reduceat(few.coordinates, few.offsets[:-1], axis=1, dtype=np.float64)
+        few.box[:], few.centroid[:] = box, (sums / few.count).T
+        proposals.box[self.changed], proposals.centroid[self.changed] = few.box, few.centroid
         observations = frame.observations.take(self.source)
-        changed = observe(proposals.take(self.changed), placement.T_world_sensor)
+        changed = observe(few, placement.T_world_sensor)
         observations.put(self.changed, changed.moved(placement.deskew(changed.centroid)))
         observations.partial[self.partial] = True
         return proposals, observations

@@ -143,8 +143,8 @@ class StateMachine:
 
     def joined(self, states: Int) -> Int:
         """(M,) states of proposals that were matched with tracks in these states (a1, then what they join)."""
-        matched = self.transition(np.full(len(states), self.proposal), Event.ASSOCIATED)
-        return self.transition(matched, self.joining[states])
+        matched = self.transition(np.array([self.proposal]), Event.ASSOCIATED)
+        return self.transition(matched.repeat(len(states)), self.joining[states])
 
 
 _E = Event

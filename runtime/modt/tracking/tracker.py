@@ -106,8 +106,7 @@ class Tracker:
         self._update(frame.matches, frame.observations)
         self._observe_rest(frame.matches.rows)
         self._coast(frame.matches.rows)
-        self._delete_expired()
-        self._spawn(frame.matches, frame.observations)
+        self._renew(self._expire(), frame.matches, frame.observations)
         t = self._tracks
         return TrackedFrame(t, frame.proposals, self.machine.wants_class[t.state] & (t.proposal != NONE))
 
@@ -172,12 +171,14 @@ class Tracker:
         return about
 
     def _observe_rest(self, rows: Int) -> None:
-        """Zero-velocity update of tracks near their rest position."""
+        """Zero-velocity update of tracks near their rest position; a track that stopped rests where it is."""
         t, rest = self._tracks, self.config.filter
-        x, position = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0)
+        x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
+        stopped = ((x[:, SPEED] < rest.stopped_mps) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
+        position[stopped] = x[stopped, :2]
         step = x[:, :2] - position
         near = np.hypot(step[:, 0], step[:, 1]) < rest.stationary_radius_m
-        t.stationary[rows] = near & (t.hits[rows] > 2)
+        t.stationary[rows] = near & (hits > 2)
         t.rest_position[rows] = position + rest.rest_gain * near[:, None] * step
         at_rest = rows[near]
         x, P = components_first(x.compress(near, axis=0), t.P.take(at_rest, axis=0))
@@ -194,22 +195,21 @@ class Tracker:
         t.missed[rows] += 1
         t.state[rows] = self.machine.transition(t.state[rows], Event.UNASSOCIATED)
 
-    def _delete_expired(self) -> None:
-        """After N frames without a proposal a track is deleted (a9, a14)."""
+    def _expire(self) -> Int:
+        """After N frames without a proposal a track is deleted (a9, a14); (A,) rows that stay."""
         t = self._tracks
         expired = t.missed > self.config.max_missed
         rows = expired.nonzero()[0]
         t.state[rows] = self.machine.transition(t.state[rows], Event.EXPIRED)
-        self._tracks = t.renewed((~expired).nonzero()[0], 0) if len(rows) else t
+        return (~expired).nonzero()[0]
 
-    def _spawn(self, matches: Matches, observations: Observations) -> None:
-        """A track for every proposal without one (a2)."""
+    def _renew(self, kept: Int, matches: Matches, observations: Observations) -> None:
+        """The rows kept, and a track for every proposal without one (a2)."""
         unclaimed = np.ones(len(observations), np.bool_)
         unclaimed[matches.proposals] = False
         proposals = unclaimed.nonzero()[0]
-        n = len(self._tracks)
-        t = self._tracks = self._tracks.renewed(np.arange(n), len(proposals))
-        new = np.arange(n, len(t))
+        t = self._tracks = self._tracks.renewed(kept, len(proposals))
+        new = np.arange(len(kept), len(t))
         t.id[new] = self._next_id + np.arange(len(new))
         self._next_id += len(new)
         t.state[new] = self.machine.transition(np.full(len(new), self.machine.proposal), Event.UNASSOCIATED)
