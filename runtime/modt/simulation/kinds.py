@@ -36,6 +36,3 @@ CYCLIST = _of_class(ObjectClass.CYCLIST)
 TRUCK = Kind("Truck", 18, 258)
 BICYCLE = Kind("", 11, 11)
 SCENERY = Kind("", 0, 0)
-
-KINDS = {kind.name: kind for kind in (CAR, VAN, TRUCK, PEDESTRIAN, SITTER, CYCLIST)} | {"Tram": TRUCK}
-"""Kind that a KITTI object type is simulated by."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.simulation.placement import placed, read_placements
 from modt.simulation.scenes import SCENES
 from modt.simulation.sensors import sensor as sensor_model
 from modt.simulation.simulator import Simulator, Truth
@@ -29,7 +27,7 @@ class SyntheticStream:
     """A drive through a synthetic scene; the same arguments give the same bytes.
 
     Args:
-        scene: name of the scene, or a KITTI label file (.txt) whose objects are placed where it states.
+        scene: name of the scene.
         sensor: name of the sensor model.
         seconds: duration [s].
         seed: of the scene, its traffic and the noise.
@@ -50,18 +48,14 @@ class SyntheticStream:
         *,
         distort: bool = False,
     ) -> None:
-        if scene not in SCENES and not scene.endswith(".txt"):
-            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}, or a KITTI label file")
+        if scene not in SCENES:
+            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
         if not 0 < seconds <= 3600:
             raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
         if seed < 0:
             raise MisuseError(seed, "no seed", "give an integer of at least 0")
         model = sensor_model(sensor)
-        rng = np.random.default_rng([seed, 0])
-        if scene in SCENES:
-            world = SCENES[scene](rng, seconds, model.height_m)
-        else:
-            world = placed(read_placements(Path(scene)), rng, seconds, model.height_m)
+        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
         self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults = Faults()
