@@ -15,7 +15,8 @@ from modt.simulation.terrain import Terrain
 from modt.simulation.world import Body, World
 from modt.types import Float64
 
-EGO_SIZE = (4.6, 1.8, 1.6)
+EGO_M = (4.6, 1.8)
+"""Length and width of the ego vehicle."""
 OVERHEAD_M = 2.2
 """Parts of scenery above this height are not part of its footprint."""
 NONE_M = 1e-3
@@ -86,9 +87,10 @@ class SceneBuilder:
 
         Of two that collide, moving bodies take precedence over bodies at rest, earlier ones over later ones.
         """
-        order = sorted(range(len(self.bodies)), key=lambda i: self.bodies[i].at_rest)
-        ego_body = Body(kinds.CAR, EGO_SIZE, ego, Solids.none())
-        kept = without_collisions([ego_body, *(self.bodies[i] for i in order)], self.seconds)[1:]
+        order = sorted(range(len(self.bodies)), key=lambda i: self.bodies[i].path.at_rest)
+        paths = [ego, *(self.bodies[i].path for i in order)]
+        footprint = np.array([EGO_M, *(self.bodies[i].size[:2] for i in order)])
+        kept = without_collisions(paths, footprint, self.seconds)[1:]
         remaining = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(remaining)}
         rows = [(number[int(p[0])], *p[1:]) for p in self._people if int(p[0]) in number]

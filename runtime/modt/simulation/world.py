@@ -34,16 +34,6 @@ class Body:
     path: Path
     solids: Solids
 
-    @property
-    def footprint(self) -> tuple[float, float]:
-        """Length and width on the ground [m]."""
-        return self.size[:2]
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether it never moves."""
-        return len(self.path.xy) == 1
-
 
 class World:
     """All bodies and the ground.
@@ -70,12 +60,12 @@ class World:
     ) -> None:
         self.terrain, self.bodies, self.people = terrain, bodies, people
         self.ego, self.height_m, self.sway_rad, self.mount_rad = ego, height_m, sway_rad, mount_rad
-        self._moving = [i for i, b in enumerate(bodies) if not b.at_rest]
+        self._moving = [i for i, b in enumerate(bodies) if not b.path.at_rest]
         self._start = np.zeros((len(bodies), 5))
         for i, body in enumerate(bodies):
             self._start[i, [0, 1, 3]] = body.path.at(0.0)
         self._start[:, 2] = terrain.heights(self._start[:, 0], self._start[:, 1])
-        static = Solids.join(b.solids.of(i) for i, b in enumerate(bodies) if b.at_rest)
+        static = Solids.join(b.solids.of(i) for i, b in enumerate(bodies) if b.path.at_rest)
         self._static = self._placed(static, self._start)
         self._rigid = Solids.join(bodies[i].solids.of(i) for i in self._moving)
 
