@@ -18,6 +18,7 @@ from modt.sources import kitti_calibration, oxts
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_stream import ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
+from modt.sources.text_file import read_numbers
 from modt.types import Float64
 
 PERIOD_S = 0.1
@@ -74,7 +75,7 @@ def tracking_sequence(scans: Path) -> ScanStream:
         notes.of_poses.append(f"{calib} is missing, and its Tr_imu_velo: {NO_POSES}")
     else:
         T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
-        poses = dict(enumerate(oxts.poses(oxts.read_sequence(records)) @ T_imu_sensor))
+        poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
     name = f"tracking {number}"
     return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turn_s=PERIOD_S)
 
@@ -100,7 +101,7 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     times = sequence / "times.txt"
     stamps: dict[int, float] = {}
     if times.is_file():
-        stamps = dict(enumerate(_numbers(times, columns=1)[:, 0].tolist()))
+        stamps = dict(enumerate(read_numbers(times, "restore it, or remove it")[:, 0].tolist()))
     else:
         notes.of_stream.append(f"{times} is missing: frames {PERIOD_S} s apart")
     return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
@@ -186,7 +187,7 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
         notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
     T_imu_sensor = kitti_calibration.T_imu_sensor_of_raw(drive.parent)
-    T_world_imu = oxts.poses(np.stack([oxts.read_record(r)[: len(oxts.FIELDS)] for r in records]))
+    T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1] for r in records]))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 
@@ -265,13 +266,3 @@ def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera
         notes.of_stream.append(f"{calib} is missing: no camera, no --fov camera")
         return None
     return read(calib)
-
-
-def _numbers(path: Path, columns: int) -> Float64:
-    try:
-        table = np.loadtxt(path, dtype=np.float64, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise MisuseError(path, f"is no table of numbers ({error})", "restore it, or remove it") from None
-    if table.shape[1] != columns:
-        raise MisuseError(path, f"{table.shape[1]} columns, not {columns}", "restore it, or remove it")
-    return table

@@ -8,10 +8,12 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, se3
+from modt.sources.text_file import read_lines
 from modt.types import Float64
 
 IMAGE_PX = (1242.0, 375.0)
 """Size of the rectified image where the calibration has none."""
+REMEDY = "restore the calibration file"
 
 
 def read_table(path: Path) -> dict[str, Float64]:
@@ -21,11 +23,7 @@ def read_table(path: Path) -> dict[str, Float64]:
         MisuseError: the file is unreadable.
     """
     table: dict[str, Float64] = {}
-    try:
-        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
-    except OSError as error:
-        raise MisuseError(path, f"cannot be read ({error.strerror})", "restore the calibration file") from None
-    for line in lines:
+    for line in read_lines(path, REMEDY):
         key, _, values = line.replace(":", " ", 1).partition(" ")
         try:
             table[key] = np.array(values.split(), dtype=np.float64)
@@ -44,9 +42,9 @@ def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys:
         if key in table:
             if table[key].size != shape[0] * shape[1]:
                 cause = f"{key} holds {table[key].size} numbers, not {shape[0] * shape[1]}"
-                raise MisuseError(path, cause, "restore the calibration file")
+                raise MisuseError(path, cause, REMEDY)
             return table[key].reshape(shape)
-    raise MisuseError(path, f"no {' or '.join(keys)}", "restore the calibration file")
+    raise MisuseError(path, f"no {' or '.join(keys)}", REMEDY)
 
 
 def rigid(table: dict[str, Float64], path: Path) -> Float64:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
@@ -14,49 +14,39 @@ from modt.sources.stream import Faults, Stream, StreamInfo
 from modt.types import Frame
 
 
-class PoseSource(Protocol):
-    """Sets the poses of frames."""
+class PoseSource:
+    """Sets the poses of frames; the poses of the recording by default.
+
+    Attributes:
+        name: of the source, in reports and messages.
+    """
+
+    name = "recording"
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
         """Properties of a stream with these poses: has_poses and pose_notes."""
-        ...
-
-    def place(self, frame: Frame) -> Frame:
-        """The frame with its pose, None where unknown; frames come in order."""
-        ...
-
-    def report(self) -> dict[str, Any]:
-        """Name of the source, and statistics."""
-        ...
-
-    def close(self) -> None:
-        """Release what the source holds."""
-        ...
-
-
-class _WithoutResources:
-    def close(self) -> None:
-        """Nothing is held."""
-
-
-class RecordedPoses(_WithoutResources):
-    """The poses of the recording."""
-
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Unchanged."""
         return info
 
     def place(self, frame: Frame) -> Frame:
-        """Unchanged."""
+        """The frame with its pose, None where unknown; frames come in order."""
         return frame
 
     def report(self) -> dict[str, Any]:
-        """Name of the source."""
-        return {"source": "recording"}
+        """Name of the source, and statistics."""
+        return {"source": self.name}
+
+    def close(self) -> None:
+        """Release what the source holds."""
 
 
-class NoPoses(_WithoutResources):
+class RecordedPoses(PoseSource):
+    """The poses of the recording."""
+
+
+class NoPoses(PoseSource):
     """No poses: ego-motion is estimated from the proposals."""
+
+    name = "none"
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
         """Without poses."""
@@ -66,12 +56,8 @@ class NoPoses(_WithoutResources):
         """Without a pose."""
         return replace(frame, T_world_sensor=None)
 
-    def report(self) -> dict[str, Any]:
-        """Name of the source."""
-        return {"source": "none"}
 
-
-class PoseFile(_WithoutResources):
+class PoseFile(PoseSource):
     """Poses of a file in KITTI's odometry format: line k, from 0, belongs to frame k.
 
     Args:
@@ -84,11 +70,11 @@ class PoseFile(_WithoutResources):
     """
 
     def __init__(self, path: Path, camera: Camera | None, end: int | None) -> None:
-        self.path = path
+        self.name = str(path)
         poses = read_poses(path)
         self._poses = poses if camera is None else sensor_poses(poses, camera.T_camera_sensor)
-        if end is not None and end > len(poses):
-            raise self._too_few(end - 1)
+        if end is not None:
+            self._require(end - 1)
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
         """With a pose for every frame."""
@@ -100,17 +86,13 @@ class PoseFile(_WithoutResources):
         Raises:
             MisuseError: there are too few.
         """
-        if frame.index >= len(self._poses):
-            raise self._too_few(frame.index)
+        self._require(frame.index)
         return replace(frame, T_world_sensor=self._poses[frame.index])
 
-    def report(self) -> dict[str, Any]:
-        """Path of the file."""
-        return {"source": str(self.path)}
-
-    def _too_few(self, frame: int) -> MisuseError:
-        cause = f"{len(self._poses)} poses, too few for frame {frame}"
-        return MisuseError(self.path, cause, "give a line for every frame from 0 on, or fewer --frames")
+    def _require(self, frame: int) -> None:
+        if frame >= len(self._poses):
+            cause = f"{len(self._poses)} poses, too few for frame {frame}"
+            raise MisuseError(self.name, cause, "give a line for every frame from 0 on, or fewer --frames")
 
 
 class PosedStream:
