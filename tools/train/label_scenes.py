@@ -19,8 +19,7 @@ from modt.simulation.world import World
 CAMERA_AHEAD_M = 0.27
 N_FIELDS = 15
 KINDS = {
-    kind.name: kind
-    for kind in (kinds.CAR, kinds.VAN, kinds.TRUCK, kinds.PEDESTRIAN, kinds.SITTER, kinds.CYCLIST)
+    kind.name: kind for kind in (kinds.CAR, kinds.VAN, kinds.TRUCK, kinds.PEDESTRIAN, kinds.SITTER, kinds.CYCLIST)
 } | {"Tram": kinds.TRUCK}
 """Kind that a KITTI object type is simulated by."""
 

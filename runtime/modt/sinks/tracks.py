@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,6 @@ from modt.sinks.json_columns import (
     probabilities,
     rounded_to_3,
 )
-from modt.sinks.output import LineFile
 from modt.sinks.records import line
 from modt.types import NONE, FrameResult
 
@@ -136,10 +134,3 @@ def _lists(values: Text) -> Text:
     """(n, w) text of JSON lists of values (n, k, v)."""
     prefixes = ["," if k else "[" for k in range(values.shape[1])]
     return join_columns(len(values), *(p for k, prefix in enumerate(prefixes) for p in (prefix, values[:, k])), "]")
-
-
-class TrackLines(LineFile[FrameResult]):
-    """Writes tracks.jsonl."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, frame_line)

@@ -101,7 +101,10 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     times = sequence / "times.txt"
     stamps: dict[int, float] = {}
     if times.is_file():
-        stamps = dict(enumerate(read_numbers(times, "restore it, or remove it")[:, 0].tolist()))
+        table = read_numbers(times, "restore it, or remove it")
+        if table.shape[1] != 1:
+            raise MisuseError(times, f"{table.shape[1]} columns, not 1", "restore it, or remove it")
+        stamps = dict(enumerate(table[:, 0].tolist()))
     else:
         notes.of_stream.append(f"{times} is missing: frames {PERIOD_S} s apart")
     return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)

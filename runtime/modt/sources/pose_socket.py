@@ -20,6 +20,7 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.sources.pose_buffer import PoseBuffer
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
+from modt.sources.pose_source import PoseSource
 from modt.sources.stream import StreamInfo
 from modt.types import Float64, Frame
 
@@ -28,7 +29,7 @@ log = logging.getLogger(__name__)
 FORM = "write recording, none, udp://HOST:PORT or unix:///PATH"
 
 
-class PoseSocket:
+class PoseSocket(PoseSource):
     """Reads the socket once a frame without blocking; refused poses are counted, and logged once of each kind.
 
     A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
@@ -132,29 +133,18 @@ def open_socket(url: str) -> socket.socket:
         scheme, host, port, path = parts.scheme, parts.hostname, parts.port, parts.path
     except ValueError as error:
         raise MisuseError(url, str(error), FORM) from None
-    if scheme == "udp" and host and port and path in ("", "/"):
-        return _bound_udp(url, host, port)
-    if scheme == "unix" and not parts.netloc and len(path) > 1:
-        return _bound_unix(url, path)
+    try:
+        if scheme == "udp" and host and port and path in ("", "/"):
+            family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            return _bound(family, address)
+        if scheme == "unix" and not parts.netloc and len(path) > 1:
+            if _stale(path):
+                Path(path).unlink()
+            return _bound(socket.AF_UNIX, path)
+    except OSError as error:
+        remedy = "give a free port of this machine, or a free path in a writable folder"
+        raise MisuseError(url, f"cannot be bound ({error.strerror or error})", remedy) from None
     raise MisuseError(url, "is no address of a socket", FORM)
-
-
-def _bound_udp(url: str, host: str, port: int) -> socket.socket:
-    try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        return _bound(family, address)
-    except OSError as error:
-        raise MisuseError(url, f"cannot be bound ({error.strerror})", "give a free port of this machine") from None
-
-
-def _bound_unix(url: str, path: str) -> socket.socket:
-    try:
-        if _stale(path):
-            Path(path).unlink()
-        return _bound(socket.AF_UNIX, path)
-    except OSError as error:
-        cause = error.strerror or str(error)
-        raise MisuseError(url, f"cannot be bound ({cause})", "give a free path in a writable folder") from None
 
 
 def _bound(family: int, address: Any) -> socket.socket:
