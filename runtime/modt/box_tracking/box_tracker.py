@@ -23,19 +23,12 @@ MAX_COST = 1.0
 
 @dataclass(frozen=True, slots=True)
 class BoxTracks:
-    """Reported tracks of a frame.
+    """Reported tracks of a frame."""
 
-    Attributes:
-        id: (K,) of the tracks.
-        box: (K, 7) smoothed, world frame.
-        confidence: (K,) in the track.
-        source: (K,) index of the associated detection, NONE where the box is a prediction.
-    """
-
-    id: Int
-    box: Float64
-    confidence: Float64
-    source: Int
+    id: Int  # (K,) of the tracks
+    box: Float64  # (K, 7) smoothed, world frame
+    confidence: Float64  # (K,) in the track
+    source: Int  # (K,) index of the associated detection, NONE where the box is a prediction
 
 
 def assign(cost: Float64) -> tuple[Int, Int]:

@@ -12,18 +12,12 @@ from modt.types import Float64
 
 @dataclass(frozen=True)
 class Path:
-    """A polyline and the distance travelled along it over time.
+    """A polyline and the distance travelled along it over time."""
 
-    Attributes:
-        xy: (n, 2) way points [m, world]; one for a body at rest.
-        time_s, travelled_m: (k,) distance along the line at ascending times; constant before and after.
-        heading_rad: of a body at rest.
-    """
-
-    xy: Float64
-    time_s: Float64
-    travelled_m: Float64
-    heading_rad: float = 0.0
+    xy: Float64  # (n, 2) way points [m, world]; one for a body at rest
+    time_s: Float64  # (k,) ascending times
+    travelled_m: Float64  # (k,) distance along the line at these times; constant before and after
+    heading_rad: float = 0.0  # of a body at rest
 
     @classmethod
     def standing(cls, x: float, y: float, heading_rad: float) -> Path:

@@ -23,33 +23,21 @@ BATCH_RAYS, CHUNK_RAYS = 1000, 16_384
 
 @dataclass(frozen=True, slots=True)
 class RangeImage:
-    """First hits of the rays of a sweep.
+    """First hits of the rays of a sweep."""
 
-    Attributes:
-        distance: (B, A) horizontal distance to the first surface [m]; infinite where there is none.
-        solid: (B, A) index of the solid hit, NO_SOLID for the ground or the sky.
-    """
-
-    distance: Float32
-    solid: NDArray[np.int32]
+    distance: Float32  # (B, A) horizontal distance to the first surface [m]; infinite where there is none
+    solid: NDArray[np.int32]  # (B, A) index of the solid hit, NO_SOLID for the ground or the sky
 
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Bounds of each solid in the range image; a solid across the seam has two windows.
+    """Bounds of each solid in the range image; a solid across the seam has two windows."""
 
-    Attributes:
-        solid: (W,) index of the solid, nearest first.
-        rows, columns: (W, 2) first, and one past the last.
-        near: (W,) least horizontal distance of the solid [m].
-        n_columns: of the image.
-    """
-
-    solid: Int
-    rows: Int
-    columns: Int
-    near: Float32
-    n_columns: int
+    solid: Int  # (W,) index of the solid, nearest first
+    rows: Int  # (W, 2) first, and one past the last
+    columns: Int  # (W, 2) first, and one past the last
+    near: Float32  # (W,) least horizontal distance of the solid [m]
+    n_columns: int  # of the image
 
     @property
     def area(self) -> Int:
@@ -60,13 +48,9 @@ class Windows:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Kinds of surfaces that bound a solid, and their intersection with rays.
+    """Kinds of surfaces that bound a solid, and their intersection with rays."""
 
-    Attributes:
-        code: 1 for a box, plus 2 for a quadric, plus 4 for foliage, plus 8 times the number of cutting planes.
-    """
-
-    code: int
+    code: int  # 1 for a box, plus 2 for a quadric, plus 4 for foliage, plus 8 times the number of cutting planes
 
     @classmethod
     def codes(cls, solids: Solids) -> Int:

@@ -26,26 +26,16 @@ class Solids:
 
     A point u in the frame of a solid belongs to it where |u| <= half on every axis, sum(quadric * u^2) <= 1 and
     cut[:3] . u <= cut[3] for every cut: boxes, wedges, ellipsoids, cylinders.
-
-    Attributes:
-        rotation: (n, 3, 3) from the frame of the solid to that of the body, the world or the sensor.
-        centre: (n, 3) of the box, in that frame [m].
-        half: (n, 3) half the sides of the box [m].
-        quadric: (n, 3) inverse squared semi-axes [1/m2]; zero along unbounded axes.
-        cuts: (n, N_CUTS, 4) outward normal and distance of the cutting planes; normal zero for none.
-        density: (n,) extinction [1/m]: infinite for a surface, finite for foliage.
-        material: (n,) its Material.
-        body: (n,) index of its body.
     """
 
-    rotation: Float32
-    centre: Float32
-    half: Float32
-    quadric: Float32
-    cuts: Float32
-    density: Float32
-    material: Int
-    body: Int
+    rotation: Float32  # (n, 3, 3) from the frame of the solid to that of the body, the world or the sensor
+    centre: Float32  # (n, 3) of the box, in that frame [m]
+    half: Float32  # (n, 3) half the sides of the box [m]
+    quadric: Float32  # (n, 3) inverse squared semi-axes [1/m2]; zero along unbounded axes
+    cuts: Float32  # (n, N_CUTS, 4) outward normal and distance of the cutting planes; normal zero for none
+    density: Float32  # (n,) extinction [1/m]: infinite for a surface, finite for foliage
+    material: Int  # (n,) its Material
+    body: Int  # (n,) index of its body
 
     def __len__(self) -> int:
         return len(self.centre)

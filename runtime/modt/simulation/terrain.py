@@ -18,19 +18,12 @@ N_ITERATIONS = 3
 
 @dataclass(frozen=True)
 class Terrain:
-    """Heights and materials on a square grid, constant beyond its border.
+    """Heights and materials on a square grid, constant beyond its border."""
 
-    Attributes:
-        corner: (2,) of the first cell [m, world].
-        cell_m: side of a cell.
-        height: (X, Y) height of the ground [m, world].
-        surface: (X, Y) its Material.
-    """
-
-    corner: Float64
-    cell_m: float
-    height: Float32
-    surface: UInt8
+    corner: Float64  # (2,) of the first cell [m, world]
+    cell_m: float  # side of a cell
+    height: Float32  # (X, Y) height of the ground [m, world]
+    surface: UInt8  # (X, Y) its Material
 
     def cells(self, x: Float32, y: Float32) -> Int:
         """Flat index of the cell under each point."""

@@ -20,19 +20,12 @@ MOVING_MPS = 0.3
 
 @dataclass(frozen=True)
 class Body:
-    """One object or piece of scenery.
+    """One object or piece of scenery."""
 
-    Attributes:
-        kind: of the body.
-        size: length, width, height of its box [m].
-        path: its motion.
-        solids: its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre).
-    """
-
-    kind: Kind
-    size: tuple[float, float, float]
-    path: Path
-    solids: Solids
+    kind: Kind  # of the body
+    size: tuple[float, float, float]  # length, width, height of its box [m]
+    path: Path  # its motion
+    solids: Solids  # its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre)
 
 
 class World:

@@ -36,23 +36,14 @@ T_LEVEL_CAMERA = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """The D detections of a sequence, ordered by frame.
+    """The D detections of a sequence, ordered by frame."""
 
-    Attributes:
-        name: of the sequence.
-        frame: (D,) index of the frame.
-        object_class: (D,) class.
-        image_box: (D, 4) left, top, right, bottom [pixel].
-        score: (D,) increasing with confidence.
-        box: (D, 7) x, y, z of the centre, l, w, h [m], yaw [rad], level frame of the camera.
-    """
-
-    name: str
-    frame: Int
-    object_class: Int
-    image_box: Float64
-    score: Float64
-    box: Float64
+    name: str  # of the sequence
+    frame: Int  # (D,) index of the frame
+    object_class: Int  # (D,) class
+    image_box: Float64  # (D, 4) left, top, right, bottom [pixel]
+    score: Float64  # (D,) increasing with confidence
+    box: Float64  # (D, 7) x, y, z of the centre, l, w, h [m], yaw [rad], level frame of the camera
 
     def __len__(self) -> int:
         return len(self.frame)

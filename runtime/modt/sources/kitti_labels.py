@@ -19,20 +19,13 @@ REMEDY = "restore the label file"
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """An object in a frame.
+    """An object in a frame."""
 
-    Attributes:
-        frame, id: 0 and NONE in the object benchmark.
-        type_: as labelled.
-        box: (7,) x, y, z of the centre, l, w, h [m], yaw [rad], sensor frame.
-        image_box: (4,) left, top, right, bottom [pixel], None where it is not labelled.
-    """
-
-    frame: int
-    id: int
-    type_: str
-    box: Float64
-    image_box: Float64 | None = None
+    frame: int  # 0 in the object benchmark
+    id: int  # NONE in the object benchmark
+    type_: str  # as labelled
+    box: Float64  # (7,) x, y, z of the centre, l, w, h [m], yaw [rad], sensor frame
+    image_box: Float64 | None = None  # (4,) left, top, right, bottom [pixel], None where it is not labelled
 
 
 def read_tracklets(path: Path) -> list[Label]:
