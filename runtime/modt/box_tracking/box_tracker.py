@@ -101,8 +101,7 @@ class BoxTracker:
         gate_m2 = config.gate * (self._P[:, :1] + variance) + np.square(config.length_share * self._box[:, 3:4])
         dz = np.abs(boxes[:, 2] - self._box[:, 2, None])
         turn = np.abs(np.sin(boxes[:, 6] - self._box[:, 6, None]))
-        cost: Float64 = (dx * dx + dy * dy) / gate_m2 + config.height_weight_per_m * dz + config.yaw_weight * turn
-        return cost
+        return np.asarray((dx * dx + dy * dy) / gate_m2 + config.height_weight_per_m * dz + config.yaw_weight * turn)
 
     def _update(self, rows: Int, columns: Int, boxes: Float64, variance: Float64, score: Float64) -> None:
         model, measured = self.config.filter, boxes.take(columns, axis=0)

@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
         ModtError: the drive cannot be written.
     """
     from modt.sinks.kitti_raw import DATE, DriveWriter
-    from modt.sources.synthetic_stream import SyntheticStream
+    from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 
     out: Path = arguments.out
     if (out / DATE).exists() or (out / "sequences").exists():
@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.scene, arguments.sensor, arguments.seconds, arguments.seed, distort=arguments.distort
     )
     try:
-        writer = DriveWriter(out, stream.camera, all_around=arguments.all_around)
+        writer = DriveWriter(out, CAMERA, all_around=arguments.all_around)
         for frame, truth in stream.sweeps():
             writer.write(frame, truth)
         writer.close()

@@ -10,7 +10,7 @@ from modt.simulation.kinds import Kind
 from modt.simulation.materials import Material
 from modt.simulation.motion import Path
 from modt.simulation.people import People, Posture
-from modt.simulation.solids import Solids, box
+from modt.simulation.solids import Solids, Triple, box
 from modt.simulation.terrain import Terrain
 from modt.simulation.world import Body, World
 from modt.types import Float64
@@ -28,12 +28,7 @@ PITCH_RAD = (0.007, 0.005)
 
 
 class SceneBuilder:
-    """Bodies of a scene.
-
-    Args:
-        rng: of the scene.
-        seconds: duration of the scene [s].
-    """
+    """Bodies of a scene of a duration [s]."""
 
     def __init__(self, rng: np.random.Generator, seconds: float) -> None:
         self.rng, self.seconds = rng, seconds
@@ -45,7 +40,7 @@ class SceneBuilder:
         """Add something at rest that is not annotated."""
         self.bodies.append(Body(kinds.SCENERY, _extent(solids), Path.standing(x, y, heading_rad), solids))
 
-    def vehicle(self, kind: Kind, path: Path, size: tuple[float, float, float] | None = None) -> None:
+    def vehicle(self, kind: Kind, path: Path, size: Triple | None = None) -> None:
         """Add a car, a van or a truck, of random proportions and, where none is given, random size."""
         random_size, make = {
             kinds.CAR: (vehicles.car_size, vehicles.car),
@@ -105,7 +100,7 @@ class SceneBuilder:
     def _person(
         self,
         kind: Kind,
-        size: tuple[float, float, float],
+        size: Triple,
         path: Path,
         posture: Posture,
         height: float,
@@ -123,7 +118,7 @@ class SceneBuilder:
         self.bodies.append(Body(kind, size, path, rigid))
 
 
-def _extent(solids: Solids) -> tuple[float, float, float]:
+def _extent(solids: Solids) -> Triple:
     """Size of the smallest box centred on the origin that holds the opaque parts below OVERHEAD_M."""
     low = solids.take((solids.centre[:, 2] - solids.half[:, 2] < OVERHEAD_M) & ~np.isfinite(solids.density))
     if not len(low):

@@ -42,8 +42,7 @@ class Windows:
     @property
     def area(self) -> Int:
         """(W,) number of rays."""
-        rays: Int = np.diff(self.rows, axis=1)[:, 0] * np.diff(self.columns, axis=1)[:, 0]
-        return rays
+        return np.asarray(np.diff(self.rows, axis=1)[:, 0] * np.diff(self.columns, axis=1)[:, 0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +57,7 @@ class Shape:
         rounded = (solids.quadric > 0).any(axis=1)
         boxed = (solids.quadric * np.square(solids.half) < np.float32(0.999)).any(axis=1)
         cut = solids.cuts[:, :, :3].any(axis=2).sum(axis=1)
-        codes: Int = boxed + 2 * rounded + 4 * np.isfinite(solids.density) + 8 * cut
-        return codes
+        return np.asarray(boxed + 2 * rounded + 4 * np.isfinite(solids.density) + 8 * cut)
 
     @property
     def foliage(self) -> bool:
@@ -72,12 +70,7 @@ class Shape:
         return self.code >> 3
 
     def cross(
-        self,
-        direction: list[Float32],
-        start: list[Float32],
-        half: Float32,
-        quadric: Float32,
-        cuts: Iterable[Float32],
+        self, direction: list[Float32], start: list[Float32], half: Float32, quadric: Float32, cuts: Iterable[Float32]
     ) -> tuple[Float32, Float32]:
         """Horizontal distances at which rays enter and leave a solid [m]; enter >= leave, or NaN, for a miss.
 
@@ -130,10 +123,6 @@ class RayCaster:
 
     A ray is a point (0, 0, origin) and a direction (cos azimuth, sin azimuth, tangent): its parameter is the
     horizontal distance. Each solid is tested with the rays of its window alone.
-
-    Args:
-        sensor: its beams.
-        batch_rays: largest window that is cast in a batch.
     """
 
     def __init__(self, sensor: SensorModel, batch_rays: int = BATCH_RAYS) -> None:
@@ -280,5 +269,4 @@ class RayCaster:
         exact = np.hypot(gap[:, 0], gap[:, 1])
         radius = np.linalg.norm(solids.half, axis=1)
         loose = np.maximum(np.hypot(solids.centre[:, 0], solids.centre[:, 1]) - radius, 0)
-        nearest: Float32 = np.where(upright, exact, loose).astype(np.float32)
-        return nearest
+        return np.asarray(np.where(upright, exact, loose).astype(np.float32))

@@ -14,12 +14,7 @@ GLOSSY = np.float32(0.25)
 
 
 class Receiver:
-    """The receiver of a sensor.
-
-    Args:
-        sensor: its model.
-        rng: of the constant errors of its beams.
-    """
+    """The receiver of a sensor; rng draws the constant errors of its beams."""
 
     def __init__(self, sensor: SensorModel, rng: np.random.Generator) -> None:
         self.sensor = sensor

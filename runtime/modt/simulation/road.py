@@ -61,8 +61,7 @@ class Road:
         table = np.arange(self.start_m - 200, self.end_m + 200, 1.0)
         swing = np.interp(along, table, self.middle(table)).astype(np.float32)
         slant = np.interp(along, table, np.cos(self.heading(table))).astype(np.float32)
-        apart: Float32 = np.abs((across - swing) * slant)
-        return apart
+        return np.asarray(np.abs((across - swing) * slant))
 
     def _left_of_centre(self, x: Float64, left_m: float) -> Float64:
         """(n, 2) world points at x (n,), left of the centre line."""
@@ -110,5 +109,4 @@ def _roughness(rng: np.random.Generator, rows: int, columns: int) -> Float32:
     coarse = rng.standard_normal((rows // 8 + 2, columns // 8 + 2), np.float32)
     swell = ndimage.zoom(coarse, 8, order=1)[:rows, :columns]
     fine = rng.standard_normal((rows, columns), np.float32)
-    uneven: Float32 = np.float32(0.06) * swell + np.float32(0.025) * np.abs(fine) * (1 + np.maximum(swell, 0))
-    return uneven
+    return np.asarray(np.float32(0.06) * swell + np.float32(0.025) * np.abs(fine) * (1 + np.maximum(swell, 0)))

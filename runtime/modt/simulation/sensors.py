@@ -30,8 +30,7 @@ class Response:
         short, beyond = np.maximum(self.near_m - range_m, 0), np.maximum(range_m - self.far_m, 0)
         left = intensity - self.near_loss * short - self.far_loss * beyond
         steps = np.rint(np.clip(left, 0, self.most) * self.steps)
-        reported: Float32 = (steps / self.steps * (left >= self.least)).astype(np.float32)
-        return reported
+        return np.asarray((steps / self.steps * (left >= self.least)).astype(np.float32))
 
 
 @dataclass(frozen=True, kw_only=True)

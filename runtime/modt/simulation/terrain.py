@@ -32,8 +32,7 @@ class Terrain:
         j = ((y - np.float32(self.corner[1])) * scale).astype(np.int32)
         np.minimum(np.maximum(i, 0, out=i), self.height.shape[0] - 1, out=i)
         np.minimum(np.maximum(j, 0, out=j), self.height.shape[1] - 1, out=j)
-        flat: Int = i * self.height.shape[1] + j
-        return flat
+        return np.asarray(i * self.height.shape[1] + j)
 
     def heights(self, x: Float64, y: Float64) -> Float64:
         """(n,) height of the ground under each point [m, world]."""

@@ -28,36 +28,24 @@ class Body:
     solids: Solids  # its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre)
 
 
+@dataclass
 class World:
-    """All bodies and the ground.
+    """All bodies and the ground."""
 
-    Args:
-        terrain: the ground.
-        bodies: on it.
-        people: articulated parts of those bodies that are people.
-        ego: motion of the sensor's carrier.
-        height_m: of the sensor above the ground.
-        sway_rad: amplitude of the carrier's roll and pitch.
-        mount_rad: roll and pitch of the sensor on its carrier.
-    """
+    terrain: Terrain
+    bodies: list[Body]
+    people: People  # articulated parts of the bodies that are people
+    ego: Path  # motion of the sensor's carrier
+    height_m: float  # of the sensor above the ground
+    sway_rad: float  # amplitude of the carrier's roll and pitch
+    mount_rad: tuple[float, float]  # roll and pitch of the sensor on its carrier
 
-    def __init__(
-        self,
-        terrain: Terrain,
-        bodies: list[Body],
-        people: People,
-        ego: Path,
-        height_m: float,
-        sway_rad: float,
-        mount_rad: tuple[float, float] = (0.0, 0.0),
-    ) -> None:
-        self.terrain, self.bodies, self.people = terrain, bodies, people
-        self.ego, self.height_m, self.sway_rad, self.mount_rad = ego, height_m, sway_rad, mount_rad
+    def __post_init__(self) -> None:
+        bodies = self.bodies
         self._moving = [i for i, b in enumerate(bodies) if not b.path.at_rest]
         self._start = np.zeros((len(bodies), 5))
-        for i, body in enumerate(bodies):
-            self._start[i, [0, 1, 3]] = body.path.at(0.0)
-        self._start[:, 2] = terrain.heights(self._start[:, 0], self._start[:, 1])
+        self._start[:, [0, 1, 3]] = np.array([b.path.at(0.0) for b in bodies]).reshape(-1, 3)
+        self._start[:, 2] = self.terrain.heights(self._start[:, 0], self._start[:, 1])
         static = Solids.join(b.solids.of(i) for i, b in enumerate(bodies) if b.path.at_rest)
         self._static = self._placed(static, self._start)
         self._rigid = Solids.join(bodies[i].solids.of(i) for i in self._moving)

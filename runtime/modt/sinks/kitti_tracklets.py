@@ -28,11 +28,7 @@ class _Track:
 
 
 class Tracklets:
-    """Tracklets of a drive; a tracklet runs from the first frame with points of the body in view to the last.
-
-    Args:
-        fov: annotated field of view; KITTI's is that of its left colour camera.
-    """
+    """Tracklets of a drive; a tracklet runs from the first frame with points of the body in view to the last."""
 
     def __init__(self, fov: FieldOfView) -> None:
         self.fov = fov

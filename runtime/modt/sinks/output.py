@@ -46,12 +46,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 class LineFile(Generic[T]):
-    """An unbuffered text file of whole lines.
-
-    Args:
-        path: of the file.
-        encode: lines of an item.
-    """
+    """An unbuffered text file of whole lines; `encode` gives the lines of an item."""
 
     def __init__(self, path: Path, encode: Callable[[T], str] = str) -> None:
         self.path, self._encode = path, encode

@@ -1,4 +1,7 @@
-"""KITTI's folder layouts: raw drives, tracking and odometry sequences, folders of scans."""
+"""KITTI's folder layouts: raw drives, tracking and odometry sequences, folders of scans.
+
+Every reader raises a MisuseError where there are no scans, or a file is invalid.
+"""
 
 from __future__ import annotations
 
@@ -40,11 +43,7 @@ class Notes:
 
 
 def raw_drive(drive: Path) -> ScanStream:
-    """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder.
-
-    Raises:
-        MisuseError: there are no scans, or a file is invalid.
-    """
+    """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder."""
     notes = Notes()
     camera = _camera(kitti_calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
     poses = _poses_of_raw(drive, notes)
@@ -59,9 +58,6 @@ def tracking_sequence(scans: Path) -> ScanStream:
     """A sequence of the tracking layout, .../training/velodyne/0005, with calib/ and oxts/ next to velodyne/.
 
     Its sweeps are those of raw drives without their time stamps: each is taken to last the period.
-
-    Raises:
-        MisuseError: there are no scans, or a file is invalid.
     """
     root, number = scans.parent.parent, scans.name
     notes = Notes()
@@ -84,9 +80,6 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     """A sequence of the odometry layout, .../sequences/00, with optional calib.txt, times.txt and poses.
 
     Its sweeps are published deskewed.
-
-    Raises:
-        MisuseError: there are no scans, or a file is invalid.
     """
     notes = Notes()
     calib = sequence / "calib.txt"
@@ -111,21 +104,13 @@ def odometry_sequence(sequence: Path) -> ScanStream:
 
 
 def scan_folder(folder: Path) -> ScanStream:
-    """A folder of .bin scans, ordered by name.
-
-    Raises:
-        MisuseError: there are none.
-    """
+    """A folder of .bin scans, ordered by name."""
     notes = Notes([f"folder of scans: no calibration, frames {PERIOD_S} s apart"], [f"folder of scans: {NO_POSES}"])
     return _stream(folder.name, "folder of scans", folder, None, {}, {}, notes)
 
 
 def _scans(data: Path) -> tuple[list[int], list[Path]]:
-    """Indices and files of the scans of a folder, ordered by name.
-
-    Raises:
-        MisuseError: there are none.
-    """
+    """Indices and files of the scans of a folder, ordered by name."""
     files = sorted(data.glob("*.bin"))
     if not files:
         raise MisuseError(data, "no .bin scans", "give a folder of scans")
@@ -228,12 +213,7 @@ def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, f
 def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_of_few: str = "") -> dict[int, int]:
     """Times of a KITTI list, by frame [ns]: line i is that of scan i, blank where it is missing.
 
-    Args:
-        path: of the list.
-        frames: indices of the scans.
-        cost: consequence of a missing list.
-        notes: receives the defects of the list.
-        cost_of_few: consequence for single frames without a time, by default the same.
+    Defects are noted with their cost, that of single frames without a time by default the same.
     """
     if not path.is_file():
         notes.of_stream.append(f"{path} is missing: {cost}")

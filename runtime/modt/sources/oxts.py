@@ -31,8 +31,7 @@ def poses(records: Float64) -> Float64:
             for angles, position in zip(np.c_[roll, pitch, yaw], np.c_[x, y, alt], strict=True)
         ]
     )
-    relative: Float64 = inverse(T_mercator_imu[0]) @ T_mercator_imu
-    return relative
+    return np.asarray(inverse(T_mercator_imu[0]) @ T_mercator_imu)
 
 
 def read_records(path: Path) -> Float64:

@@ -34,11 +34,6 @@ class PoseSocket(PoseSource):
 
     A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
     are removed and the restart is passed on in `Frame.restarts`.
-
-    Args:
-        bound: bound socket; it is made non-blocking.
-        config: limits of age and speed, capacity.
-        name: of the socket, in reports and messages.
     """
 
     REASONS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")

@@ -15,11 +15,7 @@ from modt.types import Frame
 
 
 class PoseSource:
-    """Sets the poses of frames; the poses of the recording by default.
-
-    Attributes:
-        name: of the source, in reports and messages.
-    """
+    """Sets the poses of frames; the poses of the recording by default."""
 
     name = "recording"
 
@@ -96,12 +92,7 @@ class PoseFile(PoseSource):
 
 
 class PosedStream:
-    """A stream with the poses of a source.
-
-    Args:
-        stream: of the frames.
-        odometry: source of their poses.
-    """
+    """A stream with the poses of a source."""
 
     def __init__(self, stream: Stream, odometry: PoseSource) -> None:
         self._stream, self.odometry = stream, odometry

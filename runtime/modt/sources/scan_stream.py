@@ -28,12 +28,7 @@ class ScanReference:
 
 
 class ScanStream:
-    """Frames of scan files; unusable scans are counted and skipped, the first ones are logged.
-
-    Args:
-        info: of the stream.
-        scans: the files, ordered by time.
-    """
+    """Frames of scan files, ordered by time; unusable scans are counted and skipped, the first ones are logged."""
 
     def __init__(self, info: StreamInfo, scans: list[ScanReference]) -> None:
         self.info = replace(info, n_frames=len(scans), end=scans[-1].index + 1 if scans else 0)

@@ -26,18 +26,11 @@ CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
 class SyntheticStream:
     """A drive through a synthetic scene; the same arguments give the same bytes.
 
-    Args:
-        scene: name of the scene.
-        sensor: name of the sensor model.
-        seconds: duration [s].
-        seed: of the scene, its traffic and the noise.
-        distort: leave the motion during a sweep in the scans.
+    `seed` is that of the scene, its traffic and the noise; `distort` leaves the motion during a sweep in the scans.
 
     Raises:
         MisuseError: an unknown scene or sensor, or an invalid duration or seed.
     """
-
-    camera = CAMERA
 
     def __init__(
         self,
@@ -65,7 +58,7 @@ class SyntheticStream:
             sequence=0,
             n_frames=len(self._indices),
             period_s=model.period_s,
-            camera=self.camera,
+            camera=CAMERA,
             has_poses=True,
             end=self._indices.stop,
         )
