@@ -6,10 +6,9 @@ import pytest
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, transform, transform_boxes
-from modt.simulation.scenes import SCENES
 from modt.simulation.sensors import SENSORS
 from modt.simulation.simulator import N_SLICES, slice_delay_s
-from modt.sources.synthetic_stream import SyntheticStream
+from modt.sources.synthetic_stream import SCENES, SyntheticStream
 from modt.types import NONE
 
 

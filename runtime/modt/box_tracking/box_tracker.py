@@ -50,13 +50,9 @@ class BoxTracker:
         self._box, self._score = np.zeros((0, 7)), np.zeros(0)
 
     def step(self, stamp_s: float, boxes: Float64, score: Float64, range_m: Float64) -> BoxTracks:
-        """Update the tracks with the detections of a frame.
+        """Update the tracks with the detections of a frame: boxes (D, 7) in the world frame.
 
-        Args:
-            stamp_s: time of the frame [s].
-            boxes: (D, 7) detections, world frame.
-            score: (D,) of each, increasing with the detector's confidence.
-            range_m: (D,) of each from the sensor [m].
+        Scores (D,) increase with the detector's confidence; range_m (D,) is that from the sensor.
         """
         model = self.config.filter
         variance = np.square(model.position_sigma_m * np.exp(-np.maximum(score, 0.0) / model.score_scale))

@@ -74,12 +74,8 @@ class Shape:
     ) -> tuple[Float32, Float32]:
         """Horizontal distances at which rays enter and leave a solid [m]; enter >= leave, or NaN, for a miss.
 
-        Args:
-            direction: of the rays, three components in the frame of the solid, broadcastable.
-            start: of the rays, likewise.
-            half: half sides of the solid, or of each ray's solid, by axis.
-            quadric: likewise.
-            cuts: cutting planes, likewise.
+        Directions and starts of the rays are three components in the frame of the solid, broadcastable; half sides,
+        quadric and cutting planes are those of the solid, or of each ray's solid.
         """
         enter: Float32 = np.full(1, -np.inf, np.float32)
         leave: Float32 = -enter
@@ -116,6 +112,7 @@ class _Columns:
         self.shift: Float32 = np.ascontiguousarray(-np.einsum("nji,nj->in", solids.rotation, solids.centre))
         self.half: Float32 = np.ascontiguousarray(solids.half.T)
         self.quadric: Float32 = np.ascontiguousarray(solids.quadric.T)
+        self.cuts, self.density = solids.cuts, solids.density
 
 
 class RayCaster:
@@ -181,17 +178,10 @@ class RayCaster:
             group = which[mine]
             part = np.cumsum(area[mine]) // CHUNK_RAYS
             for chunk in np.split(group, np.flatnonzero(np.diff(part)) + 1):
-                self._cast_chunk(solids, table, Shape(code), windows, chunk, depth, image)
+                self._cast_chunk(table, Shape(code), windows, chunk, depth, image)
 
     def _cast_chunk(
-        self,
-        solids: Solids,
-        table: _Columns,
-        shape: Shape,
-        windows: Windows,
-        chunk: Int,
-        depth: Float32,
-        image: RangeImage,
+        self, table: _Columns, shape: Shape, windows: Windows, chunk: Int, depth: Float32, image: RangeImage
     ) -> None:
         nearest, solid = image.distance.reshape(-1), image.solid.reshape(-1)
         ray, row, column, k = self._pairs(windows, chunk, nearest)
@@ -200,10 +190,10 @@ class RayCaster:
         up = [R[2][i][k] for i in range(3)]
         direction = [R[0][i][k] * cos + R[1][i][k] * sin + up[i] * tangent for i in range(3)]
         start = [up[i] * origin + table.shift[i][k] for i in range(3)]
-        cuts = solids.cuts[k].transpose(1, 2, 0) if shape.cuts else ()
+        cuts = table.cuts[k].transpose(1, 2, 0) if shape.cuts else ()
         enter, leave = shape.cross(direction, start, table.half[:, k], table.quadric[:, k], cuts)
         if shape.foliage:
-            enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / solids.density[k]
+            enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / table.density[k]
         hit = np.flatnonzero((enter < leave) & (enter > NEAREST_M) & (enter < nearest[ray]))
         at, enter = ray[hit], enter[hit]
         np.minimum.at(nearest, at, enter)

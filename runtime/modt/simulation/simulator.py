@@ -40,14 +40,10 @@ class Truth:
 
 
 class Simulator:
-    """Renders sweeps, in any order, each reproducibly.
+    """Renders sweeps, in any order, each reproducibly by the seed of the noise.
 
-    Args:
-        world: to render.
-        sensor: model.
-        seed: of the noise.
-        distort: leave the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor;
-            else they are as after deskewing.
+    `distort` leaves the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor; else
+    they are as after deskewing.
     """
 
     def __init__(self, world: World, sensor: SensorModel, seed: int, *, distort: bool = False) -> None:

@@ -11,9 +11,11 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.simulation.scenes import SCENES
+from modt.simulation.crossing import crossing
 from modt.simulation.sensors import sensor as sensor_model
 from modt.simulation.simulator import Simulator, Truth
+from modt.simulation.street import street
+from modt.simulation.yard import hall, yard
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Frame
 
@@ -21,6 +23,9 @@ T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27]
 K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0, 0.0]])
 CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
 """Intrinsics and mount of KITTI's left colour camera: level, 0.27 m ahead of the sensor, 0.08 m below it."""
+
+SCENES = {scene.__name__: scene for scene in (street, crossing, yard, hall)}
+"""Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""
 
 
 class SyntheticStream:
