@@ -21,6 +21,8 @@ OVERHEAD_M = 2.2
 """Parts of scenery above this height are not part of its footprint."""
 NONE_M = 1e-3
 """Size of a coat or a backpack that a person does not have."""
+POSTURES = {kinds.SITTER: Posture.SIT, kinds.CYCLIST: Posture.RIDE}
+"""Postures of others than pedestrians."""
 STRIP_M, STRIP_SHARE, STRIP_SHARE_CYCLISTS = 0.07, 0.04, 0.1
 """Height of a retroreflective strip, and the shares of pedestrians and of cyclists who wear one."""
 PITCH_RAD = (0.007, 0.005)
@@ -61,21 +63,20 @@ class SceneBuilder:
         stride = 0.24 * height * (0.6 + 0.3 * speed_mps) if speed_mps else 0.0
         rate = np.pi * speed_mps / (2 * stride) if speed_mps else 0.0
         size = (0.45 + 1.4 * stride if speed_mps else 0.5, float(self.rng.uniform(0.55, 0.7)), height)
-        posture = Posture.WALK if speed_mps else Posture.STAND
-        self._person(kinds.PEDESTRIAN, size, path, posture, height, Solids.none(), rate, stride)
+        self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride)
 
     def sitter(self, path: Path) -> None:
         """Add a seated person."""
         height = self._height(1.72, 0.08, 1.5, 1.95)
         seat = box((-0.02, 0.0, 0.22), (0.42, 0.42, 0.44), Material.WOOD)
-        self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, Posture.SIT, height, seat)
+        self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, height, seat)
 
     def cyclist(self, path: Path, speed_mps: float, height: float | None = None) -> None:
         """Add a cyclist."""
         height = height or self._height(1.74, 0.08, 1.5, 1.95)
         size = (1.76, 0.6, 0.93 + 0.3 * height * np.cos(0.55) + 0.24 * height)
         bicycle = vehicles.bicycle(self.rng)
-        self._person(kinds.CYCLIST, size, path, Posture.RIDE, height, bicycle, 2 * np.pi * speed_mps / 4.5)
+        self._person(kinds.CYCLIST, size, path, height, bicycle, 2 * np.pi * speed_mps / 4.5)
 
     def world(self, terrain: Terrain, ego: Path, height_m: float, sway_rad: float = 0.003) -> World:
         """The world of the bodies that collide neither with the ego vehicle nor with one another.
@@ -98,16 +99,9 @@ class SceneBuilder:
         return float(np.clip(self.rng.normal(mean, sigma), low, high))
 
     def _person(
-        self,
-        kind: Kind,
-        size: Triple,
-        path: Path,
-        posture: Posture,
-        height: float,
-        rigid: Solids,
-        rate: float = 0.0,
-        stride: float = 0.0,
+        self, kind: Kind, size: Triple, path: Path, height: float, rigid: Solids, rate: float = 0, stride: float = 0
     ) -> None:
+        posture = POSTURES.get(kind, Posture.WALK if rate else Posture.STAND)
         girth = float(np.clip(self.rng.normal(1.0, 0.12), 0.75, 1.35))
         phase = float(self.rng.uniform(0, 2 * np.pi))
         coat = self.rng.uniform(0.16, 0.24) if self.rng.random() < 0.35 else NONE_M

@@ -14,6 +14,8 @@ from modt.simulation.sensors import SensorModel
 from modt.simulation.solids import Solids
 from modt.types import Bool, Float32, Int
 
+Int32 = NDArray[np.int32]
+
 NO_SOLID = -1
 """Index of the solid hit by a ray that hits none."""
 NEAREST_M = np.float32(0.05)
@@ -26,7 +28,7 @@ class RangeImage:
     """First hits of the rays of a sweep."""
 
     distance: Float32  # (B, A) horizontal distance to the first surface [m]; infinite where there is none
-    solid: NDArray[np.int32]  # (B, A) index of the solid hit, NO_SOLID for the ground or the sky
+    solid: Int32  # (B, A) index of the solid hit, NO_SOLID for the ground or the sky
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,11 +135,8 @@ class RayCaster:
         """First hit of each ray.
 
         Large windows are cast one by one, nearest first, so that hidden ones are skipped; small ones in batches.
-
-        Args:
-            solids: in the sensor frame.
-            ground: (B, A) horizontal distance to the ground [m], infinite where a ray misses it.
-            depth: (B, A) optical depth at which each ray ends in foliage, exponentially distributed.
+        `ground` (B, A) is the horizontal distance to the ground [m], infinite where a ray misses it; `depth` (B, A)
+        the optical depth at which each ray ends in foliage, exponentially distributed.
         """
         image = RangeImage(ground.copy(), np.full(ground.shape, NO_SOLID, np.int32))
         windows = self.windows(solids)

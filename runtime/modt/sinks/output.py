@@ -19,11 +19,9 @@ class Writer(Protocol[T_contra]):
 
     def write(self, item: T_contra, /) -> None:
         """Write one item; it has reached the operating system on return."""
-        ...
 
     def close(self) -> None:
         """Close the files."""
-        ...
 
 
 Sink = Writer[FrameResult]

@@ -23,12 +23,9 @@ def line(record: dict[str, Any]) -> str:
 
 
 def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iterator[dict[str, Any]]:
-    """Records of a file, in order, without an incomplete last line of an aborted run.
+    """Records of a schema, in order, without an incomplete last line of an aborted run.
 
-    Args:
-        path: a file of lines as by `line`, possibly still growing.
-        schema: required of every record.
-        ignored: schemas of other records, which are skipped.
+    The file may still be growing; records of ignored schemas are skipped.
 
     Raises:
         MisuseError: missing, unreadable, or of another schema; the error names the line.

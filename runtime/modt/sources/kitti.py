@@ -72,8 +72,8 @@ def tracking_sequence(scans: Path) -> ScanStream:
     else:
         T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
         poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
-    name = f"tracking {number}"
-    return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turn_s=PERIOD_S)
+    name, turns = f"tracking {number}", dict.fromkeys(_scans(scans)[0], PERIOD_S)
+    return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turns=turns)
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
@@ -129,7 +129,6 @@ def _stream(
     *,
     sequence: int = 0,
     turns: Mapping[int, float] = MappingProxyType({}),
-    turn_s: float = 0.0,
 ) -> ScanStream:
     indices, files = _scans(data)
     gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
@@ -142,7 +141,7 @@ def _stream(
             notes.of_poses.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
         poses = _filled(poses, indices)
     scans = [
-        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, turn_s))
+        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0))
         for i, f in zip(indices, files, strict=True)
     ]
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):

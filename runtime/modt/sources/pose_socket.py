@@ -21,7 +21,6 @@ from modt.errors import MisuseError
 from modt.sources.pose_buffer import PoseBuffer
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.pose_source import PoseSource
-from modt.sources.stream import StreamInfo
 from modt.types import Float64, Frame
 
 log = logging.getLogger(__name__)
@@ -36,6 +35,7 @@ class PoseSocket(PoseSource):
     are removed and the restart is passed on in `Frame.restarts`.
     """
 
+    has_poses = True  # though frames may lack one
     REASONS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")
     """Reasons of a refusal; each has a counter."""
 
@@ -45,10 +45,6 @@ class PoseSocket(PoseSource):
         self._buffer = PoseBuffer(config)
         self.received = self.used = self.restarts = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
-
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """With poses, though frames may lack one."""
-        return replace(info, has_poses=True, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
         """The frame with T_world_sensor at its stamp, None where the poses received are too old."""

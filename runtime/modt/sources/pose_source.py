@@ -18,10 +18,12 @@ class PoseSource:
     """Sets the poses of frames; the poses of the recording by default."""
 
     name = "recording"
+    has_poses: bool | None = None
+    """Whether a stream with these poses has poses; None: as without them."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Properties of a stream with these poses: has_poses and pose_notes."""
-        return info
+        """Properties of a stream with these poses."""
+        return info if self.has_poses is None else replace(info, has_poses=self.has_poses, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
         """The frame with its pose, None where unknown; frames come in order."""
@@ -42,11 +44,7 @@ class RecordedPoses(PoseSource):
 class NoPoses(PoseSource):
     """No poses: ego-motion is estimated from the proposals."""
 
-    name = "none"
-
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Without poses."""
-        return replace(info, has_poses=False, pose_notes=())
+    name, has_poses = "none", False
 
     def place(self, frame: Frame) -> Frame:
         """Without a pose."""
@@ -56,14 +54,14 @@ class NoPoses(PoseSource):
 class PoseFile(PoseSource):
     """Poses of a file in KITTI's odometry format: line k, from 0, belongs to frame k.
 
-    Args:
-        path: of the file.
-        camera: of the stream: the poses are this camera's (KITTI's rectified left one); None: they are the sensor's.
-        end: index of the last frame plus one, None where unknown.
+    The poses are the camera's (KITTI's rectified left one), without one the sensor's; `end` is the index of the last
+    frame plus one, None where unknown.
 
     Raises:
         MisuseError: the file is missing, a line is no pose, or there are too few.
     """
+
+    has_poses = True
 
     def __init__(self, path: Path, camera: Camera | None, end: int | None) -> None:
         self.name = str(path)
@@ -71,10 +69,6 @@ class PoseFile(PoseSource):
         self._poses = poses if camera is None else sensor_poses(poses, camera.T_camera_sensor)
         if end is not None:
             self._require(end - 1)
-
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """With a pose for every frame."""
-        return replace(info, has_poses=True, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
         """The frame with the pose of its index.

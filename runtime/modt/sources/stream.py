@@ -66,8 +66,6 @@ class Stream(Protocol):
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames; faults are added to `faults` on the way."""
-        ...
 
     def between(self, first: int, last: int | None) -> Self:
         """The stream of the frames with first <= index < last."""
-        ...
