@@ -174,7 +174,7 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
         notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
     T_imu_sensor = kitti_calibration.T_imu_sensor_of_raw(drive.parent)
-    T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1] for r in records]))
+    T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1, : len(oxts.FIELDS)] for r in records]))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 

@@ -17,11 +17,11 @@ REMEDY = "restore it, or remove it to run without ego-motion"
 
 
 def poses(records: Float64) -> Float64:
-    """(n, 4, 4) T_world_imu of (n, 6) records: lat, lon [deg], alt [m], roll, pitch, yaw [rad].
+    """(n, 4, 4) T_world_imu of (n, 6 or more) records: lat, lon [deg], alt [m], roll, pitch, yaw [rad].
 
     Mercator coordinates scaled at the first latitude; the world frame is that of the first record.
     """
-    lat, lon, alt, roll, pitch, yaw = records.T
+    lat, lon, alt, roll, pitch, yaw = records[:, :6].T
     scale = np.cos(np.deg2rad(lat[0]))
     x = scale * EARTH_RADIUS_M * np.deg2rad(lon)
     y = scale * EARTH_RADIUS_M * np.log(np.tan(np.deg2rad(90.0 + lat) / 2))
@@ -35,12 +35,12 @@ def poses(records: Float64) -> Float64:
 
 
 def read_records(path: Path) -> Float64:
-    """(n, 6) FIELDS of the records of a file: one of a raw drive, one a line of a tracking sequence.
+    """(n, k) records of a file, FIELDS first: one of a raw drive, one a line of a tracking sequence.
 
     Raises:
         MisuseError: missing or no records.
     """
-    records = read_numbers(path, REMEDY)[:, : len(FIELDS)]
-    if records.shape[1] < len(FIELDS) or not np.isfinite(records).all():
+    records = read_numbers(path, REMEDY)
+    if records.shape[1] < len(FIELDS) or not np.isfinite(records[:, : len(FIELDS)]).all():
         raise MisuseError(path, f"OXTS record without {', '.join(FIELDS)}", REMEDY)
     return records
