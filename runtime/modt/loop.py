@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from modt.pipeline import SINK, SOURCE, Pipeline
-from modt.sinks.sink import LineSink, Sink
+from modt.sinks.output import LineSink, Sink
 from modt.sources.stream import Stream
 from modt.types import Budget, FrameResult
 

@@ -5,11 +5,12 @@ import pytest
 from modt.errors import ModtError
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
-from modt.sinks.tracks import TrackLines
+from modt.sinks.output import LineFile
+from modt.sinks.tracks import frame_line
 from tests.results import CAR, result
 
 SINKS = {
-    "tracks": lambda root: TrackLines(root / "tracks.jsonl"),
+    "tracks": lambda root: LineFile(root / "tracks.jsonl", frame_line),
     "kitti": lambda root: KittiResults(root / "kitti" / "0000.txt", None),
     "labels": lambda root: PointLabels(root / "labels"),
 }

@@ -9,14 +9,14 @@ from modt.cli.main import main
 from modt.geometry import inverse
 from modt.sinks.kitti_raw import DATE, DriveWriter
 from modt.sources.recognise import open_stream
-from modt.sources.synthetic_stream import SyntheticStream
+from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("drive")
     stream = SyntheticStream("street", "vlp-16", 1.5, seed=4)
-    writer = DriveWriter(folder, stream.camera)
+    writer = DriveWriter(folder, CAMERA)
     sweeps = list(stream.sweeps())
     for frame, truth in sweeps:
         writer.write(frame, truth)
@@ -46,7 +46,7 @@ def test_points_times_poses_and_camera_are_read_back(written, layout):
 @pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
 def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, turn_s):
     stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
-    writer = DriveWriter(tmp_path, stream.camera)
+    writer = DriveWriter(tmp_path, CAMERA)
     for frame, truth in stream.sweeps():
         assert frame.turn_s == turn_s
         writer.write(frame, truth)

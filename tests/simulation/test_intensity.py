@@ -21,6 +21,7 @@ from modt.simulation.sensors import sensor
 from modt.simulation.solids import box
 from modt.simulation.vehicles import car, car_size, van, van_size
 from modt.sources.synthetic_stream import SyntheticStream
+from tools.train.label_scenes import label_scene
 
 HDL = sensor("hdl-64e")
 
@@ -100,7 +101,7 @@ def test_paint_is_darker_at_grazing_incidence():
 def test_number_plates_saturate_the_intensity(tmp_path, seed):
     path = tmp_path / "000000.txt"
     path.write_text("Car 0 0 0 0 0 9 9 1.5 1.6 4.0 0.0 1.7 13.0 -1.57\n")
-    frame, truth = SyntheticStream(str(path), "hdl-64e", 0.1, seed=seed).simulator.sweep(0)
+    frame, truth = label_scene(path, seed).sweep(0)
     own = frame.points[truth.instance == truth.bodies[0]]
     bright = own[own[:, 3] > 0.9]
     assert 3 <= len(bright) < 0.1 * len(own)

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.errors import MisuseError, ModtError
-from modt.sinks.records import JsonLines, read_records
+from modt.sinks.output import LineFile
+from modt.sinks.records import line, read_records
 
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
@@ -21,7 +22,7 @@ record = st.dictionaries(st.text().filter(lambda k: k != "schema"), json_values,
 @given(st.lists(record, max_size=5))
 def test_records_are_read_back(tmp_path_factory, records):
     path = tmp_path_factory.getbasetemp() / "r.jsonl"
-    lines = JsonLines(path)
+    lines = LineFile(path, line)
     written = [{"schema": "s/1", **r} for r in records]
     for r in written:
         lines.write(r)
@@ -32,7 +33,7 @@ def test_records_are_read_back(tmp_path_factory, records):
 @given(cut=st.integers(0, 200))
 def test_a_truncated_file_keeps_its_complete_lines(tmp_path_factory, cut):
     path = tmp_path_factory.getbasetemp() / "cut.jsonl"
-    lines = JsonLines(path)
+    lines = LineFile(path, line)
     for i in range(6):
         lines.write({"schema": "s/1", "i": i, "text": "x" * i})
     lines.close()
@@ -65,7 +66,7 @@ def test_a_missing_file_is_refused(tmp_path):
 
 
 def test_nan_is_refused_before_it_reaches_the_file(tmp_path):
-    lines = JsonLines(tmp_path / "r.jsonl")
+    lines = LineFile(tmp_path / "r.jsonl", line)
     with pytest.raises(ValueError, match="JSON"):
         lines.write({"x": float("nan")})
     lines.close()
@@ -75,7 +76,7 @@ def test_nan_is_refused_before_it_reaches_the_file(tmp_path):
 def test_a_full_device_is_an_error():
     from pathlib import Path
 
-    lines = JsonLines(Path("/dev/full"))
+    lines = LineFile(Path("/dev/full"), line)
     with pytest.raises(ModtError, match="No space left"):
         lines.write({"schema": "s/1"})
     lines.close()
@@ -84,9 +85,10 @@ def test_a_full_device_is_an_error():
 FULL = """
 import resource, pathlib, sys
 from modt.errors import ModtError
-from modt.sinks.records import JsonLines
+from modt.sinks.output import LineFile
+from modt.sinks.records import line
 resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-lines = JsonLines(pathlib.Path(sys.argv[1]))
+lines = LineFile(pathlib.Path(sys.argv[1]), line)
 try:
     for i in range(100):
         lines.write({"schema": "s/1", "i": i, "fill": "x" * 90})
@@ -109,12 +111,12 @@ def test_a_line_that_does_not_fit_is_removed(tmp_path):
 
 def test_a_missing_folder_is_an_error(tmp_path):
     with pytest.raises(ModtError, match="No such file"):
-        JsonLines(tmp_path / "none" / "r.jsonl")
+        LineFile(tmp_path / "none" / "r.jsonl", line)
 
 
 def test_records_of_ignored_schemas_are_skipped(tmp_path):
     path = tmp_path / "mixed.jsonl"
-    lines = JsonLines(path)
+    lines = LineFile(path, line)
     for k in range(3):
         lines.write({"schema": "modt.ledger/1", "frame": k})
         lines.write({"schema": "modt.energy/1", "window": k})

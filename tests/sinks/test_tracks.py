@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
+from modt.sinks.output import LineFile
 from modt.sinks.records import line, read_records
-from modt.sinks.tracks import SCHEMA, TrackLines, frame_line, frame_record
+from modt.sinks.tracks import SCHEMA, frame_line, frame_record
 from tests.results import CAR, result
 
 
@@ -44,7 +45,7 @@ def test_an_empty_frame_has_a_record():
 
 
 def test_lines_are_read_back(tmp_path):
-    lines = TrackLines(tmp_path / "tracks.jsonl")
+    lines = LineFile(tmp_path / "tracks.jsonl", frame_line)
     for f in range(3):
         lines.write(result(f, [4], {0: 1}))
     lines.close()

@@ -48,7 +48,7 @@ GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
         ("2 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
         ("-1 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
         ("1 0 0 5e6 0 1 0 0 0 0 1 0\n", r"p\.txt:1: farther than 100 km"),
-        ("\u00e9", "no text"),
+        ("\u00e9", "1 numbers"),
     ],
 )
 def test_an_invalid_file_is_refused_with_its_line(tmp_path, text, named):

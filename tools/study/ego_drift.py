@@ -117,7 +117,7 @@ def by_kiss_icp(stream: Stream) -> Float64:
 def integrated(drive: Path, indices: Iterable[int]) -> Float64:
     """(n, 4, 4) sensor poses from the integrated velocities and the attitudes of the records."""
     folder = drive / "oxts"
-    records = np.array([oxts.read_record(folder / "data" / f"{i:010d}.txt") for i in indices])
+    records = np.concatenate([oxts.read_records(folder / "data" / f"{i:010d}.txt")[:1] for i in indices])
     texts = (folder / "timestamps.txt").read_text(encoding="ascii").splitlines()
     stamps = [datetime.fromisoformat(texts[i][:26]) for i in indices]
     step_s = np.diff([(s - stamps[0]).total_seconds() for s in stamps])

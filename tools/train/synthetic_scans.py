@@ -11,6 +11,7 @@ from modt.geometry import FieldOfView
 from modt.simulation.simulator import Truth
 from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 from modt.types import Frame
+from tools.train.label_scenes import label_scene
 from tools.train.labelled_scans import TEST_DRIVE, Scan
 
 PEOPLE = ("Pedestrian", "Cyclist", "Person_sitting")
@@ -52,7 +53,7 @@ def scans_from_labels(files: Sequence[Path], seeds: Sequence[int]) -> Iterator[S
     """A sweep of a world built from a random label file, for each seed."""
     for seed in seeds:
         path = files[int(np.random.default_rng(seed).integers(len(files)))]
-        frame, truth = SyntheticStream(str(path), "hdl-64e", 0.1, seed).simulator.sweep(0)
+        frame, truth = label_scene(path, seed).sweep(0)
         yield labelled_scan(frame, truth, f"{path.stem}-{seed}", f"placed-{seed}", camera=True)
 
 

@@ -23,19 +23,12 @@ MAX_COST = 1.0
 
 @dataclass(frozen=True, slots=True)
 class BoxTracks:
-    """Reported tracks of a frame.
+    """Reported tracks of a frame."""
 
-    Attributes:
-        id: (K,) of the tracks.
-        box: (K, 7) smoothed, world frame.
-        confidence: (K,) in the track.
-        source: (K,) index of the associated detection, NONE where the box is a prediction.
-    """
-
-    id: Int
-    box: Float64
-    confidence: Float64
-    source: Int
+    id: Int  # (K,) of the tracks
+    box: Float64  # (K, 7) smoothed, world frame
+    confidence: Float64  # (K,) in the track
+    source: Int  # (K,) index of the associated detection, NONE where the box is a prediction
 
 
 def assign(cost: Float64) -> tuple[Int, Int]:
@@ -57,13 +50,9 @@ class BoxTracker:
         self._box, self._score = np.zeros((0, 7)), np.zeros(0)
 
     def step(self, stamp_s: float, boxes: Float64, score: Float64, range_m: Float64) -> BoxTracks:
-        """Update the tracks with the detections of a frame.
+        """Update the tracks with the detections of a frame: boxes (D, 7) in the world frame.
 
-        Args:
-            stamp_s: time of the frame [s].
-            boxes: (D, 7) detections, world frame.
-            score: (D,) of each, increasing with the detector's confidence.
-            range_m: (D,) of each from the sensor [m].
+        Scores (D,) increase with the detector's confidence; range_m (D,) is that from the sensor.
         """
         model = self.config.filter
         variance = np.square(model.position_sigma_m * np.exp(-np.maximum(score, 0.0) / model.score_scale))
@@ -108,8 +97,7 @@ class BoxTracker:
         gate_m2 = config.gate * (self._P[:, :1] + variance) + np.square(config.length_share * self._box[:, 3:4])
         dz = np.abs(boxes[:, 2] - self._box[:, 2, None])
         turn = np.abs(np.sin(boxes[:, 6] - self._box[:, 6, None]))
-        cost: Float64 = (dx * dx + dy * dy) / gate_m2 + config.height_weight_per_m * dz + config.yaw_weight * turn
-        return cost
+        return np.asarray((dx * dx + dy * dy) / gate_m2 + config.height_weight_per_m * dz + config.yaw_weight * turn)
 
     def _update(self, rows: Int, columns: Int, boxes: Float64, variance: Float64, score: Float64) -> None:
         model, measured = self.config.filter, boxes.take(columns, axis=0)

@@ -16,8 +16,8 @@ from modt.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
 from modt.reporting.summary import Summary
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
+from modt.sinks.output import Sink
 from modt.sinks.run_directory import RunDirectory
-from modt.sinks.sink import Sink
 from modt.sources.pose_source import PosedStream
 from modt.supervisor import Supervisor
 from modt.types import FrameResult, Proposals

@@ -11,9 +11,7 @@ from modt.errors import MisuseError, ModtError
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("simulate", help="write a synthetic drive with its ground truth")
-    p.add_argument(
-        "--scene", default="street", metavar="NAME", help="scene or KITTI label file (default: %(default)s)"
-    )
+    p.add_argument("--scene", default="street", metavar="NAME", help="scene (default: %(default)s)")
     p.add_argument("--sensor", default="hdl-64e", metavar="NAME", help="sensor (default: %(default)s)")
     p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration (default: %(default)g)")
     p.add_argument("--seed", type=int, default=0, metavar="K", help="of the random numbers (default: %(default)s)")
@@ -31,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
         ModtError: the drive cannot be written.
     """
     from modt.sinks.kitti_raw import DATE, DriveWriter
-    from modt.sources.synthetic_stream import SyntheticStream
+    from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 
     out: Path = arguments.out
     if (out / DATE).exists() or (out / "sequences").exists():
@@ -40,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.scene, arguments.sensor, arguments.seconds, arguments.seed, distort=arguments.distort
     )
     try:
-        writer = DriveWriter(out, stream.camera, all_around=arguments.all_around)
+        writer = DriveWriter(out, CAMERA, all_around=arguments.all_around)
         for frame, truth in stream.sweeps():
             writer.write(frame, truth)
         writer.close()

@@ -151,7 +151,7 @@ def _poses(arguments: argparse.Namespace, sequence: Detections, sequences: int) 
         calib = path.parent.parent / "calib" / path.name
         T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
         T_sensor_camera = inverse(kitti_calibration.camera_of_sequence(calib).T_camera_sensor)
-        poses = oxts.poses(oxts.read_sequence(path)) @ T_imu_sensor @ T_sensor_camera
+        poses = oxts.poses(oxts.read_records(path)) @ T_imu_sensor @ T_sensor_camera
     if len(poses) < sequence.n_frames:
         raise MisuseError(path, f"{len(poses)} poses for {sequence.n_frames} frames", "give one a frame")
     return poses

@@ -10,16 +10,19 @@ from modt.simulation.kinds import Kind
 from modt.simulation.materials import Material
 from modt.simulation.motion import Path
 from modt.simulation.people import People, Posture
-from modt.simulation.solids import Solids, box
+from modt.simulation.solids import Solids, Triple, box
 from modt.simulation.terrain import Terrain
 from modt.simulation.world import Body, World
 from modt.types import Float64
 
-EGO_SIZE = (4.6, 1.8, 1.6)
+EGO_M = (4.6, 1.8)
+"""Length and width of the ego vehicle."""
 OVERHEAD_M = 2.2
 """Parts of scenery above this height are not part of its footprint."""
 NONE_M = 1e-3
 """Size of a coat or a backpack that a person does not have."""
+POSTURES = {kinds.SITTER: Posture.SIT, kinds.CYCLIST: Posture.RIDE}
+"""Postures of others than pedestrians."""
 STRIP_M, STRIP_SHARE, STRIP_SHARE_CYCLISTS = 0.07, 0.04, 0.1
 """Height of a retroreflective strip, and the shares of pedestrians and of cyclists who wear one."""
 PITCH_RAD = (0.007, 0.005)
@@ -27,12 +30,7 @@ PITCH_RAD = (0.007, 0.005)
 
 
 class SceneBuilder:
-    """Bodies of a scene.
-
-    Args:
-        rng: of the scene.
-        seconds: duration of the scene [s].
-    """
+    """Bodies of a scene of a duration [s]."""
 
     def __init__(self, rng: np.random.Generator, seconds: float) -> None:
         self.rng, self.seconds = rng, seconds
@@ -44,7 +42,7 @@ class SceneBuilder:
         """Add something at rest that is not annotated."""
         self.bodies.append(Body(kinds.SCENERY, _extent(solids), Path.standing(x, y, heading_rad), solids))
 
-    def vehicle(self, kind: Kind, path: Path, size: tuple[float, float, float] | None = None) -> None:
+    def vehicle(self, kind: Kind, path: Path, size: Triple | None = None) -> None:
         """Add a car, a van or a truck, of random proportions and, where none is given, random size."""
         random_size, make = {
             kinds.CAR: (vehicles.car_size, vehicles.car),
@@ -65,30 +63,30 @@ class SceneBuilder:
         stride = 0.24 * height * (0.6 + 0.3 * speed_mps) if speed_mps else 0.0
         rate = np.pi * speed_mps / (2 * stride) if speed_mps else 0.0
         size = (0.45 + 1.4 * stride if speed_mps else 0.5, float(self.rng.uniform(0.55, 0.7)), height)
-        posture = Posture.WALK if speed_mps else Posture.STAND
-        self._person(kinds.PEDESTRIAN, size, path, posture, height, Solids.none(), rate, stride)
+        self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride)
 
     def sitter(self, path: Path) -> None:
         """Add a seated person."""
         height = self._height(1.72, 0.08, 1.5, 1.95)
         seat = box((-0.02, 0.0, 0.22), (0.42, 0.42, 0.44), Material.WOOD)
-        self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, Posture.SIT, height, seat)
+        self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, height, seat)
 
     def cyclist(self, path: Path, speed_mps: float, height: float | None = None) -> None:
         """Add a cyclist."""
         height = height or self._height(1.74, 0.08, 1.5, 1.95)
         size = (1.76, 0.6, 0.93 + 0.3 * height * np.cos(0.55) + 0.24 * height)
         bicycle = vehicles.bicycle(self.rng)
-        self._person(kinds.CYCLIST, size, path, Posture.RIDE, height, bicycle, 2 * np.pi * speed_mps / 4.5)
+        self._person(kinds.CYCLIST, size, path, height, bicycle, 2 * np.pi * speed_mps / 4.5)
 
     def world(self, terrain: Terrain, ego: Path, height_m: float, sway_rad: float = 0.003) -> World:
         """The world of the bodies that collide neither with the ego vehicle nor with one another.
 
         Of two that collide, moving bodies take precedence over bodies at rest, earlier ones over later ones.
         """
-        order = sorted(range(len(self.bodies)), key=lambda i: self.bodies[i].at_rest)
-        ego_body = Body(kinds.CAR, EGO_SIZE, ego, Solids.none())
-        kept = without_collisions([ego_body, *(self.bodies[i] for i in order)], self.seconds)[1:]
+        order = sorted(range(len(self.bodies)), key=lambda i: self.bodies[i].path.at_rest)
+        paths = [ego, *(self.bodies[i].path for i in order)]
+        footprint = np.array([EGO_M, *(self.bodies[i].size[:2] for i in order)])
+        kept = without_collisions(paths, footprint, self.seconds)[1:]
         remaining = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(remaining)}
         rows = [(number[int(p[0])], *p[1:]) for p in self._people if int(p[0]) in number]
@@ -101,16 +99,9 @@ class SceneBuilder:
         return float(np.clip(self.rng.normal(mean, sigma), low, high))
 
     def _person(
-        self,
-        kind: Kind,
-        size: tuple[float, float, float],
-        path: Path,
-        posture: Posture,
-        height: float,
-        rigid: Solids,
-        rate: float = 0.0,
-        stride: float = 0.0,
+        self, kind: Kind, size: Triple, path: Path, height: float, rigid: Solids, rate: float = 0, stride: float = 0
     ) -> None:
+        posture = POSTURES.get(kind, Posture.WALK if rate else Posture.STAND)
         girth = float(np.clip(self.rng.normal(1.0, 0.12), 0.75, 1.35))
         phase = float(self.rng.uniform(0, 2 * np.pi))
         coat = self.rng.uniform(0.16, 0.24) if self.rng.random() < 0.35 else NONE_M
@@ -121,7 +112,7 @@ class SceneBuilder:
         self.bodies.append(Body(kind, size, path, rigid))
 
 
-def _extent(solids: Solids) -> tuple[float, float, float]:
+def _extent(solids: Solids) -> Triple:
     """Size of the smallest box centred on the origin that holds the opaque parts below OVERHEAD_M."""
     low = solids.take((solids.centre[:, 2] - solids.half[:, 2] < OVERHEAD_M) & ~np.isfinite(solids.density))
     if not len(low):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
@@ -11,43 +10,29 @@ from modt.geometry import corners
 from modt.simulation.motion import Path
 from modt.types import Bool, Float64, Int
 
-STEP_S = 0.25
+STEP_S, MARGIN_M = 0.25, 0.1
 
 
-class Occupant(Protocol):
-    """A body with a footprint on the ground."""
+def without_collisions(paths: Sequence[Path], footprint: Float64, seconds: float) -> Bool:
+    """(n,) which bodies stay, by path and footprint (n, 2) [m]: of two that ever collide, the one listed first.
 
-    @property
-    def path(self) -> Path: ...  # noqa: D102
-
-    @property
-    def footprint(self) -> tuple[float, float]: ...  # noqa: D102
-
-
-def without_collisions(occupants: Sequence[Occupant], seconds: float, margin_m: float = 0.1) -> Bool:
-    """(n,) which occupants stay: of two that collide at any time, the one listed first.
-
-    Occupants of zero footprint do not collide. Pairs at rest are tested once.
+    Bodies of zero footprint do not collide. Pairs at rest are tested once.
     """
-    n = len(occupants)
-    footprint = np.array([o.footprint for o in occupants]).reshape(-1, 2)
     solid = footprint.min(axis=1) > 0
     kept = solid.copy()
-    boxes = np.zeros((n, 7))
-    boxes[:, 3:5] = footprint + 2 * margin_m
-    moving = np.array([len(o.path.xy) > 1 for o in occupants], np.bool_)
-    for row, o in enumerate(occupants):
-        boxes[row, [0, 1, 6]] = o.path.at(0.0)
+    boxes = np.zeros((len(paths), 7))
+    boxes[:, 3:5] = footprint + 2 * MARGIN_M
+    boxes[:, [0, 1, 6]] = [path.at(0.0) for path in paths]
+    moving = np.array([not path.at_rest for path in paths])
     for step in range(int(seconds / STEP_S) + 2):
         for row in np.flatnonzero(moving & kept).tolist():
-            boxes[row, [0, 1, 6]] = occupants[row].path.at(step * STEP_S)
+            boxes[row, [0, 1, 6]] = paths[row].at(step * STEP_S)
         first = np.flatnonzero(kept & moving) if step else np.flatnonzero(kept)
         pairs = _close_pairs(boxes, first, np.flatnonzero(kept))
         colliding = pairs[overlapping(boxes[pairs[:, 0]], boxes[pairs[:, 1]])]
         for a, b in colliding[np.argsort(colliding[:, 0], kind="stable")].tolist():
             kept[b] &= not kept[a]
-    stay: Bool = kept | ~solid
-    return stay
+    return np.asarray(kept | ~solid)
 
 
 def overlapping(a: Float64, b: Float64) -> Bool:
@@ -67,5 +52,4 @@ def _close_pairs(boxes: Float64, some: Int, others: Int) -> Int:
     gap = np.hypot(*(boxes[some, None, :2] - boxes[None, others, :2]).transpose(2, 0, 1))
     i, j = np.nonzero(gap < radius[some, None] + radius[others])
     pairs = np.sort(np.stack([some[i], others[j]], axis=1), axis=1)
-    distinct: Int = np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)
-    return distinct
+    return np.unique(pairs[pairs[:, 0] != pairs[:, 1]], axis=0)

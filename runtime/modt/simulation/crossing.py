@@ -24,18 +24,10 @@ def crossing(rng: np.random.Generator, seconds: float, height_m: float) -> World
     speed = rng.uniform(6.0, 9.0)
     approach = min(0.5 * speed * seconds, 40.0)
     reach = REACH_M + speed * seconds
-    roads = [
-        Road(
-            start_m=-reach,
-            end_m=reach,
-            half_m=float(halves[i]),
-            pavement_m=pavement,
-            front_m=front,
-            turn_rad=i * np.pi / 2,
-            gaps=((-halves[1 - i] - pavement, halves[1 - i] + pavement),),
-        )
-        for i in range(2)
-    ]
+    roads = []
+    for half, other, turn_rad in ((*halves, 0.0), (*halves[::-1], np.pi / 2)):
+        gap = (-other - pavement, other + pavement)
+        roads.append(Road(-reach, reach, float(half), pavement, front, turn_rad=turn_rad, gaps=(gap,)))
     line, corner_m = _turn(rng, roads)
     builder = SceneBuilder(rng, seconds)
     for road in roads:

@@ -9,18 +9,12 @@ from modt.classes import CLASSES, ObjectClass
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """A kind of body.
+    """A kind of body."""
 
-    Attributes:
-        name: KITTI object type; empty for what is not annotated.
-        semantic, moving: SemanticKITTI labels at rest and in motion; 0: that of the material.
-        object_class: true class.
-    """
-
-    name: str
-    semantic: int
-    moving: int
-    object_class: ObjectClass = ObjectClass.BACKGROUND
+    name: str  # KITTI object type; empty for what is not annotated
+    semantic: int  # SemanticKITTI label at rest; 0: that of the material
+    moving: int  # SemanticKITTI label in motion; 0: that of the material
+    object_class: ObjectClass = ObjectClass.BACKGROUND  # true class
 
 
 def _of_class(object_class: ObjectClass, row: int = 0) -> Kind:
@@ -36,6 +30,3 @@ CYCLIST = _of_class(ObjectClass.CYCLIST)
 TRUCK = Kind("Truck", 18, 258)
 BICYCLE = Kind("", 11, 11)
 SCENERY = Kind("", 0, 0)
-
-KINDS = {kind.name: kind for kind in (CAR, VAN, TRUCK, PEDESTRIAN, SITTER, CYCLIST)} | {"Tram": TRUCK}
-"""Kind that a KITTI object type is simulated by."""

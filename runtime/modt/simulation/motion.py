@@ -12,18 +12,12 @@ from modt.types import Float64
 
 @dataclass(frozen=True)
 class Path:
-    """A polyline and the distance travelled along it over time.
+    """A polyline and the distance travelled along it over time."""
 
-    Attributes:
-        xy: (n, 2) way points [m, world]; one for a body at rest.
-        time_s, travelled_m: (k,) distance along the line at ascending times; constant before and after.
-        heading_rad: of a body at rest.
-    """
-
-    xy: Float64
-    time_s: Float64
-    travelled_m: Float64
-    heading_rad: float = 0.0
+    xy: Float64  # (n, 2) way points [m, world]; one for a body at rest
+    time_s: Float64  # (k,) ascending times
+    travelled_m: Float64  # (k,) distance along the line at these times; constant before and after
+    heading_rad: float = 0.0  # of a body at rest
 
     @classmethod
     def standing(cls, x: float, y: float, heading_rad: float) -> Path:
@@ -36,6 +30,11 @@ class Path:
         time = np.array([0.0, seconds])
         return cls(xy, time, start_m + speed_mps * time)
 
+    @property
+    def at_rest(self) -> bool:
+        """Whether the body never moves."""
+        return len(self.xy) == 1
+
     @cached_property
     def _segments(self) -> tuple[Float64, Float64, Float64]:
         """Distance along the line of the way points and of the middle of each segment [m], its heading [rad]."""
@@ -46,7 +45,7 @@ class Path:
 
     def at(self, time_s: float) -> tuple[float, float, float]:
         """x, y [m] and heading [rad] at a time."""
-        if len(self.xy) == 1:
+        if self.at_rest:
             return float(self.xy[0, 0]), float(self.xy[0, 1]), self.heading_rad
         along, middle, heading = self._segments
         s = float(np.interp(time_s, self.time_s, self.travelled_m))
@@ -55,7 +54,7 @@ class Path:
 
     def speed(self, time_s: float) -> float:
         """Speed at a time [m/s], over 0.1 s."""
-        if len(self.xy) == 1:
+        if self.at_rest:
             return 0.0
         travelled = np.interp([time_s - 0.05, time_s + 0.05], self.time_s, self.travelled_m)
         s0, s1 = np.clip(travelled, 0.0, self._segments[0][-1])

@@ -27,31 +27,18 @@ SADDLE_M, CRANK_M = 0.93, np.array([0.08, 0.0, 0.3])
 
 @dataclass(frozen=True)
 class People:
-    """n people.
+    """n people."""
 
-    Attributes:
-        body: (n,) index of the body.
-        posture: (n,) Posture.
-        height: (n,) standing height [m].
-        girth: (n,) breadth relative to the mean.
-        phase: (n,) of the gait at time 0 [rad].
-        rate: (n,) of the gait [rad/s].
-        stride: (n,) amplitude of a foot along the walk [m].
-        coat: (n,) breadth of a coat or skirt at the hips [m]; about zero for none.
-        pack: (n,) depth of a backpack [m]; about zero for none.
-        strip: (n,) height of a retroreflective strip around the chest [m]; zero for none.
-    """
-
-    body: Int
-    posture: Int
-    height: Float64
-    girth: Float64
-    phase: Float64
-    rate: Float64
-    stride: Float64
-    coat: Float64
-    pack: Float64
-    strip: Float64
+    body: Int  # (n,) index of the body
+    posture: Int  # (n,) Posture
+    height: Float64  # (n,) standing height [m]
+    girth: Float64  # (n,) breadth relative to the mean
+    phase: Float64  # (n,) of the gait at time 0 [rad]
+    rate: Float64  # (n,) of the gait [rad/s]
+    stride: Float64  # (n,) amplitude of a foot along the walk [m]
+    coat: Float64  # (n,) breadth of a coat or skirt at the hips [m]; about zero for none
+    pack: Float64  # (n,) depth of a backpack [m]; about zero for none
+    strip: Float64  # (n,) height of a retroreflective strip around the chest [m]; zero for none
 
     def take(self, rows: Int | Bool) -> People:
         """The people at some rows."""

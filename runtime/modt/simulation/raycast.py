@@ -14,6 +14,8 @@ from modt.simulation.sensors import SensorModel
 from modt.simulation.solids import Solids
 from modt.types import Bool, Float32, Int
 
+Int32 = NDArray[np.int32]
+
 NO_SOLID = -1
 """Index of the solid hit by a ray that hits none."""
 NEAREST_M = np.float32(0.05)
@@ -23,50 +25,33 @@ BATCH_RAYS, CHUNK_RAYS = 1000, 16_384
 
 @dataclass(frozen=True, slots=True)
 class RangeImage:
-    """First hits of the rays of a sweep.
+    """First hits of the rays of a sweep."""
 
-    Attributes:
-        distance: (B, A) horizontal distance to the first surface [m]; infinite where there is none.
-        solid: (B, A) index of the solid hit, NO_SOLID for the ground or the sky.
-    """
-
-    distance: Float32
-    solid: NDArray[np.int32]
+    distance: Float32  # (B, A) horizontal distance to the first surface [m]; infinite where there is none
+    solid: Int32  # (B, A) index of the solid hit, NO_SOLID for the ground or the sky
 
 
 @dataclass(frozen=True, slots=True)
 class Windows:
-    """Bounds of each solid in the range image; a solid across the seam has two windows.
+    """Bounds of each solid in the range image; a solid across the seam has two windows."""
 
-    Attributes:
-        solid: (W,) index of the solid, nearest first.
-        rows, columns: (W, 2) first, and one past the last.
-        near: (W,) least horizontal distance of the solid [m].
-        n_columns: of the image.
-    """
-
-    solid: Int
-    rows: Int
-    columns: Int
-    near: Float32
-    n_columns: int
+    solid: Int  # (W,) index of the solid, nearest first
+    rows: Int  # (W, 2) first, and one past the last
+    columns: Int  # (W, 2) first, and one past the last
+    near: Float32  # (W,) least horizontal distance of the solid [m]
+    n_columns: int  # of the image
 
     @property
     def area(self) -> Int:
         """(W,) number of rays."""
-        rays: Int = np.diff(self.rows, axis=1)[:, 0] * np.diff(self.columns, axis=1)[:, 0]
-        return rays
+        return np.asarray(np.diff(self.rows, axis=1)[:, 0] * np.diff(self.columns, axis=1)[:, 0])
 
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Kinds of surfaces that bound a solid, and their intersection with rays.
+    """Kinds of surfaces that bound a solid, and their intersection with rays."""
 
-    Attributes:
-        code: 1 for a box, plus 2 for a quadric, plus 4 for foliage, plus 8 times the number of cutting planes.
-    """
-
-    code: int
+    code: int  # 1 for a box, plus 2 for a quadric, plus 4 for foliage, plus 8 times the number of cutting planes
 
     @classmethod
     def codes(cls, solids: Solids) -> Int:
@@ -74,8 +59,7 @@ class Shape:
         rounded = (solids.quadric > 0).any(axis=1)
         boxed = (solids.quadric * np.square(solids.half) < np.float32(0.999)).any(axis=1)
         cut = solids.cuts[:, :, :3].any(axis=2).sum(axis=1)
-        codes: Int = boxed + 2 * rounded + 4 * np.isfinite(solids.density) + 8 * cut
-        return codes
+        return np.asarray(boxed + 2 * rounded + 4 * np.isfinite(solids.density) + 8 * cut)
 
     @property
     def foliage(self) -> bool:
@@ -88,21 +72,12 @@ class Shape:
         return self.code >> 3
 
     def cross(
-        self,
-        direction: list[Float32],
-        start: list[Float32],
-        half: Float32,
-        quadric: Float32,
-        cuts: Iterable[Float32],
+        self, direction: list[Float32], start: list[Float32], half: Float32, quadric: Float32, cuts: Iterable[Float32]
     ) -> tuple[Float32, Float32]:
         """Horizontal distances at which rays enter and leave a solid [m]; enter >= leave, or NaN, for a miss.
 
-        Args:
-            direction: of the rays, three components in the frame of the solid, broadcastable.
-            start: of the rays, likewise.
-            half: half sides of the solid, or of each ray's solid, by axis.
-            quadric: likewise.
-            cuts: cutting planes, likewise.
+        Directions and starts of the rays are three components in the frame of the solid, broadcastable; half sides,
+        quadric and cutting planes are those of the solid, or of each ray's solid.
         """
         enter: Float32 = np.full(1, -np.inf, np.float32)
         leave: Float32 = -enter
@@ -139,6 +114,7 @@ class _Columns:
         self.shift: Float32 = np.ascontiguousarray(-np.einsum("nji,nj->in", solids.rotation, solids.centre))
         self.half: Float32 = np.ascontiguousarray(solids.half.T)
         self.quadric: Float32 = np.ascontiguousarray(solids.quadric.T)
+        self.cuts, self.density = solids.cuts, solids.density
 
 
 class RayCaster:
@@ -146,10 +122,6 @@ class RayCaster:
 
     A ray is a point (0, 0, origin) and a direction (cos azimuth, sin azimuth, tangent): its parameter is the
     horizontal distance. Each solid is tested with the rays of its window alone.
-
-    Args:
-        sensor: its beams.
-        batch_rays: largest window that is cast in a batch.
     """
 
     def __init__(self, sensor: SensorModel, batch_rays: int = BATCH_RAYS) -> None:
@@ -163,11 +135,8 @@ class RayCaster:
         """First hit of each ray.
 
         Large windows are cast one by one, nearest first, so that hidden ones are skipped; small ones in batches.
-
-        Args:
-            solids: in the sensor frame.
-            ground: (B, A) horizontal distance to the ground [m], infinite where a ray misses it.
-            depth: (B, A) optical depth at which each ray ends in foliage, exponentially distributed.
+        `ground` (B, A) is the horizontal distance to the ground [m], infinite where a ray misses it; `depth` (B, A)
+        the optical depth at which each ray ends in foliage, exponentially distributed.
         """
         image = RangeImage(ground.copy(), np.full(ground.shape, NO_SOLID, np.int32))
         windows = self.windows(solids)
@@ -208,17 +177,10 @@ class RayCaster:
             group = which[mine]
             part = np.cumsum(area[mine]) // CHUNK_RAYS
             for chunk in np.split(group, np.flatnonzero(np.diff(part)) + 1):
-                self._cast_chunk(solids, table, Shape(code), windows, chunk, depth, image)
+                self._cast_chunk(table, Shape(code), windows, chunk, depth, image)
 
     def _cast_chunk(
-        self,
-        solids: Solids,
-        table: _Columns,
-        shape: Shape,
-        windows: Windows,
-        chunk: Int,
-        depth: Float32,
-        image: RangeImage,
+        self, table: _Columns, shape: Shape, windows: Windows, chunk: Int, depth: Float32, image: RangeImage
     ) -> None:
         nearest, solid = image.distance.reshape(-1), image.solid.reshape(-1)
         ray, row, column, k = self._pairs(windows, chunk, nearest)
@@ -227,10 +189,10 @@ class RayCaster:
         up = [R[2][i][k] for i in range(3)]
         direction = [R[0][i][k] * cos + R[1][i][k] * sin + up[i] * tangent for i in range(3)]
         start = [up[i] * origin + table.shift[i][k] for i in range(3)]
-        cuts = solids.cuts[k].transpose(1, 2, 0) if shape.cuts else ()
+        cuts = table.cuts[k].transpose(1, 2, 0) if shape.cuts else ()
         enter, leave = shape.cross(direction, start, table.half[:, k], table.quadric[:, k], cuts)
         if shape.foliage:
-            enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / solids.density[k]
+            enter = np.maximum(enter, NEAREST_M) + depth.reshape(-1)[ray] / table.density[k]
         hit = np.flatnonzero((enter < leave) & (enter > NEAREST_M) & (enter < nearest[ray]))
         at, enter = ray[hit], enter[hit]
         np.minimum.at(nearest, at, enter)
@@ -296,5 +258,4 @@ class RayCaster:
         exact = np.hypot(gap[:, 0], gap[:, 1])
         radius = np.linalg.norm(solids.half, axis=1)
         loose = np.maximum(np.hypot(solids.centre[:, 0], solids.centre[:, 1]) - radius, 0)
-        nearest: Float32 = np.where(upright, exact, loose).astype(np.float32)
-        return nearest
+        return np.asarray(np.where(upright, exact, loose).astype(np.float32))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modt.simulation.materials import DROPOUT, GRAZING_LOSS, INTENSITY, POINT_SIGMA, REFLECTIVITY
+from modt.simulation.raycast import Int32
 from modt.simulation.sensors import SensorModel
+from modt.simulation.terrain import UInt8
 from modt.types import Bool, Float32, Int
 
 GLOSSY = np.float32(0.25)
@@ -14,12 +15,7 @@ GLOSSY = np.float32(0.25)
 
 
 class Receiver:
-    """The receiver of a sensor.
-
-    Args:
-        sensor: its model.
-        rng: of the constant errors of its beams.
-    """
+    """The receiver of a sensor; rng draws the constant errors of its beams."""
 
     def __init__(self, sensor: SensorModel, rng: np.random.Generator) -> None:
         self.sensor = sensor
@@ -28,21 +24,13 @@ class Receiver:
         self.secant: Float32 = np.sqrt(1 + np.square(sensor.tangent[:, None]))
 
     def receive(
-        self,
-        distance: Float32,
-        material: NDArray[np.uint8],
-        solid: NDArray[np.int32],
-        offset: Float32,
-        rng: np.random.Generator,
+        self, distance: Float32, material: UInt8, solid: Int32, offset: Float32, rng: np.random.Generator
     ) -> tuple[Float32, Float32, Int]:
         """(B, A) measured horizontal distances [m], (n,) intensities [0, 1] and (n,) flat indices of the n returns.
 
-        Args:
-            distance: (B, A) true horizontal distance [m], infinite without a surface.
-            material: (B, A) of the surface.
-            solid: (B, A) which surface it is, negative for the ground.
-            offset: (P + 1,) intensity of each surface relative to its material; the last is the ground's.
-            rng: of the sweep.
+        Distance, material and solid are (B, A): the true horizontal distance [m] is infinite without a surface, the
+        solid negative for the ground. `offset` (P + 1,) is the intensity of each surface relative to its material;
+        the last is the ground's.
         """
         sensor = self.sensor
         chance = rng.random(distance.shape, dtype=np.float32)
@@ -68,7 +56,7 @@ class Receiver:
         ray = np.flatnonzero(detected)
         return measured, sensor.response.report(intensity.ravel().take(ray), slant.ravel().take(ray)), ray
 
-    def _cos_incidence(self, near: Float32, solid: NDArray[np.int32]) -> Float32:
+    def _cos_incidence(self, near: Float32, solid: Int32) -> Float32:
         """(B, A) cosine of the angle of incidence, by the slope of the range image along a beam."""
         step = np.float32(self.sensor.azimuth_rad[1] - self.sensor.azimuth_rad[0])
         slope = np.zeros_like(near)
@@ -80,7 +68,7 @@ class Receiver:
         ground = np.abs(self.sensor.tangent[:, None]) / self.secant + np.float32(0.05)
         return np.where(solid < 0, ground, np.where(same, level, np.float32(0.7))).astype(np.float32)
 
-    def _cos_glossy(self, near: Float32, solid: NDArray[np.int32], cosine: Float32, glossy: Bool) -> Float32:
+    def _cos_glossy(self, near: Float32, solid: Int32, cosine: Float32, glossy: Bool) -> Float32:
         """(B, A) the same cosine, with the slope between beams where the surface is glossy."""
         here = np.flatnonzero(glossy[:-1])
         below = here + near.shape[1]

@@ -17,27 +17,17 @@ KERB_M, CAMBER, ROUGHNESS_M = 0.12, 0.02, 0.012
 
 @dataclass(frozen=True)
 class Road:
-    """A sinusoidal road; the x axis of its frame runs along it, positive offsets are to the left.
+    """A sinusoidal road; the x axis of its frame runs along it, positive offsets are to the left."""
 
-    Attributes:
-        start_m, end_m: ends along x.
-        half_m: half the width of the carriageway.
-        pavement_m: width of each pavement.
-        front_m: distance of the house fronts from the centre line.
-        bend_m, wave_m: amplitude and wavelength of the centre line.
-        turn_rad: direction of x in the world.
-        gaps: stretches (from, to) along x occupied by other roads.
-    """
-
-    start_m: float
-    end_m: float
-    half_m: float
-    pavement_m: float
-    front_m: float
-    bend_m: float = 0.0
-    wave_m: float = 200.0
-    turn_rad: float = 0.0
-    gaps: tuple[tuple[float, float], ...] = ()
+    start_m: float  # start along x
+    end_m: float  # end along x
+    half_m: float  # half the width of the carriageway
+    pavement_m: float  # width of each pavement
+    front_m: float  # distance of the house fronts from the centre line
+    bend_m: float = 0.0  # amplitude of the centre line
+    wave_m: float = 200.0  # wavelength of the centre line
+    turn_rad: float = 0.0  # direction of x in the world
+    gaps: tuple[tuple[float, float], ...] = ()  # stretches (from, to) along x occupied by other roads
 
     def free(self, x: float) -> bool:
         """Whether no other road occupies x [m]."""
@@ -71,8 +61,7 @@ class Road:
         table = np.arange(self.start_m - 200, self.end_m + 200, 1.0)
         swing = np.interp(along, table, self.middle(table)).astype(np.float32)
         slant = np.interp(along, table, np.cos(self.heading(table))).astype(np.float32)
-        apart: Float32 = np.abs((across - swing) * slant)
-        return apart
+        return np.asarray(np.abs((across - swing) * slant))
 
     def _left_of_centre(self, x: Float64, left_m: float) -> Float64:
         """(n, 2) world points at x (n,), left of the centre line."""
@@ -120,5 +109,4 @@ def _roughness(rng: np.random.Generator, rows: int, columns: int) -> Float32:
     coarse = rng.standard_normal((rows // 8 + 2, columns // 8 + 2), np.float32)
     swell = ndimage.zoom(coarse, 8, order=1)[:rows, :columns]
     fine = rng.standard_normal((rows, columns), np.float32)
-    uneven: Float32 = np.float32(0.06) * swell + np.float32(0.025) * np.abs(fine) * (1 + np.maximum(swell, 0))
-    return uneven
+    return np.asarray(np.float32(0.06) * swell + np.float32(0.025) * np.abs(fine) * (1 + np.maximum(swell, 0)))

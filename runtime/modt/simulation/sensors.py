@@ -15,75 +15,47 @@ class Response:
     """Intensity that a sensor reports.
 
     Received power is compressed logarithmically: attenuation subtracts from the intensity.
-
-    Attributes:
-        near_m, far_m: limits of the range in which the optics are in focus.
-        near_loss, far_loss: subtracted per metre nearer or farther [1/m].
-        least: lower intensities are reported as 0.
-        most: greatest reported intensity.
-        steps: of the scale from 0 to 1.
     """
 
-    near_m: float = 0.0
-    far_m: float = np.inf
-    near_loss: float = 0.0
-    far_loss: float = 0.0
-    least: float = 0.0
-    most: float = 1.0
-    steps: int = 255
+    near_m: float = 0.0  # least range in focus of the optics
+    far_m: float = np.inf  # greatest range in focus of the optics
+    near_loss: float = 0.0  # subtracted per metre nearer [1/m]
+    far_loss: float = 0.0  # subtracted per metre farther [1/m]
+    least: float = 0.0  # lower intensities are reported as 0
+    most: float = 1.0  # greatest reported intensity
+    steps: int = 255  # of the scale from 0 to 1
 
     def report(self, intensity: Float32, range_m: Float32) -> Float32:
         """(n,) reported intensities [0, most] of returns by their intensities in focus and their ranges."""
         short, beyond = np.maximum(self.near_m - range_m, 0), np.maximum(range_m - self.far_m, 0)
         left = intensity - self.near_loss * short - self.far_loss * beyond
         steps = np.rint(np.clip(left, 0, self.most) * self.steps)
-        reported: Float32 = (steps / self.steps * (left >= self.least)).astype(np.float32)
-        return reported
+        return np.asarray((steps / self.steps * (left >= self.least)).astype(np.float32))
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorModel:
-    """A LiDAR that samples a grid of beams and azimuths once a sweep; the defaults are a rotating sensor's at 10 Hz.
+    """A LiDAR that samples a grid of beams and azimuths once a sweep; by default a rotating sensor at 10 Hz."""
 
-    Attributes:
-        name: of the sensor, and of the profile it is run with.
-        elevation_rad: (B,) of each beam, descending.
-        azimuth_rad: (A,) of each column, ascending, counter-clockwise from straight ahead.
-        origin_m: (B,) height of each beam's origin above the sensor's, or one for all.
-        rotating: the columns close a circle.
-        height_m: usual mounting height above the ground.
-        min_range_m, max_range_m: limits of a return.
-        range_sigma_m: noise of a range.
-        beam_sigma_m: standard deviation of the constant range errors of the beams.
-        azimuth_sigma_rad: jitter of a firing.
-        detect_m: distance at which half the returns of a reflectivity of 0.1 at normal incidence are lost.
-        dropout: share of firings lost on any surface.
-        beam_radius_m, divergence_rad: radius of a beam at its origin, and its growth with range.
-        mixed_share: share of the returns at a depth edge that lie between the surfaces.
-        edge_delay_m: mean range error of a return from an edge that splits the beam.
-        period_s: of a sweep.
-        response: reported intensity.
-    """
-
-    name: str
-    elevation_rad: Float64
-    azimuth_rad: Float64
-    origin_m: Float64 | float = 0.0
-    rotating: bool = True
-    height_m: float
-    min_range_m: float
-    max_range_m: float
-    range_sigma_m: float = 0.015
-    beam_sigma_m: float = 0.0075
-    azimuth_sigma_rad: float = 0.0003
-    detect_m: float = 70.0
-    dropout: float = 0.01
-    beam_radius_m: float = 0.02
-    divergence_rad: float = 0.0015
-    mixed_share: float = 0.12
-    edge_delay_m: float = 0.06
-    period_s: float = 0.1
-    response: Response = Response()
+    name: str  # of the sensor, and of the profile it is run with
+    elevation_rad: Float64  # (B,) of each beam, descending
+    azimuth_rad: Float64  # (A,) of each column, ascending, counter-clockwise from straight ahead
+    origin_m: Float64 | float = 0.0  # (B,) height of each beam's origin above the sensor's, or one for all
+    rotating: bool = True  # the columns close a circle
+    height_m: float  # usual mounting height above the ground
+    min_range_m: float  # of a return
+    max_range_m: float  # of a return
+    range_sigma_m: float = 0.015  # noise of a range
+    beam_sigma_m: float = 0.0075  # standard deviation of the constant range errors of the beams
+    azimuth_sigma_rad: float = 0.0003  # jitter of a firing
+    detect_m: float = 70.0  # distance at which half the returns of a reflectivity of 0.1 at normal incidence are lost
+    dropout: float = 0.01  # share of firings lost on any surface
+    beam_radius_m: float = 0.02  # radius of a beam at its origin
+    divergence_rad: float = 0.0015  # growth of the radius with range
+    mixed_share: float = 0.12  # share of the returns at a depth edge that lie between the surfaces
+    edge_delay_m: float = 0.06  # mean range error of a return from an edge that splits the beam
+    period_s: float = 0.1  # of a sweep
+    response: Response = Response()  # reported intensity
 
     @property
     def shape(self) -> tuple[int, int]:

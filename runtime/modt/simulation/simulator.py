@@ -27,38 +27,23 @@ def slice_delay_s(part: int, period_s: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Ground truth of a sweep.
+    """Ground truth of a sweep."""
 
-    Attributes:
-        instance: (N,) body of each point, NONE for the ground.
-        semantic: (N,) SemanticKITTI label of each point.
-        object_class: (N,) class of each point's body.
-        bodies: (b,) indices of all bodies of annotated kinds, visible or not: their identities.
-        kinds: kind of each.
-        boxes: (b, 7) box of each, sensor frame.
-        points: (b,) number of points of each in this sweep.
-        speed_mps: (b,) speed of each.
-    """
-
-    instance: Int
-    semantic: Int
-    object_class: Int
-    bodies: Int
-    kinds: tuple[Kind, ...]
-    boxes: Float64
-    points: Int
-    speed_mps: Float64
+    instance: Int  # (N,) body of each point, NONE for the ground
+    semantic: Int  # (N,) SemanticKITTI label of each point
+    object_class: Int  # (N,) class of each point's body
+    bodies: Int  # (b,) indices of all bodies of annotated kinds, visible or not: their identities
+    kinds: tuple[Kind, ...]  # kind of each
+    boxes: Float64  # (b, 7) box of each, sensor frame
+    points: Int  # (b,) number of points of each in this sweep
+    speed_mps: Float64  # (b,) speed of each
 
 
 class Simulator:
-    """Renders sweeps, in any order, each reproducibly.
+    """Renders sweeps, in any order, each reproducibly by the seed of the noise.
 
-    Args:
-        world: to render.
-        sensor: model.
-        seed: of the noise.
-        distort: leave the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor;
-            else they are as after deskewing.
+    `distort` leaves the motion of the carrier and the bodies during a sweep in the scans of a rotating sensor; else
+    they are as after deskewing.
     """
 
     def __init__(self, world: World, sensor: SensorModel, seed: int, *, distort: bool = False) -> None:

@@ -16,7 +16,6 @@ N_CUTS = 4
 NARROW_M = 0.3
 """Half the least side below which the width of the beam matters."""
 EYE: Float32 = np.eye(3, dtype=np.float32)
-OPAQUE = np.float32(np.inf)
 NO_CUTS: Float32 = np.tile(np.array([0, 0, 0, 1], np.float32), (1, N_CUTS, 1))
 
 
@@ -26,26 +25,16 @@ class Solids:
 
     A point u in the frame of a solid belongs to it where |u| <= half on every axis, sum(quadric * u^2) <= 1 and
     cut[:3] . u <= cut[3] for every cut: boxes, wedges, ellipsoids, cylinders.
-
-    Attributes:
-        rotation: (n, 3, 3) from the frame of the solid to that of the body, the world or the sensor.
-        centre: (n, 3) of the box, in that frame [m].
-        half: (n, 3) half the sides of the box [m].
-        quadric: (n, 3) inverse squared semi-axes [1/m2]; zero along unbounded axes.
-        cuts: (n, N_CUTS, 4) outward normal and distance of the cutting planes; normal zero for none.
-        density: (n,) extinction [1/m]: infinite for a surface, finite for foliage.
-        material: (n,) its Material.
-        body: (n,) index of its body.
     """
 
-    rotation: Float32
-    centre: Float32
-    half: Float32
-    quadric: Float32
-    cuts: Float32
-    density: Float32
-    material: Int
-    body: Int
+    rotation: Float32  # (n, 3, 3) from the frame of the solid to that of the body, the world or the sensor
+    centre: Float32  # (n, 3) of the box, in that frame [m]
+    half: Float32  # (n, 3) half the sides of the box [m]
+    quadric: Float32  # (n, 3) inverse squared semi-axes [1/m2]; zero along unbounded axes
+    cuts: Float32  # (n, N_CUTS, 4) outward normal and distance of the cutting planes; normal zero for none
+    density: Float32  # (n,) extinction [1/m]: infinite for a surface, finite for foliage
+    material: Int  # (n,) its Material
+    body: Int  # (n,) index of its body
 
     def __len__(self) -> int:
         return len(self.centre)
@@ -98,8 +87,9 @@ class Solids:
         material: int,
         rotation: ArrayLike = EYE,
         body: ArrayLike = 0,
+        density: float = np.inf,
     ) -> Self:
-        """Opaque solids without cuts; columns (n, 3), one material, one rotation and body for all or each."""
+        """Solids without cuts; columns (n, 3), one material and density, one rotation and body for all or each."""
         n = len(centre)
         return cls(
             rotation=np.tile(np.asarray(rotation, np.float32), (n if np.ndim(rotation) == 2 else 1, 1, 1)),
@@ -107,7 +97,7 @@ class Solids:
             half=half.astype(np.float32),
             quadric=quadric.astype(np.float32),
             cuts=NO_CUTS.repeat(n, axis=0),
-            density=np.full(n, OPAQUE, np.float32),
+            density=np.full(n, density, np.float32),
             material=np.full(n, material, np.int64),
             body=np.broadcast_to(np.asarray(body, np.int64), n).copy(),
         )
@@ -119,9 +109,7 @@ Triple = tuple[float, float, float]
 def box(centre: Triple, size: Triple, material: int, yaw: float = 0.0, density: float = np.inf) -> Solids:
     """An upright box of (length, width, height) [m]; of foliage where the density [1/m] is finite."""
     R = [[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]]
-    solid = Solids.make(np.array([centre]), np.array([size]) / 2, np.zeros((1, 3)), material, R)
-    solid.density[:] = density
-    return solid
+    return Solids.make(np.array([centre]), np.array([size]) / 2, np.zeros((1, 3)), material, R, density=density)
 
 
 def wedge(centre: Triple, size: Triple, material: int, cuts: list[tuple[float, float, float, float]]) -> Solids:
@@ -141,9 +129,7 @@ def rounded(solids: Solids, semi: Triple) -> Solids:
 def ellipsoid(centre: Triple, semi: Triple, material: int, density: float = np.inf) -> Solids:
     """An ellipsoid by its semi-axes [m]; of foliage where the density [1/m] is finite."""
     axes = np.array([semi])
-    solid = Solids.make(np.array([centre]), axes, axes**-2.0, material)
-    solid.density[:] = density
-    return solid
+    return Solids.make(np.array([centre]), axes, axes**-2.0, material, density=density)
 
 
 def cylinder(centre: Triple, radius: float, length: float, material: int, axis: int = 2) -> Solids:

@@ -18,19 +18,12 @@ N_ITERATIONS = 3
 
 @dataclass(frozen=True)
 class Terrain:
-    """Heights and materials on a square grid, constant beyond its border.
+    """Heights and materials on a square grid, constant beyond its border."""
 
-    Attributes:
-        corner: (2,) of the first cell [m, world].
-        cell_m: side of a cell.
-        height: (X, Y) height of the ground [m, world].
-        surface: (X, Y) its Material.
-    """
-
-    corner: Float64
-    cell_m: float
-    height: Float32
-    surface: UInt8
+    corner: Float64  # (2,) of the first cell [m, world]
+    cell_m: float  # side of a cell
+    height: Float32  # (X, Y) height of the ground [m, world]
+    surface: UInt8  # (X, Y) its Material
 
     def cells(self, x: Float32, y: Float32) -> Int:
         """Flat index of the cell under each point."""
@@ -39,8 +32,7 @@ class Terrain:
         j = ((y - np.float32(self.corner[1])) * scale).astype(np.int32)
         np.minimum(np.maximum(i, 0, out=i), self.height.shape[0] - 1, out=i)
         np.minimum(np.maximum(j, 0, out=j), self.height.shape[1] - 1, out=j)
-        flat: Int = i * self.height.shape[1] + j
-        return flat
+        return np.asarray(i * self.height.shape[1] + j)
 
     def heights(self, x: Float64, y: Float64) -> Float64:
         """(n,) height of the ground under each point [m, world]."""

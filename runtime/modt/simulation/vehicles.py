@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.simulation.materials import Material
-from modt.simulation.solids import Solids, box, cylinder, rod, rounded, wedge
-from modt.types import Float64
-
-Size = tuple[float, float, float]
+from modt.simulation.solids import Solids, Triple, box, cylinder, rod, rounded, wedge
 
 CLEARANCE_M = 0.07
 """Between the roof of a car and the top of its annotated box."""
@@ -20,7 +17,7 @@ INSET_M = 0.03
 """Depth of the centres of plates and lamps below the surface: the width of the beam makes up for it."""
 
 
-def car(rng: np.random.Generator, size: Size) -> Solids:
+def car(rng: np.random.Generator, size: Triple) -> Solids:
     """A hatchback, saloon or estate car of (length, width, height)."""
     length, width = size[:2]
     height = size[2] - CLEARANCE_M
@@ -61,7 +58,7 @@ def car(rng: np.random.Generator, size: Size) -> Solids:
     return Solids.join([hull, glass, lid, seats, pillars, wheels, _mirrors(front, belt, width, paint), *reflectors])
 
 
-def van(rng: np.random.Generator, size: Size) -> Solids:
+def van(rng: np.random.Generator, size: Triple) -> Solids:
     """A delivery van or a minibus of (length, width, height)."""
     length, width, height = size
     clear, belt = rng.uniform(0.2, 0.3), height * rng.uniform(0.46, 0.55)
@@ -86,12 +83,11 @@ def van(rng: np.random.Generator, size: Size) -> Solids:
     seats = _seats(front - 0.7 * rake, rear + 0.3, belt, width)
     pillars = _pillars(rng, (front, rear, rake, 0.05), (belt, height), width, LEAN, paint)
     trim = [_wheels(rng, length, width, 0.34), _mirrors(front - 0.3, belt, width, paint)]
-    return Solids.join(
-        [hull, glass, load, lid, seats, pillars, *trim, _plates(hull, 0.45, 0.8), _tail_lamps(hull, belt - 0.15)]
-    )
+    reflectors = [_plates(hull, 0.45, 0.8), _tail_lamps(hull, belt - 0.15)]
+    return Solids.join([hull, glass, load, lid, seats, pillars, *trim, *reflectors])
 
 
-def truck(rng: np.random.Generator, size: Size) -> Solids:
+def truck(rng: np.random.Generator, size: Triple) -> Solids:
     """A lorry of (length, width, height): cab, box and wheels."""
     length, width, height = size
     cab = rng.uniform(1.7, 2.2)
@@ -151,7 +147,7 @@ def _tail_lamps(hull: Solids, z: float) -> Solids:
     )
 
 
-def car_size(rng: np.random.Generator) -> Size:
+def car_size(rng: np.random.Generator) -> Triple:
     """Distribution of the KITTI object labels: 3.9 by 1.63 by 1.53 m, correlated."""
     scale = rng.normal(0.0, 1.0)
     return (
@@ -161,7 +157,7 @@ def car_size(rng: np.random.Generator) -> Size:
     )
 
 
-def van_size(rng: np.random.Generator) -> Size:
+def van_size(rng: np.random.Generator) -> Triple:
     """Vans of 5.1 by 1.9 by 2.2 m."""
     scale = rng.normal(0.0, 1.0)
     return (
@@ -171,15 +167,15 @@ def van_size(rng: np.random.Generator) -> Size:
     )
 
 
-def truck_size(rng: np.random.Generator) -> Size:
+def truck_size(rng: np.random.Generator) -> Triple:
     """Lorries of 9 by 2.6 by 3.3 m."""
     return float(rng.uniform(6.5, 12.0)), float(rng.uniform(2.3, 2.7)), float(rng.uniform(2.8, 3.8))
 
 
 def _wheels(rng: np.random.Generator, length: float, width: float, radius: float) -> Solids:
     x = length * rng.uniform(0.29, 0.32)
-    places: Float64 = np.array([[i * x, j * (width / 2 - 0.1)] for i in (-1, 1) for j in (-1, 1)])
-    return Solids.join(cylinder((px, py, radius), radius, 0.22, Material.RUBBER, axis=1) for px, py in places)
+    places = [(i * x, j * (width / 2 - 0.1), radius) for i in (-1, 1) for j in (-1, 1)]
+    return Solids.join(cylinder(place, radius, 0.22, Material.RUBBER, axis=1) for place in places)
 
 
 def _mirrors(x: float, z: float, width: float, paint: int) -> Solids:

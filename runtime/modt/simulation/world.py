@@ -20,62 +20,33 @@ MOVING_MPS = 0.3
 
 @dataclass(frozen=True)
 class Body:
-    """One object or piece of scenery.
+    """One object or piece of scenery."""
 
-    Attributes:
-        kind: of the body.
-        size: length, width, height of its box [m].
-        path: its motion.
-        solids: its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre).
-    """
-
-    kind: Kind
-    size: tuple[float, float, float]
-    path: Path
-    solids: Solids
-
-    @property
-    def footprint(self) -> tuple[float, float]:
-        """Length and width on the ground [m]."""
-        return self.size[:2]
-
-    @property
-    def at_rest(self) -> bool:
-        """Whether it never moves."""
-        return len(self.path.xy) == 1
+    kind: Kind  # of the body
+    size: tuple[float, float, float]  # length, width, height of its box [m]
+    path: Path  # its motion
+    solids: Solids  # its rigid parts, body frame (x ahead, z up, origin on the ground beneath the centre)
 
 
+@dataclass
 class World:
-    """All bodies and the ground.
+    """All bodies and the ground."""
 
-    Args:
-        terrain: the ground.
-        bodies: on it.
-        people: articulated parts of those bodies that are people.
-        ego: motion of the sensor's carrier.
-        height_m: of the sensor above the ground.
-        sway_rad: amplitude of the carrier's roll and pitch.
-        mount_rad: roll and pitch of the sensor on its carrier.
-    """
+    terrain: Terrain
+    bodies: list[Body]
+    people: People  # articulated parts of the bodies that are people
+    ego: Path  # motion of the sensor's carrier
+    height_m: float  # of the sensor above the ground
+    sway_rad: float  # amplitude of the carrier's roll and pitch
+    mount_rad: tuple[float, float]  # roll and pitch of the sensor on its carrier
 
-    def __init__(
-        self,
-        terrain: Terrain,
-        bodies: list[Body],
-        people: People,
-        ego: Path,
-        height_m: float,
-        sway_rad: float,
-        mount_rad: tuple[float, float] = (0.0, 0.0),
-    ) -> None:
-        self.terrain, self.bodies, self.people = terrain, bodies, people
-        self.ego, self.height_m, self.sway_rad, self.mount_rad = ego, height_m, sway_rad, mount_rad
-        self._moving = [i for i, b in enumerate(bodies) if not b.at_rest]
+    def __post_init__(self) -> None:
+        bodies = self.bodies
+        self._moving = [i for i, b in enumerate(bodies) if not b.path.at_rest]
         self._start = np.zeros((len(bodies), 5))
-        for i, body in enumerate(bodies):
-            self._start[i, [0, 1, 3]] = body.path.at(0.0)
-        self._start[:, 2] = terrain.heights(self._start[:, 0], self._start[:, 1])
-        static = Solids.join(b.solids.of(i) for i, b in enumerate(bodies) if b.at_rest)
+        self._start[:, [0, 1, 3]] = np.array([b.path.at(0.0) for b in bodies]).reshape(-1, 3)
+        self._start[:, 2] = self.terrain.heights(self._start[:, 0], self._start[:, 1])
+        static = Solids.join(b.solids.of(i) for i, b in enumerate(bodies) if b.path.at_rest)
         self._static = self._placed(static, self._start)
         self._rigid = Solids.join(bodies[i].solids.of(i) for i in self._moving)
 

@@ -12,7 +12,6 @@ from modt.simulation.road import CELL_M
 from modt.simulation.solids import Solids, box, cylinder, rod
 from modt.simulation.terrain import Terrain
 from modt.simulation.world import World
-from modt.types import Float64
 
 ROBOT_MPS = (0.6, 1.4)
 """Range of the robot's speed."""
@@ -25,7 +24,7 @@ def yard(rng: np.random.Generator, seconds: float, height_m: float) -> World:
     ego = _round_trip(rng, seconds, (half[0] - 6, half[1] - 6))
     _walkers(builder, half, 8)
     for _ in range(3):
-        line = _way_points(rng, (half[0] - 2, half[1] - 2))
+        line = rng.uniform(-1, 1, (6, 2)) * (half[0] - 2, half[1] - 2)
         builder.cyclist(Path.steady(line, 0.0, 2.5, seconds), 2.5)
     for _ in range(int(rng.integers(2, 6))):
         x, y = rng.uniform(-half[0] + 3, half[0] - 3), float(rng.choice([-1, 1])) * (half[1] - 3)
@@ -73,9 +72,8 @@ def pallets(rng: np.random.Generator) -> Solids:
     for _ in range(layers):
         height = float(rng.choice([0.15, 0.4, 0.7]))
         shift = rng.normal(0, 0.04, 2)
-        parts.append(
-            box((shift[0], shift[1], z + height / 2), (1.2, 0.8, height), Material.WOOD, rng.normal(0, 0.05))
-        )
+        size, turn = (1.2, 0.8, height), rng.normal(0, 0.05)
+        parts.append(box((shift[0], shift[1], z + height / 2), size, Material.WOOD, turn))
         z += height
     return Solids.join(parts)
 
@@ -108,11 +106,6 @@ def shelf(rng: np.random.Generator) -> Solids:
     return Solids.join([*boards, *sides, *things])
 
 
-def _way_points(rng: np.random.Generator, half: tuple[float, float]) -> Float64:
-    """(6, 2) random way points."""
-    return rng.uniform(-1, 1, (6, 2)) * half
-
-
 def _round_trip(rng: np.random.Generator, seconds: float, half: tuple[float, float]) -> Path:
     """Round trips of the robot with one stop."""
     angle = np.linspace(0, 2 * np.pi, 60) + rng.uniform(0, 2 * np.pi)
@@ -128,9 +121,8 @@ def _walkers(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
     rng = builder.rng
     for _ in range(n):
         speed = float(np.clip(rng.normal(1.2, 0.2), 0.6, 1.8))
-        builder.pedestrian(
-            Path.steady(_way_points(rng, (half[0] - 1, half[1] - 1)), 0.0, speed, builder.seconds), speed
-        )
+        line = rng.uniform(-1, 1, (6, 2)) * (half[0] - 1, half[1] - 1)
+        builder.pedestrian(Path.steady(line, 0.0, speed, builder.seconds), speed)
     for _ in range(n // 2):
         x, y = rng.uniform(-1, 1, 2) * (half[0] - 1, half[1] - 1)
         builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)))

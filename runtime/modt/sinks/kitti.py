@@ -25,10 +25,7 @@ NO_CAMERA = Camera(
 class KittiResults:
     """Writes kitti/NNNN.txt: frame, id, type, image box, size, position, heading, score.
 
-    Args:
-        path: of the file.
-        camera: reference of the coordinates; without one they are camera axes at the sensor's origin, and image boxes
-            are -1.
+    Without a camera, coordinates are camera axes at the sensor's origin, and image boxes are -1.
     """
 
     def __init__(self, path: Path, camera: Camera | None) -> None:
@@ -88,15 +85,10 @@ class KittiResults:
 def box_lines(
     frame: Int, kitti_type: str, ids: Int, image_box: Float64, hwlxyzry: Float64, score: Float64
 ) -> list[str]:
-    """Lines of KITTI's tracking format with a score, for boxes of another detector.
+    """Lines of KITTI's tracking format with a score, for n boxes of another detector.
 
-    Args:
-        frame: (n,) index of the frame.
-        kitti_type: object type.
-        ids: (n,) of the tracks.
-        image_box: (n, 4) left, top, right, bottom [pixel].
-        hwlxyzry: (n, 7) h, w, l, x, y, z [m], ry [rad] in camera coordinates.
-        score: (n,).
+    Image boxes (n, 4) are left, top, right, bottom [pixel]; boxes (n, 7) h, w, l, x, y, z [m], ry [rad] in camera
+    coordinates.
     """
     alpha = wrap(hwlxyzry[:, 6] - np.arctan2(hwlxyzry[:, 3], hwlxyzry[:, 5]))
     columns = (frame, ids, alpha, image_box, hwlxyzry, score)

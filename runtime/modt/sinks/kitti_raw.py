@@ -25,11 +25,7 @@ class DriveWriter:
     """Writes a raw drive DIR/DATE/DATE_drive_0000_sync and a sequence DIR/sequences/00.
 
     The scans of the sequence are hard links to those of the drive, copies where the file system has no links.
-
-    Args:
-        folder: DIR.
-        camera: of the stream; the calibration files describe it.
-        all_around: annotate every visible body, not only those in the camera's view.
+    `all_around` annotates every visible body, not only those in the camera's view.
 
     Raises:
         OSError: a file cannot be written.
@@ -93,8 +89,7 @@ def label(truth: Truth) -> UInt32:
     number = np.minimum(np.searchsorted(truth.bodies, truth.instance), len(truth.bodies) - 1)
     named = len(truth.bodies) > 0 and truth.bodies[number] == truth.instance
     instance = np.where(named, number + 1, 0).astype(np.uint32)
-    packed: UInt32 = (instance << np.uint32(16)) | truth.semantic.astype(np.uint32)
-    return packed
+    return np.asarray((instance << np.uint32(16)) | truth.semantic.astype(np.uint32))
 
 
 def oxts_records(T_world_sensor: Float64, stamp_s: Float64) -> Float64:
@@ -130,8 +125,7 @@ def _row(values: Float64) -> str:
 
 
 def _projection(camera: Camera) -> Float64:
-    P: Float64 = camera.P_image_sensor @ inverse(camera.T_camera_sensor)
-    return P
+    return np.asarray(camera.P_image_sensor @ inverse(camera.T_camera_sensor))
 
 
 def _write_calibration(folder: Path, camera: Camera) -> None:

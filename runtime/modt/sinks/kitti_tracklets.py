@@ -28,11 +28,7 @@ class _Track:
 
 
 class Tracklets:
-    """Tracklets of a drive; a tracklet runs from the first frame with points of the body in view to the last.
-
-    Args:
-        fov: annotated field of view; KITTI's is that of its left colour camera.
-    """
+    """Tracklets of a drive; a tracklet runs from the first frame with points of the body in view to the last."""
 
     def __init__(self, fov: FieldOfView) -> None:
         self.fov = fov
@@ -61,22 +57,25 @@ class Tracklets:
 
     def _lines(self) -> Iterator[str]:
         yield HEADER
-        yield f"\t<count>{len(self._tracks)}</count>\n\t<item_version>1</item_version>\n"
+        yield _elements(1, count=len(self._tracks), item_version=1)
         for track in self._tracks.values():
             poses = [(f, p) for f, p in sorted(track.poses.items()) if f <= track.last_seen]
             height, width, length = track.size
-            yield f"\t<item>\n\t\t<objectType>{track.kind}</objectType>\n"
-            yield f"\t\t<h>{height:.6f}</h>\n\t\t<w>{width:.6f}</w>\n\t\t<l>{length:.6f}</l>\n"
-            yield f"\t\t<first_frame>{poses[0][0]}</first_frame>\n"
-            yield f"\t\t<poses>\n\t\t\t<count>{len(poses)}</count>\n\t\t\t<item_version>2</item_version>\n"
+            yield "\t<item>\n"
+            yield _elements(2, objectType=track.kind, h=f"{height:.6f}", w=f"{width:.6f}", l=f"{length:.6f}")
+            yield _elements(2, first_frame=poses[0][0]) + "\t\t<poses>\n"
+            yield _elements(3, count=len(poses), item_version=2)
             for _, (x, y, z, yaw, occlusion, truncation) in poses:
-                yield f"\t\t\t<item>\n\t\t\t\t<tx>{x:.9f}</tx>\n\t\t\t\t<ty>{y:.9f}</ty>\n\t\t\t\t<tz>{z:.9f}</tz>\n"
-                yield "\t\t\t\t<rx>0</rx>\n\t\t\t\t<ry>0</ry>\n"
-                yield f"\t\t\t\t<rz>{yaw:.9f}</rz>\n\t\t\t\t<state>2</state>\n"
-                yield f"\t\t\t\t<occlusion>{occlusion}</occlusion>\n\t\t\t\t<occlusion_kf>0</occlusion_kf>\n"
-                yield f"\t\t\t\t<truncation>{truncation}</truncation>\n\t\t\t\t<amt_occlusion>-1</amt_occlusion>\n"
-                yield "\t\t\t\t<amt_occlusion_kf>-1</amt_occlusion_kf>\n\t\t\t\t<amt_border_l>-1</amt_border_l>\n"
-                yield "\t\t\t\t<amt_border_r>-1</amt_border_r>\n"
-                yield "\t\t\t\t<amt_border_kf>-1</amt_border_kf>\n\t\t\t</item>\n"
+                yield "\t\t\t<item>\n"
+                yield _elements(4, tx=f"{x:.9f}", ty=f"{y:.9f}", tz=f"{z:.9f}", rx=0, ry=0, rz=f"{yaw:.9f}", state=2)
+                yield _elements(4, occlusion=occlusion, occlusion_kf=0, truncation=truncation)
+                yield _elements(4, amt_occlusion=-1, amt_occlusion_kf=-1)
+                yield _elements(4, amt_border_l=-1, amt_border_r=-1, amt_border_kf=-1)
+                yield "\t\t\t</item>\n"
             yield "\t\t</poses>\n\t\t<finished>1</finished>\n\t</item>\n"
         yield "</tracklets>\n</boost_serialization>\n"
+
+
+def _elements(depth: int, **texts: object) -> str:
+    """XML elements of a name and a text, indented."""
+    return "".join("\t" * depth + f"<{name}>{text}</{name}>\n" for name, text in texts.items())

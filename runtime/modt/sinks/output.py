@@ -5,11 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO, Generic, TypeVar
+from typing import Any, BinaryIO, Generic, Protocol, TypeVar
 
 from modt.errors import ModtError
+from modt.types import FrameResult
 
 T = TypeVar("T")
+T_contra = TypeVar("T_contra", contravariant=True)
+
+
+class Writer(Protocol[T_contra]):
+    """Takes items one by one."""
+
+    def write(self, item: T_contra, /) -> None:
+        """Write one item; it has reached the operating system on return."""
+
+    def close(self) -> None:
+        """Close the files."""
+
+
+Sink = Writer[FrameResult]
+LineSink = Writer[dict[str, Any]]
 
 
 @contextmanager
@@ -28,12 +44,7 @@ def writing(path: Path) -> Iterator[None]:
 
 
 class LineFile(Generic[T]):
-    """An unbuffered text file of whole lines.
-
-    Args:
-        path: of the file.
-        encode: lines of an item.
-    """
+    """An unbuffered text file of whole lines; `encode` gives the lines of an item."""
 
     def __init__(self, path: Path, encode: Callable[[T], str] = str) -> None:
         self.path, self._encode = path, encode

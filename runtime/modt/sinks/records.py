@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError
-from modt.sinks.output import LineFile
 
 log = logging.getLogger(__name__)
 
@@ -23,20 +22,10 @@ def line(record: dict[str, Any]) -> str:
     return json.dumps(record, separators=(",", ":"), allow_nan=False) + "\n"
 
 
-class JsonLines(LineFile[dict[str, Any]]):
-    """A growing file of records."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, line)
-
-
 def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iterator[dict[str, Any]]:
-    """Records of a file, in order, without an incomplete last line of an aborted run.
+    """Records of a schema, in order, without an incomplete last line of an aborted run.
 
-    Args:
-        path: a file written by JsonLines, possibly still growing.
-        schema: required of every record.
-        ignored: schemas of other records, which are skipped.
+    The file may still be growing; records of ignored schemas are skipped.
 
     Raises:
         MisuseError: missing, unreadable, or of another schema; the error names the line.

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError
-from modt.sinks.output import writing
-from modt.sinks.records import JsonLines
-from modt.sinks.tracks import TrackLines
+from modt.sinks.output import LineFile, writing
+from modt.sinks.records import line
+from modt.sinks.tracks import frame_line
+from modt.types import FrameResult
 
 RUN, TRACKS, LEDGER, SUMMARY = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json"
 
@@ -33,9 +35,8 @@ class RunDirectory:
             raise MisuseError(path, "is a file", "give a directory as --out")
         with writing(path):
             if (path / TRACKS).exists():
-                self.kept = next(
-                    p for n in range(1, 10_000) if not (p := path.with_name(f"{path.name}~{n}")).exists()
-                )
+                names = (path.with_name(f"{path.name}~{n}") for n in itertools.count(1))
+                self.kept = next(name for name in names if not name.exists())
                 path.rename(self.kept)
             elif path.is_dir() and any(path.iterdir()):
                 raise MisuseError(path, "holds files but no run", "give an empty or a new directory")
@@ -45,13 +46,13 @@ class RunDirectory:
         """Write run.yaml, the configuration of the run."""
         self._write(RUN, text)
 
-    def tracks(self) -> TrackLines:
+    def tracks(self) -> LineFile[FrameResult]:
         """A new tracks.jsonl."""
-        return TrackLines(self.path / TRACKS)
+        return LineFile(self.path / TRACKS, frame_line)
 
-    def ledger(self) -> JsonLines:
+    def ledger(self) -> LineFile[dict[str, Any]]:
         """A new ledger.jsonl."""
-        return JsonLines(self.path / LEDGER)
+        return LineFile(self.path / LEDGER, line)
 
     def summarise(self, summary: dict[str, Any]) -> None:
         """Write summary.json."""

@@ -7,24 +7,12 @@ from __future__ import annotations
 
 import json
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from modt.classes import CLASS_NAMES
-from modt.sinks.json_columns import (
-    LIMIT,
-    Text,
-    decode,
-    encode,
-    encode_table,
-    integers,
-    join_columns,
-    probabilities,
-    rounded_to_3,
-)
-from modt.sinks.output import LineFile
+from modt.sinks import json_columns as text
 from modt.sinks.records import line
 from modt.types import NONE, FrameResult
 
@@ -72,9 +60,9 @@ def _frame_fields(result: FrameResult) -> dict[str, Any]:
     }
 
 
-CLASSES = encode_table([json.dumps(name) for name in CLASS_NAMES])
-BOOLEANS = encode_table(["false", "true"])
-NULL = encode("null")[0]
+CLASSES = text.encode_table([json.dumps(name) for name in CLASS_NAMES])
+BOOLEANS = text.encode_table(["false", "true"])
+NULL = text.encode("null")[0]
 
 
 def frame_line(result: FrameResult) -> str:
@@ -87,8 +75,8 @@ def frame_line(result: FrameResult) -> str:
         return line(frame_record(result))
     tracks = result.tracks
     counts = (tracks.id, np.maximum(tracks.proposal, 0), tracks.points, tracks.age, tracks.missed)
-    id_, proposal, points, age, missed = integers(np.stack(counts))
-    box = _objects(BOX_KEYS, rounded_to_3(result.proposals.box[tracks.proposal]))
+    id_, proposal, points, age, missed = text.integers(np.stack(counts))
+    box = _objects(BOX_KEYS, text.rounded_to_3(result.proposals.box[tracks.proposal]))
     for value in (proposal, box):
         value[tracks.proposal == NONE] = 0
         value[tracks.proposal == NONE, 0] = NULL
@@ -96,7 +84,7 @@ def frame_line(result: FrameResult) -> str:
         "id": id_,
         "state": _states(result.state_names)[tracks.state],
         "class": CLASSES[tracks.object_class],
-        "posterior": _lists(probabilities(tracks.posterior)),
+        "posterior": _lists(text.probabilities(tracks.posterior)),
         "viewed": BOOLEANS[tracks.viewed.astype(np.int64)],
         "final": BOOLEANS[tracks.final.astype(np.int64)],
         "proposal": proposal,
@@ -104,42 +92,39 @@ def frame_line(result: FrameResult) -> str:
         "age": age,
         "missed": missed,
         "box": box,
-        "world": _objects(WORLD_KEYS, rounded_to_3(tracks.x)),
+        "world": _objects(WORLD_KEYS, text.rounded_to_3(tracks.x)),
     }
     keyed = [part for key, column in columns.items() for part in (f',"{key}":', column)]
     keyed[0] = ',{"id":'
-    rows = decode(join_columns(len(tracks), *keyed, "}"))
+    rows = text.decode(text.join_columns(len(tracks), *keyed, "}"))
     return line(_frame_fields(result) | {"tracks": []}).replace('"tracks":[]', f'"tracks":[{rows[1:]}]')
 
 
 @lru_cache
-def _states(names: tuple[str, ...]) -> Text:
+def _states(names: tuple[str, ...]) -> text.Text:
     """(S, w) text of the names of the states."""
-    return encode_table([json.dumps(name) for name in names])
+    return text.encode_table([json.dumps(name) for name in names])
 
 
 def _in_tables(result: FrameResult) -> bool:
     """Whether the tables hold every number."""
     tracks, boxes = result.tracks, result.proposals.box
-    lengths = all((np.abs(values) < LIMIT - 1).all() for values in (tracks.x, boxes))
-    counts = all((values < LIMIT).all() for values in (tracks.id, tracks.points, tracks.age, tracks.missed))
+    lengths = all((np.abs(values) < text.LIMIT - 1).all() for values in (tracks.x, boxes))
+    counts = all((values < text.LIMIT).all() for values in (tracks.id, tracks.points, tracks.age, tracks.missed))
     return bool(len(boxes) and lengths and counts and (np.abs(tracks.posterior - 0.5) <= 0.5).all())
 
 
-def _objects(keys: tuple[str, ...], values: Text) -> Text:
+def _objects(keys: tuple[str, ...], values: text.Text) -> text.Text:
     """(n, w) text of JSON objects with some keys and values (n, k, v)."""
-    prefixes = [f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)]
-    return join_columns(len(values), *(p for k, prefix in enumerate(prefixes) for p in (prefix, values[:, k])), "}")
+    return _enclosed([f'{"," if k else "{"}"{key}":' for k, key in enumerate(keys)], values, "}")
 
 
-def _lists(values: Text) -> Text:
+def _lists(values: text.Text) -> text.Text:
     """(n, w) text of JSON lists of values (n, k, v)."""
-    prefixes = ["," if k else "[" for k in range(values.shape[1])]
-    return join_columns(len(values), *(p for k, prefix in enumerate(prefixes) for p in (prefix, values[:, k])), "]")
+    return _enclosed(["," if k else "[" for k in range(values.shape[1])], values, "]")
 
 
-class TrackLines(LineFile[FrameResult]):
-    """Writes tracks.jsonl."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, frame_line)
+def _enclosed(prefixes: list[str], values: text.Text, end: str) -> text.Text:
+    """(n, w) text of values (n, k, v), each after its prefix."""
+    parts = [part for k, prefix in enumerate(prefixes) for part in (prefix, values[:, k])]
+    return text.join_columns(len(values), *parts, end)

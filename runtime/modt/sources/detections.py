@@ -10,7 +10,7 @@ detector lie between 0 and 1 they are probabilities and are converted to that sc
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import wrap
+from modt.sources.text_file import read_lines
 from modt.types import Bool, Float64, Int
 
 DETECTED = (ObjectClass.PEDESTRIAN, ObjectClass.CAR, ObjectClass.CYCLIST)
@@ -35,23 +36,14 @@ T_LEVEL_CAMERA = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """The D detections of a sequence, ordered by frame.
+    """The D detections of a sequence, ordered by frame."""
 
-    Attributes:
-        name: of the sequence.
-        frame: (D,) index of the frame.
-        object_class: (D,) class.
-        image_box: (D, 4) left, top, right, bottom [pixel].
-        score: (D,) increasing with confidence.
-        box: (D, 7) x, y, z of the centre, l, w, h [m], yaw [rad], level frame of the camera.
-    """
-
-    name: str
-    frame: Int
-    object_class: Int
-    image_box: Float64
-    score: Float64
-    box: Float64
+    name: str  # of the sequence
+    frame: Int  # (D,) index of the frame
+    object_class: Int  # (D,) class
+    image_box: Float64  # (D, 4) left, top, right, bottom [pixel]
+    score: Float64  # (D,) increasing with confidence
+    box: Float64  # (D, 7) x, y, z of the centre, l, w, h [m], yaw [rad], level frame of the camera
 
     def __len__(self) -> int:
         return len(self.frame)
@@ -63,14 +55,7 @@ class Detections:
 
     def take(self, rows: Bool | Int) -> Detections:
         """The detections at some rows."""
-        return Detections(
-            self.name,
-            self.frame[rows],
-            self.object_class[rows],
-            self.image_box[rows],
-            self.score[rows],
-            self.box[rows],
-        )
+        return Detections(self.name, *(getattr(self, f.name)[rows] for f in fields(self)[1:]))
 
     def frames(self) -> Iterator[tuple[int, slice]]:
         """Every frame from 0, empty ones included, and its rows."""
@@ -114,10 +99,7 @@ def read(paths: Sequence[Path]) -> list[Detections]:
 
 def _table(path: Path) -> Float64:
     """(n, 15) AB3DMOT columns of a file, ordered by frame."""
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise MisuseError(path, f"cannot be read ({error})", "give a text file of detections") from None
+    lines = read_lines(path, "give a text file of detections")
     rows = [_row(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if line.strip()]
     table = np.array([r for r in rows if r is not None]).reshape(-1, N_COLUMNS)
     return table[np.argsort(table[:, 0], kind="stable")]
@@ -126,8 +108,7 @@ def _table(path: Path) -> Float64:
 def _log_odds(probability: Float64) -> Float64:
     """(n,) log odds of probabilities, plus LOGIT_OFFSET."""
     p = np.clip(probability, MIN_PROBABILITY, 1 - MIN_PROBABILITY)
-    log_odds: Float64 = LOGIT_OFFSET + np.log(p / (1 - p))
-    return log_odds
+    return np.asarray(LOGIT_OFFSET + np.log(p / (1 - p)))
 
 
 def boxes_from_kitti(hwlxyzry: Float64) -> Float64:
@@ -151,9 +132,7 @@ def _row(line: str, location: str) -> list[float] | None:
     if numbers is None:
         return None
     if len(numbers) != N_COLUMNS or not np.isfinite(numbers).all() or numbers[0] < 0:
-        raise MisuseError(
-            location, f"{len(numbers)} columns of finite numbers expected, {N_COLUMNS} in all", "correct the line"
-        )
+        raise MisuseError(location, f"has not {N_COLUMNS} finite numbers", "correct the line")
     return numbers if numbers[1] in range(1, len(DETECTED) + 1) else None
 
 

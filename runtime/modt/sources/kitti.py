@@ -1,4 +1,7 @@
-"""KITTI's folder layouts: raw drives, tracking and odometry sequences, folders of scans."""
+"""KITTI's folder layouts: raw drives, tracking and odometry sequences, folders of scans.
+
+Every reader raises a MisuseError where there are no scans, or a file is invalid.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,7 @@ from modt.sources import kitti_calibration, oxts
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_stream import ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
+from modt.sources.text_file import read_numbers
 from modt.types import Float64
 
 PERIOD_S = 0.1
@@ -39,11 +43,7 @@ class Notes:
 
 
 def raw_drive(drive: Path) -> ScanStream:
-    """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder.
-
-    Raises:
-        MisuseError: there are no scans, or a file is invalid.
-    """
+    """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder."""
     notes = Notes()
     camera = _camera(kitti_calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
     poses = _poses_of_raw(drive, notes)
@@ -58,9 +58,6 @@ def tracking_sequence(scans: Path) -> ScanStream:
     """A sequence of the tracking layout, .../training/velodyne/0005, with calib/ and oxts/ next to velodyne/.
 
     Its sweeps are those of raw drives without their time stamps: each is taken to last the period.
-
-    Raises:
-        MisuseError: there are no scans, or a file is invalid.
     """
     root, number = scans.parent.parent, scans.name
     notes = Notes()
@@ -74,18 +71,15 @@ def tracking_sequence(scans: Path) -> ScanStream:
         notes.of_poses.append(f"{calib} is missing, and its Tr_imu_velo: {NO_POSES}")
     else:
         T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
-        poses = dict(enumerate(oxts.poses(oxts.read_sequence(records)) @ T_imu_sensor))
-    name = f"tracking {number}"
-    return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turn_s=PERIOD_S)
+        poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
+    name, turns = f"tracking {number}", dict.fromkeys(_scans(scans)[0], PERIOD_S)
+    return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turns=turns)
 
 
 def odometry_sequence(sequence: Path) -> ScanStream:
     """A sequence of the odometry layout, .../sequences/00, with optional calib.txt, times.txt and poses.
 
     Its sweeps are published deskewed.
-
-    Raises:
-        MisuseError: there are no scans, or a file is invalid.
     """
     notes = Notes()
     calib = sequence / "calib.txt"
@@ -100,28 +94,23 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     times = sequence / "times.txt"
     stamps: dict[int, float] = {}
     if times.is_file():
-        stamps = dict(enumerate(_numbers(times, columns=1)[:, 0].tolist()))
+        table = read_numbers(times, "restore it, or remove it")
+        if table.shape[1] != 1:
+            raise MisuseError(times, f"{table.shape[1]} columns, not 1", "restore it, or remove it")
+        stamps = dict(enumerate(table[:, 0].tolist()))
     else:
         notes.of_stream.append(f"{times} is missing: frames {PERIOD_S} s apart")
     return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
 
 
 def scan_folder(folder: Path) -> ScanStream:
-    """A folder of .bin scans, ordered by name.
-
-    Raises:
-        MisuseError: there are none.
-    """
+    """A folder of .bin scans, ordered by name."""
     notes = Notes([f"folder of scans: no calibration, frames {PERIOD_S} s apart"], [f"folder of scans: {NO_POSES}"])
     return _stream(folder.name, "folder of scans", folder, None, {}, {}, notes)
 
 
 def _scans(data: Path) -> tuple[list[int], list[Path]]:
-    """Indices and files of the scans of a folder, ordered by name.
-
-    Raises:
-        MisuseError: there are none.
-    """
+    """Indices and files of the scans of a folder, ordered by name."""
     files = sorted(data.glob("*.bin"))
     if not files:
         raise MisuseError(data, "no .bin scans", "give a folder of scans")
@@ -140,7 +129,6 @@ def _stream(
     *,
     sequence: int = 0,
     turns: Mapping[int, float] = MappingProxyType({}),
-    turn_s: float = 0.0,
 ) -> ScanStream:
     indices, files = _scans(data)
     gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
@@ -153,7 +141,7 @@ def _stream(
             notes.of_poses.append(f"{len(lost)} frames without a pose {cost} (the first is {lost[0]})")
         poses = _filled(poses, indices)
     scans = [
-        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, turn_s))
+        ScanReference(i, f, stamps.get(i, i * PERIOD_S), poses.get(i), turns.get(i, 0.0))
         for i, f in zip(indices, files, strict=True)
     ]
     if any(b.stamp_s < a.stamp_s for a, b in pairwise(scans)):
@@ -186,7 +174,7 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
         notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
     T_imu_sensor = kitti_calibration.T_imu_sensor_of_raw(drive.parent)
-    T_world_imu = oxts.poses(np.stack([oxts.read_record(r)[: len(oxts.FIELDS)] for r in records]))
+    T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1, : len(oxts.FIELDS)] for r in records]))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 
@@ -224,12 +212,7 @@ def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, f
 def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_of_few: str = "") -> dict[int, int]:
     """Times of a KITTI list, by frame [ns]: line i is that of scan i, blank where it is missing.
 
-    Args:
-        path: of the list.
-        frames: indices of the scans.
-        cost: consequence of a missing list.
-        notes: receives the defects of the list.
-        cost_of_few: consequence for single frames without a time, by default the same.
+    Defects are noted with their cost, that of single frames without a time by default the same.
     """
     if not path.is_file():
         notes.of_stream.append(f"{path} is missing: {cost}")
@@ -265,13 +248,3 @@ def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera
         notes.of_stream.append(f"{calib} is missing: no camera, no --fov camera")
         return None
     return read(calib)
-
-
-def _numbers(path: Path, columns: int) -> Float64:
-    try:
-        table = np.loadtxt(path, dtype=np.float64, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise MisuseError(path, f"is no table of numbers ({error})", "restore it, or remove it") from None
-    if table.shape[1] != columns:
-        raise MisuseError(path, f"{table.shape[1]} columns, not {columns}", "restore it, or remove it")
-    return table

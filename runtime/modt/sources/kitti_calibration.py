@@ -1,4 +1,7 @@
-"""KITTI calibration files: left colour camera and inertial unit, relative to the sensor."""
+"""KITTI calibration files: left colour camera and inertial unit, relative to the sensor.
+
+All readers raise a MisuseError where a file or a row is missing or invalid.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +11,18 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, se3
+from modt.sources.text_file import read_lines
 from modt.types import Float64
 
 IMAGE_PX = (1242.0, 375.0)
 """Size of the rectified image where the calibration has none."""
+REMEDY = "restore the calibration file"
 
 
 def read_table(path: Path) -> dict[str, Float64]:
-    """Numeric rows by key.
-
-    Raises:
-        MisuseError: the file is unreadable.
-    """
+    """Numeric rows by key."""
     table: dict[str, Float64] = {}
-    try:
-        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
-    except OSError as error:
-        raise MisuseError(path, f"cannot be read ({error.strerror})", "restore the calibration file") from None
-    for line in lines:
+    for line in read_lines(path, REMEDY):
         key, _, values = line.replace(":", " ", 1).partition(" ")
         try:
             table[key] = np.array(values.split(), dtype=np.float64)
@@ -35,18 +32,14 @@ def read_table(path: Path) -> dict[str, Float64]:
 
 
 def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys: str) -> Float64:
-    """Matrix of the first key found.
-
-    Raises:
-        MisuseError: there is none, or it has another size.
-    """
+    """Matrix of the first key found."""
     for key in keys:
         if key in table:
             if table[key].size != shape[0] * shape[1]:
                 cause = f"{key} holds {table[key].size} numbers, not {shape[0] * shape[1]}"
-                raise MisuseError(path, cause, "restore the calibration file")
+                raise MisuseError(path, cause, REMEDY)
             return table[key].reshape(shape)
-    raise MisuseError(path, f"no {' or '.join(keys)}", "restore the calibration file")
+    raise MisuseError(path, f"no {' or '.join(keys)}", REMEDY)
 
 
 def rigid(table: dict[str, Float64], path: Path) -> Float64:
@@ -68,11 +61,7 @@ def camera(P: Float64, R_rect: Float64, T_camera_sensor: Float64, size_px: tuple
 
 
 def camera_of_raw(path: Path) -> Camera:
-    """Left colour camera by calib_cam_to_cam.txt and the calib_velo_to_cam.txt in the same folder.
-
-    Raises:
-        MisuseError: a file or a row is missing.
-    """
+    """Left colour camera by calib_cam_to_cam.txt and the calib_velo_to_cam.txt in the same folder."""
     table = read_table(path)
     size = table.get("S_rect_02", np.array(IMAGE_PX))
     to_camera = path.with_name("calib_velo_to_cam.txt")
@@ -85,11 +74,7 @@ def camera_of_raw(path: Path) -> Camera:
 
 
 def camera_of_sequence(path: Path) -> Camera:
-    """Left colour camera by a calibration file of the tracking, object or odometry layout.
-
-    Raises:
-        MisuseError: the file or a row is missing.
-    """
+    """Left colour camera by a calibration file of the tracking, object or odometry layout."""
     table = read_table(path)
     R_rect = np.eye(3)  # Tr of the odometry layout includes the rectification
     if "R0_rect" in table or "R_rect" in table:
@@ -99,20 +84,12 @@ def camera_of_sequence(path: Path) -> Camera:
 
 
 def T_imu_sensor_of_raw(folder: Path) -> Float64:
-    """(4, 4) T_imu_sensor by calib_imu_to_velo.txt.
-
-    Raises:
-        MisuseError: the file or a row is missing.
-    """
+    """(4, 4) T_imu_sensor by calib_imu_to_velo.txt."""
     path = folder / "calib_imu_to_velo.txt"
     return inverse(rigid(read_table(path), path))
 
 
 def T_imu_sensor_of_sequence(path: Path) -> Float64:
-    """(4, 4) T_imu_sensor by a calibration file of the tracking or object layout.
-
-    Raises:
-        MisuseError: the file or the row is missing.
-    """
+    """(4, 4) T_imu_sensor by a calibration file of the tracking or object layout."""
     table = read_table(path)
     return inverse(homogeneous(matrix(table, path, (3, 4), "Tr_imu_to_velo", "Tr_imu_velo")))

@@ -10,6 +10,7 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, transform
+from modt.sources.text_file import read_lines
 from modt.types import NONE, Float64
 
 DONT_CARE = "DontCare"
@@ -24,7 +25,7 @@ class Label:
     id: int  # NONE in the object benchmark
     type_: str  # as labelled
     box: Float64  # (7,) x, y, z of the centre, l, w, h [m], yaw [rad], sensor frame
-    image_box: Float64 | None = None  # (4,) left, top, right, bottom [pixel]
+    image_box: Float64 | None = None  # (4,) left, top, right, bottom [pixel], None where it is not labelled
 
 
 def read_tracklets(path: Path) -> list[Label]:
@@ -57,13 +58,9 @@ def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
     Raises:
         MisuseError: it cannot be read, or a line is no label; it names the line.
     """
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise MisuseError(path, f"cannot be read ({error})", REMEDY) from None
     T_sensor_camera = inverse(camera.T_camera_sensor)
     labels = []
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(read_lines(path, REMEDY), 1):
         words = line.split()
         try:
             frame, id_ = (int(words.pop(0)), int(words.pop(0))) if tracking else (0, NONE)

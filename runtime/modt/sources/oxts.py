@@ -8,10 +8,12 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3
+from modt.sources.text_file import read_numbers
 from modt.types import Float64
 
 EARTH_RADIUS_M = 6378137.0
 FIELDS = ("lat", "lon", "alt", "roll", "pitch", "yaw")
+REMEDY = "restore it, or remove it to run without ego-motion"
 
 
 def poses(records: Float64) -> Float64:
@@ -29,37 +31,16 @@ def poses(records: Float64) -> Float64:
             for angles, position in zip(np.c_[roll, pitch, yaw], np.c_[x, y, alt], strict=True)
         ]
     )
-    relative: Float64 = inverse(T_mercator_imu[0]) @ T_mercator_imu
-    return relative
+    return np.asarray(inverse(T_mercator_imu[0]) @ T_mercator_imu)
 
 
-def read_record(path: Path) -> Float64:
-    """(30,) values of a record of a raw drive.
-
-    Raises:
-        MisuseError: missing or no record.
-    """
-    try:
-        numbers = np.array(path.read_text(encoding="ascii").split(), dtype=np.float64)
-    except (OSError, ValueError):
-        raise MisuseError(path, "is no OXTS record", "restore it, or run without oxts/") from None
-    record: Float64 = _checked(numbers[None], path)[0]
-    return record
-
-
-def read_sequence(path: Path) -> Float64:
-    """(n, 30) records of a tracking sequence, one per line.
+def read_records(path: Path) -> Float64:
+    """(n, k) records of a file, FIELDS first: one of a raw drive, one a line of a tracking sequence.
 
     Raises:
         MisuseError: missing or no records.
     """
-    try:
-        return _checked(np.loadtxt(path, dtype=np.float64, ndmin=2), path)
-    except (OSError, ValueError):
-        raise MisuseError(path, "holds no OXTS records", "restore or remove it, to run without ego-motion") from None
-
-
-def _checked(records: Float64, path: Path) -> Float64:
+    records = read_numbers(path, REMEDY)
     if records.shape[1] < len(FIELDS) or not np.isfinite(records[:, : len(FIELDS)]).all():
-        raise MisuseError(path, f"OXTS record without {', '.join(FIELDS)}", "restore it, or run without oxts/")
+        raise MisuseError(path, f"OXTS record without {', '.join(FIELDS)}", REMEDY)
     return records

@@ -13,11 +13,7 @@ from modt.types import Float64
 
 
 class PoseBuffer:
-    """The latest poses, ordered by stamp.
-
-    Args:
-        config: its capacity, the greatest age of a pose and the noise of a position.
-    """
+    """The latest poses, ordered by stamp."""
 
     def __init__(self, config: OdometryConfig) -> None:
         self.config = config

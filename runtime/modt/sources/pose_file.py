@@ -8,6 +8,7 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import inverse
+from modt.sources.text_file import read_lines
 from modt.types import Float64
 
 N_ELEMENTS = 12
@@ -23,12 +24,7 @@ def read_poses(path: Path) -> Float64:
     Raises:
         MisuseError: the file is unreadable or empty, or a line is no pose; the error names the line.
     """
-    try:
-        lines = path.read_text(encoding="ascii").splitlines()
-    except OSError as error:
-        raise MisuseError(path, f"cannot be read ({error.strerror})", "give a file of poses") from None
-    except UnicodeDecodeError:
-        raise MisuseError(path, "no text", "give twelve numbers a line") from None
+    lines = read_lines(path, "give a file of poses")
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
@@ -50,8 +46,7 @@ def pose_defect(T: Float64) -> str | None:
 
 def sensor_poses(T_start_camera: Float64, T_camera_sensor: Float64) -> Float64:
     """(n, 4, 4) T_world_sensor of camera poses (n, 4, 4); the world frame is that of the sensor at the start."""
-    poses: Float64 = inverse(T_camera_sensor) @ T_start_camera @ T_camera_sensor
-    return poses
+    return np.asarray(inverse(T_camera_sensor) @ T_start_camera @ T_camera_sensor)
 
 
 def _pose(line: str, location: str) -> Float64:

@@ -20,7 +20,7 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.sources.pose_buffer import PoseBuffer
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
-from modt.sources.stream import StreamInfo
+from modt.sources.pose_source import PoseSource
 from modt.types import Float64, Frame
 
 log = logging.getLogger(__name__)
@@ -28,18 +28,14 @@ log = logging.getLogger(__name__)
 FORM = "write recording, none, udp://HOST:PORT or unix:///PATH"
 
 
-class PoseSocket:
+class PoseSocket(PoseSource):
     """Reads the socket once a frame without blocking; refused poses are counted, and logged once of each kind.
 
     A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
     are removed and the restart is passed on in `Frame.restarts`.
-
-    Args:
-        bound: bound socket; it is made non-blocking.
-        config: limits of age and speed, capacity.
-        name: of the socket, in reports and messages.
     """
 
+    has_poses = True  # though frames may lack one
     REASONS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")
     """Reasons of a refusal; each has a counter."""
 
@@ -49,10 +45,6 @@ class PoseSocket:
         self._buffer = PoseBuffer(config)
         self.received = self.used = self.restarts = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
-
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """With poses, though frames may lack one."""
-        return replace(info, has_poses=True, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
         """The frame with T_world_sensor at its stamp, None where the poses received are too old."""
@@ -132,29 +124,18 @@ def open_socket(url: str) -> socket.socket:
         scheme, host, port, path = parts.scheme, parts.hostname, parts.port, parts.path
     except ValueError as error:
         raise MisuseError(url, str(error), FORM) from None
-    if scheme == "udp" and host and port and path in ("", "/"):
-        return _bound_udp(url, host, port)
-    if scheme == "unix" and not parts.netloc and len(path) > 1:
-        return _bound_unix(url, path)
+    try:
+        if scheme == "udp" and host and port and path in ("", "/"):
+            family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            return _bound(family, address)
+        if scheme == "unix" and not parts.netloc and len(path) > 1:
+            if _stale(path):
+                Path(path).unlink()
+            return _bound(socket.AF_UNIX, path)
+    except OSError as error:
+        remedy = "give a free port of this machine, or a free path in a writable folder"
+        raise MisuseError(url, f"cannot be bound ({error.strerror or error})", remedy) from None
     raise MisuseError(url, "is no address of a socket", FORM)
-
-
-def _bound_udp(url: str, host: str, port: int) -> socket.socket:
-    try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        return _bound(family, address)
-    except OSError as error:
-        raise MisuseError(url, f"cannot be bound ({error.strerror})", "give a free port of this machine") from None
-
-
-def _bound_unix(url: str, path: str) -> socket.socket:
-    try:
-        if _stale(path):
-            Path(path).unlink()
-        return _bound(socket.AF_UNIX, path)
-    except OSError as error:
-        cause = error.strerror or str(error)
-        raise MisuseError(url, f"cannot be bound ({cause})", "give a free path in a writable folder") from None
 
 
 def _bound(family: int, address: Any) -> socket.socket:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol, Self
+from typing import Any, Self
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
@@ -14,85 +14,61 @@ from modt.sources.stream import Faults, Stream, StreamInfo
 from modt.types import Frame
 
 
-class PoseSource(Protocol):
-    """Sets the poses of frames."""
+class PoseSource:
+    """Sets the poses of frames; the poses of the recording by default."""
+
+    name = "recording"
+    has_poses: bool | None = None
+    """Whether a stream with these poses has poses; None: as without them."""
 
     def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Properties of a stream with these poses: has_poses and pose_notes."""
-        ...
+        """Properties of a stream with these poses."""
+        return info if self.has_poses is None else replace(info, has_poses=self.has_poses, pose_notes=())
 
     def place(self, frame: Frame) -> Frame:
         """The frame with its pose, None where unknown; frames come in order."""
-        ...
-
-    def report(self) -> dict[str, Any]:
-        """Name of the source, and statistics."""
-        ...
-
-    def close(self) -> None:
-        """Release what the source holds."""
-        ...
-
-
-class _WithoutResources:
-    def close(self) -> None:
-        """Nothing is held."""
-
-
-class RecordedPoses(_WithoutResources):
-    """The poses of the recording."""
-
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Unchanged."""
-        return info
-
-    def place(self, frame: Frame) -> Frame:
-        """Unchanged."""
         return frame
 
     def report(self) -> dict[str, Any]:
-        """Name of the source."""
-        return {"source": "recording"}
+        """Name of the source, and statistics."""
+        return {"source": self.name}
+
+    def close(self) -> None:
+        """Release what the source holds."""
 
 
-class NoPoses(_WithoutResources):
+class RecordedPoses(PoseSource):
+    """The poses of the recording."""
+
+
+class NoPoses(PoseSource):
     """No poses: ego-motion is estimated from the proposals."""
 
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """Without poses."""
-        return replace(info, has_poses=False, pose_notes=())
+    name, has_poses = "none", False
 
     def place(self, frame: Frame) -> Frame:
         """Without a pose."""
         return replace(frame, T_world_sensor=None)
 
-    def report(self) -> dict[str, Any]:
-        """Name of the source."""
-        return {"source": "none"}
 
-
-class PoseFile(_WithoutResources):
+class PoseFile(PoseSource):
     """Poses of a file in KITTI's odometry format: line k, from 0, belongs to frame k.
 
-    Args:
-        path: of the file.
-        camera: of the stream: the poses are this camera's (KITTI's rectified left one); None: they are the sensor's.
-        end: index of the last frame plus one, None where unknown.
+    The poses are the camera's (KITTI's rectified left one), without one the sensor's; `end` is the index of the last
+    frame plus one, None where unknown.
 
     Raises:
         MisuseError: the file is missing, a line is no pose, or there are too few.
     """
 
+    has_poses = True
+
     def __init__(self, path: Path, camera: Camera | None, end: int | None) -> None:
-        self.path = path
+        self.name = str(path)
         poses = read_poses(path)
         self._poses = poses if camera is None else sensor_poses(poses, camera.T_camera_sensor)
-        if end is not None and end > len(poses):
-            raise self._too_few(end - 1)
-
-    def of_stream(self, info: StreamInfo) -> StreamInfo:
-        """With a pose for every frame."""
-        return replace(info, has_poses=True, pose_notes=())
+        if end is not None:
+            self._require(end - 1)
 
     def place(self, frame: Frame) -> Frame:
         """The frame with the pose of its index.
@@ -100,26 +76,17 @@ class PoseFile(_WithoutResources):
         Raises:
             MisuseError: there are too few.
         """
-        if frame.index >= len(self._poses):
-            raise self._too_few(frame.index)
+        self._require(frame.index)
         return replace(frame, T_world_sensor=self._poses[frame.index])
 
-    def report(self) -> dict[str, Any]:
-        """Path of the file."""
-        return {"source": str(self.path)}
-
-    def _too_few(self, frame: int) -> MisuseError:
-        cause = f"{len(self._poses)} poses, too few for frame {frame}"
-        return MisuseError(self.path, cause, "give a line for every frame from 0 on, or fewer --frames")
+    def _require(self, frame: int) -> None:
+        if frame >= len(self._poses):
+            cause = f"{len(self._poses)} poses, too few for frame {frame}"
+            raise MisuseError(self.name, cause, "give a line for every frame from 0 on, or fewer --frames")
 
 
 class PosedStream:
-    """A stream with the poses of a source.
-
-    Args:
-        stream: of the frames.
-        odometry: source of their poses.
-    """
+    """A stream with the poses of a source."""
 
     def __init__(self, stream: Stream, odometry: PoseSource) -> None:
         self._stream, self.odometry = stream, odometry

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from modt.errors import MisuseError
@@ -13,43 +12,7 @@ MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
 
 
-def _raw(path: Path) -> bool:
-    return (path / "velodyne_points").is_dir()
-
-
-def _raw_inside(path: Path) -> bool:
-    return path.name == "velodyne_points" or (path.parent.name == "velodyne_points" and path.name == "data")
-
-
-def _tracking(path: Path) -> bool:
-    return path.parent.name == "velodyne" and path.name.isdigit() and _has_scans(path)
-
-
-def _odometry(path: Path) -> bool:
-    return _has_scans(path / "velodyne")
-
-
-def _odometry_inside(path: Path) -> bool:
-    return path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
-
-
-def _has_scans(path: Path) -> bool:
-    return path.is_dir() and next(path.glob("*.bin"), None) is not None
-
-
-def _drive_of(path: Path) -> Path:
-    return path.parent if path.name == "velodyne_points" else path.parent.parent
-
-
-LAYOUTS: tuple[tuple[Callable[[Path], bool], Callable[[Path], ScanStream]], ...] = (
-    (_raw, kitti.raw_drive),
-    (_raw_inside, lambda path: kitti.raw_drive(_drive_of(path))),
-    (_tracking, kitti.tracking_sequence),
-    (_odometry, kitti.odometry_sequence),
-    (_odometry_inside, lambda path: kitti.odometry_sequence(path.parent)),
-    (_has_scans, kitti.scan_folder),
-)
-"""Test and reader of each layout, the most specific first."""
+REMEDY = "give a KITTI drive, a sequence or a folder of .bin scans"
 
 
 def open_stream(path: Path) -> ScanStream:
@@ -59,24 +22,52 @@ def open_stream(path: Path) -> ScanStream:
         MisuseError: the path does not exist or holds no stream; the error names streams below it.
     """
     if not path.exists():
-        raise MisuseError(
-            path, "no such file or directory", "give a KITTI drive, a sequence or a folder of .bin scans"
-        )
+        raise MisuseError(path, "no such file or directory", REMEDY)
     path = path.resolve()
-    for matches, read in LAYOUTS:
-        if path.is_dir() and matches(path):
-            return read(path)
+    stream = _stream(path)
+    if stream is not None:
+        return stream
     if (path / "oxts").is_dir():
-        raise MisuseError(
-            path / "velodyne_points", "missing from this raw drive", "unpack all synced data of the drive"
-        )
+        scans = path / "velodyne_points"
+        raise MisuseError(scans, "missing from this raw drive", "unpack all synced data of the drive")
     nearby = _nearby(path)
     if nearby:
         more = f" (and {len(nearby) - MAX_LISTED} more)" if len(nearby) > MAX_LISTED else ""
-        raise MisuseError(
-            path, "holds several streams", f"give one: {', '.join(map(str, nearby[:MAX_LISTED]))}{more}"
-        )
-    raise MisuseError(path, "no stream of scans", "give a KITTI drive, a sequence or a folder of .bin scans")
+        remedy = f"give one: {', '.join(map(str, nearby[:MAX_LISTED]))}{more}"
+        raise MisuseError(path, "holds several streams", remedy)
+    raise MisuseError(path, "no stream of scans", REMEDY)
+
+
+def _stream(path: Path) -> ScanStream | None:
+    """The stream in a folder or around it, by the most specific layout; None where there is none."""
+    data = path.parts[-2:] == ("velodyne_points", "data")
+    scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
+    layouts = (
+        (_is_raw(path), kitti.raw_drive, path),
+        (path.name == "velodyne_points", kitti.raw_drive, path.parent),
+        (data, kitti.raw_drive, path.parent.parent),
+        (_is_tracking(path), kitti.tracking_sequence, path),
+        (_is_odometry(path), kitti.odometry_sequence, path),
+        (scans, kitti.odometry_sequence, path.parent),
+        (_has_scans(path), kitti.scan_folder, path),
+    )
+    return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
+
+
+def _is_raw(path: Path) -> bool:
+    return (path / "velodyne_points").is_dir()
+
+
+def _is_tracking(path: Path) -> bool:
+    return path.parent.name == "velodyne" and path.name.isdigit() and _has_scans(path)
+
+
+def _is_odometry(path: Path) -> bool:
+    return _has_scans(path / "velodyne")
+
+
+def _has_scans(path: Path) -> bool:
+    return path.is_dir() and next(path.glob("*.bin"), None) is not None
 
 
 def _nearby(path: Path) -> list[Path]:
@@ -84,4 +75,6 @@ def _nearby(path: Path) -> list[Path]:
     if not path.is_dir():
         return []
     below = [p for depth in ("*", "*/*", "*/*/*") for p in sorted(path.glob(depth)) if p.is_dir()]
-    return [p for p in below if _raw(p) or _tracking(p) or (_odometry(p) and not p.name.startswith("velodyne"))]
+    return [
+        p for p in below if _is_raw(p) or _is_tracking(p) or (_is_odometry(p) and not p.name.startswith("velodyne"))
+    ]

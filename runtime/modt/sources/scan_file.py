@@ -33,9 +33,7 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
         raise ScanError(path, "empty scan", "the frame is skipped; record it again")
     if len(raw) % ROW_BYTES:
         cause = f"truncated: {len(raw)} bytes are no multiple of {ROW_BYTES}-byte rows"
-        raise ScanError(
-            path, cause, "the frame is skipped; copy the file again, or convert it to x, y, z, reflectance"
-        )
+        raise ScanError(path, cause, "the frame is skipped; copy it again, or convert it to x, y, z, reflectance")
     points = np.frombuffer(raw, np.float32).reshape(-1, 4).copy()
     return sanitised(points, path)
 

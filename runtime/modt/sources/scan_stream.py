@@ -18,30 +18,17 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class ScanReference:
-    """A scan on disk.
+    """A scan on disk."""
 
-    Attributes:
-        index: frame number.
-        path: the file.
-        stamp_s: its time [s].
-        T_world_sensor: (4, 4) pose, None where unknown.
-        turn_s: duration of the sweep [s], as in Frame.
-    """
-
-    index: int
-    path: Path
-    stamp_s: float
-    T_world_sensor: Float64 | None
-    turn_s: float = 0.0
+    index: int  # frame number
+    path: Path  # the file
+    stamp_s: float  # its time [s]
+    T_world_sensor: Float64 | None  # (4, 4) pose, None where unknown
+    turn_s: float = 0.0  # duration of the sweep [s], as in Frame
 
 
 class ScanStream:
-    """Frames of scan files; unusable scans are counted and skipped, the first ones are logged.
-
-    Args:
-        info: of the stream.
-        scans: the files, ordered by time.
-    """
+    """Frames of scan files, ordered by time; unusable scans are counted and skipped, the first ones are logged."""
 
     def __init__(self, info: StreamInfo, scans: list[ScanReference]) -> None:
         self.info = replace(info, n_frames=len(scans), end=scans[-1].index + 1 if scans else 0)

@@ -5,17 +5,17 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Self
 
 import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.simulation.placement import placed, read_placements
-from modt.simulation.scenes import SCENES
+from modt.simulation.crossing import crossing
 from modt.simulation.sensors import sensor as sensor_model
 from modt.simulation.simulator import Simulator, Truth
+from modt.simulation.street import street
+from modt.simulation.yard import hall, yard
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Frame
 
@@ -24,22 +24,18 @@ K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0
 CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
 """Intrinsics and mount of KITTI's left colour camera: level, 0.27 m ahead of the sensor, 0.08 m below it."""
 
+SCENES = {scene.__name__: scene for scene in (street, crossing, yard, hall)}
+"""Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""
+
 
 class SyntheticStream:
     """A drive through a synthetic scene; the same arguments give the same bytes.
 
-    Args:
-        scene: name of the scene, or a KITTI label file (.txt) whose objects are placed where it states.
-        sensor: name of the sensor model.
-        seconds: duration [s].
-        seed: of the scene, its traffic and the noise.
-        distort: leave the motion during a sweep in the scans.
+    `seed` is that of the scene, its traffic and the noise; `distort` leaves the motion during a sweep in the scans.
 
     Raises:
         MisuseError: an unknown scene or sensor, or an invalid duration or seed.
     """
-
-    camera = CAMERA
 
     def __init__(
         self,
@@ -50,18 +46,14 @@ class SyntheticStream:
         *,
         distort: bool = False,
     ) -> None:
-        if scene not in SCENES and not scene.endswith(".txt"):
-            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}, or a KITTI label file")
+        if scene not in SCENES:
+            raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
         if not 0 < seconds <= 3600:
             raise MisuseError(f"{seconds:g} s", "no duration of a scene", "give more than 0 and at most 3600 seconds")
         if seed < 0:
             raise MisuseError(seed, "no seed", "give an integer of at least 0")
         model = sensor_model(sensor)
-        rng = np.random.default_rng([seed, 0])
-        if scene in SCENES:
-            world = SCENES[scene](rng, seconds, model.height_m)
-        else:
-            world = placed(read_placements(Path(scene)), rng, seconds, model.height_m)
+        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
         self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults = Faults()
@@ -71,7 +63,7 @@ class SyntheticStream:
             sequence=0,
             n_frames=len(self._indices),
             period_s=model.period_s,
-            camera=self.camera,
+            camera=CAMERA,
             has_poses=True,
             end=self._indices.stop,
         )

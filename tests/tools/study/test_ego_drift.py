@@ -8,7 +8,7 @@ import pytest
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.kitti_raw import DriveWriter
 from modt.sources.recognise import open_stream
-from modt.sources.synthetic_stream import SyntheticStream
+from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 from tools.study import ego_drift
 
 
@@ -32,7 +32,7 @@ def test_drift_in_path_end_and_heading():
 @pytest.mark.slow
 def test_the_drift_of_a_written_drive_is_small_against_positions_and_velocities(tmp_path, monkeypatch, capsys):
     stream = SyntheticStream("street", "vlp-16", 2.0, seed=2)
-    writer = DriveWriter(tmp_path, stream.camera)
+    writer = DriveWriter(tmp_path, CAMERA)
     for frame, truth in stream.sweeps():
         writer.write(frame, truth)
     writer.close()

@@ -11,11 +11,17 @@ from modt.errors import MisuseError
 from modt.simulation import kinds, road, roadside
 from modt.simulation.builder import SceneBuilder
 from modt.simulation.motion import Path as Trajectory
+from modt.simulation.sensors import sensor
+from modt.simulation.simulator import Simulator
 from modt.simulation.street import furnish, residential
 from modt.simulation.world import World
 
 CAMERA_AHEAD_M = 0.27
 N_FIELDS = 15
+KINDS = {
+    kind.name: kind for kind in (kinds.CAR, kinds.VAN, kinds.TRUCK, kinds.PEDESTRIAN, kinds.SITTER, kinds.CYCLIST)
+} | {"Tram": kinds.TRUCK}
+"""Kind that a KITTI object type is simulated by."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +57,24 @@ def read_placements(path: Path) -> list[Placement]:
     if any(len(v) != N_FIELDS - 1 for v in values):
         raise MisuseError(path, f"a line without its {N_FIELDS} columns", remedy)
     return [
-        Placement(kinds.KINDS[row[0]], (v[9], v[8], v[7]), v[12] + CAMERA_AHEAD_M, -v[10], float(-v[13] - np.pi / 2))
+        Placement(KINDS[row[0]], (v[9], v[8], v[7]), v[12] + CAMERA_AHEAD_M, -v[10], float(-v[13] - np.pi / 2))
         for row, v in zip(rows, values, strict=True)
-        if row[0] in kinds.KINDS
+        if row[0] in KINDS
     ]
 
 
-def placed(placements: list[Placement], rng: np.random.Generator, seconds: float, height_m: float) -> World:
+def label_scene(path: Path, seed: int) -> Simulator:
+    """Simulator of a scan of an HDL-64E in the world of a label file.
+
+    Raises:
+        MisuseError: the file is unreadable or no label file.
+    """
+    model = sensor("hdl-64e")
+    world = _placed(read_placements(path), np.random.default_rng([seed, 0]), model.period_s, model.height_m)
+    return Simulator(world, model, seed)
+
+
+def _placed(placements: list[Placement], rng: np.random.Generator, seconds: float, height_m: float) -> World:
     """A residential street with these objects alone, all at rest, before a sensor at rest."""
     street = residential(rng, 60.0)
     builder = SceneBuilder(rng, seconds)
