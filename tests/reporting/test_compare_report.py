@@ -8,7 +8,7 @@ import pytest
 from modt.config import EnergyConfig, WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Facts, Kind, Measurand, Scope
+from modt.energy.meters.meter import Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
 from modt.reporting.compare_page import compare_page
 from modt.reporting.compare_report import Basis, compare_tree
@@ -35,7 +35,6 @@ class Board:
         self.energy_J = 0.0
         self.facts = Facts(
             name="board",
-            measurand=Measurand.ENERGY,
             unit="J",
             resolution=1e-6,
             max_W=100.0,

@@ -8,13 +8,13 @@ from modt.config import EnergyConfig, WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.meters.discovery import Discovery, discover
 from modt.energy.meters.meter import Facts, Kind
-from modt.energy.meters.model import ModelMeter
+from modt.energy.meters.model import model_meter
 from modt.energy.windows import Clocks, Windows
 
 
 def meters(config: EnergyConfig) -> Discovery:
     """All meters, the model of the board among them."""
-    return discover(ModelMeter(config.idle_W, config.busy_W, time.monotonic_ns, time.process_time_ns))
+    return discover(model_meter(config.idle_W, config.busy_W, time.monotonic_ns, time.process_time_ns))
 
 
 def windows(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Protocol
 
 
 class Kind(StrEnum):
@@ -52,18 +52,16 @@ class Facts:
 
     Attributes:
         name: for display.
-        measurand: energy or power.
         unit: of the device's own readings.
         resolution: smallest step of a reading [J or W].
-        max_W: upper bound of plausible power [W].
+        max_W: upper bound of plausible power.
         scope: consumers covered.
         kind: reliability of the energy derived from it.
-        wrap_J: range of an energy counter [J]; None where it never wraps, or the range is unknown.
+        wrap_J: range of an energy counter; None where it never wraps, or the range is unknown.
         privilege: needed to read it.
     """
 
     name: str
-    measurand: Measurand
     unit: str
     resolution: float
     max_W: float
@@ -72,41 +70,27 @@ class Facts:
     wrap_J: float | None = None
     privilege: str = "none"
 
-
-class Meter(Protocol):
-    """One sensor or counter."""
-
     @property
-    def facts(self) -> Facts:
-        """Static properties."""
-        ...
-
-    def read(self) -> float:
-        """Present value [J or W, by its measurand].
-
-        Raises:
-            MeterLostError: it cannot be read now.
-        """
-        ...
+    def measurand(self) -> Measurand:
+        """Power where it is integrated, else energy."""
+        return Measurand.POWER if self.kind is Kind.INTEGRATED else Measurand.ENERGY
 
 
 @dataclass(frozen=True, slots=True)
-class FileMeter:
-    """A value of sysfs: the product of the integers in some files.
+class Meter:
+    """One sensor or counter.
 
     Attributes:
-        facts: static properties.
-        paths: of one file, or of a voltage and a current.
-        scale: of the product, to [J or W].
+        read: present value [J or W, by the measurand]; raises MeterLostError.
     """
 
     facts: Facts
-    paths: tuple[Path, ...]
-    scale: float = 1e-6
+    read: Callable[[], float]
 
-    def read(self) -> float:
-        """Present value [J or W]."""
-        return self.scale * math.prod(read_number(path) for path in self.paths)
+
+def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:
+    """Meter whose value is the scaled product of the integers in its files: one, or a voltage and a current."""
+    return Meter(facts, lambda: scale * math.prod(read_number(path) for path in paths))
 
 
 def read_text(path: Path) -> str:
