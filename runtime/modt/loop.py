@@ -9,24 +9,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from modt.pipeline import SINK, SOURCE, Pipeline
 from modt.sinks.sink import LineSink, Sink
 from modt.sources.stream import Stream
 from modt.types import Budget, FrameResult
-
-
-class Pace(Protocol):
-    """Timing of the frames."""
-
-    def wait(self) -> None:
-        """Return when the next frame may be taken from its source."""
-        ...
-
-    def report(self) -> dict[str, Any]:
-        """Rate requested and kept."""
-        ...
 
 
 class FullSpeed:
@@ -81,6 +69,9 @@ class FixedPeriod:
             "missed_deadlines": self.missed,
             "max_lateness_ms": 1e3 * self.max_lateness_s,
         }
+
+
+Pace = FullSpeed | FixedPeriod
 
 
 class Stop:

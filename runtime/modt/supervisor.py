@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import socket
 from collections.abc import Mapping
-from typing import Protocol
 
 from modt.errors import MisuseError
 
@@ -14,20 +13,8 @@ log = logging.getLogger(__name__)
 _VARIABLE = "NOTIFY_SOCKET"
 
 
-class Supervisor(Protocol):
-    """Receiver of the state of the loop."""
-
-    def frame_done(self) -> None:
-        """Report that a frame was processed and written."""
-        ...
-
-    def close(self) -> None:
-        """Report the end of the loop."""
-        ...
-
-
 class NoSupervisor:
-    """No receiver."""
+    """No receiver of the state of the loop."""
 
     def frame_done(self) -> None:
         """No effect."""
@@ -72,6 +59,9 @@ class Systemd:
                 log.warning("%s: systemd cannot be notified (%s); tried again with every frame", _VARIABLE, cause)
             return False
         return True
+
+
+Supervisor = NoSupervisor | Systemd
 
 
 def supervisor_of(environment: Mapping[str, str]) -> Supervisor:

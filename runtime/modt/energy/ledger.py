@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 SCHEMA = "modt.ledger/1"
 STAGES = ("source", "segmentation", "odometry", "tracking", "scheduling", "classification", "fusion", "sink")
@@ -19,22 +19,6 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _CALLS, _ITEMS, _POINTS, _WALL, _CPU = range(5)
-
-
-class StageLedger(Protocol):
-    """The interface that the pipeline uses."""
-
-    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Result of function(*args), timed as a span of the stage."""
-        ...
-
-    def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
-        """Add work to the stage beyond the length of its result."""
-        ...
-
-    def close_frame(self, index: int) -> Line:
-        """Line of the frame; the next frame begins."""
-        ...
 
 
 class Ledger:
@@ -144,6 +128,9 @@ class NullLedger:
     def close_frame(self, index: int) -> Line:
         """Line without stages."""
         return {"schema": SCHEMA, "frame": index, "stages": {}}
+
+
+StageLedger = Ledger | NullLedger
 
 
 def _nothing() -> None:
