@@ -94,7 +94,7 @@ def test_quantity_without_a_value_is_unavailable() -> None:
     assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
     assert quantity(float("nan")).value is None
     assert quantity(float("inf")).text() == "unavailable"
-    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00 J (0.500 to 1.50)"
+    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00e J (0.500 to 1.50)"
 
 
 def test_trees_of_quantities_become_plain_data() -> None:

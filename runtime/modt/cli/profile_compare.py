@@ -35,10 +35,9 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.cli import assemble, metering
     from modt.cli.mode_runs import MODES, VARIED, Comparison
     from modt.energy.conditions import Conditions
-    from modt.reporting.compare_page import compare_page
     from modt.reporting.compare_report import Basis, compare_tree
-    from modt.reporting.compare_text import compare_text
-    from modt.reporting.page import save
+    from modt.reporting.compare_view import compare_document, compare_plots
+    from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
 
     loaded = profile.load(arguments.profile)
@@ -71,7 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
         "host": host.description(),
     }
     tree = compare_tree(repetitions, MODES, VARIED, basis, about)
+    document = compare_document(tree)
     if arguments.html is not None:
-        save(arguments.html, compare_page(tree))
-    print(json.dumps(to_json(tree), indent=2) if arguments.json else compare_text(tree))
+        save(arguments.html, document_page(document, compare_plots(tree)))
+    print(json.dumps(to_json(tree), indent=2) if arguments.json else document.text())
     return 0

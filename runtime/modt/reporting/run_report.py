@@ -191,7 +191,7 @@ def _times(lines: list[dict[str, Any]]) -> dict[str, Any]:
         stage: {
             "cpu_ms": quantity(1e-6 * row["cpu_ns"] / len(lines), "ms"),
             "wall_ms": quantity(1e-6 * row["wall_ns"] / len(lines), "ms"),
-            **{key: quantity(float(row[key])) for key in ("calls", "items", "points")},
+            **{key: quantity(row[key]) for key in ("calls", "items", "points")},
         }
         for stage, row in sums.items()
     }
