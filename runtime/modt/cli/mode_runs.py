@@ -12,8 +12,7 @@ from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
-from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
-from modt.reporting.repetitions import Repetition
+from modt.reporting.comparison import ModeRun, RecordingClassifier, Repetition, interleave
 from modt.types import Budget, Frame
 
 BASELINE = "conventional"

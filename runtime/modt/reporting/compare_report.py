@@ -13,7 +13,7 @@ from modt.energy.attribution import usable_windows
 from modt.energy.meters.meter import Facts, Kind
 from modt.energy.savings import OtherCosts, UnitCosts, predict
 from modt.pipeline import STAGES
-from modt.reporting.comparison import COUNTS, total
+from modt.reporting.comparison import COUNTS, Repetition, total
 from modt.reporting.gamma import (
     RunCosts,
     Saving,
@@ -25,7 +25,6 @@ from modt.reporting.gamma import (
     unit_costs,
 )
 from modt.reporting.quantity import Quantity, estimate, quantity
-from modt.reporting.repetitions import Repetition, concatenated_run, median_run, windows_of
 from modt.types import Float64
 
 SCHEMA = "modt.compare/1"
@@ -55,10 +54,12 @@ def compare_tree(
         about: stream, frames, conditions; copied to the tree.
     """
     random = np.random.default_rng(0)
-    runs = {mode: median_run(repetitions, mode) for mode in modes}
-    varied_run = concatenated_run(repetitions, varied)
+    passes = {name: [repetition[name] for repetition in repetitions] for name in (*modes, varied)}
+    runs = {mode: RunCosts.median(passes[mode]) for mode in modes}
+    windows = {mode: [line for run in passes[mode] for line in run.energy_lines] for mode in modes}
+    varied_run = RunCosts.concatenated(passes[varied])
     baseline = runs[modes[0]]
-    energy = {mode: _energy(run, windows_of(repetitions, mode), basis, random) for mode, run in runs.items()}
+    energy = {mode: _energy(run, windows[mode], basis, random) for mode, run in runs.items()}
     savings = {
         mode: _saving(saving(baseline, runs[mode], varied_run, random), energy[modes[0]], energy[mode])
         | {"gamma_calibrated": estimate(_calibrated(baseline, runs[mode], basis))}

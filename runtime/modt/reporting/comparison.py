@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import islice
 from typing import Any
 
@@ -17,8 +17,8 @@ from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
 from modt.types import NONE, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
 
-COUNTS = ("proposals", "foreground", "tracks", "classified_tracks", "classified", "reacquired", "points", "calls")
-"""Columns of a run's counts, as in energy.savings.Counts."""
+COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
+"""Columns of a run's counts."""
 
 
 class RecordingClassifier:
@@ -127,6 +127,10 @@ class ModeRun:
         self.lives += [life for id_, life in self._life.items() if id_ not in alive]
         self._life = {id_: self._life.get(id_, 0) + (id_ in seen) for id_ in alive}
         self._classified, self._seen = (self._classified | classified) & alive, seen
+
+
+Repetition = dict[str, ModeRun]
+"""One pass of every mode through the stream, by the name of the mode."""
 
 
 def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from modt.energy.savings import OtherCosts, Prediction, UnitCosts, predict
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
-from modt.reporting.comparison import COUNTS, total
+from modt.reporting.comparison import COUNTS, ModeRun, total
 from modt.reporting.quantity import estimate
 from modt.types import Float64, Int
 
@@ -31,11 +31,22 @@ class RunCosts:
 
     Attributes:
         counts: (F, 8) columns as COUNTS.
-        cost: (F, S) of the pipeline's S stages, in joules or CPU seconds; the median over repetitions.
+        cost: (F, S) of the pipeline's S stages, in joules or CPU seconds.
     """
 
     counts: Int
     cost: Float64
+
+    @classmethod
+    def median(cls, runs: Sequence[ModeRun]) -> Self:
+        """Repetitions of the same work: its counts, and the median of the costs."""
+        cost: Float64 = np.median([run.cpu_s() for run in runs], axis=0)
+        return cls(runs[0].counts(), cost)
+
+    @classmethod
+    def concatenated(cls, runs: Sequence[ModeRun]) -> Self:
+        """Repetitions of work that differs, one after another."""
+        return cls(np.concatenate([run.counts() for run in runs]), np.concatenate([run.cpu_s() for run in runs]))
 
     def take(self, frames: Int) -> RunCosts:
         """The given frames."""
@@ -99,10 +110,9 @@ def saving(baseline: RunCosts, run: RunCosts, varied: RunCosts, random: np.rando
 
     prediction, measured = both(np.arange(n))
     resampled = [both(_blocks(n, random)) for _ in range(_RESAMPLES)]
-    predicted_all = np.array([p.model.gamma for p, _ in resampled])
-    measured_all = np.array([m for _, m in resampled])
-    deviations = predicted_all / measured_all - 1.0
-    return Saving(prediction, measured, *map(_interval, (predicted_all, measured_all, deviations)))
+    gammas = np.array([(found.model.gamma, ratio) for found, ratio in resampled])
+    deviations = gammas[:, 0] / gammas[:, 1] - 1.0
+    return Saving(prediction, measured, *map(_interval, (*gammas.T, deviations)))
 
 
 def prediction_tree(found: Prediction, gamma: float) -> dict[str, Any]:
