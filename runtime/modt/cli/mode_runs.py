@@ -12,6 +12,7 @@ from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
+from modt.energy.meters.meter import Meter
 from modt.reporting.comparison import ModeRun, RecordingClassifier, Repetition, interleave
 from modt.types import Budget, Frame
 
@@ -27,32 +28,22 @@ class Comparison:
     """Parameters of a comparison.
 
     Attributes:
-        request: stream, field of view, frames.
-        profile: of sensor and board.
         core: the process is pinned to.
-        meter: name of the meter to read, None for the best.
-        turn: consecutive frames of one mode; None: 1, or all frames where a meter is read.
+        meters: to read; none where energy follows from CPU time.
+        turn: consecutive frames of one mode; None: 1, or all frames where a meter is read. A meter needs a second or
+            more of one mode; CPU time is compared frame by frame, which spreads other load of the machine evenly.
     """
 
     request: assemble.Request
     profile: ProfileConfig
     core: int | None
-    meter: str | None = None
+    meters: tuple[Meter, ...] = ()
     turn: int | None = None
 
     @property
-    def metered(self) -> bool:
-        """Whether a meter is read, rather than the model."""
-        return not metering.is_estimated(self.profile.energy, self.meter)
-
-    @property
     def turn_frames(self) -> int:
-        """Consecutive frames of one mode.
-
-        A meter needs a second or more of one mode; CPU time is compared frame by frame, which spreads other load of
-        the machine evenly.
-        """
-        return self.turn or (10**9 if self.metered else 1)
+        """Consecutive frames of one mode."""
+        return self.turn or (10**9 if self.meters else 1)
 
     def repetition(self, seed: int) -> Repetition:
         """Every mode once through the stream, from its initial state."""
@@ -71,13 +62,13 @@ class Comparison:
         fov = assemble.field_of_view(self.request, assemble.stream(self.request))
         pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
         recorder = RecordingClassifier(pipeline.classifier)
-        budget = mode.budget(self.profile)
+        budget, window = mode.budget(self.profile), self.profile.energy.windows
         return ModeRun(
             pipeline=replace(pipeline, classifier=recorder),
             ledger=ledger,
             recorder=recorder,
             budget=varied_load(seed) if name == VARIED else lambda _frame: budget,
-            windows=metering.windows(self.profile.energy, self.core, self.meter) if self.metered else None,
+            windows=metering.windows(self.meters, self.core, window) if self.meters else None,
         )
 
 

@@ -35,18 +35,18 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.cli import assemble, metering
     from modt.cli.mode_runs import MODES, VARIED, Comparison
     from modt.energy.conditions import Conditions
+    from modt.energy.meters.meter import Kind
     from modt.reporting.compare_report import Basis, compare_tree
     from modt.reporting.compare_view import compare_document, compare_plots
     from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
 
     loaded = profile.load(arguments.profile)
-    request = assemble.Request(
-        path=arguments.path, profile=arguments.profile, fov=arguments.fov, frames=arguments.frames
-    )
-    comparison = Comparison(request, loaded, pinned, arguments.meter, arguments.turn)
-    info, board = assemble.stream(request).info, loaded.energy
-    meter = metering.facts(board, arguments.meter)
+    request, board = assemble.Request.of(arguments), loaded.energy
+    meters = metering.discovery(board).choose(arguments.meter).meters
+    metered = meters[0].facts.kind is not Kind.ESTIMATED
+    comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
+    info = assemble.stream(request).info
     repetitions = []
     for number in range(arguments.repeat):
         if sys.stderr.isatty():
@@ -57,14 +57,14 @@ def run(arguments: argparse.Namespace) -> int:
     frames = len(repetitions[0][VARIED].lines)
     if not frames:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
-    basis = Basis(board, meter, info.period_s)
+    basis = Basis(board, meters[0].facts, info.period_s)
     about: dict[str, Any] = {
         "stream": info.name,
         "frames": frames,
         "fov": request.fov,
         "repeat": arguments.repeat,
         "turn": min(comparison.turn_frames, frames),
-        "basis": "as run" if comparison.metered else f"at {1 / info.period_s:.0f} Hz",
+        "basis": "as run" if metered else f"at {1 / info.period_s:.0f} Hz",
         "board": board.board,
         "conditions": {**Conditions(pinned or 0).read(), "core": pinned},
         "host": host.description(),

@@ -25,7 +25,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """List the meters."""
-    found = metering.meters(profile.load(arguments.profile).energy)
+    found = metering.discovery(profile.load(arguments.profile).energy)
     print(json.dumps(_tree(found), indent=2) if arguments.json else text(found))
     return 0
 

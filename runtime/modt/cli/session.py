@@ -22,9 +22,6 @@ from modt.sources.pose_source import PosedStream
 from modt.supervisor import Supervisor
 from modt.types import FrameResult, Proposals
 
-_MAX_HELPER_SHARE = 0.01
-"""CPU time of other threads over that of the loop, up to which the process counts as single-threaded."""
-
 
 class Session:
     """A replay and its run directory.
@@ -67,7 +64,8 @@ class Session:
         summary = Summary()
         ledger_lines = self.directory.ledger()
         sinks = self._sinks()
-        windows = metering.windows(self.profile.energy, self.core)
+        energy = self.profile.energy
+        windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_result(result)
@@ -131,9 +129,7 @@ class Session:
 
     def _environment(self, frames: int, elapsed_s: float) -> dict[str, Any]:
         """Timing, pose source, host and faults of the run."""
-        threads, faults = host.thread_report(), self.stream.faults
-        single_threaded = threads.others_cpu_s <= _MAX_HELPER_SHARE * threads.main_cpu_s
-        one_core = self.core is not None and threads.cores == (self.core,) and single_threaded
+        faults = self.stream.faults
         return {
             "run": {
                 "stream": self.stream.info.name,
@@ -146,13 +142,7 @@ class Session:
                 **self.pace.report(),
             },
             "odometry": self.odometry.report(),
-            "host": {
-                "core": self.core,
-                "one_core_verified": one_core,
-                "threads": threads.threads,
-                "other_threads_cpu_s": threads.others_cpu_s,
-                "peak_rss_mb": host.peak_rss_mb(),
-            },
+            "host": host.usage(self.core),
             "faults": {
                 "count": faults.count,
                 "skipped": faults.skipped,
