@@ -104,8 +104,7 @@ class ModeRun:
 
     def cpu_s(self) -> Float64:
         """(frames, stages) CPU time of each stage of the pipeline [s]."""
-        rows = [[line["stages"].get(s, {}).get("cpu_ns", 0) for s in STAGES] for line in self.lines]
-        return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
+        return cpu_seconds(self.lines)
 
     def _count(self, result: FrameResult, line: dict[str, Any]) -> None:
         tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
@@ -154,6 +153,12 @@ def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> N
         first = (first + 1) % len(runs)
     for run in runs:
         run.finish()
+
+
+def cpu_seconds(lines: Sequence[dict[str, Any]]) -> Float64:
+    """(frames, stages) CPU time of each stage of the pipeline by ledger lines [s]."""
+    rows = [[line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES] for line in lines]
+    return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
 
 def total(counts: Int) -> Counts:
