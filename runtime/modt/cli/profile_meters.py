@@ -8,9 +8,8 @@ from typing import Any
 
 from modt import profile
 from modt.cli import metering
-from modt.energy.meters.candidate import Candidate
 from modt.energy.meters.discovery import Discovery
-from modt.energy.meters.meter import Kind, Measurand, MeterLostError
+from modt.energy.meters.meter import Candidate, Kind, Measurand, MeterLostError
 
 SCHEMA = "modt.meters/1"
 

@@ -81,9 +81,7 @@ def run_tree(run: Path) -> dict[str, Any]:
     if not frames:
         raise MisuseError(run, "no whole frame is recorded", "wait for the first, or give another run")
     lines = lines[:frames]
-    series = dict(
-        zip(("proposals", "classified", "deferred"), np.array(counted.rows[:frames]).T.tolist(), strict=False)
-    )
+    proposals, classified, deferred, _ = np.array(counted.rows[:frames]).T.tolist()
     cpu_s = cpu_seconds(lines)
     saved, predicted_s = _saved(mode, counted, lines, cpu_s, board)
     energy = _energy(windows, lines, board)
@@ -115,7 +113,9 @@ def run_tree(run: Path) -> dict[str, Any]:
             "net_W": board["busy_W"] - board["idle_W"],
             "cpu_ms": {s: (1e3 * cpu_s[:, k]).round(4).tolist() for k, s in enumerate(STAGES)},
             "predicted_cpu_ms": (1e3 * predicted_s).round(4).tolist(),
-            **series,
+            "classified": classified,
+            "deferred": deferred,
+            "proposals": proposals,
             "budget": None if mode == _CONVENTIONAL else facts["profile"]["scheduler"]["calls_per_frame"],
             "lives": sorted(counted.lives.values()),
         },

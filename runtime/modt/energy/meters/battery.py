@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modt.energy.meters.candidate import Candidate, probe
-from modt.energy.meters.meter import Facts, Kind, Meter, MeterLostError, Scope, file_meter, read_text, text_or_none
+from modt.energy.meters.meter import (
+    Candidate,
+    Facts,
+    Kind,
+    Meter,
+    MeterLostError,
+    Scope,
+    file_meter,
+    probe,
+    read_text,
+    text_or_none,
+)
 
 
 def find_batteries(sys: Path) -> list[Candidate]:

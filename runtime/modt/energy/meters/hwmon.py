@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modt.energy.meters.candidate import Candidate, probe
-from modt.energy.meters.meter import Facts, Kind, Meter, Scope, file_meter, text_or_none
+from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, Scope, file_meter, probe, text_or_none
 
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
 _INPUT_RAILS = ("VDD_IN", "POM_5V_IN", "VIN_SYS_5V0", "VIN", "5V_IN")

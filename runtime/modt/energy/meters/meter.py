@@ -1,4 +1,4 @@
-"""The interface of a meter, and readings of files of sysfs."""
+"""Meters: their facts, their readings, and the candidates of discovery."""
 
 from __future__ import annotations
 
@@ -12,23 +12,17 @@ from pathlib import Path
 class Kind(StrEnum):
     """Reliability of a figure; every figure shown carries one."""
 
-    MEASURED = "measured"
-    """Counted by hardware or by this program."""
-    INTEGRATED = "integrated"
-    """Power samples integrated over time."""
-    ESTIMATED = "estimated"
-    """Computed from assumptions."""
+    MEASURED = "measured"  # counted by hardware or by this program
+    INTEGRATED = "integrated"  # power samples integrated over time
+    ESTIMATED = "estimated"  # computed from assumptions
     UNAVAILABLE = "unavailable"
-    """Not known."""
 
 
 class Measurand(StrEnum):
     """The physical quantity of a reading."""
 
-    ENERGY = "energy"
-    """A counter [J]."""
-    POWER = "power"
-    """A momentary value [W]."""
+    ENERGY = "energy"  # a counter [J]
+    POWER = "power"  # a momentary value [W]
 
 
 class Scope(StrEnum):
@@ -51,7 +45,6 @@ class Facts:
     """Static properties of a meter.
 
     Attributes:
-        name: for display.
         unit: of the device's own readings.
         resolution: smallest step of a reading [J or W].
         max_W: upper bound of plausible power.
@@ -78,14 +71,11 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Meter:
-    """One sensor or counter.
-
-    Attributes:
-        read: present value [J or W, by the measurand]; raises MeterLostError.
-    """
+    """One sensor or counter."""
 
     facts: Facts
     read: Callable[[], float]
+    """Present value [J or W, by the measurand]; raises MeterLostError."""
 
 
 def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:
@@ -94,11 +84,7 @@ def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:
 
 
 def read_text(path: Path) -> str:
-    """Content of a small file, stripped.
-
-    Raises:
-        MeterLostError: missing or unreadable, with the reason.
-    """
+    """Content of a small file, stripped; raises MeterLostError with the reason."""
     try:
         return path.read_text(encoding="ascii", errors="replace").strip()
     except OSError as error:
@@ -106,11 +92,7 @@ def read_text(path: Path) -> str:
 
 
 def read_number(path: Path) -> float:
-    """An integer written by the kernel.
-
-    Raises:
-        MeterLostError: missing, unreadable or not a number.
-    """
+    """An integer written by the kernel; raises MeterLostError with the reason."""
     text = read_text(path)
     try:
         return float(int(text))
@@ -132,3 +114,39 @@ def number_or_none(path: Path) -> float | None:
         return read_number(path)
     except MeterLostError:
         return None
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Meters whose readings may be summed, since their scopes do not overlap; usable or not.
+
+    Attributes:
+        meters: one per socket or rail; empty where none of this type exists.
+        why_not: reason against its use, empty where there is none.
+        remedy: action that makes it usable.
+    """
+
+    name: str
+    meters: tuple[Meter, ...]
+    why_not: str = ""
+    remedy: str = ""
+
+    @property
+    def usable(self) -> bool:
+        """Whether it can be read."""
+        return bool(self.meters) and not self.why_not
+
+    @property
+    def facts(self) -> Facts | None:
+        """Facts of the first meter; those of one candidate are alike."""
+        return self.meters[0].facts if self.meters else None
+
+
+def probe(name: str, meters: tuple[Meter, ...], remedy: str) -> Candidate:
+    """A candidate, read once to find out whether it can be."""
+    try:
+        for meter in meters:
+            meter.read()
+    except MeterLostError as error:
+        return Candidate(name, meters, str(error), remedy)
+    return Candidate(name, meters)

@@ -6,8 +6,7 @@ import re
 import shutil
 import subprocess
 
-from modt.energy.meters.candidate import Candidate, probe
-from modt.energy.meters.meter import Facts, Kind, Meter, MeterLostError, Scope
+from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, MeterLostError, Scope, probe
 
 _RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=([0-9.]+)[AV]")
 
@@ -49,11 +48,7 @@ def _rails(command: str) -> str:
 
 
 def rail_power_W(text: str) -> float:
-    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`.
-
-    Raises:
-        MeterLostError: no rail has both.
-    """
+    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`."""
     amperes: dict[str, float] = {}
     volts: dict[str, float] = {}
     for rail, quantity, value in _RAIL_VALUE.findall(text):

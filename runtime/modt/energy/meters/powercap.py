@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modt.energy.meters.candidate import Candidate, probe
-from modt.energy.meters.meter import Facts, Kind, Meter, Scope, file_meter, number_or_none, text_or_none
+from modt.energy.meters.meter import (
+    Candidate,
+    Facts,
+    Kind,
+    Meter,
+    Scope,
+    file_meter,
+    number_or_none,
+    probe,
+    text_or_none,
+)
 
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
 
