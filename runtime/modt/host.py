@@ -19,12 +19,9 @@ _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 
 
 def pin_to_core(core: int | None) -> int | None:
-    """Pin this process and its future threads to a core, and disable thread pools; returns the core.
+    """Pin this process and its future threads to a core, None for any, and disable thread pools; returns the core.
 
     Call it before NumPy, SciPy or ONNX Runtime is imported: they size their thread pools when imported.
-
-    Args:
-        core: its number; None leaves the affinity unchanged.
 
     Raises:
         MisuseError: the core is not available to this process.

@@ -123,9 +123,8 @@ class Pipeline:
             ScanError: columns that are not x, y, z, reflectance.
         """
         if not np.isfinite(stamp_s) or stamp_s < self._stamp_s:
-            raise MisuseError(
-                f"stamp {stamp_s!r}", f"not after the last one, {self._stamp_s!r}", "give rising times [s]"
-            )
+            last = f"not after the last one, {self._stamp_s!r}"
+            raise MisuseError(f"stamp {stamp_s!r}", last, "give rising times [s]")
         pose = None if T_world_sensor is None else np.array(T_world_sensor, np.float64)
         if pose is not None and (pose.shape != (4, 4) or pose_defect(pose)):
             cause = pose_defect(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"

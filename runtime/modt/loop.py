@@ -30,20 +30,12 @@ class FullSpeed:
 
 @dataclass
 class FixedPeriod:
-    """Frames at absolute deadlines, which restart after an overrun so that no burst follows.
-
-    Attributes:
-        period_s: time between frames [s].
-        clock: monotonic time [s].
-        sleep: waits [s].
-        missed: deadlines that passed before their frame started.
-        max_lateness_s: largest delay of a frame [s].
-    """
+    """Frames at absolute deadlines, which restart after an overrun so that no burst follows."""
 
     period_s: float
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
-    missed: int = 0
+    missed: int = 0  # deadlines that passed before their frame started
     max_lateness_s: float = 0.0
     _deadline_s: float | None = None
 

@@ -27,9 +27,6 @@ class Systemd:
     """READY=1 with the first frame, WATCHDOG=1 with every frame, STOPPING=1 at the end; sending never blocks.
 
     The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
-
-    Args:
-        address: of systemd's datagram socket.
     """
 
     def __init__(self, address: str) -> None:
@@ -65,11 +62,7 @@ Supervisor = NoSupervisor | Systemd
 
 
 def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
-    """Systemd where the environment names its socket: /PATH, or @NAME if abstract.
-
-    Raises:
-        MisuseError: the name is neither.
-    """
+    """Systemd where the environment names its socket: /PATH, or @NAME if abstract."""
     name = environment.get(_VARIABLE)
     if not name:
         return NoSupervisor()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import chain, islice
+from itertools import islice
 
 import numpy as np
 
@@ -48,12 +48,11 @@ class Comparison:
     def repetition(self, seed: int) -> Repetition:
         """Every mode once through the stream, from its initial state."""
         runs = {name: self._mode_run(name, seed) for name in (*MODES, VARIED)}
-        frames = iter(assemble.stream(self.request))
-        first = list(islice(frames, 1))
-        for frame in first:
+        stream = assemble.stream(self.request)
+        for frame in islice(stream, 1):
             for mode_run in runs.values():
                 _warm_up(mode_run, frame)
-        interleave(chain(first, frames), [*runs.values()], self.turn_frames)
+        interleave(stream, [*runs.values()], self.turn_frames)
         return runs
 
     def _mode_run(self, name: str, seed: int) -> ModeRun:

@@ -58,13 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch)
-    workload = Workload(
-        frames=scans,
-        segment=Segmenter(loaded.segmentation, loaded.sensor, FieldOfView()).segment,
-        classify=network.classify,
-        ledger=ledger,
-        windows=metering.windows(meters, pinned, WindowConfig(min_s=1e9)),
-    )
+    segmenter = Segmenter(loaded.segmentation, loaded.sensor, FieldOfView())
+    windows = metering.windows(meters, pinned, WindowConfig(min_s=1e9))
+    workload = Workload(scans, segmenter.segment, network.classify, ledger, windows)
     try:
         found = workload.calibrate(arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))
     except FitError as error:

@@ -21,9 +21,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_meter_option(p)
     options.add_report_options(p)
     p.add_argument("--repeat", type=count, default=3, metavar="K", help="repetitions (default: %(default)s)")
-    p.add_argument(
-        "--turn", type=count, metavar="N", help="consecutive frames of one mode (default: 1, with a meter all)"
-    )
+    turn = "consecutive frames of one mode (default: 1, with a meter all)"
+    p.add_argument("--turn", type=count, metavar="N", help=turn)
     p.set_defaults(run=run)
 
 
@@ -50,10 +49,8 @@ def run(arguments: argparse.Namespace) -> int:
     repetitions = []
     for number in range(arguments.repeat):
         if sys.stderr.isatty():
-            print(f"\rmodt-profile: {number + 1} of {arguments.repeat}", end="", file=sys.stderr, flush=True)
+            print(f"modt-profile: {number + 1} of {arguments.repeat}", file=sys.stderr)
         repetitions.append(comparison.repetition(number))
-    if sys.stderr.isatty():
-        print(file=sys.stderr)
     frames = len(repetitions[0][VARIED].lines)
     if not frames:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")

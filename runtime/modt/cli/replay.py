@@ -23,15 +23,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
     p.add_argument("--rate", type=rate, dest="rate_hz", metavar="HZ|max", help="frames a second (default: max)")
     motion = p.add_mutually_exclusive_group()
-    motion.add_argument(
-        "--poses", type=Path, metavar="FILE", help="poses in KITTI odometry's format, instead of the recorded ones"
-    )
-    motion.add_argument(
-        "--odometry",
-        default="recording",
-        metavar="SOURCE",
-        help="poses: recording (the stream's, default), none, or from a socket: udp://HOST:PORT, unix:///PATH",
-    )
+    file = "poses in KITTI odometry's format, instead of the recorded ones"
+    motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
+    source = "poses: recording (the stream's, default), none, or from a socket: udp://HOST:PORT, unix:///PATH"
+    motion.add_argument("--odometry", default="recording", metavar="SOURCE", help=source)
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     p.set_defaults(run=run)

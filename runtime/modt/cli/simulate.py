@@ -11,9 +11,8 @@ from modt.errors import MisuseError, ModtError
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("simulate", help="write a synthetic drive with its ground truth")
-    p.add_argument(
-        "--scene", default="street", metavar="NAME", help="scene or KITTI label file (default: %(default)s)"
-    )
+    scene = "scene or KITTI label file (default: %(default)s)"
+    p.add_argument("--scene", default="street", metavar="NAME", help=scene)
     p.add_argument("--sensor", default="hdl-64e", metavar="NAME", help="sensor (default: %(default)s)")
     p.add_argument("--seconds", type=float, default=10.0, metavar="S", help="duration (default: %(default)g)")
     p.add_argument("--seed", type=int, default=0, metavar="K", help="of the random numbers (default: %(default)s)")

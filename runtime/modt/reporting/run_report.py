@@ -237,7 +237,7 @@ def _saved(
         "views": quantity(run.classified / run.tracks if run.tracks else None),
         "E_seg": estimate(net_W * costs.seg, "J"),
         "E_class": estimate(net_W * costs.e_class(baseline), "J"),
-        **prediction_tree(found, gamma or 1.0),
+        **prediction_tree(found, gamma),
         "gamma_of_this_run": estimate(gamma),
         "saved_J": estimate(net_W * float((e1_s - run_s).mean()), "J"),
     }, e1_s
