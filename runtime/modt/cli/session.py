@@ -24,13 +24,7 @@ from modt.types import FrameResult, Proposals
 
 
 class Session:
-    """A replay and its run directory.
-
-    Args:
-        request: options of the replay.
-        out: the run directory, None for one named after stream and mode.
-        core: to which the process is pinned, None for any.
-        command: the command line.
+    """A replay and its run directory, by default named after stream and mode.
 
     Raises:
         MisuseError: an invalid request.
@@ -80,11 +74,8 @@ class Session:
         budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
         with ExitStack() as stack:
-            stack.callback(self.odometry.close)
-            stack.callback(ledger_lines.close)
-            for sink in sinks:
-                stack.callback(sink.close)
-            stack.callback(supervisor.close)
+            for part in (self.odometry, ledger_lines, *sinks, supervisor):
+                stack.callback(part.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
             ledger_lines.write(windows.close())

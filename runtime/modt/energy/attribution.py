@@ -60,22 +60,14 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Result of a fit.
+    """Result of a fit."""
 
-    Attributes:
-        coefficients: one a regressor, in their order.
-        windows, dropped: numbers used and left out, without a reading or with a rejected mark.
-        residual_J: standard deviation of the residual, a window.
-        explained: share of the variance explained, at most 1.
-        condition: condition number of the scaled regressors.
-    """
-
-    coefficients: tuple[Coefficient, ...]
-    windows: int
-    dropped: int
-    residual_J: float
-    explained: float
-    condition: float
+    coefficients: tuple[Coefficient, ...]  # in the order of the regressors
+    windows: int  # used
+    dropped: int  # without a reading or with a rejected mark
+    residual_J: float  # standard deviation, a window
+    explained: float  # share of the variance, at most 1
+    condition: float  # number of the scaled regressors
 
     def __getitem__(self, name: str) -> Coefficient:
         return next(c for c in self.coefficients if c.name == name)

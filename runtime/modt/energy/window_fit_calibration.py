@@ -20,37 +20,24 @@ _BURSTS = 5
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Result of a calibration.
-
-    Attributes:
-        seg_burst_J: energy of one segmentation, from bursts of segmentation.
-        class_burst_J: energy of one classification of mean points, from bursts of classification.
-        class_fit_J: the same by the fit.
-        busy_W: power while computing: idle power plus energy above idling over CPU time.
-    """
+    """Result of a calibration."""
 
     fit: Fit
-    seg_burst_J: float | None
-    class_burst_J: float | None
-    class_fit_J: float
-    busy_W: float
+    seg_burst_J: float | None  # of one segmentation, from bursts of segmentation
+    class_burst_J: float | None  # of one classification of mean points, from bursts of classification
+    class_fit_J: float  # the same by the fit
+    busy_W: float  # idle power plus energy above idling over CPU time
 
 
 @dataclass(frozen=True, slots=True)
 class Workload:
-    """The work that a calibration varies.
-
-    Attributes:
-        segment: (N, 4) points to proposals.
-        classify: points, proposals and (R,) indices to (R, 4) P(Y|X); it counts its points on the ledger.
-        windows: closed explicitly.
-    """
+    """The work that a calibration varies."""
 
     frames: Sequence[Frame]
     segment: Callable[[Float32], Proposals]
-    classify: Callable[[Float32, Proposals, Int], Float64]
+    classify: Callable[[Float32, Proposals, Int], Float64]  # counts its points on the ledger
     ledger: Ledger
-    windows: Windows
+    windows: Windows  # closed explicitly
 
     def calibrate(self, windows: int, window_s: float, burst_s: float, random: np.random.Generator) -> Calibration:
         """Run the windows of varied load, fit them, and run the bursts.

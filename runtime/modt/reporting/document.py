@@ -21,19 +21,13 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A report.
-
-    Attributes:
-        about: sentences on the run, the meter and its conditions.
-        results: name, value, note.
-        test: what the figures test.
-    """
+    """A report."""
 
     title: str
-    about: Sequence[str]
-    results: Sequence[tuple[str, Quantity, str]]
+    about: Sequence[str]  # sentences on the run, the meter and its conditions
+    results: Sequence[tuple[str, Quantity, str]]  # name, value, note
     tables: Sequence[Table]
-    test: str
+    test: str  # what the figures test
 
     def text(self) -> str:
         """Lines of 100 columns at most, results first."""

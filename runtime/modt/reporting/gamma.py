@@ -28,15 +28,10 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class RunCosts:
-    """Counts and costs of one mode on F frames.
+    """Counts and costs of one mode on F frames."""
 
-    Attributes:
-        counts: (F, 8) columns as COUNTS.
-        cost: (F, S) of the pipeline's S stages, in joules or CPU seconds.
-    """
-
-    counts: Int
-    cost: Float64
+    counts: Int  # (F, 8), columns as COUNTS
+    cost: Float64  # (F, S) of the pipeline's S stages [CPU s]
 
     @classmethod
     def median(cls, runs: Sequence[ModeRun]) -> Self:

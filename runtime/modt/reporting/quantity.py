@@ -14,19 +14,12 @@ LEGEND = "Figures are measured, but for e estimated, i integrated, ? unavailable
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One number of a report.
+    """One number of a report."""
 
-    Attributes:
-        value: None where unavailable.
-        unit: empty for a ratio or a count.
-        kind: measured, integrated, estimated or unavailable.
-        low, high: 95 % interval, None where none was computed.
-    """
-
-    value: float | None
-    unit: str = ""
+    value: float | None  # None where unavailable
+    unit: str = ""  # empty for a ratio or a count
     kind: Kind = Kind.MEASURED
-    low: float | None = None
+    low: float | None = None  # 95 % interval, None where none was computed
     high: float | None = None
 
     def json(self) -> dict[str, Any]:

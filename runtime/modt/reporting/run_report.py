@@ -38,20 +38,15 @@ _CONVENTIONAL = "conventional"
 class FrameCounts:
     """Counts over the lines of tracks.jsonl.
 
-    Attributes:
-        max_points, batch: of the classifier's configuration.
-        rows: proposals, classifications, deferred, and points if all proposals were classified, of each frame.
-        foreground: proposals of a track whose class is an object's.
-        lives: frames with a proposal, by track id.
-        classified_ids: of the tracks classified at least once.
+    A row a frame: proposals, classifications, deferred, and points if all proposals were classified.
     """
 
-    max_points: int
+    max_points: int  # this and the batch as in the classifier's configuration
     batch: int
     rows: list[tuple[int, int, int, int]] = field(default_factory=list)
-    foreground: int = 0
-    lives: Counter[int] = field(default_factory=Counter)
-    classified_ids: set[int] = field(default_factory=set)
+    foreground: int = 0  # proposals of a track whose class is an object's
+    lives: Counter[int] = field(default_factory=Counter)  # frames with a proposal, by track id
+    classified_ids: set[int] = field(default_factory=set)  # of the tracks classified at least once
 
     def add(self, record: dict[str, Any]) -> None:
         """Add a line of tracks.jsonl."""

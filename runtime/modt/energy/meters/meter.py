@@ -42,26 +42,16 @@ class MeterLostError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """Static properties of a meter.
-
-    Attributes:
-        unit: of the device's own readings.
-        resolution: smallest step of a reading [J or W].
-        max_W: upper bound of plausible power.
-        scope: consumers covered.
-        kind: reliability of the energy derived from it.
-        wrap_J: range of an energy counter; None where it never wraps, or the range is unknown.
-        privilege: needed to read it.
-    """
+    """Static properties of a meter."""
 
     name: str
-    unit: str
-    resolution: float
-    max_W: float
-    scope: Scope
-    kind: Kind
-    wrap_J: float | None = None
-    privilege: str = "none"
+    unit: str  # of the device's own readings
+    resolution: float  # smallest step of a reading [J or W]
+    max_W: float  # upper bound of plausible power
+    scope: Scope  # consumers covered
+    kind: Kind  # reliability of the energy derived from it
+    wrap_J: float | None = None  # range of an energy counter; None where it never wraps, or the range is unknown
+    privilege: str = "none"  # needed to read it
 
     @property
     def measurand(self) -> Measurand:
@@ -118,18 +108,12 @@ def number_or_none(path: Path) -> float | None:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """Meters whose readings may be summed, since their scopes do not overlap; usable or not.
-
-    Attributes:
-        meters: one per socket or rail; empty where none of this type exists.
-        why_not: reason against its use, empty where there is none.
-        remedy: action that makes it usable.
-    """
+    """Meters whose readings may be summed, since their scopes do not overlap; usable or not."""
 
     name: str
-    meters: tuple[Meter, ...]
-    why_not: str = ""
-    remedy: str = ""
+    meters: tuple[Meter, ...]  # one per socket or rail; empty where none of this type exists
+    why_not: str = ""  # reason against its use
+    remedy: str = ""  # action that makes it usable
 
     @property
     def usable(self) -> bool:
