@@ -80,9 +80,7 @@ class Pipeline:
             for found in pipeline.step(points, stamp_s).objects().as_dicts():
                 print(found["id"], found["object_class"], found["box_sensor"])
 
-    Args:
-        config: of sensor and board.
-        mode: "conventional", "efficient" or "accurate".
+    The mode is "conventional", "efficient" or "accurate".
 
     Raises:
         MisuseError: an unknown mode, or a model that cannot be used.

@@ -25,24 +25,21 @@ _LOADS = (0, 1, 2, 3, 5, 8, 12, 16, 20, 30, 45, 60)
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Parameters of a comparison.
-
-    Attributes:
-        core: the process is pinned to.
-        meters: to read; none where energy follows from CPU time.
-        turn: consecutive frames of one mode; None: 1, or all frames where a meter is read. A meter needs a second or
-            more of one mode; CPU time is compared frame by frame, which spreads other load of the machine evenly.
-    """
+    """Parameters of a comparison."""
 
     request: assemble.Request
     profile: ProfileConfig
     core: int | None
-    meters: tuple[Meter, ...] = ()
-    turn: int | None = None
+    meters: tuple[Meter, ...]  # to read; none where energy follows from CPU time
+    turn: int | None  # consecutive frames of one mode, None for the default
 
     @property
     def turn_frames(self) -> int:
-        """Consecutive frames of one mode."""
+        """Consecutive frames of one mode.
+
+        A meter needs a second or more of one mode; CPU time is compared frame by frame, which spreads other load of
+        the machine evenly.
+        """
         return self.turn or (10**9 if self.meters else 1)
 
     def repetition(self, seed: int) -> Repetition:

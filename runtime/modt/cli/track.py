@@ -71,11 +71,8 @@ def follow(
 ) -> tuple[str, int]:
     """KITTI tracking results of a sequence, and the number of its tracks.
 
-    Args:
-        detections: of the sequence.
-        poses: (n, 4, 4) T_world_camera of its frames, None without ego-motion.
-        period_s: time between frames.
-        sure: minimum confidence of the tracks written, None for that of the type.
+    The (n, 4, 4) poses are T_world_camera, None without ego-motion; the minimum confidence of the tracks written is
+    that of the type where none is given.
     """
     from dataclasses import replace
 

@@ -23,17 +23,12 @@ _TAILS = (0.025, 0.975)
 
 @dataclass(frozen=True, slots=True)
 class Regressor:
-    """One count of a window: an entry of a stage, or of the whole window where the stage is empty.
+    """One count of a window: an entry of a stage, or of the whole window where the stage is empty."""
 
-    Attributes:
-        name: of its coefficient, with the unit.
-        scale: of the count, so that the coefficient has its unit.
-    """
-
-    name: str
+    name: str  # of its coefficient, with the unit
     stage: str
     key: str
-    scale: float = 1.0
+    scale: float = 1.0  # of the count, so that the coefficient has its unit
 
     def count(self, line: Line) -> float:
         """Count of one window."""

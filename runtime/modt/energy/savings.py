@@ -86,17 +86,11 @@ class GammaTerm:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Gamma predicted for a pair of runs.
+    """Gamma predicted for a pair of runs."""
 
-    Attributes:
-        model: with all costs.
-        paper: Equation 3, at the same a, n and N_go.
-        terms: from gamma = N_go to the gamma of the model; their changes sum to the difference.
-    """
-
-    model: EnergyModel
-    paper: EnergyModel
-    terms: tuple[GammaTerm, ...]
+    model: EnergyModel  # with all costs
+    paper: EnergyModel  # Equation 3, at the same a, n and N_go
+    terms: tuple[GammaTerm, ...]  # from gamma = N_go to the gamma of the model; their changes sum to the difference
 
     def explain(self, measured: float) -> tuple[GammaTerm, ...]:
         """The terms, and the remainder up to the measured ratio."""

@@ -34,7 +34,7 @@ _PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """The conversion of CPU time to energy: powers and calibration of the board, meter, period of the stream."""
+    """The conversion of CPU time to energy."""
 
     board: EnergyConfig
     meter: Facts

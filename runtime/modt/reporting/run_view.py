@@ -9,6 +9,7 @@ import numpy as np
 from modt.reporting import energy_plots, svg
 from modt.reporting.document import Cell, Document, Table
 from modt.reporting.page import Plot
+from modt.reporting.quantity import Quantity
 
 
 def run_document(tree: dict[str, Any]) -> Document:
@@ -18,30 +19,20 @@ def run_document(tree: dict[str, Any]) -> Document:
     of_e1 = "E1 is computed from this run's own costs; modt-profile compare measures it"
     if tree["mode"] == "conventional":
         of_e1 = "this is tracking-by-detection itself: nothing was saved; run the other modes, or compare"
+    said = {key: value.marked() for key, value in saved.items() if isinstance(value, Quantity)}
+    gross = f"{net_mJ.marked()} without idling; power {tree['power_W'].marked()}"
+    predicted = (
+        f"predicted {said['gamma_predicted']} in full, {said['gamma_equation_3']} by Equation 3, "
+        f"{said['gamma_short']} by N_go alone; a = {said['a']}"
+    )
+    counts = f"{said['proposals']} proposals a frame, N_go {said['N_go']}, {said['views']} classifications a track"
+    share = f"{ledger['overhead_share'].scaled(100, '%').marked()} of the CPU time"
     results = [
-        (
-            "energy a frame",
-            tree["gross_J"].scaled(1e3, "mJ"),
-            f"{net_mJ.marked()} without idling; power {tree['power_W'].marked()}",
-        ),
+        ("energy a frame", tree["gross_J"].scaled(1e3, "mJ"), gross),
         ("saved a frame", saved["saved_J"].scaled(1e3, "mJ"), of_e1),
-        (
-            "gamma",
-            saved["gamma_of_this_run"],
-            f"predicted {saved['gamma_predicted'].marked()} in full, {saved['gamma_equation_3'].marked()} by "
-            f"Equation 3, {saved['gamma_short'].marked()} by N_go alone; a = {saved['a'].marked()}",
-        ),
-        (
-            "beta",
-            saved["beta"].scaled(100, "%"),
-            f"{saved['proposals'].marked()} proposals a frame, N_go {saved['N_go'].marked()}, "
-            f"{saved['views'].marked()} classifications a track",
-        ),
-        (
-            "overhead of the ledger a frame",
-            ledger["overhead_us"],
-            f"{ledger['overhead_share'].scaled(100, '%').marked()} of the CPU time",
-        ),
+        ("gamma", saved["gamma_of_this_run"], predicted),
+        ("beta", saved["beta"].scaled(100, "%"), counts),
+        ("overhead of the ledger a frame", ledger["overhead_us"], share),
     ]
     about = [
         f"{tree['frames']} frames, mode {tree['mode']}, field of view {tree['fov']}",

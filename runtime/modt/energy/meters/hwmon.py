@@ -66,11 +66,10 @@ def _rails(folder: Path, chip: str) -> list[Meter]:
         if text_or_none(folder / f"in{n}_enable") == "0" or not voltage.exists() or label.startswith("sum"):
             continue
         computed = power.exists()
-        # The resolution is 1 mA at 5 V.
         facts = Facts(
             name=f"hwmon {chip} {label}",
             unit="uW" if computed else "mV x mA",
-            resolution=5e-3,
+            resolution=5e-3,  # 1 mA at 5 V
             max_W=500.0,
             scope=Scope.BOARD if label in _INPUT_RAILS else Scope.SOC if "CPU" in label else Scope.RAIL,
             kind=Kind.INTEGRATED,
