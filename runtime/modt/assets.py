@@ -14,11 +14,7 @@ _ROOTS = (_PACKAGE / "data", _PACKAGE.parents[1])
 
 
 def folder(kind: str) -> Path:
-    """Folder of a kind, "models" or "profiles".
-
-    Raises:
-        MisuseError: the installation lacks it.
-    """
+    """Folder of a kind, "models" or "profiles"."""
     for root in _ROOTS:
         if (root / kind).is_dir():
             return root / kind
@@ -26,11 +22,7 @@ def folder(kind: str) -> Path:
 
 
 def find(kind: str, name: str, suffix: str) -> Path:
-    """A file by its path, or by the name of one of the package.
-
-    Raises:
-        MisuseError: not found; the error lists the names.
-    """
+    """A file by its path, or by the name of one of the package; the error where there is none lists the names."""
     path = Path(name)
     if path.suffix == suffix or len(path.parts) > 1:
         if path.is_file():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 import resource
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
@@ -14,16 +13,15 @@ import psutil
 from modt.errors import MisuseError
 
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
+_MAX_HELPER_SHARE = 0.01
+"""CPU time of other threads over that of the loop, up to which the process counts as single-threaded."""
 _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 
 
 def pin_to_core(core: int | None) -> int | None:
-    """Pin this process and its future threads to a core, and disable thread pools; returns the core.
+    """Pin this process and its future threads to a core, None for any, and disable thread pools; returns the core.
 
     Call it before NumPy, SciPy or ONNX Runtime is imported: they size their thread pools when imported.
-
-    Args:
-        core: its number; None leaves the affinity unchanged.
 
     Raises:
         MisuseError: the core is not available to this process.
@@ -49,25 +47,8 @@ def last_core() -> int:
     return max(os.sched_getaffinity(0))
 
 
-@dataclass(frozen=True, slots=True)
-class ThreadReport:
-    """Threads of this process.
-
-    Attributes:
-        threads: their number.
-        cores: on which any of them may run.
-        main_cpu_s: CPU time of the main thread [s].
-        others_cpu_s: CPU time of all other threads [s].
-    """
-
-    threads: int
-    cores: tuple[int, ...]
-    main_cpu_s: float
-    others_cpu_s: float
-
-
-def thread_report() -> ThreadReport:
-    """Threads of this process, as the kernel accounts for them."""
+def usage(core: int | None) -> dict[str, object]:
+    """Threads and memory of this process, as the kernel accounts for them, and whether it kept to its core."""
     process = psutil.Process()
     used = {t.id: t.user_time + t.system_time for t in process.threads()}
     cores: set[int] = set()
@@ -76,8 +57,15 @@ def thread_report() -> ThreadReport:
             cores |= os.sched_getaffinity(thread)
         except ProcessLookupError:  # ended meanwhile
             continue
-    main = used.get(process.pid, 0.0)
-    return ThreadReport(len(used), tuple(sorted(cores)), main, sum(used.values()) - main)
+    main_s = used.get(process.pid, 0.0)
+    others_s = sum(used.values()) - main_s
+    return {
+        "core": core,
+        "one_core_verified": cores == {core} and others_s <= _MAX_HELPER_SHARE * main_s,
+        "threads": len(used),
+        "other_threads_cpu_s": others_s,
+        "peak_rss_mb": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    }
 
 
 def keep_freed_pages() -> None:
@@ -87,11 +75,6 @@ def keep_freed_pages() -> None:
     block of almost 32 MB is freed once (untouched, at no cost), glibc keeps them.
     """
     bytes(31 << 20)
-
-
-def peak_rss_mb() -> float:
-    """Peak resident memory of this process [MB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def description() -> dict[str, object]:

@@ -80,9 +80,7 @@ class Pipeline:
             for found in pipeline.step(points, stamp_s).objects().as_dicts():
                 print(found["id"], found["object_class"], found["box_sensor"])
 
-    Args:
-        config: of sensor and board.
-        mode: "conventional", "efficient" or "accurate".
+    The mode is "conventional", "efficient" or "accurate".
 
     Raises:
         MisuseError: an unknown mode, or a model that cannot be used.
@@ -123,9 +121,8 @@ class Pipeline:
             ScanError: columns that are not x, y, z, reflectance.
         """
         if not np.isfinite(stamp_s) or stamp_s < self._stamp_s:
-            raise MisuseError(
-                f"stamp {stamp_s!r}", f"not after the last one, {self._stamp_s!r}", "give rising times [s]"
-            )
+            last = f"not after the last one, {self._stamp_s!r}"
+            raise MisuseError(f"stamp {stamp_s!r}", last, "give rising times [s]")
         pose = None if T_world_sensor is None else np.array(T_world_sensor, np.float64)
         if pose is not None and (pose.shape != (4, 4) or pose_defect(pose)):
             cause = pose_defect(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"

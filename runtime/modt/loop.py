@@ -9,24 +9,12 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from modt.pipeline import SINK, SOURCE, Pipeline
 from modt.sinks.output import LineSink, Sink
 from modt.sources.stream import Stream
 from modt.types import Budget, FrameResult
-
-
-class Pace(Protocol):
-    """Timing of the frames."""
-
-    def wait(self) -> None:
-        """Return when the next frame may be taken from its source."""
-        ...
-
-    def report(self) -> dict[str, Any]:
-        """Rate requested and kept."""
-        ...
 
 
 class FullSpeed:
@@ -42,20 +30,12 @@ class FullSpeed:
 
 @dataclass
 class FixedPeriod:
-    """Frames at absolute deadlines, which restart after an overrun so that no burst follows.
-
-    Attributes:
-        period_s: time between frames [s].
-        clock: monotonic time [s].
-        sleep: waits [s].
-        missed: deadlines that passed before their frame started.
-        max_lateness_s: largest delay of a frame [s].
-    """
+    """Frames at absolute deadlines, which restart after an overrun so that no burst follows."""
 
     period_s: float
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
-    missed: int = 0
+    missed: int = 0  # deadlines that passed before their frame started
     max_lateness_s: float = 0.0
     _deadline_s: float | None = None
 
@@ -81,6 +61,9 @@ class FixedPeriod:
             "missed_deadlines": self.missed,
             "max_lateness_ms": 1e3 * self.max_lateness_s,
         }
+
+
+Pace = FullSpeed | FixedPeriod
 
 
 class Stop:

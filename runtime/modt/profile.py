@@ -32,11 +32,7 @@ def load(name: str = DEFAULT) -> ProfileConfig:
 
 
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
-    """Profile of a YAML text; every key is optional.
-
-    Raises:
-        MisuseError: as for load.
-    """
+    """Profile of a YAML text, in which every key is optional; raises as load does."""
     try:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.YAMLError as error:
@@ -57,16 +53,12 @@ def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
 
 
 def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
-    """A profile as plain data, with all defaults."""
-    tree: dict[str, dict[str, Any]] = _listed(dataclasses.asdict(config))
-    return tree
+    """A profile as plain data, with all defaults and tuples as lists."""
+    return dataclasses.asdict(config, dict_factory=_listed)
 
 
-def _listed(tree: Any) -> Any:
-    """A tree with tuples as lists."""
-    if isinstance(tree, dict):
-        return {key: _listed(value) for key, value in tree.items()}
-    return list(tree) if isinstance(tree, tuple) else tree
+def _listed(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in items}
 
 
 def to_yaml(data: Mapping[str, Any]) -> str:
@@ -75,11 +67,7 @@ def to_yaml(data: Mapping[str, Any]) -> str:
 
 
 def from_yaml(text: str, origin: Path | str) -> Any:
-    """Plain data of a YAML text written by this package.
-
-    Raises:
-        MisuseError: no YAML.
-    """
+    """Plain data of a YAML text written by this package."""
     try:
         return yaml.safe_load(text)
     except yaml.YAMLError:
@@ -96,7 +84,10 @@ def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: i
         if isinstance(nested, type) and issubclass(nested, StageConfig):
             values[key] = _stage(nested, value, origin, at)
             continue
-        plain = _plain(value, origin, at)
+        try:
+            plain = yaml.safe_load(yaml.serialize(value))
+        except yaml.YAMLError:
+            raise MisuseError(f"{origin}:{at}", "no plain value", "write a number, a name or a list") from None
         values[key] = tuple(plain) if isinstance(plain, list) else plain
     try:
         return kind(**values)
@@ -122,10 +113,3 @@ def _entries(
             raise MisuseError(f"{origin}:{at}", f"key '{key}' appears twice", "keep one")
         entries.append((key, value, at))
     return entries
-
-
-def _plain(node: yaml.Node, origin: Path | str, line: int) -> Any:
-    try:
-        return yaml.safe_load(yaml.serialize(node))
-    except yaml.YAMLError:
-        raise MisuseError(f"{origin}:{line}", "no plain value", "write a number, a name or a list") from None

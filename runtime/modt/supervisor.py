@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import socket
 from collections.abc import Mapping
-from typing import Protocol
 
 from modt.errors import MisuseError
 
@@ -14,20 +13,8 @@ log = logging.getLogger(__name__)
 _VARIABLE = "NOTIFY_SOCKET"
 
 
-class Supervisor(Protocol):
-    """Receiver of the state of the loop."""
-
-    def frame_done(self) -> None:
-        """Report that a frame was processed and written."""
-        ...
-
-    def close(self) -> None:
-        """Report the end of the loop."""
-        ...
-
-
 class NoSupervisor:
-    """No receiver."""
+    """No receiver of the state of the loop."""
 
     def frame_done(self) -> None:
         """No effect."""
@@ -40,9 +27,6 @@ class Systemd:
     """READY=1 with the first frame, WATCHDOG=1 with every frame, STOPPING=1 at the end; sending never blocks.
 
     The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
-
-    Args:
-        address: of systemd's datagram socket.
     """
 
     def __init__(self, address: str) -> None:
@@ -74,12 +58,11 @@ class Systemd:
         return True
 
 
-def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
-    """Systemd where the environment names its socket: /PATH, or @NAME if abstract.
+Supervisor = NoSupervisor | Systemd
 
-    Raises:
-        MisuseError: the name is neither.
-    """
+
+def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
+    """Systemd where the environment names its socket: /PATH, or @NAME if abstract."""
     name = environment.get(_VARIABLE)
     if not name:
         return NoSupervisor()

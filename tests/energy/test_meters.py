@@ -8,8 +8,8 @@ import pytest
 from modt.energy.meters.battery import find_batteries
 from modt.energy.meters.discovery import Discovery, discover
 from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Kind, Measurand, MeterLostError, Scope
-from modt.energy.meters.model import ModelMeter
+from modt.energy.meters.meter import Kind, Measurand, Meter, MeterLostError, Scope
+from modt.energy.meters.model import model_meter
 from modt.energy.meters.pmic import find_pmic, rail_power_W
 from modt.energy.meters.powercap import find_powercap
 from modt.errors import MisuseError
@@ -25,8 +25,8 @@ PMIC = """ 3V7_WL_SW_A current(0)=0.08784000A
 """
 
 
-def model() -> ModelMeter:
-    return ModelMeter(idle_W=3.0, busy_W=7.0, wall_ns=lambda: 2_000_000_000, cpu_ns=lambda: 500_000_000)
+def model() -> Meter:
+    return model_meter(idle_W=3.0, busy_W=7.0, wall_ns=lambda: 2_000_000_000, cpu_ns=lambda: 500_000_000)
 
 
 def powercap(sys: Path) -> Path:

@@ -9,7 +9,7 @@ from modt.config import WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Facts, Kind, Measurand, MeterLostError, Scope
+from modt.energy.meters.meter import Facts, Kind, MeterLostError, Scope
 from modt.energy.meters.powercap import find_powercap
 from modt.energy.windows import SCHEMA, EnergyAccumulator, Windows
 
@@ -175,7 +175,6 @@ class Readings:
         self.values = iter(values)
         self.facts = Facts(
             name="test",
-            measurand=Measurand.ENERGY,
             unit="J",
             resolution=0.0,
             max_W=100.0,

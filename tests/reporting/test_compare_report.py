@@ -8,12 +8,12 @@ import pytest
 from modt.config import EnergyConfig, WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Facts, Kind, Measurand, Scope
+from modt.energy.meters.meter import Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
-from modt.reporting.compare_page import compare_page
 from modt.reporting.compare_report import Basis, compare_tree
-from modt.reporting.compare_text import compare_text
+from modt.reporting.compare_view import compare_document, compare_plots
 from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
+from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
 from modt.types import UNLIMITED, Frame
 from tests.results import CAR, result
@@ -35,7 +35,6 @@ class Board:
         self.energy_J = 0.0
         self.facts = Facts(
             name="board",
-            measurand=Measurand.ENERGY,
             unit="J",
             resolution=1e-6,
             max_W=100.0,
@@ -148,7 +147,7 @@ def test_known_costs_are_predicted(estimated, mode):
 
 def said(tree):
     """The report's words, however its lines are broken."""
-    return " ".join(compare_text(tree).split())
+    return " ".join(compare_document(tree).text().split())
 
 
 def test_gamma_by_calibrated_joules():
@@ -179,11 +178,11 @@ def test_every_figure_carries_its_kind(measured):
 
 
 def test_text_fits_a_terminal(estimated):
-    assert max(map(len, compare_text(estimated).splitlines())) <= 100
+    assert max(map(len, compare_document(estimated).text().splitlines())) <= 100
 
 
 def test_page_contains_its_plots(estimated):
-    page = compare_page(estimated)
+    page = document_page(compare_document(estimated), compare_plots(estimated))
     plots = re.findall(r"<svg.*?</svg>", page, re.S)
     assert len(plots) == 8
     for plot in plots:

@@ -4,7 +4,7 @@ import pytest
 from modt.config import WindowConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
-from modt.energy.meters.model import ModelMeter
+from modt.energy.meters.model import model_meter
 from modt.energy.windows import Clocks, Windows
 from modt.pipeline import STAGES
 from modt.reporting.comparison import COUNTS, ModeRun, RecordingClassifier, interleave, total
@@ -115,7 +115,7 @@ def test_meters_are_read_at_the_ends_of_turns():
         mode_run(
             name,
             [],
-            windows=Windows([ModelMeter(1.0, 2.0, tick, tick)], clocks, Conditions(), WindowConfig(min_s=1e9)),
+            windows=Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), WindowConfig(min_s=1e9)),
         )
         for name in "ab"
     ]

@@ -8,10 +8,19 @@ import yaml
 from modt import profile
 from modt.config import ProfileConfig
 from modt.errors import MisuseError
+from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
-from modt.reporting.run_page import run_page
 from modt.reporting.run_report import run_tree
-from modt.reporting.run_text import run_text
+from modt.reporting.run_view import run_document, run_plots
+
+
+def run_text(tree):
+    return run_document(tree).text()
+
+
+def run_page(tree):
+    return document_page(run_document(tree), run_plots(tree))
+
 
 KINDS = {"measured", "integrated", "estimated", "unavailable"}
 MS = 1_000_000
@@ -200,7 +209,7 @@ def test_every_figure_carries_its_kind(run):
 
 def test_text_has_results_first_and_fits_a_terminal(run):
     text = run_text(run_tree(run))
-    assert text.splitlines()[2].startswith("  300 mJ a frame, ")
+    assert text.splitlines()[2].startswith("  energy a frame: 300 mJ ")
     assert max(map(len, text.splitlines())) <= 100
     assert "In brackets: 95 %" in text
 

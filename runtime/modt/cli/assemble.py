@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import argparse
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from modt.config import OdometryConfig
@@ -33,6 +34,12 @@ class Request:
     labels: bool = False
     odometry: str = RECORDED
     poses: Path | None = None
+
+    @classmethod
+    def of(cls, arguments: argparse.Namespace) -> Request:
+        """The options that a command has; the defaults of the others."""
+        names = {field.name for field in fields(cls)}
+        return cls(**{name: value for name, value in vars(arguments).items() if name in names})
 
 
 def stream(request: Request) -> Stream:

@@ -6,7 +6,7 @@ import argparse
 import logging
 import sys
 from collections.abc import Sequence
-from typing import Any, Protocol
+from types import ModuleType
 
 from modt import __version__
 from modt.errors import ModtError
@@ -15,16 +15,11 @@ INTERRUPTED = 130
 """Exit status after Ctrl-C, as in shells: 128 + SIGINT."""
 
 
-class Command(Protocol):
-    """A module with a subcommand; it sets `run` to a function of the parsed arguments that returns the status."""
+def dispatch(name: str, description: str, commands: Sequence[ModuleType], argv: Sequence[str] | None) -> int:
+    """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted.
 
-    def add_parser(self, commands: Any, /) -> None:
-        """Declare the command and its options."""
-        ...
-
-
-def dispatch(name: str, description: str, commands: Sequence[Command], argv: Sequence[str] | None) -> int:
-    """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted."""
+    The add_parser of its module sets `run` to a function of the parsed arguments that returns the status.
+    """
     top = argparse.ArgumentParser(prog=name, description=description)
     top.add_argument("--version", action="version", version=f"modt {__version__}")
     choice = top.add_subparsers(dest="command", required=True, metavar="COMMAND")

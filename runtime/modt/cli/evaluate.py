@@ -14,17 +14,11 @@ DIGITS = 6
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("evaluate", help="judge recorded runs against labels")
-    p.add_argument(
-        "pairs",
-        nargs="+",
-        type=Path,
-        metavar="RUN TRUTH",
-        help="run directories (of replay --labels) and their labels",
-    )
+    pairs = "run directories (of replay --labels) and their labels"
+    p.add_argument("pairs", nargs="+", type=Path, metavar="RUN TRUTH", help=pairs)
     p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
-    p.add_argument(
-        "--classes", choices=("all", "paper"), default="all", help="KITTI's vans as cars (all), or ignored (paper)"
-    )
+    vans = "KITTI's vans as cars (all), or ignored (paper)"
+    p.add_argument("--classes", choices=("all", "paper"), default="all", help=vans)
     what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
     p.add_argument("--count", action="append", choices=IGNORABLE, default=[], metavar="WHAT", help=what)
     p.add_argument("--sector", type=float, metavar="DEG", help="half the labelled sector (KITTI: 40; cuboids: 180)")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import chain, islice
+from itertools import islice
 
 import numpy as np
 
@@ -12,8 +12,8 @@ from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
-from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
-from modt.reporting.repetitions import Repetition
+from modt.energy.meters.meter import Meter
+from modt.reporting.comparison import ModeRun, RecordingClassifier, Repetition, interleave
 from modt.types import Budget, Frame
 
 BASELINE = "conventional"
@@ -25,26 +25,13 @@ _LOADS = (0, 1, 2, 3, 5, 8, 12, 16, 20, 30, 45, 60)
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Parameters of a comparison.
-
-    Attributes:
-        request: stream, field of view, frames.
-        profile: of sensor and board.
-        core: the process is pinned to.
-        meter: name of the meter to read, None for the best.
-        turn: consecutive frames of one mode; None: 1, or all frames where a meter is read.
-    """
+    """Parameters of a comparison."""
 
     request: assemble.Request
     profile: ProfileConfig
     core: int | None
-    meter: str | None = None
-    turn: int | None = None
-
-    @property
-    def metered(self) -> bool:
-        """Whether a meter is read, rather than the model."""
-        return not metering.is_estimated(self.profile.energy, self.meter)
+    meters: tuple[Meter, ...]  # to read; none where energy follows from CPU time
+    turn: int | None  # consecutive frames of one mode, None for the default
 
     @property
     def turn_frames(self) -> int:
@@ -53,17 +40,16 @@ class Comparison:
         A meter needs a second or more of one mode; CPU time is compared frame by frame, which spreads other load of
         the machine evenly.
         """
-        return self.turn or (10**9 if self.metered else 1)
+        return self.turn or (10**9 if self.meters else 1)
 
     def repetition(self, seed: int) -> Repetition:
         """Every mode once through the stream, from its initial state."""
         runs = {name: self._mode_run(name, seed) for name in (*MODES, VARIED)}
-        frames = iter(assemble.stream(self.request))
-        first = list(islice(frames, 1))
-        for frame in first:
+        stream = assemble.stream(self.request)
+        for frame in islice(stream, 1):
             for mode_run in runs.values():
                 _warm_up(mode_run, frame)
-        interleave(chain(first, frames), [*runs.values()], self.turn_frames)
+        interleave(stream, [*runs.values()], self.turn_frames)
         return runs
 
     def _mode_run(self, name: str, seed: int) -> ModeRun:
@@ -72,13 +58,13 @@ class Comparison:
         fov = assemble.field_of_view(self.request, assemble.stream(self.request))
         pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
         recorder = RecordingClassifier(pipeline.classifier)
-        budget = mode.budget(self.profile)
+        budget, window = mode.budget(self.profile), self.profile.energy.windows
         return ModeRun(
             pipeline=replace(pipeline, classifier=recorder),
             ledger=ledger,
             recorder=recorder,
             budget=varied_load(seed) if name == VARIED else lambda _frame: budget,
-            windows=metering.windows(self.profile.energy, self.core, self.meter) if self.metered else None,
+            windows=metering.windows(self.meters, self.core, window) if self.meters else None,
         )
 
 

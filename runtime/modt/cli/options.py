@@ -15,20 +15,10 @@ Parser = argparse.ArgumentParser
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
     """Stream, frames, profile and core."""
     a, b = first_frames
-    p.add_argument(
-        "path",
-        nargs="?",
-        type=Path,
-        metavar="PATH",
-        help="KITTI drive, sequence or folder of .bin scans (default: a synthetic stream)",
-    )
-    p.add_argument(
-        "--frames",
-        type=frames,
-        default=first_frames,
-        metavar="A:B",
-        help=f"frames from A to B - 1 (default: {a}:{'' if b is None else b})",
-    )
+    which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
+    stream = "KITTI drive, sequence or folder of .bin scans (default: a synthetic stream)"
+    p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
+    p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
     p.add_argument("--profile", default=DEFAULT, metavar="NAME|FILE", help="sensor and board (default: %(default)s)")
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
 

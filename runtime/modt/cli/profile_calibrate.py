@@ -22,17 +22,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_meter_option(p)
     p.add_argument("--board", default="this board", metavar="NAME", help="name of the board in the profile")
     p.add_argument("--out", type=Path, default=Path("board.yaml"), metavar="FILE", help="default: %(default)s")
-    p.add_argument(
-        "--windows",
-        type=options.integer(12, 100_000, "a count"),
-        default=60,
-        metavar="N",
-        help="windows of varied load (default: %(default)s)",
-    )
+    count = options.integer(12, 100_000, "a count")
+    p.add_argument("--windows", type=count, default=60, metavar="N", help="of varied load (default: %(default)s)")
     p.add_argument("--window-s", type=seconds, default=2.0, metavar="S", help="length of each (default: %(default)g)")
-    p.add_argument(
-        "--burst-s", type=seconds, default=10.0, metavar="S", help="length of each burst (default: %(default)g)"
-    )
+    p.add_argument("--burst-s", type=seconds, default=10.0, metavar="S", help="of each burst (default: %(default)g)")
     p.set_defaults(run=run)
 
 
@@ -58,20 +51,16 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import writing
 
     loaded = profile.load(arguments.profile)
-    stream = assemble.stream(assemble.Request(path=arguments.path, frames=arguments.frames))
+    stream = assemble.stream(assemble.Request.of(arguments))
     scans = list(stream)
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
-    meter = metering.facts(loaded.energy, arguments.meter)
-    ledger, limits, explicit = Ledger(), loaded.classification, WindowConfig(min_s=1e9)
+    meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
+    meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch)
-    workload = Workload(
-        frames=scans,
-        segment=Segmenter(loaded.segmentation, loaded.sensor, FieldOfView()).segment,
-        classify=network.classify,
-        ledger=ledger,
-        windows=metering.windows(loaded.energy, pinned, arguments.meter, explicit),
-    )
+    segmenter = Segmenter(loaded.segmentation, loaded.sensor, FieldOfView())
+    windows = metering.windows(meters, pinned, WindowConfig(min_s=1e9))
+    workload = Workload(scans, segmenter.segment, network.classify, ledger, windows)
     try:
         found = workload.calibrate(arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))
     except FitError as error:

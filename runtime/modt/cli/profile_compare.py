@@ -21,9 +21,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_meter_option(p)
     options.add_report_options(p)
     p.add_argument("--repeat", type=count, default=3, metavar="K", help="repetitions (default: %(default)s)")
-    p.add_argument(
-        "--turn", type=count, metavar="N", help="consecutive frames of one mode (default: 1, with a meter all)"
-    )
+    turn = "consecutive frames of one mode (default: 1, with a meter all)"
+    p.add_argument("--turn", type=count, metavar="N", help=turn)
     p.set_defaults(run=run)
 
 
@@ -35,43 +34,41 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.cli import assemble, metering
     from modt.cli.mode_runs import MODES, VARIED, Comparison
     from modt.energy.conditions import Conditions
-    from modt.reporting.compare_page import compare_page
+    from modt.energy.meters.meter import Kind
     from modt.reporting.compare_report import Basis, compare_tree
-    from modt.reporting.compare_text import compare_text
-    from modt.reporting.page import save
+    from modt.reporting.compare_view import compare_document, compare_plots
+    from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
 
     loaded = profile.load(arguments.profile)
-    request = assemble.Request(
-        path=arguments.path, profile=arguments.profile, fov=arguments.fov, frames=arguments.frames
-    )
-    comparison = Comparison(request, loaded, pinned, arguments.meter, arguments.turn)
-    info, board = assemble.stream(request).info, loaded.energy
-    meter = metering.facts(board, arguments.meter)
+    request, board = assemble.Request.of(arguments), loaded.energy
+    meters = metering.discovery(board).choose(arguments.meter).meters
+    metered = meters[0].facts.kind is not Kind.ESTIMATED
+    comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
+    info = assemble.stream(request).info
     repetitions = []
     for number in range(arguments.repeat):
         if sys.stderr.isatty():
-            print(f"\rmodt-profile: {number + 1} of {arguments.repeat}", end="", file=sys.stderr, flush=True)
+            print(f"modt-profile: {number + 1} of {arguments.repeat}", file=sys.stderr)
         repetitions.append(comparison.repetition(number))
-    if sys.stderr.isatty():
-        print(file=sys.stderr)
     frames = len(repetitions[0][VARIED].lines)
     if not frames:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
-    basis = Basis(board, meter, info.period_s)
+    basis = Basis(board, meters[0].facts, info.period_s)
     about: dict[str, Any] = {
         "stream": info.name,
         "frames": frames,
         "fov": request.fov,
         "repeat": arguments.repeat,
         "turn": min(comparison.turn_frames, frames),
-        "basis": "as run" if comparison.metered else f"at {1 / info.period_s:.0f} Hz",
+        "basis": "as run" if metered else f"at {1 / info.period_s:.0f} Hz",
         "board": board.board,
         "conditions": {**Conditions(pinned or 0).read(), "core": pinned},
         "host": host.description(),
     }
     tree = compare_tree(repetitions, MODES, VARIED, basis, about)
+    document = compare_document(tree)
     if arguments.html is not None:
-        save(arguments.html, compare_page(tree))
-    print(json.dumps(to_json(tree), indent=2) if arguments.json else compare_text(tree))
+        save(arguments.html, document_page(document, compare_plots(tree)))
+    print(json.dumps(to_json(tree), indent=2) if arguments.json else document.text())
     return 0

@@ -8,9 +8,8 @@ from typing import Any
 
 from modt import profile
 from modt.cli import metering
-from modt.energy.meters.candidate import Candidate
 from modt.energy.meters.discovery import Discovery
-from modt.energy.meters.meter import Kind, Measurand, MeterLostError
+from modt.energy.meters.meter import Candidate, Kind, Measurand, MeterLostError
 
 SCHEMA = "modt.meters/1"
 
@@ -25,8 +24,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """List the meters."""
-    found = metering.meters(profile.load(arguments.profile).energy)
-    print(json.dumps(_tree(found), indent=2) if arguments.json else text(found))
+    found = metering.discovery(profile.load(arguments.profile).energy)
+    tree = {"schema": SCHEMA, "meters": [_entry(c, used=c is found.best) for c in found.candidates]}
+    print(json.dumps(tree, indent=2) if arguments.json else text(found))
     return 0
 
 
@@ -51,10 +51,6 @@ def text(found: Discovery) -> str:
             f"{facts.resolution:g} {unit}{wrap}; privilege: {facts.privilege}",
         ]
     return "\n".join(lines)
-
-
-def _tree(found: Discovery) -> dict[str, Any]:
-    return {"schema": SCHEMA, "meters": [_entry(c, used=c is found.best) for c in found.candidates]}
 
 
 def _entry(candidate: Candidate, *, used: bool) -> dict[str, Any]:

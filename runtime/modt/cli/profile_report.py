@@ -19,14 +19,14 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Report."""
-    from modt.reporting.page import save
+    from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
-    from modt.reporting.run_page import run_page
     from modt.reporting.run_report import run_tree
-    from modt.reporting.run_text import run_text
+    from modt.reporting.run_view import run_document, run_plots
 
     tree = run_tree(arguments.run_directory)
+    document = run_document(tree)
     if arguments.html is not None:
-        save(arguments.html, run_page(tree))
-    print(json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else run_text(tree))
+        save(arguments.html, document_page(document, run_plots(tree)))
+    print(json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else document.text())
     return 0

@@ -21,17 +21,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_fov_option(p)
     p.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/STREAM-MODE)")
     p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
-    p.add_argument("--rate", type=rate, default=None, metavar="HZ|max", help="frames a second (default: max)")
+    p.add_argument("--rate", type=rate, dest="rate_hz", metavar="HZ|max", help="frames a second (default: max)")
     motion = p.add_mutually_exclusive_group()
-    motion.add_argument(
-        "--poses", type=Path, metavar="FILE", help="poses in KITTI odometry's format, instead of the recorded ones"
-    )
-    motion.add_argument(
-        "--odometry",
-        default="recording",
-        metavar="SOURCE",
-        help="poses: recording (the stream's, default), none, or from a socket: udp://HOST:PORT, unix:///PATH",
-    )
+    file = "poses in KITTI odometry's format, instead of the recorded ones"
+    motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
+    source = "poses: recording (the stream's, default), none, or from a socket: udp://HOST:PORT, unix:///PATH"
+    motion.add_argument("--odometry", default="recording", metavar="SOURCE", help=source)
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     p.set_defaults(run=run)
@@ -52,19 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.reporting.summary_text import summary_text
     from modt.supervisor import supervisor_of
 
-    request = Request(
-        path=arguments.path,
-        mode=arguments.mode,
-        profile=arguments.profile,
-        fov=arguments.fov,
-        frames=arguments.frames,
-        rate_hz=arguments.rate,
-        labels=arguments.labels,
-        odometry=arguments.odometry,
-        poses=arguments.poses,
-    )
     supervisor = supervisor_of(os.environ)
-    session = Session(request, arguments.out, pinned, command=["modt", *sys.argv[1:]])
+    session = Session(Request.of(arguments), arguments.out, pinned, command=["modt", *sys.argv[1:]])
     show = not arguments.quiet
     if show:
         for note in session.notes:

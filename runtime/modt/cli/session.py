@@ -22,18 +22,9 @@ from modt.sources.pose_source import PosedStream
 from modt.supervisor import Supervisor
 from modt.types import FrameResult, Proposals
 
-_MAX_HELPER_SHARE = 0.01
-"""CPU time of other threads over that of the loop, up to which the process counts as single-threaded."""
-
 
 class Session:
-    """A replay and its run directory.
-
-    Args:
-        request: options of the replay.
-        out: the run directory, None for one named after stream and mode.
-        core: to which the process is pinned, None for any.
-        command: the command line.
+    """A replay and its run directory, by default named after stream and mode.
 
     Raises:
         MisuseError: an invalid request.
@@ -67,7 +58,8 @@ class Session:
         summary = Summary()
         ledger_lines = self.directory.ledger()
         sinks = self._sinks()
-        windows = metering.windows(self.profile.energy, self.core)
+        energy = self.profile.energy
+        windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
             summary.add_result(result)
@@ -82,11 +74,8 @@ class Session:
         budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
         with ExitStack() as stack:
-            stack.callback(self.odometry.close)
-            stack.callback(ledger_lines.close)
-            for sink in sinks:
-                stack.callback(sink.close)
-            stack.callback(supervisor.close)
+            for part in (self.odometry, ledger_lines, *sinks, supervisor):
+                stack.callback(part.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
             ledger_lines.write(windows.close())
@@ -131,9 +120,7 @@ class Session:
 
     def _environment(self, frames: int, elapsed_s: float) -> dict[str, Any]:
         """Timing, pose source, host and faults of the run."""
-        threads, faults = host.thread_report(), self.stream.faults
-        single_threaded = threads.others_cpu_s <= _MAX_HELPER_SHARE * threads.main_cpu_s
-        one_core = self.core is not None and threads.cores == (self.core,) and single_threaded
+        faults = self.stream.faults
         return {
             "run": {
                 "stream": self.stream.info.name,
@@ -146,13 +133,7 @@ class Session:
                 **self.pace.report(),
             },
             "odometry": self.odometry.report(),
-            "host": {
-                "core": self.core,
-                "one_core_verified": one_core,
-                "threads": threads.threads,
-                "other_threads_cpu_s": threads.others_cpu_s,
-                "peak_rss_mb": host.peak_rss_mb(),
-            },
+            "host": host.usage(self.core),
             "faults": {
                 "count": faults.count,
                 "skipped": faults.skipped,

@@ -21,23 +21,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("detections", type=Path, metavar="DETECTIONS", help="file of a sequence, or a folder of files")
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the KITTI tracking results")
     motion = p.add_mutually_exclusive_group()
-    motion.add_argument(
-        "--poses", type=Path, metavar="FILE", help="camera poses in KITTI odometry's format, or a folder"
-    )
+    file = "camera poses in KITTI odometry's format, or a folder"
+    motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
     motion.add_argument("--oxts", type=Path, metavar="DIR", help="OXTS records, KITTI tracking; calib/ beside it")
-    p.add_argument(
-        "--period",
-        type=options.real(0.001, 10, "seconds"),
-        default=0.1,
-        metavar="S",
-        help="time between frames (default: %(default)g)",
-    )
-    p.add_argument(
-        "--sure",
-        type=options.real(-1000, 1000, "a confidence"),
-        metavar="CONFIDENCE",
-        help="minimum of the tracks written (default: by type, for PointRCNN)",
-    )
+    seconds, confidence = options.real(0.001, 10, "seconds"), options.real(-1000, 1000, "a confidence")
+    least = "minimum of the tracks written (default: by type, for PointRCNN)"
+    p.add_argument("--period", type=seconds, default=0.1, metavar="S", help="of the frames (default: %(default)g)")
+    p.add_argument("--sure", type=confidence, metavar="CONFIDENCE", help=least)
     p.add_argument("--quiet", action="store_true", help="no summary")
     p.set_defaults(run=run)
 
@@ -81,11 +71,8 @@ def follow(
 ) -> tuple[str, int]:
     """KITTI tracking results of a sequence, and the number of its tracks.
 
-    Args:
-        detections: of the sequence.
-        poses: (n, 4, 4) T_world_camera of its frames, None without ego-motion.
-        period_s: time between frames.
-        sure: minimum confidence of the tracks written, None for that of the type.
+    The (n, 4, 4) poses are T_world_camera, None without ego-motion; the minimum confidence of the tracks written is
+    that of the type where none is given.
     """
     from dataclasses import replace
 

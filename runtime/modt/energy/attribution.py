@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy import stats
 
+from modt.energy.ledger import Line
 from modt.types import Float64
 
 _REJECTED_MARKS = frozenset({"suspended", "clock", "lost", "back", "reset", "implausible", "ambiguous"})
@@ -20,24 +20,15 @@ _MAX_CONDITION = 1e6
 _TAILS = (0.025, 0.975)
 """Quantiles of the intervals at 95 %."""
 
-Line = dict[str, Any]
-
 
 @dataclass(frozen=True, slots=True)
 class Regressor:
-    """One count of a window.
+    """One count of a window: an entry of a stage, or of the whole window where the stage is empty."""
 
-    Attributes:
-        name: of its coefficient, with the unit.
-        stage: whose count it is; empty for the whole window.
-        key: of the stage's or the window's entry.
-        scale: of the count, so that the coefficient has its unit.
-    """
-
-    name: str
+    name: str  # of its coefficient, with the unit
     stage: str
     key: str
-    scale: float = 1.0
+    scale: float = 1.0  # of the count, so that the coefficient has its unit
 
     def count(self, line: Line) -> float:
         """Count of one window."""
@@ -64,23 +55,14 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """Result of a fit.
+    """Result of a fit."""
 
-    Attributes:
-        coefficients: one a regressor, in their order.
-        windows: number used.
-        dropped: number left out, without a reading or with a rejected mark.
-        residual_J: standard deviation of the residual [J a window].
-        explained: share of the variance explained, at most 1.
-        condition: condition number of the scaled regressors.
-    """
-
-    coefficients: tuple[Coefficient, ...]
-    windows: int
-    dropped: int
-    residual_J: float
-    explained: float
-    condition: float
+    coefficients: tuple[Coefficient, ...]  # in the order of the regressors
+    windows: int  # used
+    dropped: int  # without a reading or with a rejected mark
+    residual_J: float  # standard deviation, a window
+    explained: float  # share of the variance, at most 1
+    condition: float  # number of the scaled regressors
 
     def __getitem__(self, name: str) -> Coefficient:
         return next(c for c in self.coefficients if c.name == name)
@@ -92,9 +74,8 @@ class FitError(Exception):
 
 def usable_windows(lines: Iterable[Line]) -> list[Line]:
     """Windows with a reading and without a rejected mark."""
-    return [
-        line for line in lines if line["energy_J"] is not None and not _REJECTED_MARKS.intersection(line["marks"])
-    ]
+    known = (line for line in lines if line["energy_J"] is not None)
+    return [line for line in known if _REJECTED_MARKS.isdisjoint(line["marks"])]
 
 
 def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 1000) -> Fit:
@@ -148,21 +129,9 @@ def _bootstrap(X: Float64, y: Float64, random: np.random.Generator, resamples: i
 
 
 def unit_energy_J(lines: Sequence[Line], idle_W: float, work: Regressor) -> float | None:
-    """Energy of one unit of work, from windows of that work alone: a cross-check of the fit.
-
-    Args:
-        lines: windows of one stage.
-        idle_W: idle power, subtracted [W].
-        work: the unit.
-
-    Returns:
-        Median over the windows of (energy - idle) / count [J]; None without a usable window.
-    """
-    each = [
-        (line["energy_J"] - idle_W * IDLE.count(line)) / work.count(line)
-        for line in usable_windows(lines)
-        if work.count(line) > 0
-    ]
+    """Median of (energy - idle) / count over windows of that work alone; None without a usable window."""
+    worked = [line for line in usable_windows(lines) if work.count(line) > 0]
+    each = [(line["energy_J"] - idle_W * IDLE.count(line)) / work.count(line) for line in worked]
     return float(np.median(each)) if each else None
 
 
@@ -181,12 +150,7 @@ def split_by_coefficients(line: Line, values: dict[str, float]) -> dict[str, flo
 
 
 def split_by_cpu_time(line: Line, idle_W: float) -> dict[str, float]:
-    """Energy of idling and of each stage of a window by CPU time, under the assumption of equal power in all [J].
-
-    Args:
-        line: the window.
-        idle_W: power within the meter's scope while this process waits [W].
-    """
+    """Energy of idling and of each stage of a window by CPU time, under the assumption of equal power in all [J]."""
     energy_J = line["energy_J"]
     if energy_J is None:
         return {}

@@ -10,12 +10,7 @@ from modt.energy.meters.meter import number_or_none, text_or_none
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """Clock policy, frequency and temperature of a core.
-
-    Attributes:
-        core: number of the core.
-        sys: mount point of sysfs.
-    """
+    """Clock policy, frequency and temperature of a core, by the sysfs mounted at a path."""
 
     core: int = 0
     sys: Path = Path("/sys")

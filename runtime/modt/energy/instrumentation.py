@@ -23,14 +23,7 @@ class Classifier(Protocol):
 
 
 class CountingClassifier:
-    """Adds the points processed by the network, padding included, to the ledger's classification entry.
-
-    Args:
-        classifier: the classifier it wraps.
-        ledger: the ledger.
-        max_points: points of a proposal passed to the network at most.
-        batch: proposals of one network call; they are sorted by size and padded to the largest of them.
-    """
+    """Adds the points processed by the network, padding included, to the ledger's classification entry."""
 
     def __init__(self, classifier: Classifier, ledger: StageLedger, max_points: int, batch: int) -> None:
         self._classifier, self._ledger = classifier, ledger
@@ -39,19 +32,15 @@ class CountingClassifier:
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) P(Y|X) of the R proposals given by index, in their order."""
-        self._ledger.count(
-            "classification", points=padded_points(proposals.count[which], self._max_points, self._batch)
-        )
+        points_processed = padded_points(proposals.count[which], self._max_points, self._batch)
+        self._ledger.count("classification", points=points_processed)
         return self._classifier.classify(points, proposals, which)
 
 
 def padded_points(count: Int, max_points: int, batch: int) -> int:
     """Points processed by the network, padding included, for R proposals of (R,) count points.
 
-    Args:
-        count: points of each proposal.
-        max_points: points of a proposal passed to the network at most.
-        batch: proposals of one network call.
+    A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them.
     """
     size = np.sort(np.minimum(count, max_points))
     ends = np.minimum(np.arange(batch, len(size) + batch, batch), len(size))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any, ParamSpec, Protocol, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 SCHEMA = "modt.ledger/1"
 STAGES = ("source", "segmentation", "odometry", "tracking", "scheduling", "classification", "fusion", "sink")
@@ -18,32 +18,12 @@ Line = dict[str, Any]
 P = ParamSpec("P")
 R = TypeVar("R")
 
+_COLUMNS = ("calls", "items", "points", "wall_ns", "cpu_ns")
 _CALLS, _ITEMS, _POINTS, _WALL, _CPU = range(5)
 
 
-class StageLedger(Protocol):
-    """The interface that the pipeline uses."""
-
-    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Result of function(*args), timed as a span of the stage."""
-        ...
-
-    def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
-        """Add work to the stage beyond the length of its result."""
-        ...
-
-    def close_frame(self, index: int) -> Line:
-        """Line of the frame; the next frame begins."""
-        ...
-
-
 class Ledger:
-    """Records wall time, CPU time of this thread, calls, items and points of every stage.
-
-    Args:
-        wall_ns: monotonic clock [ns].
-        cpu_ns: CPU time of the calling thread [ns].
-    """
+    """Records wall time, CPU time of this thread, calls, items and points of every stage."""
 
     def __init__(self, wall_ns: Clock = time.perf_counter_ns, cpu_ns: Clock = time.thread_time_ns) -> None:
         self._wall_ns, self._cpu_ns = wall_ns, cpu_ns
@@ -86,16 +66,11 @@ class Ledger:
         self._wall0, self._cpu0 = wall, cpu
         rows, self._stages = self._stages, {}
         marks: list[str] = []
-        calls = spans = 0
-        stages: dict[str, dict[str, int]] = {}
-        for stage, row in rows.items():
+        for row in rows.values():
             if row[_WALL] < 0 or row[_CPU] < 0:
                 marks = ["clock"]
                 row[_WALL], row[_CPU] = max(row[_WALL], 0), max(row[_CPU], 0)
-            n, items, points, stage_wall, stage_cpu = row
-            calls += n
-            spans += stage_wall
-            stages[stage] = {"calls": n, "items": items, "points": points, "wall_ns": stage_wall, "cpu_ns": stage_cpu}
+        calls, spans = (sum(row[k] for row in rows.values()) for k in (_CALLS, _WALL))
         if frame_wall < spans or frame_cpu < 0:
             marks = ["clock"]
             frame_wall, frame_cpu = max(frame_wall, spans), max(frame_cpu, 0)
@@ -103,7 +78,7 @@ class Ledger:
         return {
             "schema": SCHEMA,
             "frame": index,
-            "stages": stages,
+            "stages": {stage: dict(zip(_COLUMNS, row, strict=True)) for stage, row in rows.items()},
             "wall_ns": frame_wall,
             "cpu_ns": frame_cpu,
             "overhead_ns": overhead,
@@ -144,6 +119,9 @@ class NullLedger:
     def close_frame(self, index: int) -> Line:
         """Line without stages."""
         return {"schema": SCHEMA, "frame": index, "stages": {}}
+
+
+StageLedger = Ledger | NullLedger
 
 
 def _nothing() -> None:

@@ -12,32 +12,21 @@ from dataclasses import dataclass
 class EnergyModel:
     """Equations 2 and 3 by their four parameters; the others, neutral by default, are costs that they leave out.
 
-    Attributes:
-        e_seg: E(seg), of one segmentation.
-        e_class: E(class), of one classification by tracking-by-detection.
-        n: N_obj + N_bg, proposals a frame.
-        n_go: N_go, mean life of a track in frames.
-        classified_share: share of the tracks classified at least once.
-        repeats: further classifications a track, without those after a loss.
-        reacquired: further classifications a track after it was lost.
-        view_cost_ratio: E(class) of the views selected over e_class.
-        track: tracking common to both runs, a frame.
-        extra_track1, extra_track2: tracking beyond that, a frame, of tracking-by-detection and of the pipeline.
-        schedule1, schedule2: scheduling and fusion a frame, of tracking-by-detection and of the pipeline.
+    In names, 1 is tracking-by-detection and 2 the proposed pipeline.
     """
 
-    e_seg: float
-    e_class: float
-    n: float
-    n_go: float
-    classified_share: float = 1.0
-    repeats: float = 0.0
-    reacquired: float = 0.0
-    view_cost_ratio: float = 1.0
-    track: float = 0.0
-    extra_track1: float = 0.0
+    e_seg: float  # E(seg), of one segmentation
+    e_class: float  # E(class), of one classification by tracking-by-detection
+    n: float  # N_obj + N_bg, proposals a frame
+    n_go: float  # N_go, mean life of a track in frames
+    classified_share: float = 1.0  # of the tracks, at least once
+    repeats: float = 0.0  # further classifications a track, without those after a loss
+    reacquired: float = 0.0  # further classifications a track after it was lost
+    view_cost_ratio: float = 1.0  # E(class) of the views selected over e_class
+    track: float = 0.0  # common to both runs, a frame
+    extra_track1: float = 0.0  # beyond that
     extra_track2: float = 0.0
-    schedule1: float = 0.0
+    schedule1: float = 0.0  # scheduling and fusion, a frame
     schedule2: float = 0.0
 
     @property

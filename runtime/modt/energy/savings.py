@@ -15,29 +15,17 @@ from modt.energy.prediction import EnergyModel
 
 @dataclass(frozen=True, slots=True)
 class Counts:
-    """The work of one run.
+    """The work of one run."""
 
-    Attributes:
-        frames: M.
-        proposals: over all frames.
-        foreground: proposals of a track whose class is an object's.
-        tracks: created.
-        classified_tracks: tracks classified at least once.
-        classified: proposals classified.
-        reacquired: classifications of a track that was lost in the frame before and classified earlier.
-        points: processed by the network.
-        calls: of the classifier.
-    """
-
-    frames: int
+    frames: int  # M
     proposals: int
-    foreground: int
+    foreground: int  # proposals of a track whose class is an object's
     tracks: int
-    classified_tracks: int
-    classified: int
-    reacquired: int
-    points: int
-    calls: int
+    classified_tracks: int  # at least once
+    classified: int  # proposals
+    reacquired: int  # classifications of a track that was lost in the frame before and classified earlier
+    points: int  # processed by the network
+    calls: int  # of the classifier
 
     @property
     def n(self) -> float:
@@ -62,18 +50,12 @@ class Counts:
 
 @dataclass(frozen=True, slots=True)
 class UnitCosts:
-    """Energy of units of work, all in joules or all in CPU seconds.
+    """Energy of units of work, all in joules or all in CPU seconds."""
 
-    Attributes:
-        seg: E(seg), a frame.
-        track: odometry and tracking of a frame, as in tracking-by-detection.
-        class_call, class_item, class_point: of a call of the classifier, of a proposal in it, and of a point of it.
-    """
-
-    seg: float
-    track: float
+    seg: float  # E(seg), a frame
+    track: float  # odometry and tracking of a frame, as in tracking-by-detection
     class_call: float
-    class_item: float
+    class_item: float  # of a proposal in a call
     class_point: float
 
     def classification(self, counts: Counts) -> float:
@@ -87,15 +69,10 @@ class UnitCosts:
 
 @dataclass(frozen=True, slots=True)
 class OtherCosts:
-    """Mean energy a frame of the stages that Equation 2 leaves out, in the unit of UnitCosts.
+    """Mean energy a frame of the stages that Equation 2 leaves out, in the unit of UnitCosts."""
 
-    Attributes:
-        track: odometry and tracking.
-        schedule: scheduling and fusion.
-    """
-
-    track: float
-    schedule: float
+    track: float  # odometry and tracking
+    schedule: float  # scheduling and fusion
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,17 +86,11 @@ class GammaTerm:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """Gamma predicted for a pair of runs.
+    """Gamma predicted for a pair of runs."""
 
-    Attributes:
-        model: with all costs.
-        paper: Equation 3, at the same a, n and N_go.
-        terms: from gamma = N_go to the gamma of the model; their changes sum to the difference.
-    """
-
-    model: EnergyModel
-    paper: EnergyModel
-    terms: tuple[GammaTerm, ...]
+    model: EnergyModel  # with all costs
+    paper: EnergyModel  # Equation 3, at the same a, n and N_go
+    terms: tuple[GammaTerm, ...]  # from gamma = N_go to the gamma of the model; their changes sum to the difference
 
     def explain(self, measured: float) -> tuple[GammaTerm, ...]:
         """The terms, and the remainder up to the measured ratio."""
@@ -128,14 +99,9 @@ class Prediction:
 
 
 def predict(baseline: Counts, run: Counts, costs: UnitCosts, other1: OtherCosts, other2: OtherCosts) -> Prediction:
-    """Gamma of a run over tracking-by-detection, from the counts of both and unit costs.
+    """Gamma of a run over tracking-by-detection on the same stream, from the counts of both and unit costs.
 
-    Args:
-        baseline: tracking-by-detection on the same stream.
-        run: the proposed pipeline.
-        costs: measured on neither of the two.
-        other1: further costs of the baseline.
-        other2: further costs of the run.
+    The unit costs are measured on neither of the two; other1 are further costs of the baseline, other2 of the run.
     """
     tracks = run.tracks or 1
     e_class = costs.e_class(baseline)

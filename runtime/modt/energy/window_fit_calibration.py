@@ -6,66 +6,41 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import cycle
-from typing import Any
 
 import numpy as np
 
 from modt.energy.attribution import CLASS, IDLE, SEG, Fit, fit, unit_energy_J, usable_windows
-from modt.energy.ledger import Ledger
+from modt.energy.ledger import Ledger, Line
 from modt.energy.windows import Windows
 from modt.types import Float32, Float64, Frame, Int, Proposals
 
 _BURSTS = 5
 """Bursts of each stage; the median counts."""
 
-Line = dict[str, Any]
-
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Result of a calibration.
-
-    Attributes:
-        fit: coefficients with intervals.
-        seg_burst_J: energy of one segmentation, from bursts of segmentation.
-        class_burst_J: energy of one classification of mean points, from bursts of classification.
-        class_fit_J: the same by the fit.
-        busy_W: power while computing: idle power plus energy above idling over CPU time.
-    """
+    """Result of a calibration."""
 
     fit: Fit
-    seg_burst_J: float | None
-    class_burst_J: float | None
-    class_fit_J: float
-    busy_W: float
+    seg_burst_J: float | None  # of one segmentation, from bursts of segmentation
+    class_burst_J: float | None  # of one classification of mean points, from bursts of classification
+    class_fit_J: float  # the same by the fit
+    busy_W: float  # idle power plus energy above idling over CPU time
 
 
 @dataclass(frozen=True, slots=True)
 class Workload:
-    """The work that a calibration varies.
-
-    Attributes:
-        frames: processed repeatedly.
-        segment: (N, 4) points to proposals.
-        classify: points, proposals and (R,) indices to (R, 4) P(Y|X); it counts its points on the ledger.
-        ledger: of both.
-        windows: over the meters, closed explicitly.
-    """
+    """The work that a calibration varies."""
 
     frames: Sequence[Frame]
     segment: Callable[[Float32], Proposals]
-    classify: Callable[[Float32, Proposals, Int], Float64]
+    classify: Callable[[Float32, Proposals, Int], Float64]  # counts its points on the ledger
     ledger: Ledger
-    windows: Windows
+    windows: Windows  # closed explicitly
 
     def calibrate(self, windows: int, window_s: float, burst_s: float, random: np.random.Generator) -> Calibration:
-        """Run the varied load, fit it, and run the bursts.
-
-        Args:
-            windows: number of varied load.
-            window_s: length of each [s].
-            burst_s: length of each burst [s].
-            random: draws the loads.
+        """Run the windows of varied load, fit them, and run the bursts.
 
         Raises:
             FitError: the windows do not determine the coefficients.

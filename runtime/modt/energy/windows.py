@@ -3,34 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from modt.config import WindowConfig
 from modt.energy.conditions import Conditions
+from modt.energy.ledger import Clock, Line
 from modt.energy.meters.meter import Kind, Measurand, Meter, MeterLostError
 
 SCHEMA = "modt.energy/1"
 
-Line = dict[str, Any]
-
 
 @dataclass(frozen=True, slots=True)
 class Clocks:
-    """The clocks of a machine [ns].
+    """The clocks of a machine."""
 
-    Attributes:
-        monotonic_ns: stops while the machine is suspended.
-        boot_ns: includes suspended time.
-        calendar_ns: may be set.
-        process_ns: CPU time of all threads of this process.
-    """
-
-    monotonic_ns: Callable[[], int] = time.monotonic_ns
-    boot_ns: Callable[[], int] = lambda: time.clock_gettime_ns(time.CLOCK_BOOTTIME)
-    calendar_ns: Callable[[], int] = time.time_ns
-    process_ns: Callable[[], int] = time.process_time_ns
+    monotonic_ns: Clock = time.monotonic_ns  # stops while the machine is suspended
+    boot_ns: Clock = lambda: time.clock_gettime_ns(time.CLOCK_BOOTTIME)  # includes suspended time
+    calendar_ns: Clock = time.time_ns  # may be set
+    process_ns: Clock = time.process_time_ns  # CPU time of all threads
 
 
 class EnergyAccumulator:
@@ -82,14 +74,7 @@ class EnergyAccumulator:
 
 
 class Windows:
-    """Sums the lines of the ledger, and closes a window over them when enough time has passed.
-
-    Args:
-        meters: to be summed; their scopes do not overlap.
-        clocks: of this machine.
-        conditions: governor, frequency, temperature.
-        config: length of a window and tolerances of the clocks.
-    """
+    """Sums the lines of the ledger, and closes a window over them when enough time has passed."""
 
     def __init__(self, meters: Sequence[Meter], clocks: Clocks, conditions: Conditions, config: WindowConfig) -> None:
         self._accumulators = [EnergyAccumulator(meter) for meter in meters]

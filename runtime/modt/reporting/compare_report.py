@@ -13,19 +13,18 @@ from modt.energy.attribution import usable_windows
 from modt.energy.meters.meter import Facts, Kind
 from modt.energy.savings import OtherCosts, UnitCosts, predict
 from modt.pipeline import STAGES
-from modt.reporting.comparison import COUNTS, total
+from modt.reporting.comparison import COUNTS, Repetition, total
 from modt.reporting.gamma import (
     RunCosts,
     Saving,
     interval,
-    mean_interval,
+    mean,
     other_costs,
     prediction_tree,
     saving,
     unit_costs,
 )
 from modt.reporting.quantity import Quantity, estimate, quantity
-from modt.reporting.repetitions import Repetition, concatenated_run, median_run, windows_of
 from modt.types import Float64
 
 SCHEMA = "modt.compare/1"
@@ -35,7 +34,7 @@ _PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
 
 @dataclass(frozen=True, slots=True)
 class Basis:
-    """The conversion of CPU time to energy: powers and calibration of the board, meter, period of the stream."""
+    """The conversion of CPU time to energy."""
 
     board: EnergyConfig
     meter: Facts
@@ -45,36 +44,32 @@ class Basis:
 def compare_tree(
     repetitions: Sequence[Repetition], modes: Sequence[str], varied: str, basis: Basis, about: dict[str, Any]
 ) -> dict[str, Any]:
-    """Results of a comparison.
+    """Results of a comparison over repetitions of the same stream.
 
-    Args:
-        repetitions: of the same stream.
-        modes: compared, tracking-by-detection first.
-        varied: name of the run that gives the unit costs.
-        basis: conversion to joules.
-        about: stream, frames, conditions; copied to the tree.
+    The first of the modes is tracking-by-detection; the varied run gives the unit costs. What the comparison is about
+    (stream, frames, conditions) is copied to the tree.
     """
     random = np.random.default_rng(0)
-    runs = {mode: median_run(repetitions, mode) for mode in modes}
-    varied_run = concatenated_run(repetitions, varied)
+    passes = {name: [repetition[name] for repetition in repetitions] for name in (*modes, varied)}
+    runs = {mode: RunCosts.median(passes[mode]) for mode in modes}
+    windows = {mode: [line for run in passes[mode] for line in run.energy_lines] for mode in modes}
+    varied_run = RunCosts.concatenated(passes[varied])
     baseline = runs[modes[0]]
-    energy = {mode: _energy(run, windows_of(repetitions, mode), basis, random) for mode, run in runs.items()}
+    energy = {mode: _energy(run, windows[mode], basis, random) for mode, run in runs.items()}
     savings = {
         mode: _saving(saving(baseline, runs[mode], varied_run, random), energy[modes[0]], energy[mode])
         | {"gamma_calibrated": estimate(_calibrated(baseline, runs[mode], basis))}
         for mode in modes[1:]
     }
-    meter = {"name": basis.meter.name, "kind": basis.meter.kind.value} | {
-        key: getattr(basis.board, key) for key in ("idle_W", "busy_W")
-    }
+    meter, board = basis.meter, basis.board
     metered = all(e["net_J"].kind is not Kind.ESTIMATED for e in energy.values())
     return {
         "schema": SCHEMA,
         **about,
-        "meter": meter,
+        "meter": {"name": meter.name, "kind": meter.kind.value, "idle_W": board.idle_W, "busy_W": board.busy_W},
         "test": _PHYSICS if metered else _COUNTING,
         "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
-        "unit_costs": _costs(unit_costs(varied_run), baseline, basis.board.active_W),
+        "unit_costs": _costs(unit_costs(varied_run), baseline, board.active_W),
         "savings": savings,
         "series_kind": Kind.MEASURED.value,
         "series": {mode: _series(runs[mode], repetitions[0][mode].lives) for mode in modes},
@@ -96,19 +91,14 @@ def _energy(
             return quantity(float(energy_J.sum() / frames.sum()), "J", Kind(good[0]["kind"]), bounds)
 
         return {"net_J": per_frame(net_J), "gross_J": per_frame(gross_J)}
-    cpu_s = run.cost.sum(axis=1)
-    idle_J = basis.board.idle_W * basis.period_s
-    mean, low, high = (basis.board.active_W * s for s in (float(cpu_s.mean()), *mean_interval(cpu_s, random)))
-    return {
-        "net_J": estimate(mean, "J", (low, high)),
-        "gross_J": estimate(idle_J + mean, "J", (idle_J + low, idle_J + high)),
-    }
+    net_J = basis.board.active_W * run.cost.sum(axis=1)
+    gross_J = net_J + basis.board.idle_W * basis.period_s
+    return {key: mean(J, "J", Kind.ESTIMATED, random) for key, J in (("net_J", net_J), ("gross_J", gross_J))}
 
 
 def _work(run: RunCosts, net_J: Quantity, random: np.random.Generator) -> dict[str, Any]:
     def cpu_ms(cpu_s: Float64) -> Quantity:
-        low, high = mean_interval(cpu_s, random)
-        return quantity(1e3 * float(cpu_s.mean()), "ms", Kind.MEASURED, (1e3 * low, 1e3 * high))
+        return mean(1e3 * cpu_s, "ms", Kind.MEASURED, random)
 
     counts, total_s = total(run.counts), float(run.cost.sum(axis=1).mean())
     share = None if net_J.value is None or not total_s else net_J.value / total_s
@@ -135,15 +125,15 @@ def _saving(found: Saving, energy1: dict[str, Quantity], energy2: dict[str, Quan
     net, gross = ((energy1[key].value, energy2[key].value) for key in ("net_J", "gross_J"))
     gamma_net, gamma_gross = (a / b if a is not None and b else None for a, b in (net, gross))
     saved_J = None if net[0] is None or net[1] is None else net[0] - net[1]
-    kind = energy1["net_J"].kind
-    return prediction_tree(found.prediction, found.measured) | {
-        "short_form_error": estimate(found.prediction.paper.short_form_error),
-        "gamma_predicted": estimate(found.predicted, "", found.predicted_interval),
-        "gamma_measured_cpu": quantity(found.measured, "", Kind.MEASURED, found.measured_interval),
+    kind, prediction = energy1["net_J"].kind, found.prediction
+    return prediction_tree(prediction, found.measured.value) | {
+        "short_form_error": estimate(prediction.paper.short_form_error),
+        "gamma_predicted": found.predicted,
+        "gamma_measured_cpu": found.measured,
         "gamma_net": quantity(gamma_net, "", kind),
         "gamma_gross": quantity(gamma_gross, "", energy1["gross_J"].kind),
-        "deviation_net": estimate(found.predicted / gamma_net - 1.0 if gamma_net else None),
-        "deviation": estimate(found.deviation, "", found.deviation_interval),
+        "deviation_net": estimate(prediction.model.gamma / gamma_net - 1.0 if gamma_net else None),
+        "deviation": found.deviation,
         "saved_J": quantity(saved_J, "J", kind),
     }
 

@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.energy.ledger import Ledger
+from modt.energy.ledger import Ledger, Line
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
 from modt.types import NONE, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
 
-COUNTS = ("proposals", "foreground", "tracks", "classified_tracks", "classified", "reacquired", "points", "calls")
-"""Columns of a run's counts, as in energy.savings.Counts."""
+COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
+"""Columns of a run's counts."""
 
 
 class RecordingClassifier:
-    """A classifier that records the proposals of its last call.
-
-    Attributes:
-        rows: (R,) proposals classified by the last call.
-    """
+    """A classifier that records the (R,) proposals of its last call in `rows`."""
 
     def __init__(self, classifier: Classifier) -> None:
         self._classifier = classifier
@@ -45,27 +40,16 @@ class RecordingClassifier:
 
 @dataclass
 class ModeRun:
-    """One pass of one mode through the stream.
-
-    Attributes:
-        pipeline: its stages, with the recorder as classifier.
-        ledger: of the pipeline.
-        recorder: the classifier.
-        budget: of the frame with that index.
-        windows: over the meters, None where modes share a window.
-        lines: ledger lines.
-        energy_lines: windows closed.
-        lives: frames with a proposal, of every track that ended.
-    """
+    """One pass of one mode through the stream."""
 
     pipeline: Pipeline
     ledger: Ledger
-    recorder: RecordingClassifier
-    budget: Callable[[int], Budget]
-    windows: Windows | None = None
-    lines: list[dict[str, Any]] = field(default_factory=list)
-    energy_lines: list[dict[str, Any]] = field(default_factory=list)
-    lives: list[int] = field(default_factory=list)
+    recorder: RecordingClassifier  # the pipeline's classifier
+    budget: Callable[[int], Budget]  # of the frame with that index
+    windows: Windows | None = None  # None where no meter is read
+    lines: list[Line] = field(default_factory=list)  # of the ledger
+    energy_lines: list[Line] = field(default_factory=list)
+    lives: list[int] = field(default_factory=list)  # frames with a proposal, of every track that ended
     _counts: list[tuple[int, ...]] = field(default_factory=list)
     _life: dict[int, int] = field(default_factory=dict)
     _classified: set[int] = field(default_factory=set)
@@ -104,10 +88,9 @@ class ModeRun:
 
     def cpu_s(self) -> Float64:
         """(frames, stages) CPU time of each stage of the pipeline [s]."""
-        rows = [[line["stages"].get(s, {}).get("cpu_ns", 0) for s in STAGES] for line in self.lines]
-        return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
+        return cpu_seconds(self.lines)
 
-    def _count(self, result: FrameResult, line: dict[str, Any]) -> None:
+    def _count(self, result: FrameResult, line: Line) -> None:
         tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
         visible = tracks.proposal != NONE
         rows = tracks.row_of_proposal(len(result.proposals))[self.recorder.rows]
@@ -129,14 +112,12 @@ class ModeRun:
         self._classified, self._seen = (self._classified | classified) & alive, seen
 
 
-def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> None:
-    """Process every frame by every run, `turn` frames at a time, with the first run rotating.
+Repetition = dict[str, ModeRun]
+"""One pass of every mode through the stream, by the name of the mode."""
 
-    Args:
-        stream: frames, read once.
-        runs: of the modes.
-        turn: consecutive frames of one run.
-    """
+
+def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> None:
+    """Process every frame by every run, `turn` frames at a time, with the first run rotating."""
     gc.collect()
     gc.freeze()
     frames = iter(stream)
@@ -150,6 +131,12 @@ def interleave(stream: Iterable[Frame], runs: Sequence[ModeRun], turn: int) -> N
         first = (first + 1) % len(runs)
     for run in runs:
         run.finish()
+
+
+def cpu_seconds(lines: Sequence[Line]) -> Float64:
+    """(frames, stages) CPU time of each stage of the pipeline by ledger lines [s]."""
+    rows = [[line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES] for line in lines]
+    return 1e-9 * np.array(rows, float).reshape(-1, len(STAGES))
 
 
 def total(counts: Int) -> Counts:

@@ -1,4 +1,4 @@
-"""Plots and tables that the pages of a run and of a comparison share."""
+"""Plots, tables and sentences that the reports of a run and of a comparison share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from modt.energy.prediction import EnergyModel
 from modt.reporting import svg
-from modt.reporting.page import Plot, table
+from modt.reporting.document import Table
+from modt.reporting.page import Plot
 from modt.reporting.quantity import Quantity
 from modt.types import Float64
 
@@ -64,8 +65,17 @@ def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quanti
     return ("Gamma against N_go", svg.lines(traces, "N_go [frames]", "gamma", log=True), note)
 
 
-def gamma_terms(title: str, saving: dict[str, Any], note: str) -> str:
+def gamma_terms(title: str, saving: dict[str, Any]) -> Table:
     """Table of the terms from gamma = N_go to the ratio of the runs."""
-    rows = [["the short form, gamma = N_go", "", saving["gamma_short"].with_kind()]]
-    rows += [[t["name"], f"{t['change'].value:+.3f}", t["gamma"].with_kind()] for t in saving["terms"]]
-    return table(title, ["reason", "change", "gamma"], rows, note)
+    short = ["the short form, gamma = N_go", "", saving["gamma_short"]]
+    rows = [[term["name"], f"{term['change'].value:+.3f}e", term["gamma"]] for term in saving["terms"]]
+    return Table([title, "change", "gamma"], [short, *rows])
+
+
+def conditions_text(conditions: dict[str, Any]) -> str:
+    """Governor, frequency and core, where available."""
+    governor, frequency = conditions.get("governor"), conditions.get("frequency_MHz")
+    return (
+        f"governor {governor or 'unavailable'}, "
+        f"frequency {'unavailable' if frequency is None else f'{frequency:.0f} MHz'}, core {conditions.get('core')}"
+    )

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
+from modt.energy.meters.meter import Kind
 from modt.energy.savings import OtherCosts, Prediction, UnitCosts, predict
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
-from modt.reporting.comparison import COUNTS, total
-from modt.reporting.quantity import estimate
+from modt.reporting.comparison import COUNTS, ModeRun, total
+from modt.reporting.quantity import Quantity, estimate, quantity
 from modt.types import Float64, Int
 
 _BLOCK = 8
@@ -27,15 +28,21 @@ Interval = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class RunCosts:
-    """Counts and costs of one mode on F frames.
+    """Counts and costs of one mode on F frames."""
 
-    Attributes:
-        counts: (F, 8) columns as COUNTS.
-        cost: (F, S) of the pipeline's S stages, in joules or CPU seconds; the median over repetitions.
-    """
+    counts: Int  # (F, 8), columns as COUNTS
+    cost: Float64  # (F, S) of the pipeline's S stages [CPU s]
 
-    counts: Int
-    cost: Float64
+    @classmethod
+    def median(cls, runs: Sequence[ModeRun]) -> Self:
+        """Repetitions of the same work: its counts, and the median of the costs."""
+        cost: Float64 = np.median([run.cpu_s() for run in runs], axis=0)
+        return cls(runs[0].counts(), cost)
+
+    @classmethod
+    def concatenated(cls, runs: Sequence[ModeRun]) -> Self:
+        """Repetitions of work that differs, one after another."""
+        return cls(np.concatenate([run.counts() for run in runs]), np.concatenate([run.cpu_s() for run in runs]))
 
     def take(self, frames: Int) -> RunCosts:
         """The given frames."""
@@ -44,29 +51,12 @@ class RunCosts:
 
 @dataclass(frozen=True, slots=True)
 class Saving:
-    """Gamma of one mode over tracking-by-detection, with intervals at 95 % over resampled frames.
-
-    Attributes:
-        prediction: from counts and unit costs.
-        measured: ratio of the costs of the two runs.
-        deviation_interval: of predicted / measured - 1.
-    """
+    """Gamma of one mode over tracking-by-detection, with intervals at 95 % over resampled frames."""
 
     prediction: Prediction
-    measured: float
-    predicted_interval: Interval
-    measured_interval: Interval
-    deviation_interval: Interval
-
-    @property
-    def predicted(self) -> float:
-        """By the full model."""
-        return self.prediction.model.gamma
-
-    @property
-    def deviation(self) -> float:
-        """Predicted / measured - 1."""
-        return self.predicted / self.measured - 1.0
+    predicted: Quantity  # by the full model
+    measured: Quantity  # ratio of the costs of the two runs
+    deviation: Quantity  # predicted / measured - 1
 
 
 def unit_costs(varied: RunCosts) -> UnitCosts:
@@ -80,13 +70,9 @@ def unit_costs(varied: RunCosts) -> UnitCosts:
 
 
 def saving(baseline: RunCosts, run: RunCosts, varied: RunCosts, random: np.random.Generator) -> Saving:
-    """Predicted and measured gamma, with unit costs of a third run.
+    """Predicted and measured gamma of a run on the F frames of tracking-by-detection.
 
-    Args:
-        baseline: tracking-by-detection, F frames.
-        run: the proposed pipeline on the same F frames.
-        varied: the same frames once or several times, under varied load.
-        random: draws the frames of the intervals.
+    The unit costs are of a third run: the same frames once or several times, under varied load.
     """
     n = len(baseline.counts)
     passes = len(varied.counts) // n
@@ -97,15 +83,20 @@ def saving(baseline: RunCosts, run: RunCosts, varied: RunCosts, random: np.rando
         prediction = predict(total(a.counts), total(b.counts), costs, other_costs(a), other_costs(b))
         return prediction, float(a.cost.sum() / b.cost.sum())
 
-    prediction, measured = both(np.arange(n))
+    prediction, ratio = both(np.arange(n))
+    gamma = prediction.model.gamma
     resampled = [both(_blocks(n, random)) for _ in range(_RESAMPLES)]
-    predicted_all = np.array([p.model.gamma for p, _ in resampled])
-    measured_all = np.array([m for _, m in resampled])
-    deviations = predicted_all / measured_all - 1.0
-    return Saving(prediction, measured, *map(_interval, (predicted_all, measured_all, deviations)))
+    gammas = np.array([found.model.gamma for found, _ in resampled])
+    ratios = np.array([found for _, found in resampled])
+    return Saving(
+        prediction,
+        predicted=estimate(gamma, "", _interval(gammas)),
+        measured=quantity(ratio, "", Kind.MEASURED, _interval(ratios)),
+        deviation=estimate(gamma / ratio - 1.0, "", _interval(gammas / ratios - 1.0)),
+    )
 
 
-def prediction_tree(found: Prediction, gamma: float) -> dict[str, Any]:
+def prediction_tree(found: Prediction, gamma: float | None) -> dict[str, Any]:
     """The paper's figures, the predicted gamma, and the terms from N_go to the gamma of the runs."""
     return {
         "a": estimate(found.paper.a),
@@ -113,7 +104,8 @@ def prediction_tree(found: Prediction, gamma: float) -> dict[str, Any]:
         "gamma_equation_3": estimate(found.paper.gamma),
         "gamma_predicted": estimate(found.model.gamma),
         "terms": [
-            {"name": t.name, "change": estimate(t.change), "gamma": estimate(t.gamma)} for t in found.explain(gamma)
+            {"name": term.name, "change": estimate(term.change), "gamma": estimate(term.gamma)}
+            for term in found.explain(1.0 if gamma is None else gamma)
         ],
     }
 
@@ -123,9 +115,10 @@ def interval(n: int, statistic: Callable[[Int], float], random: np.random.Genera
     return _interval(np.array([statistic(_blocks(n, random)) for _ in range(_RESAMPLES)]))
 
 
-def mean_interval(values: Float64, random: np.random.Generator) -> Interval:
-    """95 % interval of the mean of (F,) values over resampled frames."""
-    return interval(len(values), lambda frames: float(values[frames].mean()), random)
+def mean(values: Float64, unit: str, kind: Kind, random: np.random.Generator) -> Quantity:
+    """Mean of (F,) values, with its interval over resampled frames."""
+    bounds = interval(len(values), lambda frames: float(values[frames].mean()), random)
+    return quantity(float(values.mean()), unit, kind, bounds)
 
 
 def other_costs(run: RunCosts) -> OtherCosts:

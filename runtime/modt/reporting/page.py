@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
+from modt.reporting.document import Cell, Document, Table
+from modt.reporting.quantity import LEGEND
 from modt.sinks.output import writing
 
 _COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a")
@@ -45,6 +47,13 @@ Plot = tuple[str, str, str]
 """Title, SVG and note of a plot."""
 
 
+def document_page(document: Document, drawn: Iterable[Plot]) -> str:
+    """HTML of a report with its plots."""
+    blocks = [_tiles(document), plots(drawn), *map(_table, document.tables)]
+    notes = "".join(f'<p class="legend">{escape(note)}</p>' for note in (document.test, LEGEND))
+    return page(document.title, "; ".join(document.about), [*blocks, notes])
+
+
 def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
     """HTML of a page."""
     colours = "".join(
@@ -56,23 +65,6 @@ def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
         f"<title>{escape(title)}</title><style>{_STYLE}{colours}</style></head><body>"
         f'<h1>{escape(title)}</h1><p class="sub">{escape(subtitle)}</p>{"".join(blocks)}</body></html>\n'
     )
-
-
-def tiles(items: Sequence[tuple[str, str, str]]) -> str:
-    """Main results: name, value, note."""
-    cells = (
-        f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
-        for name, value, note in items
-    )
-    return f'<div class="tiles">{"".join(cells)}</div>'
-
-
-def table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]], note: str = "") -> str:
-    """A table under a heading; in a cell "12 (estimated)" the bracket is small."""
-    top = "".join(f"<th>{escape(cell)}</th>" for cell in head)
-    body = "".join("<tr>" + "".join(f"<td>{_cell(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    foot = f'<p class="legend">{escape(note)}</p>' if note else ""
-    return f"<section><h2>{escape(title)}</h2><table><tr>{top}</tr>{body}</table>{foot}</section>"
 
 
 def plots(items: Iterable[Plot]) -> str:
@@ -94,6 +86,24 @@ def save(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _cell(text: str) -> str:
-    value, bracket, kind = text.partition(" (")
+def _tiles(document: Document) -> str:
+    cells = (
+        f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
+        for name, value, note in document.results
+    )
+    return f'<div class="tiles">{"".join(cells)}</div>'
+
+
+def _table(table: Table) -> str:
+    title, *others = table.head
+    top = "".join(f"<th>{escape(cell)}</th>" for cell in ("", *others))
+    body = "".join("<tr>" + "".join(f"<td>{_cell(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    return f"<section><h2>{escape(title)}</h2><table><tr>{top}</tr>{body}</table></section>"
+
+
+def _cell(cell: Cell) -> str:
+    """HTML of a cell; the kind of a quantity is small."""
+    if isinstance(cell, str):
+        return escape(cell)
+    value, bracket, kind = cell.with_kind().partition(" (")
     return escape(value) + (f" <em>({escape(kind)}</em>" if bracket else "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from modt.energy.meters.meter import Kind
@@ -14,19 +14,12 @@ LEGEND = "Figures are measured, but for e estimated, i integrated, ? unavailable
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One number of a report.
+    """One number of a report."""
 
-    Attributes:
-        value: None where unavailable.
-        unit: empty for a ratio or a count.
-        kind: measured, integrated, estimated or unavailable.
-        low, high: 95 % interval, None where none was computed.
-    """
-
-    value: float | None
-    unit: str = ""
+    value: float | None  # None where unavailable
+    unit: str = ""  # empty for a ratio or a count
     kind: Kind = Kind.MEASURED
-    low: float | None = None
+    low: float | None = None  # 95 % interval, None where none was computed
     high: float | None = None
 
     def json(self) -> dict[str, Any]:
@@ -34,24 +27,26 @@ class Quantity:
         plain: dict[str, Any] = {"value": self.value, "unit": self.unit, "kind": self.kind.value}
         return plain if self.low is None else plain | {"low": self.low, "high": self.high}
 
+    def scaled(self, factor: float, unit: str) -> Quantity:
+        """The same in another unit."""
+        value, low, high = (None if v is None else factor * v for v in (self.value, self.low, self.high))
+        return replace(self, value=value, unit=unit, low=low, high=high)
+
+    def marked(self) -> str:
+        """Value, letter of its kind (LEGEND) and unit."""
+        return "unavailable" if self.value is None else self._number(_MARK[self.kind])
+
     def text(self) -> str:
-        """Value, unit and interval."""
-        if self.value is None:
-            return "unavailable"
+        """As marked, with the interval."""
         interval = "" if self.low is None else f" ({format_number(self.low)} to {format_number(self.high)})"
-        return f"{format_number(self.value)} {self.unit}".rstrip() + interval
+        return self.marked() + interval
 
-    def marked(self, scale: float = 1.0) -> str:
-        """Scaled value and the letter of its kind (LEGEND), without unit and interval."""
-        return "unavailable" if self.value is None else format_number(self.value * scale) + _MARK[self.kind]
+    def with_kind(self) -> str:
+        """Value, unit and kind in brackets."""
+        return "unavailable" if self.value is None else f"{self._number()} ({self.kind})"
 
-    def with_kind(self, scale: float = 1.0, unit: str | None = None) -> str:
-        """Scaled value, unit and kind in brackets."""
-        if self.value is None:
-            return "unavailable"
-        return (
-            f"{format_number(scale * self.value)} {self.unit if unit is None else unit}".rstrip() + f" ({self.kind})"
-        )
+    def _number(self, mark: str = "") -> str:
+        return f"{format_number(self.value)}{mark} {self.unit}".rstrip()
 
 
 def quantity(
@@ -61,7 +56,7 @@ def quantity(
     if value is None or not math.isfinite(value):
         return Quantity(None, unit, Kind.UNAVAILABLE)
     low, high = interval if interval is not None else (None, None)
-    return Quantity(float(value), unit, kind, low, high)
+    return Quantity(value if isinstance(value, int) else float(value), unit, kind, low, high)
 
 
 def estimate(value: float | None, unit: str = "", interval: tuple[float, float] | None = None) -> Quantity:
@@ -70,9 +65,11 @@ def estimate(value: float | None, unit: str = "", interval: tuple[float, float] 
 
 
 def format_number(value: float | None, digits: int = 3) -> str:
-    """A number in that many significant digits, without exponent from 1e-4 to 1e6."""
+    """A number in that many significant digits, without exponent from 1e-4 to 1e6; a count with all of them."""
     if value is None:
         return "-"
+    if isinstance(value, int):
+        return str(value)
     if value and not 1e-4 <= abs(value) < 1e6:
         return f"{value:.{digits - 1}e}"
     decimals = digits - 1 - math.floor(math.log10(abs(value))) if value else 0

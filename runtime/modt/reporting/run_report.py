@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -21,13 +21,13 @@ from modt.energy.savings import predict
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, STAGES
-from modt.reporting.comparison import COUNTS, total
+from modt.reporting.comparison import COUNTS, cpu_seconds, total
 from modt.reporting.gamma import CLASS, RunCosts, other_costs, prediction_tree, unit_costs
 from modt.reporting.quantity import estimate, quantity
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
-from modt.types import Float64, Int
+from modt.types import Float64
 
 SCHEMA = "modt.report/1"
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
@@ -38,33 +38,22 @@ _CONVENTIONAL = "conventional"
 class FrameCounts:
     """Counts over the lines of tracks.jsonl.
 
-    Attributes:
-        max_points, batch: of the classifier's configuration.
-        proposals, classified, deferred: of each frame.
-        points: of each frame, if all proposals were classified.
-        foreground: proposals of a track whose class is an object's.
-        lives: frames with a proposal, by track id.
-        classified_ids: of the tracks classified at least once.
+    A row a frame: proposals, classifications, deferred, and points if all proposals were classified.
     """
 
-    max_points: int
+    max_points: int  # this and the batch as in the classifier's configuration
     batch: int
-    proposals: list[int] = field(default_factory=list)
-    classified: list[int] = field(default_factory=list)
-    deferred: list[int] = field(default_factory=list)
-    points: list[int] = field(default_factory=list)
-    foreground: int = 0
-    lives: Counter[int] = field(default_factory=Counter)
-    classified_ids: set[int] = field(default_factory=set)
+    rows: list[tuple[int, int, int, int]] = field(default_factory=list)
+    foreground: int = 0  # proposals of a track whose class is an object's
+    lives: Counter[int] = field(default_factory=Counter)  # frames with a proposal, by track id
+    classified_ids: set[int] = field(default_factory=set)  # of the tracks classified at least once
 
     def add(self, record: dict[str, Any]) -> None:
         """Add a line of tracks.jsonl."""
         seen = [track for track in record["tracks"] if track["proposal"] is not None]
-        self.proposals.append(record["proposals"])
-        self.classified.append(record["classifications"])
-        self.deferred.append(record["deferred"])
         sizes = np.array([track["points"] for track in seen], np.int64)
-        self.points.append(padded_points(sizes, self.max_points, self.batch))
+        points = padded_points(sizes, self.max_points, self.batch)
+        self.rows.append((record["proposals"], record["classifications"], record["deferred"], points))
         self.foreground += sum(track["class"] != _BACKGROUND for track in seen)
         self.lives.update(track["id"] for track in seen)
         self.classified_ids.update(track["id"] for track in record["tracks"] if track["viewed"])
@@ -83,11 +72,12 @@ def run_tree(run: Path) -> dict[str, Any]:
     counted = FrameCounts(limits["max_points"], limits["batch"])
     for record in read_records(run / TRACKS, FRAME_SCHEMA):
         counted.add(record)
-    frames = min(len(lines), len(counted.proposals))
+    frames = min(len(lines), len(counted.rows))
     if not frames:
         raise MisuseError(run, "no whole frame is recorded", "wait for the first, or give another run")
     lines = lines[:frames]
-    cpu_s = 1e-9 * np.array([[line["stages"].get(s, {}).get("cpu_ns", 0) for s in STAGES] for line in lines], float)
+    proposals, classified, deferred, _ = np.array(counted.rows[:frames]).T.tolist()
+    cpu_s = cpu_seconds(lines)
     saved, predicted_s = _saved(mode, counted, lines, cpu_s, board)
     energy = _energy(windows, lines, board)
     return {
@@ -118,9 +108,9 @@ def run_tree(run: Path) -> dict[str, Any]:
             "net_W": board["busy_W"] - board["idle_W"],
             "cpu_ms": {s: (1e3 * cpu_s[:, k]).round(4).tolist() for k, s in enumerate(STAGES)},
             "predicted_cpu_ms": (1e3 * predicted_s).round(4).tolist(),
-            "classified": counted.classified[:frames],
-            "deferred": counted.deferred[:frames],
-            "proposals": counted.proposals[:frames],
+            "classified": classified,
+            "deferred": deferred,
+            "proposals": proposals,
             "budget": None if mode == _CONVENTIONAL else facts["profile"]["scheduler"]["calls_per_frame"],
             "lives": sorted(counted.lives.values()),
         },
@@ -183,15 +173,15 @@ def _modelled(line: dict[str, Any], board: dict[str, Any]) -> dict[str, Any]:
 
 
 def _times(lines: list[dict[str, Any]]) -> dict[str, Any]:
-    sums: dict[str, Counter[str]] = {}
+    sums: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for line in lines:
         for stage, row in line["stages"].items():
-            sums.setdefault(stage, Counter()).update(row)
+            sums[stage].update(row)
     return {
         stage: {
             "cpu_ms": quantity(1e-6 * row["cpu_ns"] / len(lines), "ms"),
             "wall_ms": quantity(1e-6 * row["wall_ns"] / len(lines), "ms"),
-            **{key: quantity(float(row[key])) for key in ("calls", "items", "points")},
+            **{key: quantity(row[key]) for key in ("calls", "items", "points")},
         }
         for stage, row in sums.items()
     }
@@ -211,29 +201,22 @@ def _saved(
     """Gamma by Equation 3 and in full from this run's own counts and costs; (frames,) CPU seconds of E1."""
     frames = len(lines)
     rows = [line["stages"].get(CLASSIFICATION, {}) for line in lines]
-    n, all_points = np.array(counted.proposals[:frames]), np.array(counted.points[:frames])
-    columns: dict[str, Int] = {
-        "proposals": n,
-        "classified": np.array(counted.classified[:frames]),
-        "points": np.array([row.get("points", 0) for row in rows]),
-        "calls": np.array([row.get("calls", 0) for row in rows]),
-    }
-    nothing = np.zeros(frames, np.int64)
-    costs_of_run = RunCosts(np.stack([columns.get(name, nothing) for name in COUNTS], axis=1), cpu_s)
+    n, classified, _, all_points = np.array(counted.rows[:frames]).T
+    counts = np.zeros((frames, len(COUNTS)), np.int64)
+    counts[:, COUNTS.index("proposals")] = n
+    counts[:, COUNTS.index("classified")] = classified
+    for name in ("points", "calls"):
+        counts[:, COUNTS.index(name)] = [row.get(name, 0) for row in rows]
+    costs_of_run = RunCosts(counts, cpu_s)
     costs, other = unit_costs(costs_of_run), other_costs(costs_of_run)
     run = replace(
-        total(costs_of_run.counts),
+        total(counts),
         foreground=counted.foreground,
         tracks=len(counted.lives),
         classified_tracks=len(counted.classified_ids),
     )
-    baseline = replace(
-        run,
-        classified_tracks=run.tracks,
-        classified=run.proposals,
-        points=int(all_points.sum()),
-        calls=frames,
-    )
+    points = int(all_points.sum())
+    baseline = replace(run, classified_tracks=run.tracks, classified=run.proposals, points=points, calls=frames)
     found = predict(baseline, run, costs, other, other)
     run_s = e1_s = cpu_s.sum(axis=1)
     if mode != _CONVENTIONAL:
@@ -249,7 +232,7 @@ def _saved(
         "views": quantity(run.classified / run.tracks if run.tracks else None),
         "E_seg": estimate(net_W * costs.seg, "J"),
         "E_class": estimate(net_W * costs.e_class(baseline), "J"),
-        **prediction_tree(found, gamma or 1.0),
+        **prediction_tree(found, gamma),
         "gamma_of_this_run": estimate(gamma),
         "saved_J": estimate(net_W * float((e1_s - run_s).mean()), "J"),
     }, e1_s

@@ -20,19 +20,12 @@ _MAX_POINTS = 400
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """One line, area or set of marks.
+    """One line, area or set of marks."""
 
-    Attributes:
-        name: in the legend.
-        x, y: (n,) values.
-        dots: draw marks instead of a line.
-        dashed: draw a dashed line.
-    """
-
-    name: str
+    name: str  # in the legend
     x: Float64
     y: Float64
-    dots: bool = False
+    dots: bool = False  # marks instead of a line
     dashed: bool = False
 
 

@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from modt.energy.meters.battery import find_batteries
-from modt.energy.meters.candidate import Candidate
 from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Kind, Scope
-from modt.energy.meters.model import ModelMeter
+from modt.energy.meters.meter import Candidate, Kind, Meter, Scope
 from modt.energy.meters.pmic import find_pmic
 from modt.energy.meters.powercap import find_powercap
 from modt.errors import MisuseError
@@ -21,11 +19,7 @@ _SCOPES = (Scope.CPU, Scope.SOC, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PRO
 
 @dataclass(frozen=True, slots=True)
 class Discovery:
-    """The meters of a machine.
-
-    Attributes:
-        candidates: usable ones first, the best before all; then the others, with the reason.
-    """
+    """The meters of a machine: usable ones first, the best before all; then the others, with the reason."""
 
     candidates: tuple[Candidate, ...]
 
@@ -51,7 +45,7 @@ class Discovery:
         raise MisuseError(f"meter {name}", "not on this machine", f"use one of: {names}")
 
 
-def discover(model: ModelMeter, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
+def discover(model: Meter, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
     """Search every type of meter; the model is the last of the usable ones."""
     found = [*find_powercap(sys), *find_hwmon(sys), *find_pmic(vcgencmd), *find_batteries(sys)]
     found.append(Candidate(model.facts.name, (model,)))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modt.energy.meters.candidate import Candidate, probe
-from modt.energy.meters.meter import Facts, FileMeter, Kind, Measurand, Scope, text_or_none
+from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, Scope, file_meter, probe, text_or_none
 
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
 _INPUT_RAILS = ("VDD_IN", "POM_5V_IN", "VIN_SYS_5V0", "VIN", "5V_IN")
@@ -15,8 +14,8 @@ _INPUT_RAILS = ("VDD_IN", "POM_5V_IN", "VIN_SYS_5V0", "VIN", "5V_IN")
 def find_hwmon(sys: Path) -> list[Candidate]:
     """AMD sockets, then every rail: rails may feed one another, so none are summed."""
     folders = sorted((sys / "class" / "hwmon").glob("hwmon*"), key=lambda p: (len(p.name), p.name))
-    sockets: list[FileMeter] = []
-    rails: list[FileMeter] = []
+    sockets: list[Meter] = []
+    rails: list[Meter] = []
     for folder in folders:
         chip = text_or_none(folder / "name")
         if chip == "amd_energy":
@@ -37,14 +36,13 @@ def _channels(folder: Path, prefix: str) -> list[int]:
     return sorted(int(name[len(prefix) : -len("_input")]) for name in names)
 
 
-def _sockets(folder: Path) -> list[FileMeter]:
+def _sockets(folder: Path) -> list[Meter]:
     """Energy counters of the sockets, without those of the cores; the driver widens them to 64 bits."""
     sockets = []
     for n in _channels(folder, "energy"):
         if (text_or_none(folder / f"energy{n}_label") or "").startswith("Esocket"):
             facts = Facts(
                 name=f"hwmon amd_energy socket {n}",
-                measurand=Measurand.ENERGY,
                 unit="uJ",
                 resolution=15.3e-6,
                 max_W=1000.0,
@@ -52,11 +50,11 @@ def _sockets(folder: Path) -> list[FileMeter]:
                 kind=Kind.MEASURED,
                 privilege="root",
             )
-            sockets.append(FileMeter(facts, (folder / f"energy{n}_input",)))
+            sockets.append(file_meter(facts, folder / f"energy{n}_input"))
     return sockets
 
 
-def _rails(folder: Path, chip: str) -> list[FileMeter]:
+def _rails(folder: Path, chip: str) -> list[Meter]:
     """Enabled channels with a current, by their own power where the chip computes it, else by voltage x current.
 
     The sum channel of an INA3221 is not a rail.
@@ -70,12 +68,11 @@ def _rails(folder: Path, chip: str) -> list[FileMeter]:
         computed = power.exists()
         facts = Facts(
             name=f"hwmon {chip} {label}",
-            measurand=Measurand.POWER,
             unit="uW" if computed else "mV x mA",
             resolution=5e-3,  # 1 mA at 5 V
             max_W=500.0,
             scope=Scope.BOARD if label in _INPUT_RAILS else Scope.SOC if "CPU" in label else Scope.RAIL,
             kind=Kind.INTEGRATED,
         )
-        rails.append(FileMeter(facts, (power,) if computed else (voltage, current)))
+        rails.append(file_meter(facts, *((power,) if computed else (voltage, current))))
     return rails

@@ -1,34 +1,28 @@
-"""The interface of a meter, and readings of files of sysfs."""
+"""Meters: their facts, their readings, and the candidates of discovery."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Protocol
 
 
 class Kind(StrEnum):
     """Reliability of a figure; every figure shown carries one."""
 
-    MEASURED = "measured"
-    """Counted by hardware or by this program."""
-    INTEGRATED = "integrated"
-    """Power samples integrated over time."""
-    ESTIMATED = "estimated"
-    """Computed from assumptions."""
+    MEASURED = "measured"  # counted by hardware or by this program
+    INTEGRATED = "integrated"  # power samples integrated over time
+    ESTIMATED = "estimated"  # computed from assumptions
     UNAVAILABLE = "unavailable"
-    """Not known."""
 
 
 class Measurand(StrEnum):
     """The physical quantity of a reading."""
 
-    ENERGY = "energy"
-    """A counter [J]."""
-    POWER = "power"
-    """A momentary value [W]."""
+    ENERGY = "energy"  # a counter [J]
+    POWER = "power"  # a momentary value [W]
 
 
 class Scope(StrEnum):
@@ -48,73 +42,39 @@ class MeterLostError(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """Static properties of a meter.
-
-    Attributes:
-        name: for display.
-        measurand: energy or power.
-        unit: of the device's own readings.
-        resolution: smallest step of a reading [J or W].
-        max_W: upper bound of plausible power [W].
-        scope: consumers covered.
-        kind: reliability of the energy derived from it.
-        wrap_J: range of an energy counter [J]; None where it never wraps, or the range is unknown.
-        privilege: needed to read it.
-    """
+    """Static properties of a meter."""
 
     name: str
-    measurand: Measurand
-    unit: str
-    resolution: float
-    max_W: float
-    scope: Scope
-    kind: Kind
-    wrap_J: float | None = None
-    privilege: str = "none"
-
-
-class Meter(Protocol):
-    """One sensor or counter."""
+    unit: str  # of the device's own readings
+    resolution: float  # smallest step of a reading [J or W]
+    max_W: float  # upper bound of plausible power
+    scope: Scope  # consumers covered
+    kind: Kind  # reliability of the energy derived from it
+    wrap_J: float | None = None  # range of an energy counter; None where it never wraps, or the range is unknown
+    privilege: str = "none"  # needed to read it
 
     @property
-    def facts(self) -> Facts:
-        """Static properties."""
-        ...
-
-    def read(self) -> float:
-        """Present value [J or W, by its measurand].
-
-        Raises:
-            MeterLostError: it cannot be read now.
-        """
-        ...
+    def measurand(self) -> Measurand:
+        """Power where it is integrated, else energy."""
+        return Measurand.POWER if self.kind is Kind.INTEGRATED else Measurand.ENERGY
 
 
 @dataclass(frozen=True, slots=True)
-class FileMeter:
-    """A value of sysfs: the product of the integers in some files.
-
-    Attributes:
-        facts: static properties.
-        paths: of one file, or of a voltage and a current.
-        scale: of the product, to [J or W].
-    """
+class Meter:
+    """One sensor or counter."""
 
     facts: Facts
-    paths: tuple[Path, ...]
-    scale: float = 1e-6
+    read: Callable[[], float]
+    """Present value [J or W, by the measurand]; raises MeterLostError."""
 
-    def read(self) -> float:
-        """Present value [J or W]."""
-        return self.scale * math.prod(read_number(path) for path in self.paths)
+
+def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:
+    """Meter whose value is the scaled product of the integers in its files: one, or a voltage and a current."""
+    return Meter(facts, lambda: scale * math.prod(read_number(path) for path in paths))
 
 
 def read_text(path: Path) -> str:
-    """Content of a small file, stripped.
-
-    Raises:
-        MeterLostError: missing or unreadable, with the reason.
-    """
+    """Content of a small file, stripped; raises MeterLostError with the reason."""
     try:
         return path.read_text(encoding="ascii", errors="replace").strip()
     except OSError as error:
@@ -122,11 +82,7 @@ def read_text(path: Path) -> str:
 
 
 def read_number(path: Path) -> float:
-    """An integer written by the kernel.
-
-    Raises:
-        MeterLostError: missing, unreadable or not a number.
-    """
+    """An integer written by the kernel; raises MeterLostError with the reason."""
     text = read_text(path)
     try:
         return float(int(text))
@@ -148,3 +104,33 @@ def number_or_none(path: Path) -> float | None:
         return read_number(path)
     except MeterLostError:
         return None
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Meters whose readings may be summed, since their scopes do not overlap; usable or not."""
+
+    name: str
+    meters: tuple[Meter, ...]  # one per socket or rail; empty where none of this type exists
+    why_not: str = ""  # reason against its use
+    remedy: str = ""  # action that makes it usable
+
+    @property
+    def usable(self) -> bool:
+        """Whether it can be read."""
+        return bool(self.meters) and not self.why_not
+
+    @property
+    def facts(self) -> Facts | None:
+        """Facts of the first meter; those of one candidate are alike."""
+        return self.meters[0].facts if self.meters else None
+
+
+def probe(name: str, meters: tuple[Meter, ...], remedy: str) -> Candidate:
+    """A candidate, read once to find out whether it can be."""
+    try:
+        for meter in meters:
+            meter.read()
+    except MeterLostError as error:
+        return Candidate(name, meters, str(error), remedy)
+    return Candidate(name, meters)

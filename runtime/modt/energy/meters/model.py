@@ -3,43 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from modt.energy.meters.meter import Facts, Kind, Measurand, Scope
+from modt.energy.meters.meter import Facts, Kind, Meter, Scope
 
 
-@dataclass(frozen=True, slots=True)
-class ModelMeter:
+def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns: Callable[[], int]) -> Meter:
     """Energy = idle_W x wall time + (busy_W - idle_W) x CPU time of this process.
 
-    Attributes:
+    Args:
         idle_W: drawn while this process waits.
         busy_W: drawn while it computes on one core.
-        wall_ns: monotonic clock [ns].
-        cpu_ns: CPU time of this process [ns].
+        wall_ns: monotonic clock.
+        cpu_ns: CPU time of this process.
     """
-
-    idle_W: float
-    busy_W: float
-    wall_ns: Callable[[], int]
-    cpu_ns: Callable[[], int]
-
-    @property
-    def facts(self) -> Facts:
-        """Its kind is estimated."""
-        return Facts(
-            name=model_name(self.idle_W, self.busy_W),
-            measurand=Measurand.ENERGY,
-            unit="J",
-            resolution=1e-9,
-            max_W=max(self.idle_W, self.busy_W) * 1024,
-            scope=Scope.PROCESS,
-            kind=Kind.ESTIMATED,
-        )
-
-    def read(self) -> float:
-        """Energy since the epoch of the clocks [J]."""
-        return 1e-9 * (self.idle_W * self.wall_ns() + (self.busy_W - self.idle_W) * self.cpu_ns())
+    facts = Facts(
+        name=model_name(idle_W, busy_W),
+        unit="J",
+        resolution=1e-9,
+        max_W=max(idle_W, busy_W) * 1024,
+        scope=Scope.PROCESS,
+        kind=Kind.ESTIMATED,
+    )
+    return Meter(facts, lambda: 1e-9 * (idle_W * wall_ns() + (busy_W - idle_W) * cpu_ns()))
 
 
 def model_name(idle_W: float, busy_W: float) -> str:

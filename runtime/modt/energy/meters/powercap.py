@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from modt.energy.meters.candidate import Candidate, probe
-from modt.energy.meters.meter import Facts, FileMeter, Kind, Measurand, Scope, number_or_none, text_or_none
+from modt.energy.meters.meter import (
+    Candidate,
+    Facts,
+    Kind,
+    Meter,
+    Scope,
+    file_meter,
+    number_or_none,
+    probe,
+    text_or_none,
+)
 
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
 
@@ -22,7 +31,7 @@ def find_powercap(sys: Path) -> list[Candidate]:
         cause = "no zone under /sys/class/powercap"
         remedy = "use bare metal with the intel_rapl_msr or arm_scmi_powercap module; virtual machines have none"
         return [Candidate("powercap", (), cause, remedy)]
-    packages: list[FileMeter] = []
+    packages: list[Meter] = []
     found: list[Candidate] = []
     for zone in zones:
         label = text_or_none(zone / "name") or "unnamed"
@@ -44,11 +53,10 @@ def find_powercap(sys: Path) -> list[Candidate]:
     return found
 
 
-def _rapl(zone: Path, name: str, scope: Scope) -> FileMeter:
+def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
     """An energy counter that wraps at the range of its zone."""
     facts = Facts(
         name=name,
-        measurand=Measurand.ENERGY,
         unit="uJ",
         resolution=61e-6,
         max_W=1000.0,
@@ -57,17 +65,9 @@ def _rapl(zone: Path, name: str, scope: Scope) -> FileMeter:
         wrap_J=1e-6 * (number_or_none(zone / "max_energy_range_uj") or 0.0) or None,
         privilege="root since Linux 5.10",
     )
-    return FileMeter(facts, (zone / "energy_uj",))
+    return file_meter(facts, zone / "energy_uj")
 
 
-def _scmi(zone: Path, name: str) -> FileMeter:
-    facts = Facts(
-        name=name,
-        measurand=Measurand.POWER,
-        unit="uW",
-        resolution=1e-3,
-        max_W=1000.0,
-        scope=Scope.SOC,
-        kind=Kind.INTEGRATED,
-    )
-    return FileMeter(facts, (zone / "power_uw",))
+def _scmi(zone: Path, name: str) -> Meter:
+    facts = Facts(name=name, unit="uW", resolution=1e-3, max_W=1000.0, scope=Scope.SOC, kind=Kind.INTEGRATED)
+    return file_meter(facts, zone / "power_uw")
