@@ -5,9 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from modt.tracking.states import ACCURATE, EFFICIENT, StateMachine
+from modt.tracking.states import ACCURATE, EFFICIENT, StateMachine, Transition
+from tools.docs.sections import replace_section
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "states.md"
+COMMON = "both"
+SHARED = tuple(t for t in EFFICIENT.transitions if t.label.startswith("e"))
 
 
 def mermaid(machine: StateMachine) -> str:
@@ -20,32 +23,29 @@ def mermaid(machine: StateMachine) -> str:
     return "\n".join(["stateDiagram-v2", f"    [*] --> {first}", *lines, f"    {last} --> [*]"])
 
 
-def table(machine: StateMachine) -> str:
-    """Markdown table of the transitions."""
-    rows = [
-        f"| {t.label} | {t.source} | {t.target} | {t.event.name.lower()} | {t.meaning} |" for t in machine.transitions
-    ]
-    return "\n".join(["| event | from | to | set off by | meaning |", "|---|---|---|---|---|", *rows])
+def table(transitions: tuple[Transition, ...]) -> str:
+    """Markdown table of transitions."""
+    rows = [f"| {t.label} | {t.source} | {t.target} | {t.event.name.lower()} | {t.meaning} |" for t in transitions]
+    return "\n".join(["| row | from | to | event | meaning |", "|---|---|---|---|---|", *rows])
 
 
 def section(machine: StateMachine) -> str:
-    """Text of a machine between its marks."""
-    return f"\n```mermaid\n{mermaid(machine)}\n```\n\n{table(machine)}\n"
+    """Diagram of a machine, and the table of its own rows."""
+    own = tuple(t for t in machine.transitions if t not in SHARED)
+    return f"```mermaid\n{mermaid(machine)}\n```\n\n{table(own)}"
 
 
-def replace_sections(text: str) -> str:
-    """The document with the sections of both machines replaced."""
+def document() -> str:
+    """The page with its sections up to date."""
+    text = DOCUMENT.read_text(encoding="utf-8")
     for machine in (EFFICIENT, ACCURATE):
-        begin, end = f"<!-- {machine.title} -->", f"<!-- end of {machine.title} -->"
-        before, rest = text.split(begin)
-        _, after = rest.split(end)
-        text = f"{before}{begin}{section(machine)}{end}{after}"
-    return text
+        text = replace_section(text, machine.title, section(machine))
+    return replace_section(text, COMMON, table(SHARED))
 
 
 def main() -> None:
     argparse.ArgumentParser(description=__doc__).parse_args()
-    DOCUMENT.write_text(replace_sections(DOCUMENT.read_text(encoding="utf-8")), encoding="utf-8")
+    DOCUMENT.write_text(document(), encoding="utf-8")
 
 
 if __name__ == "__main__":
