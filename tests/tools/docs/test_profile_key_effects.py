@@ -36,13 +36,6 @@ from tools.docs.profile_keys import Key, keys
 pytestmark = pytest.mark.slow
 
 BASE = profile.load("vlp-16")
-LONG = (
-    "segmentation.ground.start_m",
-    "segmentation.person_splitting.min_gap_columns",
-    "segmentation.car_merging.min_person_top_m",
-    "tracking.split",
-)
-"""What a second of the street has no occasion for: they have four of another."""
 Scenario = Callable[[ProfileConfig, Path], str]
 
 
@@ -203,10 +196,19 @@ SCENARIOS: dict[str, Scenario] = {
 """Scenario of each condition of tools.docs.profile_keys."""
 
 
+RARE: dict[str, Scenario] = {
+    "segmentation.ground.start_m": long_street,
+    "segmentation.person_splitting.min_gap_columns": long_street,
+    "segmentation.car_merging.min_person_top_m": long_street,
+    "tracking.split.": long_street,
+    "odometry.registration.max_turn_rad": turning,
+    "energy.windows.": windows,
+}
+"""Scenario of what a second of the street has no occasion for, by the beginning of the path."""
+
+
 def scenario_of(key: Key) -> Scenario:
-    if key.path.startswith("energy.windows."):
-        return windows
-    return long_street if key.path.startswith(LONG) else SCENARIOS[key.condition]
+    return next((scenario for path, scenario in RARE.items() if key.path.startswith(path)), SCENARIOS[key.condition])
 
 
 def others(key: Key) -> Iterator[Any]:
@@ -262,6 +264,8 @@ def test_the_powers_of_the_board_decide_on_a_budget_of_energy(path, tmp_path):
     assert has_effect(next(key for key in keys() if key.path == path), ten_mJ, tmp_path)
 
 
-@pytest.mark.parametrize("scenario", sorted({*SCENARIOS.values(), windows}, key=lambda s: s.__name__), ids=lambda s: s.__name__)
+@pytest.mark.parametrize(
+    "scenario", sorted({*SCENARIOS.values(), *RARE.values()}, key=lambda s: s.__name__), ids=lambda s: s.__name__
+)
 def test_a_scenario_repeats_itself(scenario, tmp_path):
     assert scenario(BASE, tmp_path / "one") == scenario(BASE, tmp_path / "two")
