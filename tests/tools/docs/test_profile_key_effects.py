@@ -264,8 +264,9 @@ def test_the_powers_of_the_board_decide_on_a_budget_of_energy(path, tmp_path):
     assert has_effect(next(key for key in keys() if key.path == path), ten_mJ, tmp_path)
 
 
-@pytest.mark.parametrize(
-    "scenario", sorted({*SCENARIOS.values(), *RARE.values()}, key=lambda s: s.__name__), ids=lambda s: s.__name__
-)
+ALL = sorted({*SCENARIOS.values(), *RARE.values()}, key=lambda scenario: scenario.__name__)
+
+
+@pytest.mark.parametrize("scenario", ALL, ids=lambda scenario: scenario.__name__)
 def test_a_scenario_repeats_itself(scenario, tmp_path):
     assert scenario(BASE, tmp_path / "one") == scenario(BASE, tmp_path / "two")
