@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 from modt.cli import main as modt
@@ -33,12 +35,17 @@ def row(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
 
 
 def page() -> str:
-    """A table a command."""
-    lines: list[str] = []
+    """A table of the options that commands share, and one a command of its own."""
+    rows = {p.prog: [row(p, action) for action in p._actions if action.dest != "help"] for _, p in parsers()}
+    number = Counter(chain.from_iterable(rows.values()))
+    lines = ["## Shared options", "", "| option | | of |", "|---|---|---|"]
+    for text in (text for text, n in number.items() if n > 1):
+        lines.append(f"{text} {', '.join(prog.split()[-1] for prog, own in rows.items() if text in own)} |")
     for summary, parser in parsers():
-        lines += ["", f"## {parser.prog}", "", f"{summary[0].upper()}{summary[1:]}.", "", "| option | |", "|---|---|"]
-        lines += [row(parser, action) for action in parser._actions if action.dest != "help"]
-    return "\n".join(lines[1:])
+        lines += ["", f"## {parser.prog}", "", f"{summary[0].upper()}{summary[1:]}.", ""]
+        own = [text for text in rows[parser.prog] if number[text] == 1]
+        lines += ["| option | |", "|---|---|", *own] if own else []
+    return "\n".join(lines).replace("\n\n\n", "\n\n").rstrip()
 
 
 def document() -> str:

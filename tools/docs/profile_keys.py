@@ -1,6 +1,6 @@
 """Generate docs/profile-keys.md and docs/profile-keys.yaml from the configuration.
 
-The page has the keys of the stages, the YAML file every key: it is a profile of all defaults.
+The page has the keys that a robot sets, the YAML file every key: it is a profile of all defaults.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from tools.docs.sections import replace_section
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "profile-keys.md"
 WHOLE = DOCUMENT.with_suffix(".yaml")
 MARK = "tools.docs.profile_keys"
+PAGE = ("sensor", "classification", "scheduler", "odometry", "energy")
+"""Stages whose own keys are on the page."""
 
 CONDITIONS = {
     "segmentation.sensor_height": "sensor.height_m: null",
@@ -104,7 +106,7 @@ def page() -> str:
     """A table a stage, of the keys outside its mechanisms."""
     lines: list[str] = []
     own = [key for key in keys() if key.path.count(".") == 1]
-    for stage in dict.fromkeys(key.path.partition(".")[0] for key in own):
+    for stage in PAGE:
         always = CONDITIONS.get(stage, "")
         lines += ["", f"## {stage}", "", *([f"With {always}:", ""] if always else [])]
         lines += ["| key | default | from, to | meaning |", "|---|---|---|---|"]
