@@ -19,8 +19,8 @@ TABLES = {
 
 def table(transitions: tuple[Transition, ...]) -> str:
     """Markdown table of transitions."""
-    rows = [f"| {t.label} | {t.source} | {t.target} | {t.event.name.lower()} | {t.meaning} |" for t in transitions]
-    return "\n".join(["| row | from | to | event | meaning |", "|---|---|---|---|---|", *rows])
+    rows = [f"| {t.label} | {t.source} | {t.target} | {t.event.name.lower()} |" for t in transitions]
+    return "\n".join(["| row | from | to | event |", "|---|---|---|---|", *rows])
 
 
 def document() -> str:
