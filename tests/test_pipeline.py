@@ -1,11 +1,13 @@
-"""The step: every stage once, in order, with what the one before it made."""
+"""The step: every stage once, in order, with what the stage before it made."""
 
 import numpy as np
 import pytest
 
 from modt.energy.ledger import Ledger
-from modt.pipeline import STAGES, Pipeline
-from modt.types import NONE, Budget, Frame, Tracks
+from modt.observations import Located, observe
+from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING, Pipeline
+from modt.placement import Placement
+from modt.types import NONE, Budget, Frame, TrackedFrame, Tracks
 from tests.results import STATES, proposals
 
 
@@ -15,7 +17,7 @@ class Selected:
 
 
 class Stages:
-    """All stages at once, noting what they are called with."""
+    """All stages in one, which record their calls."""
 
     state_names = STATES
 
@@ -29,17 +31,23 @@ class Stages:
         self.calls.append(("segment", len(points)))
         return proposals([3, 4])
 
-    def follow(self, frame, found):
-        self.calls.append(("follow", frame.index, len(found)))
-        self.proposals = found
-        return self.tracks
+    def static_tracks(self):
+        self.calls.append(("static_tracks",))
 
-    def asking(self):
-        return np.array([True, False, True])
+    def locate(self, frame, found, static_tracks):
+        self.calls.append(("locate", frame.index, len(found)))
+        static_tracks()
+        placement = Placement(np.eye(4))
+        return Located(placement, observe(found, placement.T_world_sensor))
 
-    def asks(self, tracks, found, asking):
-        self.calls.append(("asks", asking.tolist()))
-        return asking
+    def follow(self, stamp_s, found, located):
+        self.calls.append(("follow", stamp_s, len(found), len(located)))
+        regrouped = found.take(np.array([1, 0]))
+        return TrackedFrame(self.tracks, regrouped, np.array([True, False, True]))
+
+    def asks(self, tracks, found, wants_class):
+        self.calls.append(("asks", found.count.tolist(), wants_class.tolist()))
+        return wants_class
 
     def select(self, tracks, found, asks, budget):
         rows = self.choose(asks, budget)
@@ -47,23 +55,24 @@ class Stages:
         return Selected(rows, int(asks.sum()) - len(rows))
 
     def classify(self, points, found, which):
-        self.calls.append(("classify", which.tolist()))
+        self.calls.append(("classify", found.count.tolist(), which.tolist()))
         return np.tile([0.0, 1, 0, 0], (len(which), 1))
 
     def fuse(self, tracks, found, rows, likelihood):
         self.calls.append(("fuse", rows.tolist(), likelihood.shape))
         tracks.posterior[rows] = likelihood
-        return np.ones(len(rows), np.bool_)
+        return np.arange(len(rows)) == 0
 
-    def settle(self, rows, certain):
-        self.calls.append(("settle", rows.tolist(), certain.tolist()))
+    def conclude(self, rows, certain):
+        self.calls.append(("conclude", rows.tolist(), certain.tolist()))
+        return self.tracks.copy()
 
 
 FRAME = Frame(7, 0.7, np.ones((9, 4), np.float32))
 
 
 def pipeline(stages):
-    return Pipeline(stages, stages, stages, stages, stages, Ledger())
+    return Pipeline(stages, stages, stages, stages, stages, stages, Ledger())
 
 
 def test_the_stages_run_once_and_in_order():
@@ -72,37 +81,63 @@ def test_the_stages_run_once_and_in_order():
     result = pipe.step(FRAME, Budget(calls=5))
     assert stages.calls == [
         ("segment", 9),
-        ("follow", 7, 2),
-        ("asks", [True, False, True]),
+        ("locate", 7, 2),
+        ("static_tracks",),
+        ("follow", 0.7, 2, 2),
+        ("asks", [4, 3], [True, False, True]),
         ("select", Budget(calls=5)),
-        ("classify", [1, 0]),  # the proposals of rows 0 and 2
+        ("classify", [4, 3], [1, 0]),  # the proposals of rows 0 and 2, as regrouped by the tracker
         ("fuse", [0, 2], (2, 4)),
-        ("settle", [0, 2], [True, True]),
+        ("conclude", [0, 2], [True, False]),
     ]
     assert (result.n_classified, result.n_deferred) == (2, 0)
+    assert result.proposals.count.tolist() == [4, 3]
+    assert result.state_names == STATES
     assert set(pipe.ledger.close_frame(7)["stages"]) == set(STAGES)
 
 
-def test_without_a_choice_nothing_is_classified():
+def test_without_a_selection_nothing_is_classified():
     stages = Stages(choose=lambda asks, budget: [])
     pipe = pipeline(stages)
     result = pipe.step(FRAME)
-    assert [c[0] for c in stages.calls] == ["segment", "follow", "asks", "select"]
+    assert [c[0] for c in stages.calls] == [
+        "segment", "locate", "static_tracks", "follow", "asks", "select", "conclude"
+    ]  # fmt: skip
+    assert stages.calls[-1] == ("conclude", [], [])
     assert (result.n_classified, result.n_deferred) == (0, 2)
-    assert "classification" not in pipe.ledger.close_frame(7)["stages"]
+    assert CLASSIFICATION not in pipe.ledger.close_frame(7)["stages"]
 
 
-def test_a_result_outlives_the_tables_it_was_made_from():
+def test_a_result_is_independent_of_the_live_tracks():
     stages = Stages()
     result = pipeline(stages).step(FRAME)
     stages.tracks.id[:] = 99
     assert result.tracks.id.tolist() == [4, 5, 6]
 
 
-def test_a_stage_that_fails_is_still_booked():
-    stages = Stages()
-    stages.segment = lambda points: 1 / 0
-    pipe = pipeline(stages)
+@pytest.mark.parametrize(
+    ("call", "stage"),
+    [
+        ("segment", SEGMENTATION),
+        ("locate", ODOMETRY),
+        ("follow", TRACKING),
+        ("asks", FUSION),
+        ("select", SCHEDULING),
+        ("classify", CLASSIFICATION),
+        ("fuse", FUSION),
+        ("conclude", TRACKING),
+    ],
+)
+def test_every_call_is_booked_on_its_stage_even_if_it_fails(call, stage):
+    def fail(*arguments):
+        raise ZeroDivisionError
+
+    healthy, failing = pipeline(Stages()), Stages()
+    setattr(failing, call, fail)
+    pipe = pipeline(failing)
     with pytest.raises(ZeroDivisionError):
         pipe.step(FRAME)
-    assert pipe.ledger.close_frame(7)["stages"]["segmentation"]["calls"] == 1
+    booked = pipe.ledger.close_frame(7)["stages"]
+    assert booked[stage]["calls"] == 1 + (call in {"fuse", "conclude"})
+    healthy.step(FRAME)
+    assert set(booked) <= set(healthy.ledger.close_frame(7)["stages"])

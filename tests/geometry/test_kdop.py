@@ -1,18 +1,24 @@
-"""Outlines and their overlaps against the obvious."""
+"""k-DOPs and their overlap against slow references."""
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modt.geometry import kdop as kdop_module
-from modt.geometry.kdop import DIRECTIONS, PAD_M, centres, coverage, overlapping_pairs, width_sum, widths
+from modt.geometry.kdop import DIRECTIONS, centres, coverage, kdops, overlapping_pairs, width_sum, widths
+from tests.tracking.tracking_scenes import box, frame_of
+
+SIZES = {"exact": (15, 15), "in cells": (90, 70)}
+"""Numbers of k-DOPs for which overlapping_pairs takes each of its two ways."""
+PAD_M = 0.15
+at_each_size = pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
 
 
-def ends(n, seed, longest):
-    """(n, 4) low and (n, 4) high ends."""
+def random_ends(n, seed, max_length):
+    """(n, 4) low and (n, 4) high ends, in half metres."""
     rng = np.random.default_rng(seed)
-    middle, length = rng.integers(-20, 20, (n, 4)), rng.integers(0, longest + 1, (n, 4))
+    spread = 20 + n // 5  # about as many neighbours each, however many
+    middle, length = rng.integers(-spread, spread, (n, 4)), rng.integers(0, max_length + 1, (n, 4))
     return middle - length / 2, middle + length / 2
 
 
@@ -20,73 +26,79 @@ def kdop(low, high):
     return np.concatenate([high, -low], axis=1).T
 
 
-def slow_touching(low_a, high_a, low_b, high_b):
-    return [
-        (i, j)
-        for i in range(len(low_a))
-        for j in range(len(low_b))
-        if all(low_a[i, k] <= high_b[j, k] and high_a[i, k] >= low_b[j, k] for k in (0, 2))
-    ]
+def slow_overlapping_pairs(low_a, high_a, low_b, high_b):
+    """Interval by interval along x and y."""
+    pairs = []
+    for i in range(len(low_a)):
+        overlap = np.logical_and.reduce(
+            [(low_a[i, k] <= high_b[:, k]) & (high_a[i, k] >= low_b[:, k]) for k in (0, 2)]
+        )
+        pairs += [(i, j) for j in np.flatnonzero(overlap).tolist()]
+    return pairs
 
 
-HOW = pytest.mark.parametrize("few", [(10**9, 0), (0, 10**9), (0, 0)], ids=["handful", "all compared", "sorted"])
+@at_each_size
+@settings(max_examples=15)
+@given(data=st.data(), seed=st.integers(0, 2**16), max_length=st.integers(0, 30))
+def test_overlapping_pairs_match_the_slow_reference(size, data, seed, max_length):
+    n, k = size if max(size) > 15 else (data.draw(st.integers(0, size[0])), data.draw(st.integers(0, size[1])))
+    a, b = random_ends(n, seed, max_length), random_ends(k, seed + 1, max_length)
+    i, j = overlapping_pairs(kdop(*a), kdop(*b))
+    assert list(zip(i.tolist(), j.tolist(), strict=True)) == slow_overlapping_pairs(*a, *b)
 
 
-def found(patch, few, a, b):
-    """What touches, found as if so many pairs were few."""
-    patch.setattr(kdop_module, "HANDFUL", few[0])
-    patch.setattr(kdop_module, "FEW_PAIRS", few[1])
-    return overlapping_pairs(a, b)
+@at_each_size
+def test_an_empty_envelope_overlaps_nothing(size):
+    n, k = size
+    assert not len(overlapping_pairs(np.full((8, n), -np.inf), kdop(*random_ends(k, 0, 30)))[0])
 
 
-@HOW
-@given(st.integers(0, 15), st.integers(0, 15), st.integers(0, 2**16), st.integers(0, 30))
-def test_touching_outlines(few, n, k, seed, longest):
-    a, b = ends(n, seed, longest), ends(k, seed + 1, longest)
-    with pytest.MonkeyPatch.context() as patch:
-        i, j = found(patch, few, kdop(*a), kdop(*b))
-    assert list(zip(i.tolist(), j.tolist(), strict=True)) == slow_touching(*a, *b)
+@at_each_size
+def test_pairs_do_not_depend_on_the_origin_of_the_world(size):
+    n, k = size
+    origin = (np.array([-458_000, 5_430_000]) @ DIRECTIONS)[:, None]
+    a, b = kdop(*random_ends(n, 1, 9)) + 0.51, kdop(*random_ends(k, 2, 9))
+    near, far = overlapping_pairs(a, b), overlapping_pairs(a + origin, b + origin)
+    assert len(near[0])
+    np.testing.assert_array_equal(far, near)
 
 
-@HOW
-def test_what_was_never_seen_touches_nothing(few, monkeypatch):
-    something, nothing = kdop(*ends(6, 0, 30)), np.full((8, 2), -np.inf)
-    assert not len(found(monkeypatch, few, nothing, something)[0])
-
-
-@HOW
-@pytest.mark.parametrize("origin", [(0, 0), (-458_000, 5_430_000)], ids=["here", "UTM"])
-def test_where_the_world_begins_does_not_matter(few, origin, monkeypatch):
-    start = (origin @ DIRECTIONS)[:, None]
-    a, b = kdop(*ends(15, 1, 9)) + 0.51, kdop(*ends(15, 2, 9))
-    here, there = found(monkeypatch, few, a, b), found(monkeypatch, few, a + start, b + start)
-    assert len(here[0])
-    np.testing.assert_array_equal(there, here)
-
-
-@HOW
-def test_what_lies_apart_does_not_touch_however_far_away(few, monkeypatch):
-    a = kdop(*ends(5, 1, 9)) + (np.array([2_000.0, 0.0]) @ DIRECTIONS)[:, None]
-    assert not len(found(monkeypatch, few, a, kdop(*ends(5, 2, 9)))[0])
+@at_each_size
+def test_groups_far_apart_do_not_overlap(size):
+    n, k = size
+    a = kdop(*random_ends(n, 1, 9)) + (np.array([2_000.0, 0.0]) @ DIRECTIONS)[:, None]
+    assert not len(overlapping_pairs(a, kdop(*random_ends(k, 2, 9)))[0])
 
 
 @given(st.integers(0, 9), st.integers(0, 2**16))
-def test_lengths_and_middles(n, seed):
-    low, high = ends(n, seed, 9)
-    one = kdop(low, high)
-    np.testing.assert_array_equal(widths(one), (high - low).T)
-    np.testing.assert_array_equal(centres(one), (high + low).T / 2)
-    np.testing.assert_array_equal(width_sum(one), (high - low).sum(axis=1))
+def test_widths_and_centres(n, seed):
+    low, high = random_ends(n, seed, 9)
+    ends = kdop(low, high)
+    np.testing.assert_array_equal(widths(ends), (high - low).T)
+    np.testing.assert_array_equal(centres(ends), (high + low).T / 2)
+    np.testing.assert_array_equal(width_sum(ends), (high - low).sum(axis=1))
 
 
 @given(st.integers(0, 9), st.integers(0, 2**16))
-def test_what_is_covered_is_so_in_both_squares(n, seed):
-    (low, high), (low_place, high_place) = ends(n, seed, 9), ends(n, seed + 1, 30)
-    part = coverage(kdop(low, high), kdop(low_place, high_place))
+def test_coverage_is_the_lesser_of_both_squares(n, seed):
+    (low, high), (low_position, high_position) = random_ends(n, seed, 9), random_ends(n, seed + 1, 30)
+    found = coverage(kdop(low, high), kdop(low_position, high_position))
     for i in range(n):
-        along = [
-            max(min(high[i, k], high_place[i, k] + PAD_M) - max(low[i, k], low_place[i, k] - PAD_M), 0.0)
+        part = [
+            max(min(high[i, k], high_position[i, k] + PAD_M) - max(low[i, k], low_position[i, k] - PAD_M), 0.0)
             / max(high[i, k] - low[i, k], PAD_M)
             for k in range(4)
         ]
-        np.testing.assert_allclose(part[i], min(along[0] * along[2], along[1] * along[3]))
+        np.testing.assert_allclose(found[i], min(part[0] * part[2], part[1] * part[3]))
+
+
+def test_kdops_are_the_greatest_coordinates_of_the_points():
+    c, s = np.cos(0.4), np.sin(0.4)
+    T = np.array([[c, -s, 0, 5], [s, c, 0, -3], [0, 0, 1, 1.7], [0, 0, 0, 1.0]])
+    frame, proposals = frame_of([box(10, 0, yaw=0.3), box(-4, 7)], 0, T)
+    found = kdops(proposals, T)
+    world = frame.points[:, :3] @ T[:3, :3].T + T[:3, 3]
+    for i in range(2):
+        along = world[proposals.members[proposals.offsets[i] : proposals.offsets[i + 1]], :2] @ DIRECTIONS
+        np.testing.assert_allclose(found[:, i], along.max(axis=0), atol=1e-4)
+    assert kdops(proposals.take(np.zeros(0, np.int64)), T).shape == (8, 0)

@@ -28,14 +28,14 @@ boxes = arrays(np.float64, (3, 7), elements=st.floats(0.1, 20))
 
 
 @given(angle)
-def test_wrap_is_the_same_direction_in_the_principal_range(a):
+def test_wrapped_angles_keep_their_direction(a):
     w = float(wrap(np.array(a)))
     assert -np.pi <= w < np.pi
     assert np.allclose([np.cos(w), np.sin(w)], [np.cos(a), np.sin(a)])
 
 
 @given(angle, angle, angle)
-def test_rotation_is_the_product_of_its_turns(roll, pitch, yaw):
+def test_rotation_is_the_product_of_its_axis_rotations(roll, pitch, yaw):
     whole = rotation_zyx(roll, pitch, yaw)
     parts = rotation_zyx(0, 0, yaw) @ rotation_zyx(0, pitch, 0) @ rotation_zyx(roll, 0, 0)
     assert np.allclose(whole, parts)
@@ -43,7 +43,7 @@ def test_rotation_is_the_product_of_its_turns(roll, pitch, yaw):
 
 
 @given(pose)
-def test_inverse_undoes(T):
+def test_a_transform_times_its_inverse_is_the_identity(T):
     assert np.allclose(T @ inverse(T), np.eye(4), atol=1e-9)
 
 
@@ -55,14 +55,14 @@ def test_corners_of_a_moved_box_are_the_moved_corners(T, box):
 
 
 @given(boxes)
-def test_corners_enclose_the_area(box):
+def test_corners_enclose_length_times_width(box):
     c = corners(box)
     x, y = c[..., 0], c[..., 1]
     area = 0.5 * np.abs((x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1))
     assert np.allclose(area, box[:, 3] * box[:, 4])
 
 
-def test_yaw_of_a_turn():
+def test_yaw_of_a_rotation():
     assert np.isclose(yaw_of(se3(rotation_zyx(0.1, -0.1, 0.7), np.zeros(3))), 0.7)
 
 

@@ -40,10 +40,10 @@ def flood_fill(cells, beam_rad, config):
 
 
 def trace(lowest, range_m, height_m, config):
-    """(rings, SECTORS) ground cells and (1, SECTORS) last slopes, ray by ray and ring by ring."""
+    """(rings, SECTORS) ground cells, ray by ray and ring by ring."""
     max_slope, max_bend = (np.tan(np.deg2rad(v)) for v in (config.max_slope_deg, config.ground.max_bend_deg))
     gain = config.ground.slope_gain
-    found, slopes = np.zeros(lowest.shape, bool), np.zeros((1, SECTORS))
+    found = np.zeros(lowest.shape, bool)
     for ray in range(SECTORS):
         height, at, slope, bend = -height_m, 0.0, 0.0, max_slope
         for ring in range(len(range_m)):
@@ -56,8 +56,7 @@ def trace(lowest, range_m, height_m, config):
                 found[ring, ray] = True
                 slope = float(np.clip(slope + gain * ((here - height) / gap - slope), -max_slope, max_slope))
                 height, at, bend = here, range_m[ring], max_bend
-        slopes[0, ray] = slope
-    return found, slopes
+    return found
 
 
 def closeness(x, y, noise_m):

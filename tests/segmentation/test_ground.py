@@ -4,7 +4,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.config.segmentation import GroundConfig
 from modt.segmentation.grids import SECTORS, PolarGrid, pseudo_angle
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.point_columns import PointColumns
@@ -63,29 +62,6 @@ def test_reflections_below_the_ground_do_not_lower_it():
     assert (np.abs(height[kept]) < 0.15).mean() > 0.99
 
 
-def test_a_climbing_road_is_extrapolated():
-    direction = scans.rays(step_deg=1.0)
-    hit = scans.floor_ranges(direction, PROFILES["ramp up"])
-    near = hit < 24.0
-    road = (direction[near] * hit[near, None]).astype(np.float32)
-    far = np.array([[44.0, y, z - HEIGHT_M + 0.12 * 25] for y in np.arange(-3.0, 3.1, 0.5) for z in (0.5, 1.5)])
-    height = ground().height_above(PointColumns.from_array(np.concatenate([road, far.astype(np.float32)])), HEIGHT_M)
-    assert np.allclose(height[: len(road)], 0.0, atol=0.3)
-    assert np.allclose(height[len(road) :], far[:, 2] + HEIGHT_M - 0.12 * 25, atol=0.7)
-
-
-def test_without_a_share_of_the_slope_the_surface_ends_level():
-    direction = scans.rays(step_deg=1.0)
-    hit = scans.floor_ranges(direction, PROFILES["ramp up"])
-    near = hit < 24.0
-    road = (direction[near] * hit[near, None]).astype(np.float32)
-    far = np.float32([[44.0, 0.0, 0.5]])
-    config = SegmentationConfig(ground=GroundConfig(extrapolation_share=0.0))
-    sweep = PointColumns.from_array(np.concatenate([road, far]))
-    level = GroundEstimator(SensorConfig(), config).height_above(sweep, HEIGHT_M)
-    assert level[-1] > ground().height_above(sweep, HEIGHT_M)[-1] + 0.5
-
-
 @pytest.mark.parametrize(("x", "y", "width"), [(53.0, 1.0, 3.0), (50.0, 12.0, 3.0), (47.0, 20.0, 4.6)])
 def test_the_side_of_a_far_car_is_not_ground(x, y, width):
     points, on = scans.scan([(x, y, 1.8, width, 0.3, 1.6)], step_deg=0.17, azimuth_deg=(-60, 60))
@@ -117,11 +93,9 @@ def test_tracing_equals_a_loop_over_rays_and_rings(seed):
     fast = ground()
     lowest = rng.normal(-HEIGHT_M, 0.25, (fast.grid.rings, SECTORS)).astype(np.float32)
     lowest[rng.random(lowest.shape) < 0.3] = np.inf
-    expected, expected_slope = reference.trace(lowest, fast.grid.range_m.astype(float), HEIGHT_M, CONFIG)
-    is_ground, slope = fast.trace(lowest, HEIGHT_M)
+    expected = reference.trace(lowest, fast.grid.range_m.astype(float), HEIGHT_M, CONFIG)
+    is_ground = fast.trace(lowest, HEIGHT_M)
     assert (is_ground == expected).mean() > 0.999  # float32 against float64 at the bound
-    alike = (is_ground == expected).all(axis=0)
-    assert slope[0, alike] == pytest.approx(expected_slope[0, alike], abs=1e-4)
 
 
 @given(angle=st.floats(-3.14, 3.14), other=st.floats(-3.14, 3.14))

@@ -1,23 +1,30 @@
-"""The larger part of an object goes to its eldest track."""
+"""Fragments of one object go to its oldest track."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.tracking.fragments import swap_proposals
+from modt.classes import ObjectClass
+from modt.config import FragmentConfig
+from modt.geometry.kdop import DIRECTIONS
+from modt.tracking.fragments import Reunion, swap_proposals
 from modt.types import NONE
+from tests.tracking.tracking_scenes import EYE, Follower, associated, box, frame_of, tracks_at
+
+BACKGROUND, CAR, PEDESTRIAN = ObjectClass.BACKGROUND, ObjectClass.CAR, ObjectClass.PEDESTRIAN
 
 
-def one_by_one(pairs, proposal, owner):
-    """What each track has, and what is free, after swap upon swap; nobody and nothing changes hands twice."""
+def slow_swap(pairs, proposal, owner):
+    """Proposal of each track after one swap at a time, and the tracks that changed; each track changes once."""
     proposal, owner, moved, changed = list(proposal), list(owner), set(), set()
-    for elder, part in pairs:
-        younger, left = owner[part], proposal[elder]
-        if part in moved or elder in changed or younger in changed:
+    for older, part in pairs:
+        younger, left = owner[part], proposal[older]
+        if part in moved or older in changed or younger in changed:
             continue
-        proposal[elder], owner[part] = part, elder
+        proposal[older], owner[part] = part, older
         moved |= {part, left}
-        changed.add(elder)
+        changed.add(older)
         if younger != NONE:
             proposal[younger] = left
             changed.add(younger)
@@ -27,20 +34,136 @@ def one_by_one(pairs, proposal, owner):
 
 
 @given(st.data(), st.integers(1, 6), st.integers(1, 6))
-def test_each_proposal_has_one_track_whoever_wants_it(data, n_tracks, n_proposals):
+def test_swaps_match_the_slow_reference_and_keep_one_track_a_proposal(data, n_tracks, n_proposals):
     k = data.draw(st.integers(0, min(n_tracks, n_proposals)))
     rows = data.draw(st.permutations(range(n_tracks)))[:k]
     columns = data.draw(st.permutations(range(n_proposals)))[:k]
     proposal, owner = np.full(n_tracks, NONE), np.full(n_proposals, NONE)
     proposal[rows], owner[columns] = columns, rows
     pair = st.tuples(st.integers(0, n_tracks - 1), st.integers(0, n_proposals - 1))
-    pairs = [(elder, part) for elder, part in data.draw(st.lists(pair, max_size=8)) if owner[part] != elder]
-    elders, parts = np.array(pairs, np.int64).reshape(-1, 2).T
-    changed, has = swap_proposals(elders, parts, proposal, owner)
-    expected, who = one_by_one(pairs, proposal.tolist(), owner.tolist())
-    assert changed.tolist() == sorted(who)
+    pairs = [(older, part) for older, part in data.draw(st.lists(pair, max_size=8)) if owner[part] != older]
+    older, parts = np.array(pairs, np.int64).reshape(-1, 2).T
+    changed, now = swap_proposals(older, parts, proposal, owner)
+    expected, expected_changed = slow_swap(pairs, proposal.tolist(), owner.tolist())
+    assert changed.tolist() == sorted(expected_changed)
     after = proposal.copy()
-    after[changed] = has
+    after[changed] = now
     assert after.tolist() == expected
     held = after[after != NONE]
     assert len(np.unique(held)) == len(held)
+
+
+WHOLE, REAR, FRONT = box(12, 4), box(11.0, 4, l=1.9), box(13.3, 4, l=1.3)
+POST, PERSON = box(12, 4, 0.5, 0.5, 1.7), box(12.3, 4, 0.6, 0.6, 1.7)
+
+
+def reunited(tracks, boxes, rows, points, min_hits=4, **options):
+    """Proposal of each track after reunite, where the first proposals were matched with the rows given."""
+    frame = associated(frame_of(boxes, points=points)[1], rows)
+    matches = Reunion(FragmentConfig(**options), min_hits).reunite(tracks, frame.observations, frame.matches)
+    assert len(set(matches.rows.tolist())) == len(matches.rows)
+    assert len(set(matches.proposals.tolist())) == len(matches.proposals)
+    proposal = np.full(len(tracks), NONE)
+    proposal[matches.rows] = matches.proposals
+    return proposal.tolist(), matches
+
+
+def test_the_older_track_takes_the_larger_part():
+    tracks = tracks_at([WHOLE, FRONT], CAR, CAR)
+    assert reunited(tracks, [REAR, FRONT], [1, 0], (40, 80))[0] == [1, 0]  # it is matched with the larger already
+    assert reunited(tracks, [REAR, FRONT], [0, 1], (40, 80))[0] == [1, 0]
+    assert reunited(tracks, [REAR, FRONT], [0, 1], (80, 40))[0] == [0, 1]
+
+
+def test_a_lost_track_takes_the_part_and_its_former_owner_is_lost():
+    tracks = tracks_at([WHOLE, FRONT], CAR, CAR)
+    proposal, matches = reunited(tracks, [FRONT], [1], 40)
+    assert proposal == [0, NONE]
+    np.testing.assert_allclose(matches.position[0], tracks.x[0, :2])  # a part measures nothing
+    assert matches.covariance[0, 0, 0] >= 100
+
+
+def test_a_part_without_a_track_is_taken():
+    assert reunited(tracks_at([WHOLE], CAR), [REAR, FRONT], [0], (40, 80))[0] == [1]
+
+
+@pytest.mark.parametrize(
+    ("older", "younger", "boxes", "columns", "why"),
+    [
+        (WHOLE, box(17.4, 4), [REAR, box(17.4, 4)], {}, "the parts are longer than a car"),
+        (WHOLE, FRONT, [WHOLE, FRONT], {}, "the older track is matched with as much as is known"),
+        (WHOLE, FRONT, [REAR, FRONT], {"hits": 1}, "the older track was seen once"),
+    ],
+)
+def test_what_is_no_fragment_stays_with_its_track(older, younger, boxes, columns, why):
+    tracks = tracks_at([older, younger], CAR, CAR, **columns)
+    assert reunited(tracks, boxes, [0, 1], (40, 80))[0] == [0, 1], why
+
+
+def test_a_part_around_the_older_track_is_taken():
+    """The older track knows a fragment only; the whole came to a younger one."""
+    assert reunited(tracks_at([FRONT, WHOLE], CAR, CAR), [WHOLE], [1], 80)[0] == [0, NONE]
+
+
+@pytest.mark.parametrize(("length_m", "swapped"), [(1.5, True), (3.5, False)])
+def test_parts_that_are_longer_than_their_class_together_are_not_one_object(length_m, swapped):
+    """Both lie within the known extent, which once was that of a merged object."""
+    part = box(14.2 + length_m / 2, 4, length_m)
+    tracks = tracks_at([WHOLE, part], CAR, CAR)
+    tracks.envelope[0] += 6 * np.maximum(DIRECTIONS[0], 0)
+    assert (reunited(tracks, [REAR, part], [0, 1], (40, 80))[0] == [1, 0]) == swapped
+
+
+@pytest.mark.parametrize(
+    ("older_class", "younger_class", "final", "swapped"),
+    [
+        (CAR, CAR, True, True),
+        (BACKGROUND, CAR, True, True),  # background and cars are easily confused
+        (CAR, PEDESTRIAN, True, False),
+        (CAR, PEDESTRIAN, False, True),  # it is not final that it is a pedestrian
+        (BACKGROUND, PEDESTRIAN, True, False),
+    ],
+)
+def test_parts_of_different_classes_are_not_one_object(older_class, younger_class, final, swapped):
+    tracks = tracks_at([WHOLE, FRONT], older_class, younger_class)
+    tracks.final[1] = final
+    assert (reunited(tracks, [REAR, FRONT], [0, 1], (40, 80))[0] == [1, 0]) == swapped
+
+
+@pytest.mark.parametrize(
+    ("older_class", "younger_hits", "swapped"),
+    [(CAR, 10, True), (BACKGROUND, 10, False), (BACKGROUND, 3, True)],
+)
+def test_a_part_of_the_size_of_a_person_stays_with_an_established_track(older_class, younger_hits, swapped):
+    tracks = tracks_at([WHOLE, PERSON], older_class, BACKGROUND)
+    tracks.hits[1] = younger_hits
+    assert (reunited(tracks, [POST, PERSON], [0, 1], (20, 40))[0] == [1, 0]) == swapped
+
+
+@pytest.mark.parametrize(("option", "value"), [("min_coverage", 1.0), ("shrink", 10.0)])
+def test_the_thresholds_are_those_of_the_configuration(option, value):
+    tracks, boxes = tracks_at([WHOLE, FRONT], CAR, CAR), [REAR, box(13.6, 4, l=1.9)]
+    assert reunited(tracks, boxes, [0, 1], (40, 80))[0] == [1, 0]
+    assert reunited(tracks, boxes, [0, 1], (40, 80), **{option: value})[0] == [0, 1]
+
+
+def test_an_empty_frame_is_no_fragment():
+    assert reunited(tracks_at([WHOLE], CAR), [], [], 0)[0] == [NONE]
+
+
+def test_a_car_behind_a_pole_keeps_its_track():
+    follower, i = Follower(regroupings=()), 0
+    scenes = [
+        ([[WHOLE]] * 4, 60, 0),
+        ([[REAR, FRONT]], (80, 40), 0),
+        ([[FRONT, REAR]], (80, 40), 0),
+        ([[REAR, FRONT]], (80, 40), 0),
+        ([[box(11.0, 4, l=1.2), box(13.0, 4, l=1.9)]] * 2, (40, 80), 1),
+        ([[WHOLE]], 60, 0),
+    ]
+    for frames, points, larger in scenes:
+        for boxes in frames:
+            follower.follow(*frame_of(boxes, i, EYE, points=points))
+            follower.classify(CAR)
+            i += 1
+        assert follower.tracks.id[follower.tracks.proposal == larger].tolist() == [0]

@@ -1,242 +1,223 @@
-"""A car that something nearer cuts in two stays one."""
+"""Parts of a car are merged where its track knows it whole."""
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from modt.tracking.unions import Unions, united_proposals, united_sightings
 
-from modt.classes import N_CLASSES, ObjectClass
-from modt.config import TrackingConfig
-from modt.geometry import boxes_about, corners, inverse, rotation_zyx, se3, transform_boxes, upright_box
+from modt.classes import ObjectClass
+from modt.config import MergeConfig, TrackingConfig
+from modt.geometry import inverse, transform_boxes
 from modt.geometry.kdop import DIRECTIONS
-from modt.observations import observe
-from modt.segmentation.reflectance_statistics import reflectance_statistics
-from modt.tracking.states import EFFICIENT
-from modt.types import NONE
-from tests.tracking.tracking_scenes import Follower, box, frame_of
+from modt.placement import Placement
+from modt.tracking.merging import CarMerging
+from tests.tracking.tracking_scenes import (
+    EYE,
+    Follower,
+    associated,
+    box,
+    driving,
+    frame_of,
+    owner_of_points,
+    tracks_at,
+)
 
-CAR = box(10, 3, 4.2, 1.8, 1.5)
-REAR, FRONT = box(8.6, 3, 1.4, 1.8, 1.5), box(11.1, 3, 2.0, 1.8, 1.5)
+BACKGROUND, CAR, PEDESTRIAN = ObjectClass.BACKGROUND, ObjectClass.CAR, ObjectClass.PEDESTRIAN
+WHOLE, REAR, FRONT = (box(x, 3, length, 1.8, 1.5) for x, length in ((10, 4.2), (8.6, 1.4), (11.1, 2.0)))
+AHEAD = box(15, 3, 4.2, 1.8, 1.5)
+POINTS = 80
+
+
+def merging(tracks, frame, **options):
+    """The frame after merging."""
+    return CarMerging(MergeConfig(**options), min_hits=4).regroup(tracks, frame, Placement(EYE))
+
+
+def frame_at_rest(tracks, boxes, *rows):
+    """A frame whose first proposals are matched with the rows, and measure that these did not move."""
+    frame = associated(frame_of(boxes, points=POINTS)[1], rows)
+    frame.matches.position[:] = tracks.x[list(rows), :2]
+    return frame
+
+
+def merged(tracks, boxes, rows):
+    """Original proposals of each one after merging, and the frame; the first are matched with the rows."""
+    after, n = merging(tracks, frame_at_rest(tracks, boxes, *rows)), len(boxes)
+    label = after.proposals.label(n * POINTS)
+    assert sorted(after.proposals.members) == list(range(n * POINTS))
+    per_box = label.reshape(n, POINTS)
+    assert (per_box == per_box[:, :1]).all()
+    groups = [np.flatnonzero(per_box[:, 0] == k).tolist() for k in range(len(after.proposals))]
+    return groups, after
+
+
+def test_the_parts_of_a_car_become_one_proposal():
+    groups, after = merged(tracks_at([WHOLE], CAR), [REAR, FRONT], [0])
+    assert groups == [[0, 1]]
+    np.testing.assert_allclose(after.proposals.box[0], WHOLE, atol=0.05)
+    np.testing.assert_allclose(after.observations.box[0], WHOLE, atol=0.05)
+    assert after.observations.partial.all()
+    assert (after.matches.rows.tolist(), after.matches.proposals.tolist()) == ([0], [0])
+
+
+def test_the_match_of_a_part_is_dropped_and_proposals_are_renumbered():
+    tracks = tracks_at([WHOLE, FRONT, box(30, 0)], CAR)
+    groups, after = merged(tracks, [REAR, FRONT, box(30, 0)], [0, 1, 2])
+    assert groups == [[0, 1], [2]]
+    assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 0, 2: 1}
+
+
+@pytest.mark.parametrize(
+    ("object_class", "columns", "why"),
+    [
+        (BACKGROUND, {}, "it is no car"),
+        (PEDESTRIAN, {}, "it is no car"),
+        (CAR, {"final": False}, "its class is not final"),
+        (CAR, {"hits": 3}, "it was seen too few times"),
+    ],
+)
+def test_only_established_cars_with_a_final_class_merge(object_class, columns, why):
+    groups, _ = merged(tracks_at([WHOLE], object_class, **columns), [REAR, FRONT], [0])
+    assert groups == [[0], [1]], why
+
+
+@pytest.mark.parametrize(
+    ("own", "part", "why"),
+    [
+        (REAR, box(13.0, 3, 1.5, 1.8, 1.5), "it lies ahead of the car"),
+        (REAR, box(11.1, 4.2, 2.0, 1.8, 1.5), "it reaches beyond its side"),
+        (FRONT, box(13.0, 3, 2.0, 1.8, 1.5), "most of it lies ahead, though both are no longer than the car"),
+        (REAR, box(11.65, 3, 2.6, 1.8, 1.5), "both are longer than the car, though most of it lies within"),
+    ],
+)
+def test_what_exceeds_the_known_extent_is_no_part(own, part, why):
+    tracks = tracks_at([WHOLE], CAR)
+    assert len(merging(tracks, frame_at_rest(tracks, [own, part], 0)).proposals) == 2, why
+
+
+@pytest.mark.parametrize(("option", "value"), [("min_coverage", 1.0), ("longer_m", 0.0)])
+def test_the_thresholds_are_those_of_the_configuration(option, value):
+    part = box(11.3, 3, 2.0, 1.8, 1.5)  # sticks out by 0.2 m
+    tracks = tracks_at([WHOLE], CAR)
+    frame = frame_at_rest(tracks, [REAR, part], 0)
+    assert len(merging(tracks, frame).proposals) == 1
+    assert len(merging(tracks, frame, **{option: value}).proposals) == 2
+
+
+@pytest.mark.parametrize(
+    ("object_class", "final", "groups"),
+    [
+        (PEDESTRIAN, True, [[0], [1]]),
+        (ObjectClass.CYCLIST, True, [[0], [1]]),
+        (PEDESTRIAN, False, [[0, 1]]),  # not classified yet
+        (BACKGROUND, True, [[0, 1]]),
+    ],
+)
+def test_a_classified_person_is_no_part(object_class, final, groups):
+    tracks = tracks_at([WHOLE, FRONT], CAR, object_class)
+    tracks.final[1] = final
+    assert merged(tracks, [REAR, FRONT], [0, 1])[0] == groups
+
+
+def test_a_car_takes_all_its_parts():
+    lorry = box(10, 3, 9.0, 1.8, 1.5)
+    parts = [box(7.0, 3, 2.0, 1.8, 1.5), box(9.4, 3, 2.0, 1.8, 1.5), box(12.5, 3, 3.0, 1.8, 1.5)]
+    tracks = tracks_at([lorry], CAR)
+    assert len(merging(tracks, frame_at_rest(tracks, parts, 0)).proposals) == 1
+
+
+def two_cars(ahead_m=0.0, behind_m=0.0):
+    """An older car whose known extent is longer ahead, and a younger one's, longer behind."""
+    tracks = tracks_at([WHOLE, AHEAD], CAR, CAR)
+    tracks.envelope[0] += np.maximum(DIRECTIONS[0], 0) * ahead_m
+    tracks.envelope[1] += np.maximum(-DIRECTIONS[0], 0) * behind_m
+    return tracks
+
+
+def test_the_proposal_of_an_older_car_is_no_part():
+    assert merged(two_cars(behind_m=5.5), [WHOLE, AHEAD], [0, 1])[0] == [[0], [1]]
+
+
+def test_the_proposal_of_a_younger_car_is_a_part():
+    """The younger track then has none."""
+    groups, after = merged(two_cars(ahead_m=6.5), [WHOLE, AHEAD], [0, 1])
+    assert groups == [[0, 1]]
+    assert after.matches.rows.tolist() == [0]
+
+
+def test_a_part_of_two_cars_goes_to_the_older():
+    part = box(12.5, 3, 0.5, 1.8, 1.5)
+    assert merged(two_cars(ahead_m=3.5, behind_m=3.5), [WHOLE, AHEAD, part], [0, 1])[0] == [[0, 2], [1]]
+    assert merged(two_cars(behind_m=3.5), [WHOLE, AHEAD, part], [0, 1])[0] == [[0], [1, 2]]
+
+
+def test_a_proposal_that_gains_a_part_is_no_part_itself():
+    near, far = box(14.2, 3, 2.6, 1.8, 1.5), box(16.4, 3, 1.3, 1.8, 1.5)
+    tracks = two_cars(ahead_m=3.5)
+    after = merging(tracks, frame_at_rest(tracks, [WHOLE, near, far], 0, 1))
+    assert after.proposals.count.tolist() == [POINTS, 2 * POINTS]
+
+
+def test_the_reflectance_is_that_of_the_matched_proposal():
+    tracks = tracks_at([WHOLE], CAR)
+    frame = frame_at_rest(tracks, [FRONT, REAR], 0)
+    reflectance = np.arange(10.0).reshape(2, 5)
+    after = merging(tracks, replace(frame, proposals=replace(frame.proposals, reflectance=reflectance)))
+    np.testing.assert_array_equal(after.proposals.reflectance, reflectance[:1])
+
+
+def test_a_frame_without_parts_is_returned_as_it_is():
+    frame = associated(frame_of([WHOLE, AHEAD])[1], [0])
+    assert merging(tracks_at([WHOLE], CAR), frame) is frame
+
+
 KNOWN = 6
 """Frames in which the car is seen whole."""
 
 
-def still(i):
-    return np.eye(4)
-
-
-def driving(i):
-    """Far from the origin of the world, and turning."""
-    return se3(rotation_zyx(0.01, -0.02, 0.7 + 0.02 * i), np.array([458_000.0 + 0.3 * i, 5_430_000.0, 120.0]))
-
-
-def settle(tracker, *kinds, fixed=True):
-    """Tell the tracks, in the order of their birth, what they are."""
-    t = tracker.tracks
-    t.final[:], t.key_points[:] = fixed, 50
-    t.posterior[:] = t.key_posterior[:] = np.eye(N_CLASSES)[list(kinds)]
-
-
-def seen(tracker, bodies, i, pose=still, points=80):
-    """Follow a frame of bodies that stand where frame 0 has them; ids of whom the points of each belong to."""
+def follow(follower, boxes, i, pose=lambda i: EYE, classes=(CAR,)):
+    """Follow boxes that stand where frame 0 has them; id of the track of each of them."""
     T = pose(i)
-    frame, proposals = frame_of(transform_boxes(inverse(T) @ pose(0), np.array(bodies)), i, T, points=points)
-    tracker.follow(frame, proposals)
-    label = tracker.proposals.label(len(frame.points))
-    assert NONE not in label
-    row = tracker.tracks.row_of_proposal(len(tracker.proposals))
-    return [tracker.tracks.id[row[own[0]]] for own in label.reshape(len(bodies), points)]
+    frame, proposals = frame_of(transform_boxes(inverse(T) @ pose(0), np.array(boxes)), i, T, points=POINTS)
+    follower.follow(frame, proposals)
+    follower.classify(*classes)
+    owner = owner_of_points(follower.tracks, follower.proposals, len(frame.points)).reshape(len(boxes), POINTS)
+    assert (owner == owner[:, :1]).all()
+    return owner[:, 0].tolist()
 
 
-def known(bodies, kinds, pose=still, frames=KNOWN, association="kdop", fixed=True):
-    """A tracker that knows these bodies."""
-    tracker = Follower(TrackingConfig(association=association), EFFICIENT)
-    for i in range(frames):
-        seen(tracker, bodies, i, pose)
-        settle(tracker, *kinds, fixed=fixed)
-    return tracker
-
-
-@pytest.mark.parametrize(
-    ("kind", "length_m", "known_m"),
-    [
-        (ObjectClass.CAR, 5.8, 5.8),
-        (ObjectClass.CAR, 6.4, 5.0),  # no car is as long
-        (ObjectClass.BACKGROUND, 6.4, 6.4),
-    ],
-)
-def test_what_a_car_is_one_with_is_not_what_was_seen_of_it(kind, length_m, known_m):
-    tracker = known([box(10, 3, 5.0, 1.8, 1.5)], [kind])
-    assert seen(tracker, [box(10, 3, length_m, 1.8, 1.5)], KNOWN) == [0]
-    envelope = tracker.tracks.envelope[0]
-    assert envelope[0] + envelope[4] == pytest.approx(known_m, abs=0.25)
-
-
-@pytest.mark.parametrize("pose", [still, driving])
-def test_a_car_in_two_pieces_is_one(pose):
-    tracker = known([CAR], [ObjectClass.CAR], pose)
+@pytest.mark.parametrize("pose", [lambda i: EYE, driving], ids=["stationary", "driving"])
+def test_a_car_in_two_parts_keeps_its_track_and_its_box(pose):
+    follower = Follower()
+    for i in range(KNOWN):
+        follow(follower, [WHOLE], i, pose)
     for i in range(KNOWN, KNOWN + 8):
-        assert seen(tracker, [REAR, FRONT], i, pose) == [0, 0]
-        assert len(tracker.proposals) == 1
-        settle(tracker, *[ObjectClass.CAR] * len(tracker.tracks))
-    found = tracker.proposals
-    np.testing.assert_allclose(found.box[0, 3:6], CAR[3:6], atol=0.05)
-    assert found.occluded.tolist() == [True]
-    np.testing.assert_allclose(tracker.tracks.box[0], transform_boxes(pose(0), np.array([CAR]))[0], atol=0.05)
+        assert follow(follower, [REAR, FRONT], i, pose) == [0, 0]
+        assert len(follower.proposals) == 1
+    np.testing.assert_allclose(follower.proposals.box[0, 3:6], WHOLE[3:6], atol=0.05)
+    np.testing.assert_allclose(follower.tracks.box[0], transform_boxes(pose(0), np.array([WHOLE]))[0], atol=0.05)
+
+
+def test_the_papers_association_takes_proposals_as_they_are():
+    follower = Follower(TrackingConfig(association="paper"))
+    for i in range(KNOWN):
+        follow(follower, [WHOLE], i)
+    follow(follower, [REAR, FRONT], KNOWN)
+    assert len(follower.proposals) == 2
 
 
 @pytest.mark.parametrize(
-    ("change", "why"),
+    ("object_class", "length_m", "known_m"),
     [
-        ({"association": "paper"}, "the paper takes proposals as they are"),
-        ({"kinds": [ObjectClass.BACKGROUND]}, "it is no car"),
-        ({"fixed": False}, "it may be none"),
-        ({"frames": 3}, "it is not known for long enough"),
+        (CAR, 5.8, 5.8),
+        (CAR, 6.4, 5.0),  # longer than any car
+        (BACKGROUND, 6.4, 6.4),
     ],
 )
-def test_only_cars_that_are_known_are_made_whole(change, why):
-    tracker = known(**({"bodies": [CAR], "kinds": [ObjectClass.CAR]} | change))
-    seen(tracker, [REAR, FRONT], KNOWN)
-    assert len(tracker.proposals) == 2, why
-
-
-@pytest.mark.parametrize(
-    ("own", "piece", "why"),
-    [
-        (REAR, box(13.0, 3, 1.5, 1.8, 1.5), "it lies ahead of the car"),
-        (REAR, box(11.1, 4.2, 2.0, 1.8, 1.5), "it reaches beyond its side"),
-        (
-            FRONT,
-            box(13.0, 3, 2.0, 1.8, 1.5),
-            "most of it lies ahead, though both are no longer than the car",
-        ),
-        (REAR, box(11.65, 3, 2.1, 1.8, 1.5), "both are longer than the car, though most of it lies within"),
-    ],
-)
-def test_what_the_car_never_was_is_no_part_of_it(own, piece, why):
-    tracker = known([CAR], [ObjectClass.CAR])
-    seen(tracker, [own, piece], KNOWN)
-    assert len(tracker.proposals) == 2, why
-
-
-@pytest.mark.parametrize(("kind", "alone"), [(ObjectClass.PEDESTRIAN, True), (ObjectClass.BACKGROUND, False)])
-def test_who_is_known_as_a_person_stays_one(kind, alone):
-    kinds = [ObjectClass.CAR, kind]
-    tracker = known([CAR, box(12.7, 3, 0.5, 0.5, 1.7)], kinds)
-    for i, x in enumerate((12.5, 12.3, 12.1)):
-        seen(tracker, [CAR, box(x, 3, 0.5, 0.5, 1.7)], KNOWN + i)
-        settle(tracker, *kinds)
-    owners = seen(tracker, [REAR, box(11.9, 3, 0.5, 0.5, 1.7)], KNOWN + 3)
-    assert (owners == [0, 1]) == alone
-
-
-def test_a_car_takes_all_its_pieces():
-    lorry = box(10, 3, 9.0, 1.8, 1.5)
-    tracker = known([lorry], [ObjectClass.CAR])
-    pieces = [box(7.0, 3, 2.0, 1.8, 1.5), box(9.4, 3, 2.0, 1.8, 1.5), box(12.5, 3, 3.0, 1.8, 1.5)]
-    assert seen(tracker, pieces, KNOWN) == [0, 0, 0]
-    assert len(tracker.proposals) == 1
-
-
-YOUNGER = box(15, 3, 4.2, 1.8, 1.5)
-
-
-def two_cars(ahead_m=0.0, behind_m=0.0):
-    """A tracker that knows CAR, who was once taken for longer ahead, and YOUNGER, once taken for longer behind."""
-    tracker = known([CAR, YOUNGER], [ObjectClass.CAR, ObjectClass.CAR])
-    tracker.tracks.envelope[0] += np.maximum(DIRECTIONS[0], 0) * ahead_m
-    tracker.tracks.envelope[1] += np.maximum(-DIRECTIONS[0], 0) * behind_m
-    return tracker
-
-
-def test_an_elder_car_keeps_its_own():
-    tracker = two_cars(behind_m=3.5)
-    assert seen(tracker, [FRONT, YOUNGER], KNOWN) == [0, 1]
-
-
-def test_what_may_be_a_piece_of_two_cars_is_the_elders():
-    tracker = two_cars(ahead_m=3.5, behind_m=3.5)
-    assert seen(tracker, [CAR, YOUNGER, box(12.5, 3, 0.5, 1.8, 1.5)], KNOWN) == [0, 1, 0]
-
-
-def test_a_car_that_takes_something_gives_nothing_away():
-    tracker = two_cars(ahead_m=3.5)
-    near, far = box(14.2, 3, 2.6, 1.8, 1.5), box(16.4, 3, 1.3, 1.8, 1.5)
-    assert seen(tracker, [CAR, near, far], KNOWN) == [0, 1, 1]
-    assert len(tracker.proposals) == 2
-
-
-def groups(draw, n):
-    """Hosts and parts among n proposals."""
-    role = draw(st.lists(st.integers(-1, n - 1), min_size=n, max_size=n))
-    hosts = {k for k in range(n) if role[k] < 0}
-    pairs = [(h, k) for k, h in enumerate(role) if h in hosts]
-    return np.array([h for h, _ in pairs], np.int64), np.array([k for _, k in pairs], np.int64)
-
-
-@given(st.lists(st.integers(6, 14), min_size=2, max_size=7), st.floats(-3, 3), st.data())
-def test_unions_hold_what_their_parts_did(counts, yaw, data):
-    n = len(counts)
-    frame, proposals = frame_of([box(6 * k + 5, k, yaw=0.3 * k) for k in range(n)], points=counts)
-    light = np.random.default_rng(n).uniform(0, 1, len(frame.points)).astype(np.float32)
-    told = reflectance_statistics(light[proposals.members], proposals.offsets)
-    proposals = dataclasses.replace(proposals, reflectance=told, truncated=np.arange(n) % 3 == 0, sensor_height_m=1.6)
-    hosts, parts = groups(data.draw, n)
-    if not len(parts):
-        return
-    unions = Unions.of(n, hosts, parts)
-    after = united_proposals(proposals, unions, np.full(len(np.unique(hosts)), yaw))
-    assert sorted(after.members) == sorted(proposals.members)
-    assert after.coordinates.shape == (3, 0)
-    assert after.sensor_height_m == 1.6
-    into = np.arange(n)
-    into[parts] = hosts
-    kept = np.unique(into)
-    assert unions.kept.tolist() == kept.tolist()
-    assert unions.hosts.tolist() == np.unique(hosts).tolist()
-    label, before = after.label(len(frame.points)), into[proposals.label(len(frame.points))]
-    np.testing.assert_array_equal(kept[label], before)
-    own = [frame.points[label == k, :3].astype(np.float64) for k in range(len(kept))]
-    np.testing.assert_allclose(after.centroid, [p.mean(axis=0) for p in own], atol=1e-5)
-    expected = reflectance_statistics(light[after.members], after.offsets)
-    np.testing.assert_allclose(after.reflectance, expected, atol=1e-5)
-    for k in unions.new:
-        exact = upright_box(own[k].T, float(after.box[k, 6]))
-        assert (after.box[k, 3:6] >= exact[3:6] - 1e-6).all()
-        assert after.occluded[k]
-        assert after.truncated[k] == proposals.truncated[into == kept[k]].any()
-    others = np.setdiff1d(np.arange(len(kept)), unions.new)
-    np.testing.assert_array_equal(after.box[others], proposals.box[kept[others]])
-
-    T = driving(3)
-    seen = dataclasses.replace(after, coordinates=frame.points[after.members, :3].T)
-    fresh, said = observe(seen, T), united_sightings(observe(proposals, T), unions, after, T)
-    for column in dataclasses.fields(fresh):
-        if column.name != "cut":
-            np.testing.assert_allclose(
-                getattr(said, column.name), getattr(fresh, column.name), atol=1e-4, err_msg=column.name
-            )
-    assert said.partial[unions.new].all()
-
-
-def test_nothing_is_known_of_the_brightness_of_a_union_with_what_has_none():
-    _, proposals = frame_of([box(5, 0), box(9, 0)])
-    told = np.full((2, 5), 0.5)
-    told[1] = np.nan
-    unions = Unions.of(2, np.array([0]), np.array([1]))
-    after = united_proposals(dataclasses.replace(proposals, reflectance=told), unions, np.zeros(1))
-    assert np.isnan(after.reflectance).all()
-    assert united_proposals(proposals, unions, np.zeros(1)).reflectance is None
-
-
-@given(st.lists(st.tuples(*[st.floats(-9, 9)] * 3, st.floats(-4, 4)), min_size=1, max_size=4), st.floats(-4, 4))
-def test_a_box_about_boxes_is_the_least_at_its_heading(places, yaw):
-    boxes = np.array([[x, y, z, 3.0, 1.0, 1.2, turn] for x, y, z, turn in places])
-    (about,) = boxes_about(boxes, np.zeros(len(boxes), np.int64), np.array([yaw]))
-    ends = np.concatenate([np.c_[corners(boxes).reshape(-1, 2), np.repeat(boxes[:, 2] + s, 4)] for s in (-0.6, 0.6)])
-    expected = upright_box(ends.T, yaw)
-    np.testing.assert_allclose(about[:6], expected[:6], atol=1e-9)
-    np.testing.assert_allclose(np.sin(about[6] - expected[6]) * (expected[3] - expected[4] > 1e-6), 0, atol=1e-9)
+def test_the_known_extent_grows_up_to_the_size_of_the_class(object_class, length_m, known_m):
+    follower = Follower()
+    for i in range(KNOWN):
+        follow(follower, [box(10, 3, 5.0)], i, classes=(object_class,))
+    assert follow(follower, [box(10, 3, length_m)], KNOWN, classes=(object_class,)) == [0]
+    envelope = follower.tracks.envelope[0]
+    assert envelope[0] + envelope[4] == pytest.approx(known_m, abs=0.25)

@@ -1,112 +1,123 @@
+"""The state machines, state by event."""
+
 import numpy as np
 import pytest
 
-from modt.tracking.states import ACCURATE, EFFICIENT, Event, UndefinedTransitionError
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, Event, UndefinedTransitionError
 from modt.types import NONE
 
-MACHINES = [EFFICIENT, ACCURATE]
-PAPER = {
-    EFFICIENT: {
-        ("proposal", "a1", "matched"),
-        ("proposal", "a2", "unmatched"),
-        ("unmatched", "a3", "tracked"),
-        ("tracked", "a4", "tracked"),
-        ("matched", "a5", "tracked"),
-        ("tracked", "a6", "lost"),
-        ("lost", "a7", "tracked"),
-        ("lost", "a8", "lost"),
-        ("lost", "a9", "deleted"),
-    },
-    ACCURATE: {
-        ("proposal", "a1", "matched"),
-        ("proposal", "a2", "unmatched"),
-        ("unmatched", "a3", "tracked_unclassified"),
-        ("unmatched", "a4", "tracked_classified"),
-        ("matched", "a5", "tracked_unclassified"),
-        ("matched", "a6", "tracked_classified"),
-        ("tracked_classified", "a7", "tracked_classified"),
-        ("tracked_unclassified", "a8", "tracked_classified"),
-        ("tracked_unclassified", "a9", "tracked_unclassified"),
-        ("tracked_classified", "a10", "lost_classified"),
-        ("lost_classified", "a11", "tracked_classified"),
-        ("tracked_unclassified", "a12", "lost_unclassified"),
-        ("lost_unclassified", "a13", "tracked_unclassified"),
-        ("lost_classified", "a14", "deleted"),
-        ("lost_unclassified", "a14", "deleted"),
-    },
+WAITING = {
+    ("unmatched", Event.ASSOCIATED): ("e1", "unmatched"),
+    ("matched", Event.JOINS_WAITING): ("e2", "unmatched"),
+    ("unmatched", Event.UNASSOCIATED): ("e3", "lost_unmatched"),
+    ("lost_unmatched", Event.ASSOCIATED): ("e4", "unmatched"),
+    ("lost_unmatched", Event.UNASSOCIATED): ("e5", "lost_unmatched"),
+    ("lost_unmatched", Event.EXPIRED): ("e6", "deleted"),
 }
+TABLE_I = {
+    ("proposal", Event.ASSOCIATED): ("a1", "matched"),
+    ("proposal", Event.UNASSOCIATED): ("a2", "unmatched"),
+    ("unmatched", Event.CLASSIFIED): ("a3", "tracked"),
+    ("tracked", Event.ASSOCIATED): ("a4", "tracked"),
+    ("matched", Event.JOINS_FINAL): ("a5", "tracked"),
+    ("tracked", Event.UNASSOCIATED): ("a6", "lost"),
+    ("lost", Event.ASSOCIATED): ("a7", "tracked"),
+    ("lost", Event.UNASSOCIATED): ("a8", "lost"),
+    ("lost", Event.EXPIRED): ("a9", "deleted"),
+} | WAITING
+TABLE_II = {
+    ("proposal", Event.ASSOCIATED): ("a1", "matched"),
+    ("proposal", Event.UNASSOCIATED): ("a2", "unmatched"),
+    ("unmatched", Event.UNDECIDED): ("a3", "tracked_unclassified"),
+    ("unmatched", Event.CLASSIFIED): ("a4", "tracked_classified"),
+    ("matched", Event.JOINS_UNCERTAIN): ("a5", "tracked_unclassified"),
+    ("matched", Event.JOINS_FINAL): ("a6", "tracked_classified"),
+    ("tracked_classified", Event.ASSOCIATED): ("a7", "tracked_classified"),
+    ("tracked_unclassified", Event.CLASSIFIED): ("a8", "tracked_classified"),
+    ("tracked_unclassified", Event.ASSOCIATED): ("a9", "tracked_unclassified"),
+    ("tracked_classified", Event.UNASSOCIATED): ("a10", "lost_classified"),
+    ("lost_classified", Event.ASSOCIATED): ("a11", "tracked_classified"),
+    ("tracked_unclassified", Event.UNASSOCIATED): ("a12", "lost_unclassified"),
+    ("lost_unclassified", Event.ASSOCIATED): ("a13", "tracked_unclassified"),
+    ("lost_classified", Event.EXPIRED): ("a14", "deleted"),
+    ("lost_unclassified", Event.EXPIRED): ("a14", "deleted"),
+    ("tracked_unclassified", Event.UNDECIDED): ("e7", "tracked_unclassified"),
+    ("lost_classified", Event.UNASSOCIATED): ("e8", "lost_classified"),
+    ("lost_unclassified", Event.UNASSOCIATED): ("e9", "lost_unclassified"),
+    ("tracked_classified", Event.CLASSIFIED): ("e10", "tracked_classified"),
+    ("tracked_classified", Event.UNDECIDED): ("e11", "tracked_unclassified"),
+} | WAITING
+TABLES = {
+    "efficient": (EFFICIENT, TABLE_I),
+    "conventional": (CONVENTIONAL, TABLE_I | {("tracked", Event.CLASSIFIED): ("e7", "tracked")}),
+    "accurate": (ACCURATE, TABLE_II),
+}
+CELLS = [(name, state, event) for name, (machine, _) in TABLES.items() for state in machine.names for event in Event]
+each_machine = pytest.mark.parametrize("machine", [machine for machine, _ in TABLES.values()], ids=TABLES)
 
-pytestmark = pytest.mark.parametrize("machine", MACHINES, ids=lambda m: m.title)
+
+@pytest.mark.parametrize(("name", "state", "event"), CELLS)
+def test_every_state_by_every_event(name, state, event):
+    machine, table = TABLES[name]
+    states = np.array([machine.index(state)])
+    if (state, event) in table:
+        assert machine.names[machine.transition(states, event)[0]] == table[state, event][1]
+    else:
+        with pytest.raises(UndefinedTransitionError, match=f"{machine.title}: {event.name} in state {state}"):
+            machine.transition(states, event)
 
 
-def test_every_state_by_every_event(machine):
-    defined = {(t.source, t.label): t.target for t in machine.transitions}
-    for state in range(len(machine.names)):
-        for label in range(len(machine.labels)):
-            one, which = np.array([state]), np.array([label])
-            target = defined.get((machine.names[state], machine.labels[label]))
-            if target is None:
-                with pytest.raises(UndefinedTransitionError, match=machine.title):
-                    machine.fire(one, which)
-            else:
-                assert machine.names[machine.fire(one, which)[0]] == target
+@pytest.mark.parametrize(("machine", "table"), TABLES.values(), ids=TABLES)
+def test_rows_have_the_labels_of_the_tables_once(machine, table):
+    rows = [((t.source, t.event), (t.label, t.target)) for t in machine.transitions]
+    assert dict(rows) == table
+    assert len(rows) == len(table)
 
 
-def test_the_papers_events_stand_as_the_paper_has_them(machine):
-    rows = {(t.source, t.label, t.target) for t in machine.transitions if t.label.startswith("a")}
-    assert rows == PAPER[machine]
-
-
-def test_every_state_by_every_happening_answers_with_at_most_one_event(machine):
-    pairs = [(t.source, t.event) for t in machine.transitions]
-    assert len(pairs) == len(set(pairs))
-    for state in range(len(machine.names)):
-        for event in Event:
-            label = machine.answer[state, event]
-            if label == NONE:
-                with pytest.raises(UndefinedTransitionError):
-                    machine.transition(np.array([state]), event)
-            else:
-                (t,) = [t for t in machine.transitions if t.source == machine.names[state] and t.event is event]
-                assert machine.labels[label] == t.label
-                assert machine.transition(np.array([state]), event)[0] == machine.index(t.target)
-
-
-def test_arrays_of_states_move_together(machine):
+@each_machine
+def test_an_array_of_states_takes_one_event_each(machine):
     sources = np.array([machine.index(t.source) for t in machine.transitions])
-    labels = np.array([machine.labels.index(t.label) for t in machine.transitions])
-    targets = np.array([machine.index(t.target) for t in machine.transitions])
-    np.testing.assert_array_equal(machine.fire(sources, labels), targets)
     events = np.array([t.event for t in machine.transitions])
+    targets = np.array([machine.index(t.target) for t in machine.transitions])
     np.testing.assert_array_equal(machine.transition(sources, events), targets)
+    assert len(machine.transition(sources[:0], Event.ASSOCIATED)) == 0
 
 
-def test_one_bad_row_is_an_error(machine):
-    states = np.array([machine.proposal, machine.deleted])
-    with pytest.raises(UndefinedTransitionError, match="deleted"):
+@each_machine
+def test_one_undefined_transition_among_many_is_an_error(machine):
+    states = np.array([machine.proposal, machine.index("deleted")])
+    with pytest.raises(UndefinedTransitionError, match="ASSOCIATED in state deleted"):
         machine.transition(states, Event.ASSOCIATED)
+    with pytest.raises(UndefinedTransitionError, match="EXPIRED in state proposal"):
+        machine.transition(np.array([machine.index("lost_unmatched"), machine.proposal]), Event.EXPIRED)
 
 
-def test_every_state_is_reached_and_only_the_end_is_final(machine):
+@each_machine
+def test_every_state_is_reached_from_a_proposal_and_only_deleted_is_the_end(machine):
     reached = {machine.names[machine.proposal]}
     for _ in machine.names:
         reached |= {t.target for t in machine.transitions if t.source in reached}
     assert reached == set(machine.names)
-    assert {t.source for t in machine.transitions} == set(machine.names) - {machine.names[machine.deleted]}
+    assert {t.source for t in machine.transitions} == set(machine.names) - {"deleted"}
 
 
-def test_no_rows_are_fine(machine):
-    none = np.zeros(0, np.int64)
-    assert len(machine.transition(none, Event.ASSOCIATED)) == 0
+@each_machine
+def test_a_matched_proposal_and_its_track_end_in_one_state(machine):
+    tracks = (machine.after[:, Event.ASSOCIATED] != NONE).nonzero()[0]
+    tracks = tracks[tracks != machine.proposal]
+    after = machine.transition(tracks, Event.ASSOCIATED)
+    np.testing.assert_array_equal(machine.joined(after), after)
 
 
-def test_a_proposal_inherits_what_its_track_then_is(machine):
-    """A matched proposal and the track that it joined end in the same state."""
-    alive = [
-        s for s in range(len(machine.names)) if s != machine.proposal and machine.answer[s, Event.ASSOCIATED] != NONE
-    ]
-    track = np.array(alive)
-    matched = machine.transition(np.full(len(track), machine.proposal), Event.ASSOCIATED)
-    np.testing.assert_array_equal(
-        machine.transition(matched, machine.inherits(track)), machine.transition(track, Event.ASSOCIATED)
-    )
+@pytest.mark.parametrize(
+    ("machine", "final", "wants_class"),
+    [
+        (EFFICIENT, {"tracked", "lost"}, {"unmatched"}),
+        (CONVENTIONAL, set(), {"unmatched"}),
+        (ACCURATE, {"tracked_classified", "lost_classified"}, {"unmatched", "tracked_unclassified"}),
+    ],
+    ids=TABLES,
+)
+def test_states_whose_class_is_final_or_wanted(machine, final, wants_class):
+    assert {name for name, flag in zip(machine.names, machine.final, strict=True) if flag} == final
+    assert {name for name, flag in zip(machine.names, machine.wants_class, strict=True) if flag} == wants_class

@@ -1,36 +1,37 @@
+"""The tracker: births, prediction, updates, rest and deaths."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import TrackingConfig
-from modt.tracking.states import ACCURATE, EFFICIENT
+from modt.config.tracking import FilterConfig
+from modt.geometry.kdop import DIRECTIONS
+from modt.tracking.kdop_association import KdopAssociation
+from modt.tracking.paper_association import PaperAssociation
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, UndefinedTransitionError
+from modt.tracking.tracker import association_of, regroupings_of
 from modt.types import NONE, Proposals
-from tests.tracking.tracking_scenes import Follower, box, frame_of
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
-ASSOCIATIONS = ["robust", "paper"]
-EYE = np.eye(4)
+ASSOCIATIONS = ["kdop", "paper"]
 
 
 @pytest.fixture(params=ASSOCIATIONS)
 def tracker(request):
-    return Follower(TrackingConfig(association=request.param, ask_from=1), EFFICIENT)
+    return Follower(TrackingConfig(association=request.param))
 
 
-def names(tracker):
-    return [tracker.machine.names[s] for s in tracker.tracks.state]
-
-
-def run(tracker, frames, settle=True):
+def run(tracker, frames):
     for frame, proposals in frames:
         tracks = tracker.follow(frame, proposals)
-        if settle:
-            rows = np.flatnonzero(tracker.wants_class)
-            tracker.conclude(rows, np.ones(len(rows), np.bool_))
+        rows = np.flatnonzero(tracker.wants_class)
+        tracker.conclude(rows, np.ones(len(rows), np.bool_))
     return tracks
 
 
-def test_a_standing_box_keeps_its_track(tracker):
+def test_a_stationary_box_keeps_its_track(tracker):
     tracks = run(tracker, [frame_of([box(10, 2)], i, EYE, seed=0) for i in range(10)])
     assert len(tracks) == 1
     assert (tracks.id[0], tracks.age[0], tracks.hits[0]) == (0, 10, 10)
@@ -38,8 +39,8 @@ def test_a_standing_box_keeps_its_track(tracker):
 
 
 @pytest.mark.parametrize("course", np.deg2rad([0, 90, 180, -45]))
-def test_a_moving_box_keeps_its_track_and_shows_its_course(course):
-    tracker = Follower(TrackingConfig(), EFFICIENT)
+def test_a_moving_box_keeps_its_track_with_its_heading_and_speed(course):
+    tracker = Follower()
     v = 8.0
     step = v * 0.1 * np.array([np.cos(course), np.sin(course)])
     tracks = run(tracker, [frame_of([box(12 + i * step[0], 6 + i * step[1], yaw=course)], i, EYE) for i in range(12)])
@@ -48,79 +49,80 @@ def test_a_moving_box_keeps_its_track_and_shows_its_course(course):
     assert abs(np.angle(np.exp(1j * (tracks.x[0, 2] - course)))) < 0.1
 
 
-def test_states_of_a_life(tracker):
-    tracker.follow(*frame_of([box(10, 0)], 0, EYE))
-    assert names(tracker) == ["unmatched"]
-    assert tracker.wants_class.all()
-    tracker.conclude(np.array([0]), np.array([True]))
-    assert names(tracker) == ["tracked"]
-    tracker.follow(*frame_of([box(10, 0)], 1, EYE))
-    assert names(tracker) == ["tracked"]
-    assert not tracker.wants_class.any()
-    tracker.follow(*frame_of([], 2, EYE))
-    assert names(tracker) == ["lost"]
-    assert tracker.tracks.proposal[0] == NONE
-    tracker.follow(*frame_of([box(10, 0)], 3, EYE))
-    assert names(tracker) == ["tracked"]
-    assert tracker.tracks.id[0] == 0
-    for i in range(4, 5 + tracker.config.max_missed):
-        assert len(tracker.tracks) == 1
-        tracker.follow(*frame_of([], i, EYE))
-    assert len(tracker.tracks) == 0
+def test_a_classified_track_is_deleted_after_its_last_frame_without_a_proposal(tracker):
+    frames = [frame_of([box(10, 0)] if i in (0, 1, 3) else [], i, EYE) for i in range(13)]
+    lives = []
+    for frame in frames:
+        run(tracker, [frame])
+        lives.append(tracker.states)
+    assert lives == [["tracked"], ["tracked"], ["lost"], ["tracked"], *[["lost"]] * TrackingConfig().max_missed, []]
 
 
-def test_a_track_that_waits_for_its_class_is_followed_and_dies_like_others(tracker):
+def test_a_track_waits_for_its_class(tracker):
     for i in range(3):
         tracker.follow(*frame_of([box(10, 0)], i, EYE))
-        assert names(tracker) == ["unmatched"]
+        assert tracker.states == ["unmatched"]
         assert tracker.wants_class.all()
     tracker.follow(*frame_of([], 3, EYE))
-    assert names(tracker) == ["lost_unmatched"]
+    assert tracker.states == ["lost_unmatched"]
     assert not tracker.wants_class.any()
     tracker.follow(*frame_of([box(10, 0)], 4, EYE))
-    assert names(tracker) == ["unmatched"]
-    assert list(tracker.tracks.id) == [0]
-    for i in range(5, 6 + tracker.config.max_missed):
-        tracker.follow(*frame_of([], i, EYE))
-    assert len(tracker.tracks) == 0
+    assert tracker.states == ["unmatched"]
+    assert tracker.tracks.id.tolist() == [0]
 
 
-@pytest.mark.parametrize(("seen", "patience"), [(2, 4), (3, 8)])
-def test_what_was_never_asked_for_is_given_up_sooner(seen, patience):
-    tracker = Follower(TrackingConfig(ask_from=3, max_missed=8), EFFICIENT)
-    for i in range(seen):
-        tracker.follow(*frame_of([box(10, 0)], i, EYE))
-    for i in range(seen, seen + patience):
-        tracker.follow(*frame_of([], i, EYE))
-        assert len(tracker.tracks) == 1
-    tracker.follow(*frame_of([], seen + patience, EYE))
-    assert len(tracker.tracks) == 0
-
-
-def test_doubt_is_asked_again_until_it_is_gone():
-    tracker = Follower(TrackingConfig(ask_from=1), ACCURATE)
+@pytest.mark.parametrize("max_missed", [0, 1, 3])
+def test_tracks_live_as_many_frames_without_a_proposal_as_configured(max_missed):
+    tracker = Follower(TrackingConfig(max_missed=max_missed))
     tracker.follow(*frame_of([box(10, 0)], 0, EYE))
-    tracker.conclude(np.array([0]), np.array([False]))
-    assert names(tracker) == ["tracked_unclassified"]
-    tracker.follow(*frame_of([box(10, 0)], 1, EYE))
-    assert tracker.wants_class.all()
-    tracker.conclude(np.array([0]), np.array([False]))
-    tracker.follow(*frame_of([], 2, EYE))
-    assert names(tracker) == ["lost_unclassified"]
+    for i in range(1, 1 + max_missed):
+        tracker.follow(*frame_of([], i, EYE))
+        assert tracker.tracks.missed.tolist() == [i]
+    tracker.follow(*frame_of([], 1 + max_missed, EYE))
+    assert len(tracker.tracks) == 0
+
+
+def test_the_id_of_a_deleted_track_is_never_used_again():
+    tracker = Follower(TrackingConfig(max_missed=0))
+    for i, boxes in enumerate([[box(10, 0), box(20, 8)], [box(10, 0)], [box(10, 0), box(20, 8)]]):
+        tracker.follow(*frame_of(boxes, i, EYE))
+    assert tracker.tracks.id.tolist() == [0, 2]
+
+
+def test_an_uncertain_class_is_wanted_until_it_is_certain():
+    tracker = Follower(machine=ACCURATE)
+    for i, certain in enumerate([False, False, True]):
+        tracker.follow(*frame_of([box(10, 0)], i, EYE))
+        assert tracker.wants_class.tolist() == [True]
+        tracks = tracker.conclude([0], [certain])
+        assert tracks.final.tolist() == [certain]
     tracker.follow(*frame_of([box(10, 0)], 3, EYE))
-    tracker.conclude(np.array([0]), np.array([True]))
-    assert names(tracker) == ["tracked_classified"]
-    tracker.follow(*frame_of([], 4, EYE))
-    assert names(tracker) == ["lost_classified"]
+    assert tracker.wants_class.tolist() == [False]
 
 
-def test_classifying_what_did_not_ask_changes_no_state(tracker):
+def test_conclude_returns_a_copy(tracker):
+    tracker.follow(*frame_of([box(10, 0)], 0, EYE))
+    tracks = tracker.conclude([0], [True])
+    tracks.id[:] = 99
+    assert tracker.tracks.id.tolist() == [0]
+
+
+@pytest.mark.parametrize(("machine", "certain"), [(EFFICIENT, False), (EFFICIENT, True), (CONVENTIONAL, False)])
+def test_a_classification_that_the_machine_has_no_row_for_is_an_error(machine, certain):
+    tracker = Follower(machine=machine)
     run(tracker, [frame_of([box(10, 0)], i, EYE) for i in range(2)])
-    tracker.conclude(np.array([0]), np.array([False]))
-    assert names(tracker) == ["tracked"]
+    with pytest.raises(UndefinedTransitionError):
+        tracker.conclude([0], [certain])
 
 
-@settings(deadline=None, max_examples=40)
+@pytest.mark.parametrize(("association", "kind", "n"), [("kdop", KdopAssociation, 2), ("paper", PaperAssociation, 0)])
+def test_association_and_regroupings_follow_the_configuration(association, kind, n):
+    config = TrackingConfig(association=association)
+    assert isinstance(association_of(config), kind)
+    assert len(regroupings_of(config)) == n
+
+
+@settings(max_examples=40)
 @given(
     st.lists(
         st.lists(
@@ -131,12 +133,12 @@ def test_classifying_what_did_not_ask_changes_no_state(tracker):
         max_size=8,
     ),
     st.sampled_from(ASSOCIATIONS),
-    st.sampled_from([EFFICIENT, ACCURATE]),
+    st.sampled_from([EFFICIENT, CONVENTIONAL, ACCURATE]),
     st.booleans(),
 )
 def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine, posed):
     tracker = Follower(TrackingConfig(association=association, max_missed=2), machine)
-    seen = set()
+    known = set()
     for i, boxes in enumerate(scene):
         frame, proposals = frame_of(
             [box(x, y, max(a, b), min(a, b), yaw=c) for x, y, a, b, c in boxes], i, EYE if posed else None
@@ -145,43 +147,72 @@ def test_every_proposal_belongs_to_exactly_one_track(scene, association, machine
         owned = np.sort(tracks.proposal[tracks.proposal != NONE])
         np.testing.assert_array_equal(owned, np.arange(len(proposals)))
         assert len(set(tracks.id)) == len(tracks)
-        gone = seen - set(tracks.id)
-        seen |= set(tracks.id)
-        assert not gone & set(tracks.id)
+        born = set(tracks.id[tracks.age == 1].tolist())
+        assert not born & known  # an id is never used twice
+        known |= born
+        assert known.issuperset(tracks.id.tolist())
         assert (tracks.missed <= 2).all()
         assert ((tracks.missed > 0) == (tracks.proposal == NONE)).all()
         assert np.isfinite(tracks.x).all()
         assert np.isfinite(tracks.P).all()
         assert tracker.tracks is tracks
-        asking = np.flatnonzero(tracker.wants_class)
-        tracker.conclude(asking, np.arange(len(asking)) % 2 == 0)
+        rows = np.flatnonzero(tracker.wants_class)
+        certain = np.arange(len(rows)) % 2 == 0 if machine is ACCURATE else np.ones(len(rows), np.bool_)
+        tracker.conclude(rows, certain)
+        np.testing.assert_array_equal(tracks.final, machine.final[tracks.state])
 
 
-def test_frames_without_anything(tracker):
+def test_an_empty_frame_has_no_tracks(tracker):
     frame, _ = frame_of([], 0)
     assert len(tracker.follow(frame, Proposals.empty())) == 0
     assert len(tracker.wants_class) == 0
     tracker.conclude(np.zeros(0, np.int64), np.zeros(0, np.bool_))
 
 
-def test_two_runs_are_the_same():
+def test_two_runs_give_the_same_tracks():
     frames = [
         frame_of([box(10 + 0.5 * i, 0), box(8, 5), box(15, -4, 0.6, 0.6)][: 2 + i % 2], i, EYE) for i in range(9)
     ]
-    first, second = (run(Follower(TrackingConfig(), EFFICIENT), frames) for _ in range(2))
+    first, second = (run(Follower(), frames) for _ in range(2))
     for (name, a), (_, b) in zip(first.columns(), second.columns(), strict=True):
         np.testing.assert_array_equal(a, b, err_msg=name)
 
 
-def test_background_that_went_away_is_as_agile_as_anything():
-    """It was not what it was taken for."""
-    grown = []
-    for step_m in (0.0, 0.15):
-        tracker = Follower(TrackingConfig(), EFFICIENT)
-        for i in range(12):
-            tracks = tracker.follow(*frame_of([box(12 + step_m * i, 3, 0.6, 0.6, 1.7)], i, EYE))
-            tracks.posterior[:], tracks.final[:] = np.eye(4)[0], True
-        before = tracks.P[0, 3, 3]
-        grown.append(tracker.follow(*frame_of([], 12, EYE)).P[0, 3, 3] - before)
-    assert grown[1] == pytest.approx(np.square(0.1 * TrackingConfig().acceleration_sigma_mps2))
-    assert grown[0] == pytest.approx(grown[1] / 16)
+def test_the_process_noise_is_that_of_the_configuration():
+    tracker = Follower(TrackingConfig(filter=FilterConfig(acceleration_sigma_mps2=3.0)))
+    for i in range(6):
+        tracker.follow(*frame_of([box(12, 3, 0.6, 0.6, 1.7)], i, EYE))
+    before = tracker.tracks.P[0, 3, 3]
+    grown = tracker.follow(*frame_of([], 6, EYE)).P[0, 3, 3] - before
+    assert grown == pytest.approx(np.square(0.1 * 3.0))
+
+
+def test_a_track_at_rest_is_stationary_until_it_leaves_its_rest_position():
+    tracker = Follower()
+    for i in range(20):
+        x = 10.0 if i < 8 else 10.0 + 0.4 * (i - 7)
+        tracks = run(tracker, [frame_of([box(x, 2, 0.6, 0.6)], i, EYE, seed=i)])
+        assert tracks.id.tolist() == [0]
+        if i == 7:
+            assert tracks.stationary[0]
+            assert tracks.x[0, 3] < 0.3
+    assert not tracks.stationary[0]
+    assert tracks.x[0, 3] == pytest.approx(4.0, abs=0.5)
+
+
+def test_the_mean_kdop_follows_views_that_jitter_and_restarts_at_an_end_that_jumps():
+    tracker = Follower()
+    for i in range(12):
+        tracks = run(tracker, [frame_of([box(12, 3, 2.0, 1.0)], i, EYE, points=2000)])
+    np.testing.assert_allclose(tracks.mean_kdop[0][[0, 2, 4, 6]], [1.0, 0.5, 1.0, 0.5], atol=0.05)
+    tracks = run(tracker, [frame_of([box(12.5, 3, 3.0, 1.0)], 12, EYE, points=2000)])  # its front comes into view
+    reach = tracks.kdop[0] - tracks.x[0, :2] @ DIRECTIONS
+    assert tracks.mean_kdop[0, 0] == pytest.approx(reach[0], abs=0.15)
+    np.testing.assert_allclose(tracks.mean_kdop[0][[2, 4, 6]], [0.5, 1.0, 0.5], atol=0.15)
+
+
+def test_new_tracks_begin_with_the_uncertainty_of_the_configuration():
+    config = FilterConfig(initial_position_sigma_m=0.7, initial_speed_sigma_mps=9.0)
+    tracker = Follower(TrackingConfig(filter=config))
+    tracks = tracker.follow(*frame_of([box(10, 0)], 0, EYE))
+    np.testing.assert_allclose(np.diag(tracks.P[0]), [0.49, 0.49, np.pi**2, 81.0])

@@ -1,12 +1,23 @@
-"""Frames made of boxes full of points, for the tracker's tests."""
+"""Frames of boxes full of points, tables of tracks at boxes, and what follows them, for the tests of the tracker."""
+
+from dataclasses import replace
 
 import numpy as np
 
+from modt.classes import N_CLASSES, ObjectClass
 from modt.config import OdometryConfig, TrackingConfig
+from modt.geometry import rotation_zyx, se3
+from modt.geometry.kdop import DIRECTIONS
+from modt.observations import observe
 from modt.odometry.odometry import Odometry
+from modt.tracking.association import Matches
+from modt.tracking.regrouping import Associated
 from modt.tracking.states import EFFICIENT
+from modt.tracking.track_table import TrackTable
 from modt.tracking.tracker import Tracker
-from modt.types import Frame, Proposals
+from modt.types import NONE, Frame, Proposals
+
+EYE = np.eye(4)
 
 
 class Follower:
@@ -21,6 +32,10 @@ class Follower:
     def tracks(self):
         return self.tracker.tracks
 
+    @property
+    def states(self):
+        return [self.tracker.state_names[s] for s in self.tracks.state]
+
     def follow(self, frame, proposals):
         located = self.odometry.locate(frame, proposals, self.tracker.static_tracks)
         self.T_world_sensor = located.placement.T_world_sensor
@@ -30,6 +45,25 @@ class Follower:
 
     def conclude(self, rows, certain):
         return self.tracker.conclude(np.asarray(rows), np.asarray(certain))
+
+    def classify(self, *classes):
+        """Give the tracks that want a class one each, in the order of their birth; the last for all further ones."""
+        rows = self.wants_class.nonzero()[0]
+        for row in rows:
+            set_class(self.tracks, row, classes[min(row, len(classes) - 1)])
+        return self.conclude(rows, np.ones(len(rows), np.bool_))
+
+
+def set_class(tracks, row, object_class):
+    """Write what the fusion writes of a classified track."""
+    tracks.posterior[row] = tracks.key_posterior[row] = np.eye(N_CLASSES)[object_class]
+    tracks.key_points[row] = tracks.points[row]
+
+
+def driving(i):
+    """Poses far from the origin of the world, of a sensor that turns."""
+    position = np.array([458_000.0 + 0.3 * i, 5_430_000.0 + 0.2 * i, 120.0])
+    return se3(rotation_zyx(0.01, -0.02, 0.7 + 0.02 * i), position)
 
 
 def frame_of(boxes, index=0, T_world_sensor=None, points=60, seed=0, period_s=0.1):
@@ -59,3 +93,58 @@ def cloud(box, n, rng):
 
 def box(x, y, l=4.0, w=1.8, h=1.5, yaw=0.0, z=-1.0):  # noqa: E741
     return [x, y, z, l, w, h, yaw]
+
+
+def joined(proposals, groups):
+    """Proposals that are unions of others, given by their numbers, with boxes along the axes."""
+    rows = [np.concatenate([np.arange(*proposals.offsets[k : k + 2]) for k in group]) for group in groups]
+    xyz = [proposals.coordinates[:, r].T.astype(np.float64) for r in rows]
+    low, high = ([f(p, axis=0) for p in xyz] for f in (np.min, np.max))
+    boxes = [[*(a + b) / 2, *(b - a), 0.0] for a, b in zip(low, high, strict=True)]
+    return replace(
+        proposals,
+        members=proposals.members[np.concatenate(rows)],
+        offsets=np.cumsum([0, *map(len, rows)]),
+        coordinates=proposals.coordinates[:, np.concatenate(rows)],
+        centroid=np.array([p.mean(axis=0) for p in xyz]),
+        box=np.array(boxes),
+        truncated=np.zeros(len(rows), np.bool_),
+        reflectance=None if proposals.reflectance is None else proposals.reflectance[[g[0] for g in groups]],
+    )
+
+
+def tracks_at(boxes, *classes, points=60, **columns):
+    """A table of tracks last observed at boxes (M, 7) of the world, classified as given, by default as background."""
+    observations = observe(frame_of(boxes, points=2000)[1], EYE)  # dense: k-DOPs reach the corners
+    n = len(observations)
+    t = TrackTable.blank(n)
+    t.id[:], t.age[:], t.hits[:], t.points[:] = np.arange(n), 10, 10, points
+    t.x[:, :2] = t.anchor[:] = t.rest_position[:] = observations.position
+    t.P[:] = 0.01 * np.eye(4)
+    t.box[:], t.kdop[:] = observations.box, observations.kdop.T
+    t.bottom[:], t.top[:] = observations.bottom, observations.top
+    t.envelope[:] = t.mean_kdop[:] = t.kdop - t.x[:, :2] @ DIRECTIONS
+    t.final[:] = True
+    t.last_class[:] = [*classes, *[ObjectClass.BACKGROUND] * (n - len(classes))]
+    for row in range(n):
+        set_class(t, row, t.last_class[row])
+    for column, value in columns.items():
+        getattr(t, column)[:] = value
+    return t
+
+
+def associated(proposals, rows=(), matched=None):
+    """A frame at the origin whose proposals, by default the first ones, are matched with these rows of a table."""
+    observations, rows = observe(proposals, EYE), np.array(rows, np.int64)
+    matched = np.arange(len(rows)) if matched is None else np.array(matched, np.int64)
+    covariance = 0.01 * np.eye(2)[None].repeat(len(rows), axis=0)
+    matches = Matches(rows, matched, observations.position[matched], covariance, np.zeros((len(rows), 4)))
+    return Associated(proposals, observations, matches)
+
+
+def owner_of_points(tracks, proposals, n_points):
+    """(n_points,) id of the track of each point; every point must be in one proposal, and that in one track."""
+    label = proposals.label(n_points)
+    assert NONE not in label
+    assert sorted(proposals.members) == list(range(n_points))
+    return tracks.id[tracks.row_of_proposal(len(proposals))[label]]

@@ -14,7 +14,7 @@ the results of those of --world.
 
 --own uses modt's tracker instead of the ideal one and counts fragments and merged objects as background. --paper is
 the setting of Figs. 10 and 11: classification from the first frame, views independent by their number of points
-alone, no review. --docs updates the tables of docs/classification.md.
+alone, no review. --docs updates the tables of docs/log/fusion-sweep.md.
 
 --drive replaces the worlds by a KITTI drive with tracklets, in the camera's view. Drive 0001 has five scans, which
 are training data of pointnet-kitti. The test drive, 0005, requires --confirm, and no parameter is swept on it.
@@ -51,7 +51,7 @@ from tools.train.synthetic_scans import labelled_scan
 WORLDS = ("street:2001", "street:2002", "crossing:2003")
 CHECKS = ("street:3001", "street:3002", "crossing:3003", "street:3004", "street:3005", "crossing:3006")
 PERIOD_S = 0.1
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "classification.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "log" / "fusion-sweep.md"
 BEGIN, END = "<!-- tools/study/sweep_fusion.py -->\n", "<!-- end of tools/study/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
 POINT_CHANGES = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
@@ -313,7 +313,7 @@ def main() -> None:
     options.add_argument("--paper", action="store_true", help="the setting of the paper's Figs. 10 and 11")
     options.add_argument("--points", type=int, default=0, help="minimum points of a scored proposal")
     options.add_argument("--page", type=Path, help="HTML file for plots of precision against calls")
-    options.add_argument("--docs", action="store_true", help="update the tables of docs/classification.md")
+    options.add_argument("--docs", action="store_true", help="update the tables of docs/log/fusion-sweep.md")
     args = options.parse_args()
     testing = args.drive is not None and args.drive.resolve().name == TEST_DRIVE
     if testing and not args.confirm:

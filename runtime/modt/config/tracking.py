@@ -17,6 +17,7 @@ class FilterConfig(StageConfig):
     initial_speed_sigma_mps: float = number(5.0, 0.1, 50.0, "m/s", "of the speed of a new track")
     stationary_radius_m: float = number(0.5, 0.05, 5.0, "m", "a track this near to its rest position is stationary")
     stationary_sigma_mps: float = number(1.0, 0.01, 50.0, "m/s", "of the speed 0 that is observed of such a track")
+    stopped_mps: float = number(0.5, 0.01, 5.0, "m/s", "a moving track slower than this has a new rest position")
     rest_gain: float = number(0.1, 0.0, 1.0, "", "weight of a new position in the rest position")
 
 
@@ -37,6 +38,7 @@ class KdopAssociationConfig(StageConfig):
 
     gate: float = number(16.0, 0.1, 1000.0, "", "squared Mahalanobis distance of a pair at most")
     max_cost: float = number(10.0, 0.1, 1000.0, "", "cost of leaving a track without a proposal")
+    min_coverage: float = number(0.3, 0.0, 1.0, "", "overlap over the smaller, of a pair that changed its shape")
     jump_sigma_m: float = number(0.2, 0.0, 5.0, "m", "jumps of k-DOPs as parts of an object come into view and go")
     size_weight: float = number(2.0, 0.0, 100.0, "", "of the difference of log sizes")
     overlap_weight: float = number(3.0, 0.0, 100.0, "", "of 1 - IoU")

@@ -1,13 +1,12 @@
 """Transforms, boxes, k-DOPs and the field of view."""
 
-from modt.geometry.boxes import boxes_about, corners, transform_boxes, upright_box
+from modt.geometry.boxes import corners, transform_boxes, upright_box
 from modt.geometry.field_of_view import Camera, FieldOfView
 from modt.geometry.transforms import inverse, rotation_zyx, se3, transform, wrap, yaw_of
 
 __all__ = [
     "Camera",
     "FieldOfView",
-    "boxes_about",
     "corners",
     "inverse",
     "rotation_zyx",

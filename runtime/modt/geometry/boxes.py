@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.geometry.transforms import transform, wrap, yaw_of
-from modt.types import Float64, Int
+from modt.types import Float64
 
 
 def transform_boxes(T: Float64, boxes: Float64) -> Float64:
@@ -25,28 +25,6 @@ def upright_box(xyz: Float64, yaw: float) -> Float64:
     if length < width:
         length, width, yaw = width, length, yaw - np.pi / 2
     return np.array([u * c - v * s, u * s + v * c, w, length, width, tall, yaw])
-
-
-def boxes_about(boxes: Float64, group: Int, yaw: Float64) -> Float64:
-    """(U, 7) boxes, l >= w, about groups of boxes (F, 7); group (F,) ascends.
-
-    Args:
-        boxes: (F, 7) those to hold.
-        group: (F,) which of the U each is in.
-        yaw: (U,) heading of each, or across it [rad].
-    """
-    begins, own = group.searchsorted(np.arange(len(yaw))), yaw[group]
-    x, y, z, length, width, height, heading = boxes.T
-    c, s, along, across = np.cos(own), np.sin(own), np.abs(np.cos(heading - own)), np.abs(np.sin(heading - own))
-    middle = np.array((x * c + y * s, y * c - x * s, z))
-    half = np.array((length * along + width * across, length * across + width * along, height)) / 2
-    low = np.minimum.reduceat(middle - half, begins, axis=1)
-    high = np.maximum.reduceat(middle + half, begins, axis=1)
-    (u, v, w), (length, width, height) = (low + high) / 2, high - low
-    c, s = np.cos(yaw), np.sin(yaw)
-    turn = np.where(length < width, np.pi / 2, 0.0)
-    sides = np.maximum(length, width), np.minimum(length, width)
-    return np.array((u * c - v * s, u * s + v * c, w, *sides, height, yaw - turn)).T
 
 
 def corners(boxes: Float64) -> Float64:

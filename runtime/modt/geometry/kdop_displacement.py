@@ -84,12 +84,13 @@ def _moved(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
     return (both - unlike * np.copysign(apart, both)) / 2, unlike, apart
 
 
-def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64]:
+def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
     """Similarity of k-DOPs a and b (8, K), one by one.
 
     Returns:
         size: (K,) mean difference of the logarithms of their widths.
         overlap: (K,) intersection over union.
+        coverage: (K,) intersection over the smaller of the two.
     """
     width_a, width_b = widths(a), widths(b)
     size = np.abs(np.log((width_b + _SOFT_M) / (width_a + _SOFT_M))).sum(axis=0) / 4
@@ -97,4 +98,5 @@ def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64]:
     common = np.maximum(widths(np.minimum(a, b)) + pad, 0.0)
     areas = [side[:2] * side[2:] for side in (width_a + pad, width_b + pad)]
     shared = common[:2] * common[2:]  # of the upright rectangles, and of those at 45 degrees
-    return size, np.minimum(*(shared / (areas[0] + areas[1] - shared)))
+    overlap = np.minimum(*(shared / (areas[0] + areas[1] - shared)))
+    return size, overlap, np.minimum(*(shared / np.minimum(*areas)))

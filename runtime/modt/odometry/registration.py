@@ -131,7 +131,7 @@ class Registration:
             return None
         if not self._initialised:
             a, b = landmarks.kdop[:, i], near[:, j]
-            shift, (size, _) = shift_between(a, b), shape_similarity(a, b)
+            shift, (size, _, _) = shift_between(a, b), shape_similarity(a, b)
             vote = _vote(shift[size < limit.max_size_difference], limit.reach_m, limit.vote_cell_m)
             motion = motion + np.append(-vote, 0.0)
         a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
@@ -141,7 +141,7 @@ class Registration:
         for _ in range(choices):
             moved = b + np.tensordot(motion, jacobian, 1)
             shift = shift_between(a, moved)
-            size, overlap = shape_similarity(a, moved)
+            size, overlap, _ = shape_similarity(a, moved)
             best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
             motion = _fit(gain.take(best, axis=1), jacobian.take(best, axis=2), variance[best], motion, scales)
         a, b, jacobian = a.take(best, axis=1), b.take(best, axis=1), jacobian.take(best, axis=2)

@@ -12,7 +12,7 @@ from modt.tracking import kalman
 from modt.tracking.assignment import assign
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
-from modt.types import Float64
+from modt.types import Bool, Float64, Int
 
 
 class KdopAssociation:
@@ -30,14 +30,14 @@ class KdopAssociation:
         self.config = config
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
-        """Pairs of least cost within the gate."""
+        """Pairs within the gate; then, among the rest, those that overlap although they changed their shape."""
         weight = self.config
         expected = tracks.predicted_kdops()
         variance = self.noise(observations)
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
         rows, columns = overlapping_pairs(expected + reach, observations.kdop)
         a, b = expected.take(rows, axis=1), observations.kdop.take(columns, axis=1)
-        size, overlap = shape_similarity(a, b)
+        size, overlap, coverage = shape_similarity(a, b)
         S = tracks.P[:, :2, :2].transpose(1, 2, 0).copy().take(rows, axis=2)
         noise = variance[columns] + weight.jump_sigma_m**2
         for k in (0, 1):
@@ -49,8 +49,12 @@ class KdopAssociation:
         shape = weight.size_weight * size + weight.overlap_weight * (1 - overlap)
         shape += weight.height_weight * (height + bottom) / 2 + weight.count_weight * count
         cost = distance / 2 + shape
-        near = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
-        kept = near[assign(rows[near], columns[near], cost[near], weight.max_cost)]
+        first = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
+        first = first[assign(rows[first], columns[first], cost[first], weight.max_cost)]
+        free = _free(rows, rows[first], len(tracks)) & _free(columns, columns[first], len(observations))
+        second = (free & (coverage > weight.min_coverage)).nonzero()[0]
+        second = second[assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
+        kept = np.concatenate([first, second])
         rows, columns = rows[kept], columns[kept]
         x = tracks.x.take(rows, axis=0)[:, :2]
         mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
@@ -70,3 +74,10 @@ class KdopAssociation:
         sigma = np.where(observations.partial, noise.partial_factor * sigma, sigma)
         variance: Float64 = np.square(sigma)
         return variance
+
+
+def _free(index: Int, taken: Int, n: int) -> Bool:
+    """(K,) which of the indices, each below n, were not taken."""
+    free = np.ones(n, np.bool_)
+    free[taken] = False
+    return free[index]

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.geometry import transform, upright_box
+from modt.geometry import upright_box
 from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
@@ -71,11 +71,9 @@ class Grouping:
         for row, yaw in zip(self.changed.tolist(), self.yaw.tolist(), strict=True):  # one to three a frame
             xyz = proposals.coordinates[:, slice(*proposals.offsets[row : row + 2])].astype(np.float64)
             proposals.box[row], proposals.centroid[row] = upright_box(xyz, yaw), xyz.mean(axis=1)
-        # The deskew of a proposal that changed is that of the one whose columns it took over.
-        old, T = self.source[self.changed], placement.T_world_sensor
-        deskew = frame.observations.centroid[old] - transform(T, frame.proposals.centroid[old])[:, :2]
         observations = frame.observations.take(self.source)
-        observations.put(self.changed, observe(proposals.take(self.changed), T).moved(deskew))
+        changed = observe(proposals.take(self.changed), placement.T_world_sensor)
+        observations.put(self.changed, changed.moved(placement.deskew(changed.centroid)))
         observations.partial[self.partial] = True
         return proposals, observations
 

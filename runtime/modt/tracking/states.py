@@ -49,7 +49,7 @@ class State:
         name: as in the paper's figure.
         wants_class: the class is asked for.
         final: the class is final.
-        joining: event that a proposal meets which joins a track in this state.
+        joining: event that a proposal meets which joins a track in this state, once that was associated.
     """
 
     name: str
@@ -166,7 +166,7 @@ EFFICIENT = StateMachine(
         State("matched"),
         State("unmatched", wants_class=True),
         State("tracked", final=True, joining=_E.JOINS_FINAL),
-        State("lost", final=True, joining=_E.JOINS_FINAL),
+        State("lost", final=True),
         State("lost_unmatched"),
         State("deleted"),
     ),
@@ -204,8 +204,8 @@ ACCURATE = StateMachine(
         State("unmatched", wants_class=True),
         State("tracked_unclassified", wants_class=True, joining=_E.JOINS_UNCERTAIN),
         State("tracked_classified", final=True, joining=_E.JOINS_FINAL),
-        State("lost_unclassified", joining=_E.JOINS_UNCERTAIN),
-        State("lost_classified", final=True, joining=_E.JOINS_FINAL),
+        State("lost_unclassified"),
+        State("lost_classified", final=True),
         State("lost_unmatched"),
         State("deleted"),
     ),

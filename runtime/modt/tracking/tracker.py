@@ -172,12 +172,14 @@ class Tracker:
         return about
 
     def _observe_rest(self, rows: Int) -> None:
-        """Zero-velocity update of tracks near their rest position."""
+        """Zero-velocity update of tracks near their rest position; a track that stopped rests where it is."""
         t, rest = self._tracks, self.config.filter
-        x, position = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0)
+        x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
+        stopped = ((x[:, SPEED] < rest.stopped_mps) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
+        position[stopped] = x[stopped, :2]
         step = x[:, :2] - position
         near = np.hypot(step[:, 0], step[:, 1]) < rest.stationary_radius_m
-        t.stationary[rows] = near & (t.hits[rows] > 2)
+        t.stationary[rows] = near & (hits > 2)
         t.rest_position[rows] = position + rest.rest_gain * near[:, None] * step
         at_rest = rows[near]
         x, P = components_first(x.compress(near, axis=0), t.P.take(at_rest, axis=0))

@@ -32,7 +32,7 @@ def test_drift_in_path_end_and_heading():
 @pytest.mark.slow
 def test_the_drift_of_a_written_drive_is_small_against_positions_and_velocities(tmp_path, monkeypatch, capsys):
     stream = SyntheticStream("street", "vlp-16", 2.0, seed=2)
-    writer = DriveWriter(tmp_path, stream)
+    writer = DriveWriter(tmp_path, stream.camera)
     for frame, truth in stream.sweeps():
         writer.write(frame, truth)
     writer.close()
