@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from modt.classes import CLASS_NAMES
 from modt.evaluation.class_score import ClassScore
 from modt.evaluation.evaluation import Evaluation, RangeScore
 from modt.evaluation.segmentation_score import SegmentationScore
 from modt.evaluation.track_score import TrackScore
 from modt.reporting.summary import Summary
 from modt.sinks.tracks import frame_record
+from modt.sources.synthetic_stream import SyntheticStream
 from tests import results
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -81,6 +83,14 @@ def test_the_way_in_names_the_steps_in_order():
     ]
     places = [text.index(step) for step in steps]
     assert places == sorted(places)
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", DOCS / "library.md"], ids=lambda p: p.name)
+def test_the_examples_of_the_library_run(page, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    frames = SyntheticStream("street", "vlp-16", 0.5, seed=3)
+    exec(code, {"sweeps": [(frame.stamp_s, frame.points, frame.T_world_sensor) for frame in frames]})
+    assert {line.split()[1] for line in capsys.readouterr().out.splitlines()} & set(CLASS_NAMES)
 
 
 def test_modules_of_the_glossary_exist():
