@@ -1,4 +1,4 @@
-"""Generate docs/profile-keys.md and docs/profile-keys.yaml from the configuration.
+"""Generate docs/profile-keys.md and .yaml from the configuration.
 
 The page has the keys that a robot sets, the YAML file every key: it is a profile of all defaults.
 """
