@@ -1,13 +1,25 @@
-"""The documents speak of what is there."""
+"""The documents name what exists, and every page can be reached."""
 
+import dataclasses
 import importlib
 import re
 from pathlib import Path
 
 import pytest
 
+from modt.classes import CLASS_NAMES
+from modt.evaluation.class_score import ClassScore
+from modt.evaluation.evaluation import Evaluation, RangeScore
+from modt.evaluation.segmentation_score import SegmentationScore
+from modt.evaluation.track_score import TrackScore
+from modt.reporting.summary import Summary
+from modt.sinks.tracks import frame_record
+from modt.sources.synthetic_stream import SyntheticStream
+from tests import results
+
 ROOT = Path(__file__).resolve().parents[1]
-PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted(DOCS.glob("*.md"))]
 
 
 def resolves(dotted: str) -> bool:
@@ -26,22 +38,71 @@ def resolves(dotted: str) -> bool:
     return False
 
 
+def links(page: Path) -> set[Path]:
+    """Files that a page links to."""
+    targets = re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text())
+    return {(page.parent / target).resolve() for target in targets if not target.startswith("http")}
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_names_of_code_exist(page):
-    names = re.findall(r"`(modt\.[a-z_]\w*(?:\.\w+)*)(?:\(.*?\))?`", page.read_text())
-    missing = [n for n in names if not n.endswith((".service", ".env")) and not resolves(n) and "/" not in n]
+    names = re.findall(r"`((?:modt|tools)\.[a-z_]\w*(?:\.\w+)*)(?:\(.*?\))?`", page.read_text())
+    commands = re.findall(r"python -m (tools\.[\w.]+)", page.read_text())
+    missing = [n for n in (*names, *commands) if not n.endswith((".service", ".env")) and not resolves(n)]
     assert [n for n in missing if not re.fullmatch(r"modt\.\w+/\d+", n)] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_links_lead_somewhere(page):
-    for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", page.read_text()):
-        if not target.startswith("http"):
-            assert (page.parent / target).exists(), f"{page.name}: {target}"
+    assert [str(target) for target in links(page) if not target.exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_into_pages_lead_to_their_headings(page):
+    for target, anchor in re.findall(r"\]\(([^)#]*)#([^)]+)\)", page.read_text()):
+        headings = re.findall(r"^#+ (.*)$", (page.parent / target if target else page).read_text(), re.MULTILINE)
+        assert anchor in {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def test_every_page_is_linked_from_the_readme_or_another_page():
+    linked = set.union(*(links(page) - {page} for page in PAGES))
+    assert [page.name for page in (*DOCS.glob("*.md"), ROOT / "CONTRIBUTING.md") if page not in linked] == []
 
 
 def test_the_way_in_names_the_steps_in_order():
-    text = (ROOT / "docs" / "life-of-a-frame.md").read_text()
-    steps = ["Segmenter.segment", "Tracker.follow", "Scheduler.select", "PointNet.classify", "KeyViews.fuse"]
+    text = (DOCS / "life-of-a-frame.md").read_text()
+    steps = [
+        "Segmenter.segment",
+        "Odometry.locate",
+        "Tracker.follow",
+        "KeyViews.asks",
+        "Scheduler.select",
+        "PointNet.classify",
+        "KeyViews.fuse",
+        "Tracker.conclude",
+    ]
     places = [text.index(step) for step in steps]
     assert places == sorted(places)
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", DOCS / "library.md"], ids=lambda p: p.name)
+def test_the_examples_of_the_library_run(page, capsys):
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    frames = SyntheticStream("street", "vlp-16", 0.5, seed=3)
+    exec(code, {"sweeps": [(frame.stamp_s, frame.points, frame.T_world_sensor) for frame in frames]})
+    assert {line.split()[1] for line in capsys.readouterr().out.splitlines()} & set(CLASS_NAMES)
+
+
+def test_modules_of_the_glossary_exist():
+    modules = re.findall(r"`([\w/]+\.py)`", (DOCS / "glossary.md").read_text())
+    assert [module for module in modules if not (ROOT / "runtime" / "modt" / module).is_file()] == []
+    assert len(modules) > 30
+
+
+def test_the_formats_name_every_field():
+    record = frame_record(results.result(0, [5], {0: 0}))
+    scores = (Evaluation, RangeScore, SegmentationScore, ClassScore, TrackScore)
+    fields = {f.name for score in scores for f in dataclasses.fields(score)}
+    fields |= record.keys() | record["tracks"][0].keys() | Summary().result().keys()
+    text = (DOCS / "formats.md").read_text()
+    assert [name for name in sorted(fields - {"schema"}) if f"`{name}`" not in text] == []

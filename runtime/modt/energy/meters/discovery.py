@@ -12,6 +12,8 @@ from modt.energy.meters.pmic import find_pmic
 from modt.energy.meters.powercap import find_powercap
 from modt.errors import MisuseError
 
+FINDERS = (find_powercap, find_hwmon, find_batteries)
+"""Searches of a mount point of sysfs; each returns the candidates of one type of meter."""
 _KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
 _SCOPES = (Scope.CPU, Scope.SOC, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
 """Order of preference: the narrower the scope, the larger the share of this program."""
@@ -47,8 +49,8 @@ class Discovery:
 
 def discover(model: Meter, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
     """Search every type of meter; the model is the last of the usable ones."""
-    found = [*find_powercap(sys), *find_hwmon(sys), *find_pmic(vcgencmd), *find_batteries(sys)]
-    found.append(Candidate(model.facts.name, (model,)))
+    found = [candidate for find in FINDERS for candidate in find(sys)]
+    found += [*find_pmic(vcgencmd), Candidate(model.facts.name, (model,))]
     return Discovery(tuple(sorted(found, key=_rank)))
 
 

@@ -1,0 +1,45 @@
+"""How to add another association cost (docs/extending.md): an object handed to the Tracker."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from modt import assembly
+from modt.energy.ledger import NullLedger
+from modt.geometry import FieldOfView
+from modt.profile import load
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.tracking.assignment import assign
+from modt.tracking.association import Matches
+from modt.tracking.states import ACCURATE
+from modt.tracking.tracker import Tracker
+
+GATE_M, SIGMA_M = 2.0, 0.3
+
+
+class NearestCentroid:
+    """Matches centroids within two metres; the cost is their distance."""
+
+    def match(self, tracks, observations):
+        distance = np.linalg.norm(tracks.x[:, None, :2] - observations.centroid[None], axis=2)
+        rows, columns = np.nonzero(distance < GATE_M)
+        kept = assign(rows, columns, distance[rows, columns], GATE_M)
+        rows, columns = rows[kept], columns[kept]
+        covariance = SIGMA_M**2 * np.eye(2)[None].repeat(len(rows), axis=0)
+        return Matches(rows, columns, observations.centroid[columns], covariance, np.zeros((len(rows), 4)))
+
+    def initial_position(self, observations):
+        return observations.centroid
+
+
+def test_the_tracker_follows_by_the_association_it_is_given():
+    profile = load("vlp-16")
+    pipeline = assembly.pipeline(assembly.MODES["accurate"], profile, FieldOfView(), NullLedger())
+    tracker = Tracker(profile.tracking, ACCURATE, association=NearestCentroid())
+    pipeline = replace(pipeline, tracker=tracker)
+    for frame in SyntheticStream("street", "vlp-16", 1.0, seed=0):
+        result = pipeline.step(frame)
+    followed = result.tracks.hits >= 9
+    assert followed.sum() > 0.5 * len(result.proposals)
+    offset = tracker.tracks.anchor - result.tracks.box[:, :2]
+    assert np.abs(offset[followed]).max() < GATE_M  # it measures centroids, not centres of k-DOPs

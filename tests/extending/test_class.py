@@ -1,0 +1,93 @@
+"""How to add a class (docs/extending.md): a fifth row of the table of classes, and a model of five outputs."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+import yaml
+from onnx import TensorProto, helper, numpy_helper
+
+import modt
+
+PACKAGE = Path(modt.__file__).parent
+SHARES = np.array([0.02, 0.02, 0.02, 0.02, 0.92], np.float32)
+VALUE = "    CYCLIST = 3\n"
+ROW = '    ObjectClass.CYCLIST: ClassSpec(("Cyclist",)'
+
+
+@pytest.fixture(scope="module", name="source")
+def a_package_with_trucks(tmp_path_factory):
+    """A copy of the package whose table of classes has one row more."""
+    source = tmp_path_factory.mktemp("source")
+    shutil.copytree(PACKAGE, source / "runtime" / "modt", ignore=shutil.ignore_patterns("__pycache__"))
+    (source / "models").mkdir()
+    shutil.copytree(Path(__file__).parents[2] / "profiles", source / "profiles")
+    table = source / "runtime" / "modt" / "classes.py"
+    text = table.read_text()
+    assert text.count(VALUE) == text.count(ROW) == 1
+    truck = '    ObjectClass.TRUCK: ClassSpec(("Truck",), (18, 258), 9.0, 2.7, False, 0.01, 0.2, "#7048e8"),\n'
+    text = text.replace(VALUE, f"{VALUE}    TRUCK = 4\n")
+    table.write_text(text.replace("}\n", f"{truck}}}\n", 1))
+    return source
+
+
+@pytest.fixture(scope="module", name="profile")
+def a_profile_with_a_model_of_five_outputs(source):
+    nodes = [
+        helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0),
+        helper.make_node("MatMul", ["pooled", "zeros"], ["nothing"]),
+        helper.make_node("Add", ["nothing", "shares"], ["probability"]),
+    ]
+    weights = {"zeros": np.zeros((3, 5), np.float32), "shares": SHARES}
+    graph = helper.make_graph(
+        nodes,
+        "trucks",
+        [helper.make_tensor_value_info("points", TensorProto.FLOAT, ["batch", "n", 3])],
+        [helper.make_tensor_value_info("probability", TensorProto.FLOAT, ["batch", 5])],
+        [numpy_helper.from_array(value, name) for name, value in weights.items()],
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8)
+    onnx.save(model, source / "models" / "trucks.onnx")
+    profile = source / "profiles" / "trucks.yaml"
+    vlp_16 = yaml.safe_load((source / "profiles" / "vlp-16.yaml").read_text())
+    profile.write_text(yaml.safe_dump(vlp_16 | {"classification": {"model": "trucks"}}))
+    return profile
+
+
+def run(source, *arguments):
+    environment = os.environ | {"PYTHONPATH": str(source / "runtime")}
+    command = [sys.executable, "-m", *arguments]
+    return subprocess.run(command, cwd=source, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+@pytest.fixture(scope="module", name="drive")
+def a_short_drive(source):
+    out = source / "drive"
+    run(source, "modt", "simulate", "--sensor", "vlp-16", "--seconds", "0.6", "--out", str(out))
+    return next(out.rglob("velodyne_points")).parent
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["conventional", "efficient", "accurate"])
+def test_every_mode_and_sink_knows_the_class(source, profile, drive, mode):
+    out = source / mode
+    options = ["--profile", str(profile), "--mode", mode, "--labels", "--out", str(out)]
+    run(source, "modt", "replay", str(drive), *options)
+    *_, last = map(json.loads, (out / "tracks.jsonl").read_text().splitlines())
+    trucks = [track for track in last["tracks"] if track["viewed"]]
+    assert trucks
+    assert {track["class"] for track in trucks} == {"truck"}
+    assert {len(track["posterior"]) for track in last["tracks"]} == {5}
+    (results,) = (out / "kitti").iterdir()
+    assert " Truck " in results.read_text()
+    labels = np.fromfile(sorted((out / "labels").iterdir())[-1], np.uint32)
+    assert 4 in labels & 0xFFFF
+    assert "frames" in run(source, "modt.cli.profile", "report", str(out))
+    judged = json.loads(run(source, "modt", "evaluate", str(out), str(drive), "--json"))
+    assert "truck" in json.dumps(judged)

@@ -1,0 +1,56 @@
+"""How to add a meter (docs/extending.md): an object with facts and a reading, and a search for it."""
+
+from pathlib import Path
+
+from modt.cli import metering
+from modt.config import EnergyConfig
+from modt.energy.meters import discovery
+from modt.energy.meters.candidate import Candidate, probe
+from modt.energy.meters.meter import Facts, Kind, Measurand, Scope, read_number
+
+
+class CoulombCounter:
+    """A counter of the energy that a battery has delivered."""
+
+    facts = Facts(
+        name="coulomb counter",
+        measurand=Measurand.ENERGY,
+        unit="mJ",
+        resolution=1e-3,
+        max_W=100.0,
+        scope=Scope.CPU,
+        kind=Kind.MEASURED,
+    )
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def read(self) -> float:
+        return 1e-3 * read_number(self.path)
+
+
+def find_coulomb_counters(sys: Path) -> list[Candidate]:
+    path = sys / "coulomb" / "energy_mJ"
+    if not path.exists():
+        return [Candidate("coulomb counter", (), f"no {path}", "connect it")]
+    return [probe("coulomb counter", (CoulombCounter(path),), f"make {path} readable")]
+
+
+def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
+    counter = tmp_path / "coulomb" / "energy_mJ"
+    counter.parent.mkdir()
+    counter.write_text("1000")
+    monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
+    assert metering.meters(EnergyConfig()).best.name == "coulomb counter"
+    windows = metering.windows(EnergyConfig(), None, "coulomb")
+    counter.write_text("1004")
+    line = windows.close()
+    assert line["kind"] == "measured"
+    assert abs(line["energy_J"] - 0.004) < 1e-9
+
+
+def test_a_machine_without_it_says_why(tmp_path, monkeypatch):
+    monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
+    found = metering.meters(EnergyConfig())
+    assert found.best.name != "coulomb counter"
+    assert "energy_mJ" in next(c.why_not for c in found.candidates if c.name == "coulomb counter")

@@ -1,0 +1,18 @@
+"""The generated page of the commands."""
+
+from tools.docs.commands import DOCUMENT, document, page, parsers
+
+
+def test_the_page_is_up_to_date():
+    assert document() == DOCUMENT.read_text(encoding="utf-8")
+
+
+def test_every_option_of_every_command_is_listed():
+    shared, *commands = page().split("\n## ")
+    rows = [line for line in shared.splitlines() if line.startswith("| `")]
+    assert len(commands) == len(list(parsers()))
+    for (_, parser), own in zip(parsers(), commands, strict=True):
+        name = parser.prog.split()[-1]
+        known = own + "\n".join(line for line in rows if name in line.split("|")[-2])
+        for action in parser._actions:
+            assert action.dest == "help" or (action.option_strings or [str(action.metavar)])[0] in known

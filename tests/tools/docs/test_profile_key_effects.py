@@ -1,0 +1,272 @@
+"""Every key of a profile has an effect in the mode that its documentation names.
+
+A scenario digests what comes of a profile: a second of a synthetic street, or what is computed beside the pipeline. A
+key has an effect if another value of it, half and double the default first, gives another digest.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+import json
+import socket
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from modt import assembly, profile
+from modt.config import ProfileConfig
+from modt.energy.conditions import Conditions
+from modt.energy.ledger import Ledger
+from modt.energy.windows import Clocks, Windows
+from modt.geometry import FieldOfView
+from modt.reporting.run_report import run_tree
+from modt.sources.pose_socket import PoseSocket
+from modt.sources.synthetic_stream import CAMERA, SyntheticStream
+from modt.types import Frame
+from tests.reporting.test_run_report import write_run
+from tools.docs.profile_keys import Key, keys
+
+pytestmark = pytest.mark.slow
+
+BASE = profile.load("vlp-16")
+Scenario = Callable[[ProfileConfig, Path], str]
+
+
+@pytest.fixture(autouse=True)
+def a_clock_that_counts_its_readings(monkeypatch):
+    """The CPU time of a classification, which its budget depends on, is the same in every replay."""
+    monkeypatch.setattr(assembly, "time", type("Clock", (), {"thread_time_ns": itertools.count(0, 400_000).__next__}))
+
+
+@cache
+def frames(seed: int, seconds: float) -> tuple[Frame, ...]:
+    return tuple(SyntheticStream("street", "vlp-16", seconds, seed))
+
+
+def replay(stream: tuple[Frame, ...], config: ProfileConfig, mode: str = "accurate", view: Any = None) -> str:
+    """Digest of the tracks, the proposals and the work of every frame."""
+    ledger = Ledger(lambda: 0, lambda: 0)
+    pipeline = assembly.pipeline(assembly.MODES[mode], config, view or FieldOfView(), ledger)
+    digest = hashlib.sha256()
+    for frame in stream:
+        result = pipeline.step(frame, assembly.MODES[mode].budget(config))
+        columns = [column for _, column in result.tracks.columns()]
+        for column in (*columns, result.proposals.members, result.proposals.box):
+            digest.update(column.tobytes())
+        digest.update(json.dumps(ledger.close_frame(frame.index)["stages"]).encode())
+    return digest.hexdigest()
+
+
+def changed(config: Any, path: str, value: Any) -> Any:
+    """The configuration with another value of a key."""
+    head, _, rest = path.partition(".")
+    return dataclasses.replace(config, **{head: changed(getattr(config, head), rest, value) if rest else value})
+
+
+def street(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), config)
+
+
+def long_street(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(1, 4.0), config)
+
+
+def unknown_height(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), changed(config, "sensor.height_m", None))
+
+
+def no_ground(config: ProfileConfig, _folder: Path) -> str:
+    raised = [dataclasses.replace(f, points=f.points[f.points[:, 2] > -0.2]) for f in frames(3, 1.0)]
+    return replay(tuple(raised), changed(config, "sensor.height_m", None))
+
+
+def camera(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), config, view=FieldOfView.of_camera(CAMERA))
+
+
+def efficient(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), config, "efficient")
+
+
+def paper(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), changed(config, "tracking.association", "paper"))
+
+
+def one_call(config: ProfileConfig, _folder: Path) -> str:
+    one = changed(config, "scheduler.calls_per_frame", 1)
+    return replay(frames(1, 4.0), one, view=FieldOfView.of_camera(CAMERA))
+
+
+def two_ms(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), changed(config, "scheduler.cpu_ms_per_frame", 2.0))
+
+
+def ten_mJ(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), changed(config, "scheduler.energy_mJ_per_frame", 10.0))
+
+
+def unposed(config: ProfileConfig, _folder: Path) -> str:
+    return replay(tuple(dataclasses.replace(f, T_world_sensor=None) for f in frames(3, 1.0)), config)
+
+
+def turning(config: ProfileConfig, _folder: Path) -> str:
+    """A sensor that turns from the start, and a second sweep that fits nothing."""
+    turns = [0.15 * k if k != 1 else 2.0 for k in range(10)]
+    stream = [dataclasses.replace(f, points=f.points.copy(), T_world_sensor=None) for f in frames(3, 1.0)]
+    for frame, turn in zip(stream, turns, strict=True):
+        c, s = np.cos(turn), np.sin(turn)
+        frame.points[:, :2] = frame.points[:, :2] @ np.array([[c, s], [-s, c]], np.float32)
+    return replay(tuple(stream), config)
+
+
+def pose_socket(config: ProfileConfig, _folder: Path) -> str:
+    """Poses with a gap, a flood, a leap, a pose of the future, and noise faster than the sensor."""
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    source = PoseSocket(here, config.odometry, "test")
+    empty, placed = np.zeros((0, 4), np.float32), []
+    for k in range(40):
+        stamps = [0.1 * k, 0.1 * k + 0.005, *([0.1 * k + 0.006 + 1e-5 * n for n in range(40)] if k == 20 else [])]
+        for stamp in [] if 5 <= k < 8 else stamps:
+            x = 5.0 * stamp + (4.0 if k >= 12 else 0.0) + (0.35 if stamp > 0.1 * k and k < 5 else 0.0)
+            there.send(json.dumps({"stamp": stamp, "x": x, "y": 0.0, "yaw": 0.0}).encode())
+        if k == 30:
+            there.send(b'{"stamp": 40.0, "x": 0, "y": 0, "yaw": 0}')
+        placed.append(str(source.place(Frame(k, 0.1 * k, empty)).T_world_sensor))
+    report = source.report()
+    source.close()
+    there.close()
+    return f"{placed}{report}"
+
+
+def report_of_a_run(config: ProfileConfig, folder: Path) -> str:
+    """What modt-profile report makes of a board with a calibration and a meter."""
+    coefficients = {"seg_J": 0.01, "class_J": 0.002, "point_J": 1e-5}
+    given = dataclasses.asdict(config.energy)
+    own = {name: value if given[name] is None else given[name] for name, value in coefficients.items()}
+    tree = run_tree(write_run(folder, energy=given | own))
+    return str({name: value for name, value in tree.items() if name != "run"})
+
+
+def described(config: ProfileConfig, _folder: Path) -> str:
+    return yaml.safe_dump(profile.dump(config))
+
+
+def windows(config: ProfileConfig, _folder: Path) -> str:
+    """Windows of a machine that sleeps, and whose calendar is set, for half a second each."""
+    now = {"wall": 0, "asleep": 0, "calendar": 0}
+    clocks = Clocks(
+        lambda: now["wall"], lambda: now["wall"] + now["asleep"], lambda: now["wall"] + now["calendar"], lambda: 0
+    )
+    found, lines = Windows((), clocks, Conditions(0), config.energy.windows), []
+    for k in range(40):
+        now["wall"] += 300_000_000
+        now["asleep"] += 150_000_000 * (k == 10) + 300_000_000 * (k == 20)
+        now["calendar"] += (150_000_000 * (k == 10) + 300_000_000 * (k == 20)) + 400_000_000 * (k == 30)
+        lines.append(found.add({"frame": k, "stages": {}, "overhead_ns": 0, "marks": []}))
+    return str([line and (line["frames"], line["marks"]) for line in lines])
+
+
+SCENARIOS: dict[str, Scenario] = {
+    "": street,
+    "sensor.height_m: null": unknown_height,
+    "sensor.height_m: null, no ground in sight": no_ground,
+    "--fov camera": camera,
+    "association: paper": paper,
+    "association: kdop": street,
+    "association: kdop, --fov camera": camera,
+    "--mode accurate": street,
+    "--mode efficient": efficient,
+    "--mode accurate, efficient": street,
+    "a binding budget": one_call,
+    "scheduler.cpu_ms_per_frame or energy_mJ_per_frame": two_ms,
+    "--odometry udp://, unix://": pose_socket,
+    "frames without a pose": unposed,
+    "the first frames without a pose": turning,
+    "figures of energy": report_of_a_run,
+    "figures of energy; scheduler.energy_mJ_per_frame": report_of_a_run,
+    "none: kept in run.yaml": described,
+}
+"""Scenario of each condition of tools.docs.profile_keys."""
+
+
+RARE: dict[str, Scenario] = {
+    "segmentation.ground.start_m": long_street,
+    "segmentation.person_splitting.min_gap_columns": long_street,
+    "segmentation.car_merging.min_person_top_m": long_street,
+    "tracking.split.": long_street,
+    "odometry.registration.max_turn_rad": turning,
+    "energy.windows.": windows,
+}
+"""Scenario of what a second of the street has no occasion for, by the beginning of the path."""
+
+
+def scenario_of(key: Key) -> Scenario:
+    return next((scenario for path, scenario in RARE.items() if key.path.startswith(path)), SCENARIOS[key.condition])
+
+
+def others(key: Key) -> Iterator[Any]:
+    """Other values of a key, the moderate ones first."""
+    value, facts = value_of(BASE, key.path), key.facts
+    if "options" in facts:
+        yield from (option for option in facts["options"] if option != value)
+    elif key.kind == "str":
+        yield "pointnet-synthetic" if key.path == "classification.model" else "another"
+    else:
+        low, high = facts["low"], facts["high"]
+        start = low + (high - low) / 1000 if value is None else value
+        whole = key.kind.startswith("int")
+
+        def bounded(number: float) -> float:
+            number = min(max(number, low), high)
+            return round(number) if whole else float(number)
+
+        for scale in (0.5, 2.0, 0.1, 10.0):
+            yield tuple(bounded(scale * n) for n in start) if isinstance(start, tuple) else bounded(scale * start)
+        if not isinstance(start, tuple):
+            yield from (bounded(low), bounded(high))
+
+
+def value_of(config: Any, path: str) -> Any:
+    """Value of a key."""
+    for name in path.split("."):
+        config = getattr(config, name)
+    return config
+
+
+DIGESTS: dict[Scenario, str] = {}
+"""Of the profile without a change."""
+
+
+def has_effect(key: Key, scenario: Scenario, folder: Path) -> bool:
+    if scenario not in DIGESTS:
+        DIGESTS[scenario] = scenario(BASE, folder / "base")
+    values = [value for value in others(key) if value != value_of(BASE, key.path)]
+    return any(
+        scenario(changed(BASE, key.path, value), folder / str(n)) != DIGESTS[scenario]
+        for n, value in enumerate(values)
+    )
+
+
+@pytest.mark.parametrize("key", list(keys()), ids=lambda key: key.path)
+def test_a_key_has_an_effect_where_the_page_says_so(key, tmp_path):
+    assert has_effect(key, scenario_of(key), tmp_path)
+
+
+@pytest.mark.parametrize("path", ["energy.idle_W", "energy.busy_W"])
+def test_the_powers_of_the_board_decide_on_a_budget_of_energy(path, tmp_path):
+    assert has_effect(next(key for key in keys() if key.path == path), ten_mJ, tmp_path)
+
+
+ALL = sorted({*SCENARIOS.values(), *RARE.values()}, key=lambda scenario: scenario.__name__)
+
+
+@pytest.mark.parametrize("scenario", ALL, ids=lambda scenario: scenario.__name__)
+def test_a_scenario_repeats_itself(scenario, tmp_path):
+    assert scenario(BASE, tmp_path / "one") == scenario(BASE, tmp_path / "two")

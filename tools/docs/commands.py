@@ -1,0 +1,62 @@
+"""Generate the options in docs/commands.md from the argument parsers."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+
+from modt.cli import main as modt
+from modt.cli import profile as modt_profile
+from tools.docs.sections import replace_section
+
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "commands.md"
+MARK = "tools.docs.commands"
+
+
+def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Summary and parser of each command."""
+    for prog, commands in (("modt", modt.COMMANDS), ("modt-profile", modt_profile.COMMANDS)):
+        choice = argparse.ArgumentParser(prog=prog).add_subparsers()
+        for command in commands:
+            command.add_parser(choice)
+        summaries = {action.dest: action.help or "" for action in choice._choices_actions}
+        yield from ((summaries[name], parser) for name, parser in choice.choices.items())
+
+
+def row(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
+    """One option or argument of a command."""
+    words = "|".join(map(str, action.choices)) if action.choices else action.metavar or ""
+    name = " ".join(filter(None, [*action.option_strings, "" if action.nargs == 0 else str(words)]))
+    cells = (f"`{name}`", parser._get_formatter()._expand_help(action))
+    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+
+
+def page() -> str:
+    """A table of the options that commands share, and one a command of its own."""
+    rows = {p.prog: [row(p, action) for action in p._actions if action.dest != "help"] for _, p in parsers()}
+    number = Counter(chain.from_iterable(rows.values()))
+    lines = ["## Shared options", "", "| option | | of |", "|---|---|---|"]
+    for text in (text for text, n in number.items() if n > 1):
+        lines.append(f"{text} {', '.join(prog.split()[-1] for prog, own in rows.items() if text in own)} |")
+    for summary, parser in parsers():
+        lines += ["", f"## {parser.prog}", "", f"{summary[0].upper()}{summary[1:]}.", ""]
+        own = [text for text in rows[parser.prog] if number[text] == 1]
+        lines += ["| option | |", "|---|---|", *own] if own else []
+    return "\n".join(lines).replace("\n\n\n", "\n\n").rstrip()
+
+
+def document() -> str:
+    """The page with its section up to date."""
+    return replace_section(DOCUMENT.read_text(encoding="utf-8"), MARK, page())
+
+
+def main() -> None:
+    argparse.ArgumentParser(description=__doc__).parse_args()
+    DOCUMENT.write_text(document(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
