@@ -6,10 +6,10 @@ import argparse
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from modt import profile
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.profile import DEFAULT
 from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.recognise import open_stream
@@ -27,7 +27,7 @@ class Request:
 
     path: Path | None = None
     mode: str = "accurate"
-    profile: str = DEFAULT
+    profile: str = profile.DEFAULT
     fov: str = "full"
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
@@ -51,7 +51,7 @@ def stream(request: Request) -> Stream:
     if request.path is None:
         whole: Stream = SyntheticStream("street", "hdl-64e", EMBEDDED_SECONDS, seed=0)
     else:
-        whole = open_stream(request.path)
+        whole = open_stream(request.path, profile.load(request.profile).sensor.period_s)
     cut = whole.between(*request.frames)
     if cut.info.n_frames == 0:
         first, last = request.frames

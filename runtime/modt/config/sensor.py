@@ -16,6 +16,7 @@ class SensorConfig(StageConfig):
     max_range_m: float = number(80.0, 1.0, 400.0, "m", "of the points used")
     elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
     azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
+    period_s: float = number(0.1, 0.001, 10.0, "s", "between the scans of a folder, which has no stamps")
     reflectance: str = choice(
         "none", ("none", "hdl-64e"), "scale; models use only the one they learnt; none: not used"
     )

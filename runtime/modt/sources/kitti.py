@@ -103,10 +103,11 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
 
 
-def scan_folder(folder: Path) -> ScanStream:
-    """A folder of .bin scans, ordered by name."""
-    notes = Notes([f"folder of scans: no calibration, frames {PERIOD_S} s apart"], [f"folder of scans: {NO_POSES}"])
-    return _stream(folder.name, "folder of scans", folder, None, {}, {}, notes)
+def scan_folder(folder: Path, period_s: float = PERIOD_S) -> ScanStream:
+    """A folder of .bin scans, ordered by name, period_s apart."""
+    notes = Notes([f"folder of scans: no calibration, frames {period_s} s apart"], [f"folder of scans: {NO_POSES}"])
+    stamps = {i: i * period_s for i in _scans(folder)[0]}
+    return _stream(folder.name, "folder of scans", folder, None, {}, stamps, notes, period_s=period_s)
 
 
 def _scans(data: Path) -> tuple[list[int], list[Path]]:
@@ -129,6 +130,7 @@ def _stream(
     *,
     sequence: int = 0,
     turns: Mapping[int, float] = MappingProxyType({}),
+    period_s: float = PERIOD_S,
 ) -> ScanStream:
     indices, files = _scans(data)
     gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
@@ -152,7 +154,7 @@ def _stream(
         layout=layout,
         sequence=sequence,
         n_frames=len(scans),
-        period_s=PERIOD_S,
+        period_s=period_s,
         camera=camera,
         has_poses=bool(poses),
         notes=tuple(notes.of_stream),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from modt.errors import MisuseError
@@ -15,8 +16,8 @@ MAX_LISTED = 5
 REMEDY = "give a KITTI drive, a sequence or a folder of .bin scans"
 
 
-def open_stream(path: Path) -> ScanStream:
-    """The stream at a path.
+def open_stream(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
+    """The stream at a path; period_s is the time between the scans of a folder, which has no stamps.
 
     Raises:
         MisuseError: the path does not exist or holds no stream; the error names streams below it.
@@ -24,7 +25,7 @@ def open_stream(path: Path) -> ScanStream:
     if not path.exists():
         raise MisuseError(path, "no such file or directory", REMEDY)
     path = path.resolve()
-    stream = _stream(path)
+    stream = _stream(path, period_s)
     if stream is not None:
         return stream
     if (path / "oxts").is_dir():
@@ -38,7 +39,7 @@ def open_stream(path: Path) -> ScanStream:
     raise MisuseError(path, "no stream of scans", REMEDY)
 
 
-def _stream(path: Path) -> ScanStream | None:
+def _stream(path: Path, period_s: float) -> ScanStream | None:
     """The stream in a folder or around it, by the most specific layout; None where there is none."""
     data = path.parts[-2:] == ("velodyne_points", "data")
     scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
@@ -49,7 +50,7 @@ def _stream(path: Path) -> ScanStream | None:
         (_is_tracking(path), kitti.tracking_sequence, path),
         (_is_odometry(path), kitti.odometry_sequence, path),
         (scans, kitti.odometry_sequence, path.parent),
-        (_has_scans(path), kitti.scan_folder, path),
+        (_has_scans(path), partial(kitti.scan_folder, period_s=period_s), path),
     )
     return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
 

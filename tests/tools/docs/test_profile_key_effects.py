@@ -21,6 +21,7 @@ import pytest
 import yaml
 
 from modt import assembly, profile
+from modt.cli import assemble
 from modt.config import ProfileConfig
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
@@ -158,6 +159,16 @@ def described(config: ProfileConfig, _folder: Path) -> str:
     return yaml.safe_dump(profile.dump(config))
 
 
+def scan_folder(config: ProfileConfig, folder: Path) -> str:
+    """Stamps of a folder of two scans, opened with a profile."""
+    (folder / "scans").mkdir(parents=True, exist_ok=True)
+    for frame in frames(3, 1.0)[:2]:
+        frame.points.tofile(folder / "scans" / f"{frame.index:06d}.bin")
+    (folder / "own.yaml").write_text(profile.to_yaml(profile.dump(config)))
+    request = assemble.Request(path=folder / "scans", profile=str(folder / "own.yaml"))
+    return str([frame.stamp_s for frame in assemble.stream(request)])
+
+
 def windows(config: ProfileConfig, _folder: Path) -> str:
     """Windows of a machine that sleeps, and whose calendar is set, for half a second each."""
     now = {"wall": 0, "asleep": 0, "calendar": 0}
@@ -175,6 +186,7 @@ def windows(config: ProfileConfig, _folder: Path) -> str:
 
 SCENARIOS: dict[str, Scenario] = {
     "": street,
+    "a folder of scans": scan_folder,
     "sensor.height_m: null": unknown_height,
     "sensor.height_m: null, no ground in sight": no_ground,
     "--fov camera": camera,
