@@ -7,7 +7,7 @@ from modt import assembly
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
-from tools.study.leave_one_out import FIGURES, interval, run, simulated, study, table
+from tools.study.leave_one_out import FIGURES, brief, interval, run, simulated, study, table
 from tools.study.mechanisms import MECHANISMS, PAIRS, Setup
 
 
@@ -43,6 +43,9 @@ def test_table_marks_what_lies_beyond_its_interval():
     row = table(["CarMerger"], differences).splitlines()[2].split(" | ")
     assert row[2].startswith("**-2.00 (")
     assert row[3].startswith("+0.00 (")
+    line = brief(["CarMerger"], differences).splitlines()[2]
+    assert "recall -2.00" in line
+    assert "said" not in line
 
 
 @pytest.mark.slow
