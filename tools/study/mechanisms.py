@@ -1,0 +1,143 @@
+"""The mechanisms of segmentation, odometry, tracking and fusion that can be switched off.
+
+A switch is a change of the set-up: other values of the configuration, or the null object of a part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from modt import assembly
+from modt.config import ProfileConfig
+from modt.energy.ledger import StageLedger
+from modt.geometry import FieldOfView
+from modt.pipeline import Pipeline
+from modt.segmentation.car_merging import NoCarMerger
+from modt.segmentation.clustering import Merger, Splitter
+from modt.segmentation.person_splitting import NoPersonSplitter
+from modt.segmentation.segmenter import Segmenter
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What a pipeline is built from; None: the part that the pipeline has by default."""
+
+    profile: ProfileConfig
+    splitter: Splitter | None = None
+    merger: Merger | None = None
+
+    def pipeline(self, mode: assembly.Mode, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
+        """The pipeline in a mode."""
+        config, sensor = self.profile.segmentation, self.profile.sensor
+        segmenter = Segmenter(config, sensor, fov, splitter=self.splitter, merger=self.merger)
+        return replace(assembly.pipeline(mode, self.profile, fov, ledger), segmenter=segmenter)
+
+
+Switch = Callable[[Setup], Setup]
+
+
+def values(mechanism: str, **changes: Any) -> Switch:
+    """Values of a mechanism's configuration, such as "tracking.kdop"."""
+
+    def changed(config: Any, path: list[str]) -> Any:
+        inner = {path[0]: changed(getattr(config, path[0]), path[1:])} if path else changes
+        return replace(config, **inner)
+
+    return lambda setup: replace(setup, profile=changed(setup.profile, mechanism.split(".")))
+
+
+def part(**parts: Any) -> Switch:
+    """Parts of the set-up, replaced."""
+    return lambda setup: replace(setup, **parts)
+
+
+def together(*names: str) -> tuple[str, Switch]:
+    """Entry of several mechanisms at once."""
+
+    def switch(setup: Setup) -> Setup:
+        for name in names:
+            setup = MECHANISMS[name][1](setup)
+        return setup
+
+    return "together", switch
+
+
+_GROUND, _CLUSTERS, _PERSONS, _CARS = (
+    f"segmentation.{name}" for name in ("ground", "clusters", "person_splitting", "car_merging")
+)
+_KDOP, _FILTER = "tracking.kdop", "tracking.filter"
+_REGISTRATION, _LANDMARKS = "odometry.registration", "odometry.landmarks"
+
+MECHANISMS: dict[str, tuple[str, Switch]] = {
+    "ground flanks": ("a surface is lowered to the median beside it", values(_GROUND, flank_m=100.0)),
+    "height gap": ("neighbouring cells are joined if near in height", values(_CLUSTERS, max_gap_m=5.0)),
+    "height gap by beams": ("that bound grows with the beam spacing", values(_CLUSTERS, max_gap_beams=0.0)),
+    "parts of large clusters": ("kept from a finer grid", values(_CLUSTERS, min_part_top_m=5.0)),
+    "large parts stand out": ("by height and points", values(_CLUSTERS, min_part_top_m=0.0, min_part_points=1)),
+    "PersonSplitter": ("people split by azimuth and depth", part(splitter=NoPersonSplitter())),
+    "person columns are filled": ("by as many returns", values(_PERSONS, min_fill=0.0)),
+    "person depth steps": ("split people behind one another", values(_PERSONS, depth_step_m=5.0)),
+    "CarMerger": ("strips of a car merged", part(merger=NoCarMerger())),
+    "CarMerger leaves people": ("strips that may be people", values(_CARS, max_person_width_m=0.0)),
+    "CarMerger bounds elevation": ("of strips", values(_CARS, min_gap_beams=-20.0, max_gap_beams=20.0)),
+    "CarMerger ends near by": ("where cars are whole", values(_CARS, max_beams=200.0)),
+    "view margin": ("points beyond a limited view", values("segmentation.view_margin", margin_m=0.0)),
+    "few cells for headings": ("at most 32 (saves CPU)", values("segmentation.boxes", max_cells=10_000)),
+    "Reunion": ("fragments stay with one track", values("tracking.fragments", min_coverage=1.0)),
+    "ExpectedSplitting": ("objects split off what they touch", values("tracking.split", min_coverage=1.0)),
+    "CarMerging": ("parts of known cars merged", values("tracking.merge", min_coverage=1.0)),
+    "mean k-DOP": ("of the last frames", values("tracking", mean_kdop_decay=0.0)),
+    "envelope decay": ("an extent not seen again shrinks", values("tracking", envelope_decay=1.0)),
+    "envelope": ("known extent, not the last one", values("tracking", envelope_decay=0.0)),
+    "established tracks": ("only those change proposals", values("tracking", min_hits=1)),
+    "second matching": ("by coverage", values(_KDOP, min_coverage=1.0)),
+    "jump of k-DOPs": ("in the gate", values(_KDOP, jump_sigma_m=0.0)),
+    "cost by size": ("of an association", values(_KDOP, size_weight=0.0)),
+    "cost by overlap": ("of an association", values(_KDOP, overlap_weight=0.0)),
+    "cost by height": ("of an association", values(_KDOP, height_weight=0.0)),
+    "cost by points": ("of an association", values(_KDOP, count_weight=0.0)),
+    "noise of partial k-DOPs": ("1.5 times as large", values(_KDOP, partial_factor=1.0)),
+    "noise by range": ("of a position", values(_KDOP, sigma_per_range=0.0)),
+    "noise by extent": ("of a position", values(_KDOP, sigma_per_extent=0.0)),
+    "zero-velocity update": ("near the rest position", values(_FILTER, stationary_sigma_mps=50.0)),
+    "new rest position": ("of what stopped", values(_FILTER, stopped_mps=0.01)),
+    "rest position follows": ("the track", values(_FILTER, rest_gain=0.0)),
+    "box update": ("change of the box prior since a view", values("fusion", box_update_weight=0.0)),
+    "part of the box update": ("weight 0.75, not 1", values("fusion", box_update_weight=1.0)),
+    "mismatch": ("a proposal may be another object", values("fusion", mismatch_probability=0.0)),
+    "probable objects": ("first of several views", values("fusion", min_object_probability=0.0)),
+    "probable objects, efficient": ("only view", values("fusion", first_view_min_object_probability=0.0)),
+    "review": ("of final classes", values("fusion", review_point_ratio=None)),
+    "review of probable objects": ("only", values("fusion", review_min_object_probability=0.0)),
+    "review of few points": ("only", values("fusion", review_max_points=10_000)),
+    "review beyond chance": ("five more points", values("fusion", review_extra_points=0)),
+    "points by class": ("views independent by points (Equation 4)", values("fusion", point_change=(0.2,) * 4)),
+    "views by points": ("Equation 4", values("fusion", point_change=(10.0,) * 4)),
+    "views by extent": ("independent by extent", values("fusion", extent_change=10.0)),
+    "start frame": ("of fusion", values("fusion", start_frame=1)),
+    "worth": (
+        "order of calls; off: longest waiting first",
+        values("scheduler.worth", uncertainty_weight=0.0, nearness_weight=0.0, novelty_weight=0.0),
+    ),
+    "reflectance": ("evidence, hdl-64e only", values("sensor", reflectance="none")),
+    "landmarks": ("mean k-DOPs (no poses)", values(_LANDMARKS, min_frames=1000)),
+    "young landmarks": ("say less (no poses)", values(_REGISTRATION, young_sigma_m=0.0)),
+    "ends by range": ("say less (no poses)", values(_REGISTRATION, end_sigma_per_m=0.0)),
+    "wider search": ("with few inliers (no poses)", values(_REGISTRATION, inlier_ratio=0.0, inlier_drop=0.0)),
+    "inlier drop": ("the same, since the last frame (no poses)", values(_REGISTRATION, inlier_drop=0.0)),
+    "turns at the outset": ("tried (no poses)", values(_REGISTRATION, initial_turn_rad=0.0)),
+}
+"""What each is, and its switch."""
+PAIRS = (
+    ("CarMerger", "CarMerging"),
+    ("CarMerger", "Reunion"),
+    ("Reunion", "CarMerging"),
+    ("CarMerger", "Reunion", "CarMerging"),
+    ("PersonSplitter", "ExpectedSplitting"),
+    ("second matching", "Reunion"),
+    ("box update", "mismatch"),
+)
+"""Mechanisms that repair the same thing."""
+MECHANISMS |= {" + ".join(names): together(*names) for names in PAIRS}
