@@ -26,25 +26,25 @@ def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
         yield from ((summaries[name], parser) for name, parser in choice.choices.items())
 
 
-def row(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
-    """One option or argument of a command."""
+def cells(parser: argparse.ArgumentParser, action: argparse.Action) -> tuple[str, str]:
+    """Name and meaning of an option or argument of a command."""
     words = "|".join(map(str, action.choices)) if action.choices else action.metavar or ""
     name = " ".join(filter(None, [*action.option_strings, "" if action.nargs == 0 else str(words)]))
-    cells = (f"`{name}`", parser._get_formatter()._expand_help(action))
-    return f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |"
+    return f"`{name}`", parser._get_formatter()._expand_help(action)
 
 
 def page() -> str:
-    """A table of the options that commands share, and one a command of its own."""
-    rows = {p.prog: [row(p, action) for action in p._actions if action.dest != "help"] for _, p in parsers()}
+    """A table of the options that commands share, and a list a command of its own."""
+    rows = {p.prog: [cells(p, action) for action in p._actions if action.dest != "help"] for _, p in parsers()}
     number = Counter(chain.from_iterable(rows.values()))
     lines = ["## Shared options", "", "| option | | of |", "|---|---|---|"]
-    for text in (text for text, n in number.items() if n > 1):
-        lines.append(f"{text} {', '.join(prog.split()[-1] for prog, own in rows.items() if text in own)} |")
+    for option in (option for option, n in number.items() if n > 1):
+        name, text = (cell.replace("|", r"\|") for cell in option)
+        users = ", ".join(prog.split()[-1] for prog, own in rows.items() if option in own)
+        lines.append(f"| {name} | {text} | {users} |")
     for summary, parser in parsers():
         lines += ["", f"## {parser.prog}", "", f"{summary[0].upper()}{summary[1:]}.", ""]
-        own = [text for text in rows[parser.prog] if number[text] == 1]
-        lines += ["| option | |", "|---|---|", *own] if own else []
+        lines += [f"- {name}: {text}" for name, text in rows[parser.prog] if number[name, text] == 1]
     return "\n".join(lines).replace("\n\n\n", "\n\n").rstrip()
 
 
