@@ -6,7 +6,7 @@
 Drive k of a scene and seed has sensor k of --sensors, in turn. Every figure is that without the mechanism less that
 with it: the mean over drives with its 95 % bootstrap interval, bold where the interval excludes zero. A labelled
 recording (--kitti) is judged apart, without interval. --docs writes what is
-beyond its interval to docs/ablation.md.
+beyond its interval to docs/log/leave-one-out.md.
 
 recall, said, precision, AP, life [%]: found; found and of the class said; right of what is called; average precision;
 frames followed a track, of the ideal. breaks: in 1000 frames of an object. calls: a frame. error [cm]: rms of the
@@ -46,7 +46,7 @@ from modt.types import Float64, Frame
 from tools.options import parser
 from tools.study import truth_replay
 from tools.study.filter_consistency import errors, lives
-from tools.study.mechanisms import MECHANISMS, Setup, Switch
+from tools.study.mechanisms import MECHANISMS, Switch
 
 FIGURES = ("recall", "said", "precision", "AP", "life", "breaks", "calls", "error", "CPU")
 MIN_OBJECTS = 20
@@ -54,7 +54,7 @@ MIN_OBJECTS = 20
 TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTRAL)}
 RESAMPLES, EVERY = 10_000, 5
 SENSORS = ("vlp-16", "hdl-64e", "os1-32", "os1-64", "hdl-32e", "os1-128")
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "ablation.md"
+DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "log" / "leave-one-out.md"
 BEGIN, END = "<!-- tools/study/leave_one_out.py -->\n", "<!-- end of tools/study/leave_one_out.py -->"
 
 
@@ -92,9 +92,8 @@ def labelled(path: Path) -> Drive:
 
 def run(drive: Drive, mode_name: str, switch: Switch | None = None) -> Float64:
     """FIGURES of a drive in a mode of the method, with one mechanism switched off; NaN for what it cannot show."""
-    setup, mode = Setup(drive.profile), assembly.MODES[mode_name]
-    setup = setup if switch is None else switch(setup)
-    pipeline, budget = setup.pipeline(mode, drive.fov, NullLedger()), mode.budget(setup.profile)
+    profile, mode = drive.profile if switch is None else switch(drive.profile), assembly.MODES[mode_name]
+    pipeline, budget = assembly.pipeline(mode, profile, drive.fov, NullLedger()), mode.budget(profile)
     results, cpu_ns = [], 0
     gc.collect()
     for frame, _ in drive.frames:
@@ -105,7 +104,7 @@ def run(drive: Drive, mode_name: str, switch: Switch | None = None) -> Float64:
         JudgedFrame.of_result(result, truth, drive.fov)
         for result, (_, truth) in zip(results, drive.frames, strict=True)
     )
-    evaluation = score(judged, drive.rules, metrics=False)
+    evaluation = score(judged, drive.rules)
     error = np.nan
     if drive.stream is not None and drive.frames[0][0].T_world_sensor is not None:  # else the worlds differ
         seen = (
@@ -202,7 +201,7 @@ def main() -> None:
     options.add_argument("--no-poses", action="store_true")
     options.add_argument("--only", nargs="+", choices=MECHANISMS, default=list(MECHANISMS), metavar="NAME")
     options.add_argument("--kitti", type=Path, action="append", default=[], metavar="DRIVE")
-    options.add_argument("--docs", action="store_true", help="write the table to docs/ablation.md")
+    options.add_argument("--docs", action="store_true", help="write the table to docs/log/leave-one-out.md")
     args = options.parse_args()
     differences, last = [], None
     for k, (seed, scene) in enumerate(product(range(*args.seeds), args.scene)):

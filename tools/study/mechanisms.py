@@ -1,41 +1,17 @@
 """The mechanisms of segmentation, odometry, tracking and fusion that can be switched off.
 
-A switch is a change of the set-up: other values of the configuration, or the null object of a part.
+A switch is a change of the configuration.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-from modt import assembly
 from modt.config import ProfileConfig
-from modt.energy.ledger import StageLedger
-from modt.geometry import FieldOfView
-from modt.pipeline import Pipeline
-from modt.segmentation.car_merging import NoCarMerger
-from modt.segmentation.clustering import Merger, Splitter
-from modt.segmentation.person_splitting import NoPersonSplitter
-from modt.segmentation.segmenter import Segmenter
 
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """What a pipeline is built from; None: the part that the pipeline has by default."""
-
-    profile: ProfileConfig
-    splitter: Splitter | None = None
-    merger: Merger | None = None
-
-    def pipeline(self, mode: assembly.Mode, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
-        """The pipeline in a mode."""
-        config, sensor = self.profile.segmentation, self.profile.sensor
-        segmenter = Segmenter(config, sensor, fov, splitter=self.splitter, merger=self.merger)
-        return replace(assembly.pipeline(mode, self.profile, fov, ledger), segmenter=segmenter)
-
-
-Switch = Callable[[Setup], Setup]
+Switch = Callable[[ProfileConfig], ProfileConfig]
 
 
 def values(mechanism: str, **changes: Any) -> Switch:
@@ -45,21 +21,16 @@ def values(mechanism: str, **changes: Any) -> Switch:
         inner = {path[0]: changed(getattr(config, path[0]), path[1:])} if path else changes
         return replace(config, **inner)
 
-    return lambda setup: replace(setup, profile=changed(setup.profile, mechanism.split(".")))
-
-
-def part(**parts: Any) -> Switch:
-    """Parts of the set-up, replaced."""
-    return lambda setup: replace(setup, **parts)
+    return lambda profile: changed(profile, mechanism.split("."))
 
 
 def together(*names: str) -> tuple[str, Switch]:
     """Entry of several mechanisms at once."""
 
-    def switch(setup: Setup) -> Setup:
+    def switch(profile: ProfileConfig) -> ProfileConfig:
         for name in names:
-            setup = MECHANISMS[name][1](setup)
-        return setup
+            profile = MECHANISMS[name][1](profile)
+        return profile
 
     return "together", switch
 
@@ -76,10 +47,10 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
     "height gap by beams": ("that bound grows with the beam spacing", values(_CLUSTERS, max_gap_beams=0.0)),
     "parts of large clusters": ("kept from a finer grid", values(_CLUSTERS, min_part_top_m=5.0)),
     "large parts stand out": ("by height and points", values(_CLUSTERS, min_part_top_m=0.0, min_part_points=1)),
-    "PersonSplitter": ("people split by azimuth and depth", part(splitter=NoPersonSplitter())),
+    "PersonSplitter": ("people split by azimuth and depth", values(_PERSONS, min_points=1000)),
     "person columns are filled": ("by as many returns", values(_PERSONS, min_fill=0.0)),
     "person depth steps": ("split people behind one another", values(_PERSONS, depth_step_m=5.0)),
-    "CarMerger": ("strips of a car merged", part(merger=NoCarMerger())),
+    "CarMerger": ("strips of a car merged", values(_CARS, min_points=1000)),
     "CarMerger leaves people": ("strips that may be people", values(_CARS, max_person_width_m=0.0)),
     "CarMerger bounds elevation": ("of strips", values(_CARS, min_gap_beams=-20.0, max_gap_beams=20.0)),
     "CarMerger ends near by": ("where cars are whole", values(_CARS, max_beams=200.0)),

@@ -3,31 +3,22 @@
 import numpy as np
 import pytest
 
-from modt import assembly
-from modt.energy.ledger import NullLedger
-from modt.geometry import FieldOfView
 from modt.profile import load
 from tools.study.leave_one_out import FIGURES, brief, interval, run, simulated, study, table
-from tools.study.mechanisms import MECHANISMS, PAIRS, Setup
+from tools.study.mechanisms import MECHANISMS, PAIRS
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_every_switch_changes_the_setup_within_the_bounds_of_the_configuration(name):
-    setup = Setup(load("hdl-64e"))
-    assert MECHANISMS[name][1](setup) != setup
+def test_every_switch_changes_the_profile_within_the_bounds_of_the_configuration(name):
+    profile = load("hdl-64e")
+    assert MECHANISMS[name][1](profile) != profile
 
 
 def test_a_pair_is_both_of_its_switches():
-    setup = Setup(load("hdl-64e"))
+    profile = load("hdl-64e")
     names = PAIRS[0]
-    expected = MECHANISMS[names[1]][1](MECHANISMS[names[0]][1](setup))
-    assert MECHANISMS[" + ".join(names)][1](setup) == expected
-
-
-def test_replaced_parts_reach_the_pipeline():
-    setup = MECHANISMS["CarMerger"][1](Setup(load("vlp-16")))
-    pipeline = setup.pipeline(assembly.MODES["accurate"], FieldOfView(), NullLedger())
-    assert pipeline.segmenter.clusterer.merger is setup.merger
+    expected = MECHANISMS[names[1]][1](MECHANISMS[names[0]][1](profile))
+    assert MECHANISMS[" + ".join(names)][1](profile) == expected
 
 
 def test_interval_of_equal_differences_is_a_point_and_drives_without_a_figure_are_left_out():
