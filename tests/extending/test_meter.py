@@ -2,12 +2,10 @@
 
 from pathlib import Path
 
-from modt.energy.meters.candidate import Candidate, probe
-
 from modt.cli import metering
 from modt.config import EnergyConfig
 from modt.energy.meters import discovery
-from modt.energy.meters.meter import Facts, Kind, Measurand, Scope, read_number
+from modt.energy.meters.meter import Candidate, Facts, Kind, Measurand, Scope, probe, read_number
 
 
 class CoulombCounter:

@@ -38,7 +38,7 @@ def transposed(A: Float64) -> Float64:
 
 
 def symmetric(P: Float64) -> Float64:
-    """(4, 4, M) covariances without what rounding made lopsided."""
+    """(4, 4, M) covariances, symmetric despite rounding."""
     return (P + transposed(P)) / 2
 
 
