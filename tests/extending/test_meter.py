@@ -1,38 +1,27 @@
-"""How to add a meter (docs/extending.md): an object with facts and a reading, and a search for it."""
+"""How to add a meter (docs/extending.md): its facts, its reading, and a search for it."""
 
 from pathlib import Path
 
 from modt.cli import metering
-from modt.config import EnergyConfig
+from modt.config import EnergyConfig, WindowConfig
 from modt.energy.meters import discovery
-from modt.energy.meters.meter import Candidate, Facts, Kind, Measurand, Scope, probe, read_number
+from modt.energy.meters.meter import Candidate, Facts, Kind, Scope, file_meter, probe
 
-
-class CoulombCounter:
-    """A counter of the energy that a battery has delivered."""
-
-    facts = Facts(
-        name="coulomb counter",
-        measurand=Measurand.ENERGY,
-        unit="mJ",
-        resolution=1e-3,
-        max_W=100.0,
-        scope=Scope.CPU,
-        kind=Kind.MEASURED,
-    )
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def read(self) -> float:
-        return 1e-3 * read_number(self.path)
+FACTS = Facts(
+    name="coulomb counter",
+    unit="mJ",
+    resolution=1e-3,
+    max_W=100.0,
+    scope=Scope.CPU,
+    kind=Kind.MEASURED,
+)
 
 
 def find_coulomb_counters(sys: Path) -> list[Candidate]:
     path = sys / "coulomb" / "energy_mJ"
     if not path.exists():
         return [Candidate("coulomb counter", (), f"no {path}", "connect it")]
-    return [probe("coulomb counter", (CoulombCounter(path),), f"make {path} readable")]
+    return [probe("coulomb counter", (file_meter(FACTS, path, scale=1e-3),), f"make {path} readable")]
 
 
 def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
@@ -40,8 +29,9 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
     counter.parent.mkdir()
     counter.write_text("1000")
     monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
-    assert metering.meters(EnergyConfig()).best.name == "coulomb counter"
-    windows = metering.windows(EnergyConfig(), None, "coulomb")
+    found = metering.discovery(EnergyConfig())
+    assert found.best.name == "coulomb counter"
+    windows = metering.windows(found.choose("coulomb").meters, None, WindowConfig())
     counter.write_text("1004")
     line = windows.close()
     assert line["kind"] == "measured"
@@ -50,6 +40,6 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
 
 def test_a_machine_without_it_says_why(tmp_path, monkeypatch):
     monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
-    found = metering.meters(EnergyConfig())
+    found = metering.discovery(EnergyConfig())
     assert found.best.name != "coulomb counter"
     assert "energy_mJ" in next(c.why_not for c in found.candidates if c.name == "coulomb counter")
