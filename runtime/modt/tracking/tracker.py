@@ -216,8 +216,7 @@ class Tracker:
         t.inherited &= ~t.viewed
         rows = (t.inherited & (t.proposal != NONE) & ~self._near_rest()).nonzero()[0]
         t.state[rows] = self.machine.transition(t.state[rows], Event.WITHDRAWN)
-        t.final[rows], t.inherited[rows] = self.machine.final[t.state[rows]], False
-        t.posterior[rows] = 1 / N_CLASSES
+        t.final[rows], t.inherited[rows], t.posterior[rows] = self.machine.final[t.state[rows]], False, 1 / N_CLASSES
 
     def _expire(self) -> Int:
         """After N frames without a proposal a track is deleted (a9, a14), background mapped; (A,) rows that stay."""
