@@ -2,7 +2,7 @@
 
 A row says which event leads from which state to which. In each state an event has one row at most, so arrays of
 states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are extensions: the paper has
-no budget, so no object waits for its first class, no second look at a final class, and no remembered background.
+no budget, so it has no object that waits for its first class, no second look at a final class, no background map.
 """
 
 from __future__ import annotations

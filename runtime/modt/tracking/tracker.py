@@ -219,7 +219,7 @@ class Tracker:
         t.final[rows], t.inherited[rows], t.posterior[rows] = self.machine.final[t.state[rows]], False, 1 / N_CLASSES
 
     def _expire(self) -> Int:
-        """After N frames without a proposal a track is deleted (a9, a14), background mapped; (A,) rows that stay."""
+        """After N frames without a proposal a track is deleted (a9, a14), background into the map; rows (A,) kept."""
         t = self._tracks
         expired = t.missed > self.config.max_missed
         rows = expired.nonzero()[0]
@@ -228,7 +228,7 @@ class Tracker:
         return (~expired).nonzero()[0]
 
     def _renew(self, kept: Int, matches: Matches, observations: Observations) -> None:
-        """The rows kept, and a track for every proposal without one: a2, or as if matched with a remembered place."""
+        """The rows kept, and a track for every proposal without one: a2, or a1 and a5 (a6) at a remembered place."""
         unclaimed = np.ones(len(observations), np.bool_)
         unclaimed[matches.proposals] = False
         proposals = unclaimed.nonzero()[0]
