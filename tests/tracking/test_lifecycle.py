@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from modt.classes import ObjectClass
 from modt.config import OdometryConfig, TrackingConfig
 from modt.energy.ledger import NullLedger
 from modt.odometry.odometry import Odometry
@@ -13,8 +14,8 @@ from modt.types import NONE
 from tests.tracking.tracking_scenes import EYE, box, frame_of, set_class
 
 MAX_MISSED = 2
-SEEN, HIDDEN, CERTAIN, UNCERTAIN = "seen", "hidden", "certain", "uncertain"
-"""The object of a scene is visible and not classified, not visible, or classified with that result."""
+SEEN, MOVED, HIDDEN, CERTAIN, UNCERTAIN = "seen", "moved", "hidden", "certain", "uncertain"
+"""The object of a scene is visible and not classified, also 1 m on, not visible, or classified with that result."""
 GONE = "gone"
 
 
@@ -55,7 +56,7 @@ class Scripted:
 
     def fuse(self, tracks, proposals, rows, likelihood):
         for row in rows:
-            set_class(tracks, row, 1)
+            set_class(tracks, row, ObjectClass.BACKGROUND)
         return np.full(len(rows), self.certain)
 
 
@@ -66,7 +67,8 @@ def live(machine, script):
     pipeline = Pipeline(stub, Odometry(OdometryConfig()), tracker, stub, stub, stub, NullLedger())
     states = []
     for i, step in enumerate(script):
-        frame, stub.proposals = frame_of([] if step == HIDDEN else [box(10, 2)], i, EYE)
+        boxes = [] if step == HIDDEN else [box(11 if step == MOVED else 10, 2)]
+        frame, stub.proposals = frame_of(boxes, i, EYE)
         stub.certain = {CERTAIN: True, UNCERTAIN: False}.get(step)
         tracks = pipeline.step(frame).tracks
         np.testing.assert_array_equal(tracks.final, machine.final[tracks.state])
@@ -123,12 +125,15 @@ CLASSIFIED_AGAIN = [
     (UNCERTAIN, "tracked_unclassified"),
     (CERTAIN, "tracked_classified"),
 ]
+REMEMBERED_ONCE = [*CLASSIFIED_ONCE, (SEEN, "tracked"), (MOVED, "unmatched")]
+REMEMBERED = [*CERTAIN_AT_ONCE, (SEEN, "tracked_classified"), (MOVED, "unmatched")]
+NOT_REMEMBERED = [*CLASSIFIED_ONCE, (SEEN, "unmatched"), (MOVED, "unmatched")]
 LIVES = {
-    "efficient": (EFFICIENT, [WAITING, CLASSIFIED_ONCE]),
-    "conventional": (CONVENTIONAL, [WAITING, CLASSIFIED_ONCE, CLASSIFIED_ALWAYS]),
+    "efficient": (EFFICIENT, [WAITING, CLASSIFIED_ONCE, REMEMBERED_ONCE]),
+    "conventional": (CONVENTIONAL, [WAITING, CLASSIFIED_ONCE, CLASSIFIED_ALWAYS, NOT_REMEMBERED]),
     "accurate": (
         ACCURATE,
-        [WAITING, UNCERTAIN_UNTIL_FUSED, UNCERTAIN_AND_LOST, CERTAIN_AT_ONCE, CLASSIFIED_AGAIN],
+        [WAITING, UNCERTAIN_UNTIL_FUSED, UNCERTAIN_AND_LOST, CERTAIN_AT_ONCE, CLASSIFIED_AGAIN, REMEMBERED],
     ),
 }
 

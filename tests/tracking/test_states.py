@@ -25,6 +25,7 @@ TABLE_I = {
     ("lost", Event.UNASSOCIATED): ("a8", "lost"),
     ("lost", Event.EXPIRED): ("a9", "deleted"),
 } | WAITING
+WITHDRAWN = {("tracked", Event.WITHDRAWN): ("e12", "unmatched")}
 TABLE_II = {
     ("proposal", Event.ASSOCIATED): ("a1", "matched"),
     ("proposal", Event.UNASSOCIATED): ("a2", "unmatched"),
@@ -46,9 +47,10 @@ TABLE_II = {
     ("lost_unclassified", Event.UNASSOCIATED): ("e9", "lost_unclassified"),
     ("tracked_classified", Event.CLASSIFIED): ("e10", "tracked_classified"),
     ("tracked_classified", Event.UNDECIDED): ("e11", "tracked_unclassified"),
+    ("tracked_classified", Event.WITHDRAWN): ("e12", "unmatched"),
 } | WAITING
 TABLES = {
-    "efficient": (EFFICIENT, TABLE_I),
+    "efficient": (EFFICIENT, TABLE_I | WITHDRAWN),
     "conventional": (CONVENTIONAL, TABLE_I | {("tracked", Event.CLASSIFIED): ("e7", "tracked")}),
     "accurate": (ACCURATE, TABLE_II),
 }

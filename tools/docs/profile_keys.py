@@ -30,6 +30,7 @@ CONDITIONS = {
     "tracking.kdop.partial_factor": "association: kdop, --fov camera",
     "tracking.split": "association: kdop",
     "tracking.merge": "association: kdop",
+    "tracking.background_map": "association: kdop",
     "scheduler": "--mode accurate, efficient",
     "scheduler.worth": "a binding budget",
     "scheduler.cost": "scheduler.cpu_ms_per_frame or energy_mJ_per_frame",

@@ -15,6 +15,7 @@ from modt.config.profile import ProfileConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.sensor import SensorConfig
 from modt.config.tracking import (
+    BackgroundMapConfig,
     FilterConfig,
     FragmentConfig,
     KdopAssociationConfig,
@@ -25,6 +26,7 @@ from modt.config.tracking import (
 )
 
 __all__ = [
+    "BackgroundMapConfig",
     "BoxTrackingConfig",
     "CallWorthConfig",
     "ClassificationConfig",

@@ -79,6 +79,15 @@ class MergeConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class BackgroundMapConfig(StageConfig):
+    """Places of background at rest, whose class new proposals take over; in effect with association: kdop."""
+
+    capacity: int = number(2048, 0, 100_000, "places", "of deleted tracks; 0: no class is taken over")
+    min_coverage: float = number(0.6, 0.0, 1.0, "", "part of a new proposal that lies within the place")
+    rise_m: float = number(0.5, 0.0, 10.0, "m", "by which a new proposal may rise above the place")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingConfig(StageConfig):
     """Filter, association, regrouping and life of a track."""
 
@@ -93,3 +102,4 @@ class TrackingConfig(StageConfig):
     fragments: FragmentConfig = mechanism(FragmentConfig)
     split: SplitConfig = mechanism(SplitConfig)
     merge: MergeConfig = mechanism(MergeConfig)
+    background_map: BackgroundMapConfig = mechanism(BackgroundMapConfig)

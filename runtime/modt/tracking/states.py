@@ -2,7 +2,7 @@
 
 A row says which event leads from which state to which. In each state an event has one row at most, so arrays of
 states are driven by one dense look-up. Rows a1 to a14 are the paper's; rows e1 and on are extensions: the paper has
-no budget, so it has no object that waits for its first class, and no second look at a final class.
+no budget, so it has no object that waits for its first class, no second look at a final class, no background map.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Event(IntEnum):
     EXPIRED = 2
     """The track went without a proposal for more than N frames."""
     JOINS_FINAL = 3
-    """The proposal joins a track whose class is final."""
+    """The proposal joins a track whose class is final, or takes over that of a remembered place."""
     JOINS_UNCERTAIN = 4
     """The proposal joins a track that was classified without certainty."""
     JOINS_WAITING = 5
@@ -39,6 +39,8 @@ class Event(IntEnum):
     """Classified: the class is certain."""
     UNDECIDED = 7
     """Classified without certainty."""
+    WITHDRAWN = 8
+    """An inherited class does not hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +183,7 @@ EFFICIENT = StateMachine(
         Transition("lost", "a8", "lost", _E.UNASSOCIATED, "still no proposal"),
         Transition("lost", "a9", "deleted", _E.EXPIRED, "no proposal for N frames"),
         *_WAITING,
+        Transition("tracked", "e12", "unmatched", _E.WITHDRAWN, "leaves the place of its class"),
     ),
 )
 """Table I and Fig. 3: classify once, then track."""
@@ -190,7 +193,7 @@ CONVENTIONAL = replace(
     title="Table I, every frame classified",
     states=tuple(replace(state, final=False) for state in EFFICIENT.states),
     transitions=(
-        *EFFICIENT.transitions,
+        *(t for t in EFFICIENT.transitions if t.event != _E.WITHDRAWN),
         Transition("tracked", "e7", "tracked", _E.CLASSIFIED, "classified in every frame"),
     ),
 )
@@ -231,6 +234,7 @@ ACCURATE = StateMachine(
         Transition("lost_unclassified", "e9", "lost_unclassified", _E.UNASSOCIATED, "still no proposal"),
         Transition("tracked_classified", "e10", "tracked_classified", _E.CLASSIFIED, "a second look confirms it"),
         Transition("tracked_classified", "e11", "tracked_unclassified", _E.UNDECIDED, "a second look leaves doubt"),
+        Transition("tracked_classified", "e12", "unmatched", _E.WITHDRAWN, "leaves the place of its class"),
     ),
 )
 """Table II and Fig. 6: classify until certain.

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import CLASSES, ObjectClass
-from modt.config import TrackingConfig
+from modt.classes import CLASSES, N_CLASSES, ObjectClass
+from modt.config import BackgroundMapConfig, TrackingConfig
 from modt.geometry.kdop import DIRECTIONS, widths
 from modt.geometry.kdop_displacement import AGREE_M
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
+from modt.tracking.background_map import BackgroundMap
 from modt.tracking.fragments import Reunion
 from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
@@ -57,6 +58,8 @@ class Tracker:
         self.config, self.machine = config, machine
         self.association = association_of(config) if association is None else association
         self.regroupings = regroupings_of(config) if regroupings is None else regroupings
+        none = BackgroundMapConfig(capacity=0)  # the paper classifies every new proposal
+        self.background_map = BackgroundMap(none if config.association == "paper" else config.background_map)
         self._reunion = Reunion(config.fragments, config.min_hits)
         position, speed = config.filter.initial_position_sigma_m, config.filter.initial_speed_sigma_mps
         self._P_new = np.diag(np.square([position, position, np.pi, speed]))  # a heading of pi: unknown
@@ -106,6 +109,7 @@ class Tracker:
         self._update(frame.matches, frame.observations)
         self._observe_rest(frame.matches.rows)
         self._coast(frame.matches.rows)
+        self._withdraw()
         self._renew(self._expire(), frame.matches, frame.observations)
         t = self._tracks
         return TrackedFrame(t, frame.proposals, self.machine.wants_class[t.state] & (t.proposal != NONE))
@@ -195,24 +199,51 @@ class Tracker:
         t.missed[rows] += 1
         t.state[rows] = self.machine.transition(t.state[rows], Event.UNASSOCIATED)
 
+    def _near_rest(self) -> Bool:
+        """(M,) tracks near their rest position."""
+        step = self._tracks.x[:, :2] - self._tracks.rest_position
+        near: Bool = np.hypot(step[:, 0], step[:, 1]) < self.config.filter.stationary_radius_m
+        return near
+
+    def _background_at_rest(self) -> Bool:
+        """(M,) tracks that are finally background, and near their rest position."""
+        background: Bool = self._tracks.last_class == ObjectClass.BACKGROUND.value
+        return self._tracks.final & background & self._near_rest()
+
+    def _withdraw(self) -> None:
+        """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
+        t = self._tracks
+        t.inherited &= ~t.viewed
+        rows = (t.inherited & (t.proposal != NONE) & ~self._near_rest()).nonzero()[0]
+        t.state[rows] = self.machine.transition(t.state[rows], Event.WITHDRAWN)
+        t.final[rows], t.inherited[rows], t.posterior[rows] = self.machine.final[t.state[rows]], False, 1 / N_CLASSES
+
     def _expire(self) -> Int:
-        """After N frames without a proposal a track is deleted (a9, a14); (A,) rows that stay."""
+        """After N frames without a proposal a track is deleted (a9, a14), background into the map; rows (A,) kept."""
         t = self._tracks
         expired = t.missed > self.config.max_missed
         rows = expired.nonzero()[0]
         t.state[rows] = self.machine.transition(t.state[rows], Event.EXPIRED)
+        self.background_map.add(t, (expired & self._background_at_rest()).nonzero()[0])
         return (~expired).nonzero()[0]
 
     def _renew(self, kept: Int, matches: Matches, observations: Observations) -> None:
-        """The rows kept, and a track for every proposal without one (a2)."""
+        """The rows kept, and a track for every proposal without one: a2, or a1 and a5 (a6) at a remembered place."""
         unclaimed = np.ones(len(observations), np.bool_)
         unclaimed[matches.proposals] = False
         proposals = unclaimed.nonzero()[0]
+        at_rest = kept[self._background_at_rest()[kept]]
+        known = self.background_map.recall(self._tracks, at_rest, observations, proposals)
         t = self._tracks = self._tracks.renewed(kept, len(proposals))
         new = np.arange(len(kept), len(t))
         t.id[new] = self._next_id + np.arange(len(new))
         self._next_id += len(new)
-        t.state[new] = self.machine.transition(np.full(len(new), self.machine.proposal), Event.UNASSOCIATED)
+        event = np.where(known, Event.ASSOCIATED, Event.UNASSOCIATED)
+        t.state[new] = self.machine.transition(np.full(len(new), self.machine.proposal), event)
+        heirs = new[known]
+        t.state[heirs] = self.machine.transition(t.state[heirs], Event.JOINS_FINAL)
+        t.final[heirs] = t.inherited[heirs] = True
+        t.posterior[heirs] = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
         position = self.association.initial_position(observations)[proposals]
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new

@@ -213,6 +213,7 @@ RARE: dict[str, Scenario] = {
     "segmentation.person_splitting.min_gap_columns": long_street,
     "segmentation.car_merging.min_person_top_m": long_street,
     "tracking.split.": long_street,
+    "tracking.background_map.": long_street,
     "odometry.registration.max_turn_rad": turning,
     "energy.windows.": windows,
 }

@@ -1,0 +1,37 @@
+"""The map of remembered background: the class of a place outlives the track that stood there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.config import BackgroundMapConfig
+from modt.geometry.kdop import coverage, overlapping_pairs
+from modt.observations import Observations
+from modt.tracking.track_table import TrackTable
+from modt.types import Bool, Int
+
+
+class BackgroundMap:
+    """k-DOPs and tops of deleted background in the world; of capacity 0, a map that recalls nothing."""
+
+    def __init__(self, config: BackgroundMapConfig) -> None:
+        self.config = config
+        self._kdop, self._top = np.zeros((8, 0)), np.zeros(0)
+
+    def add(self, tracks: TrackTable, rows: Int) -> None:
+        """Remember the places of rows, background at rest; beyond the capacity the oldest places are dropped."""
+        first = max(0, len(self._top) + len(rows) - self.config.capacity)
+        self._kdop = np.concatenate([self._kdop, tracks.kdop.take(rows, axis=0).T], axis=1)[:, first:]
+        self._top = np.concatenate([self._top, tracks.top[rows]])[first:]
+
+    def recall(self, tracks: TrackTable, rows: Int, observations: Observations, which: Int) -> Bool:
+        """(n,) whether background stood, or as rows of the tracks stands, where the observations which (n,) are."""
+        known, config = np.zeros(len(which), np.bool_), self.config
+        if config.capacity and len(which):
+            place = np.concatenate([self._kdop, tracks.known_kdops(rows)], axis=1)
+            top = np.concatenate([self._top, tracks.top[rows]])
+            kdop = observations.kdop.take(which, axis=1)
+            i, j = overlapping_pairs(kdop, place)
+            within = coverage(kdop.take(i, axis=1), place.take(j, axis=1)) >= config.min_coverage
+            known[i[within & (observations.top[which[i]] < top[j] + config.rise_m)]] = True
+        return known

@@ -1,0 +1,155 @@
+"""New proposals take over the class of background that stands, or stood, where they appear."""
+
+import numpy as np
+import pytest
+
+from modt.classes import N_CLASSES, ObjectClass
+from modt.config import BackgroundMapConfig, TrackingConfig
+from modt.observations import observe
+from modt.tracking.background_map import BackgroundMap
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of, set_class, tracks_at
+
+BACKGROUND, CAR = ObjectClass.BACKGROUND, ObjectClass.CAR
+POST, FAR = box(10, 4, 1, 1), box(30, 0, 1, 1)
+EMPTY = tracks_at([])
+NO_ROWS = np.zeros(0, np.int64)
+
+
+def recalled(background_map, boxes, tracks=EMPTY, rows=NO_ROWS, which=None):
+    observations = observe(frame_of(boxes)[1], EYE)
+    which = np.arange(len(boxes)) if which is None else np.array(which)
+    return background_map.recall(tracks, rows, observations, which).tolist()
+
+
+def map_of(*boxes, **options):
+    background_map = BackgroundMap(BackgroundMapConfig(**options))
+    background_map.add(tracks_at(boxes), np.arange(len(boxes)))
+    return background_map
+
+
+@pytest.mark.parametrize(
+    ("stranger", "known"),
+    [
+        (POST, True),
+        (box(10.2, 4, 1, 1), True),
+        (box(10, 4, 0.4, 0.4, h=0.5), True),
+        (box(10, 4, 1, 1, h=1.9, z=-0.8), True),  # by 0.4 m
+        (box(10, 4, 1, 1, h=2.1, z=-0.7), False),  # by 0.6 m
+        (box(12, 4, 1, 1), False),
+        (box(10, 4, 3, 3), False),
+    ],
+    ids=["same", "shifted", "smaller", "little taller", "taller", "elsewhere", "larger"],
+)
+def test_a_proposal_within_a_place_is_recalled_unless_it_rises_above(stranger, known):
+    assert recalled(map_of(FAR, POST), [stranger]) == [known]
+    assert recalled(BackgroundMap(BackgroundMapConfig()), [stranger], tracks_at([FAR, POST]), np.arange(2)) == [known]
+
+
+def test_only_the_rows_and_observations_named_count():
+    tracks, nothing = tracks_at([FAR, POST]), BackgroundMap(BackgroundMapConfig())
+    assert recalled(nothing, [POST, FAR], tracks, np.array([0])) == [False, True]
+    assert recalled(nothing, [POST, FAR], tracks, np.array([0]), which=[1]) == [True]
+    assert recalled(nothing, [POST, FAR], tracks, np.array([0]), which=NO_ROWS) == []
+    nothing.add(tracks, np.array([1]))
+    assert recalled(nothing, [POST, FAR]) == [True, False]
+
+
+def test_the_oldest_places_beyond_the_capacity_are_forgotten():
+    boxes = [box(10 + 5 * i, 0, 1, 1) for i in range(5)]
+    assert recalled(map_of(*boxes, capacity=3), boxes) == [False, False, True, True, True]
+    by_one = BackgroundMap(BackgroundMapConfig(capacity=3))
+    for row in range(5):
+        by_one.add(tracks_at(boxes), np.array([row]))
+    assert recalled(by_one, boxes) == [False, False, True, True, True]
+
+
+def test_without_capacity_nothing_is_recalled():
+    assert recalled(map_of(POST, capacity=0), [POST], tracks_at([POST]), np.arange(1)) == [False]
+
+
+@pytest.mark.parametrize(
+    ("options", "stranger", "known"),
+    [({"min_coverage": 0.9}, box(10.4, 4, 1, 1), False), ({"rise_m": 2.0}, box(10, 4, 1, 1, 2.6, z=-0.35), True)],
+)
+def test_the_thresholds_are_those_of_the_configuration(options, stranger, known):
+    assert recalled(map_of(POST), [stranger]) == [not known]
+    assert recalled(map_of(POST, **options), [stranger]) == [known]
+
+
+def run(follower, scenes, object_class=BACKGROUND):
+    """Number of tracks classified as the class, in scenes one after the other."""
+    first, classified = int(follower.tracks.age.max(initial=0)), 0
+    for i, boxes in enumerate(scenes, first):
+        follower.follow(*frame_of(boxes, i, EYE))
+        classified += int(np.count_nonzero(follower.wants_class))
+        follower.classify(object_class)
+    return classified
+
+
+def gone(machine=EFFICIENT, object_class=BACKGROUND, **options):
+    """A follower of FAR, and of POST until it expired."""
+    follower = Follower(TrackingConfig(max_missed=2, **options), machine)
+    run(follower, [[FAR, POST]] * 4 + [[FAR]] * 5, object_class)
+    assert follower.tracks.id.tolist() == [0]
+    return follower
+
+
+@pytest.mark.parametrize(("machine", "state"), [(EFFICIENT, "tracked"), (ACCURATE, "tracked_classified")])
+def test_an_heir_is_final_background_at_once(machine, state):
+    follower = gone(machine)
+    assert run(follower, [[FAR, POST]]) == 0
+    tracks = follower.tracks
+    assert follower.states == [state] * 2
+    assert tracks.id.tolist() == [0, 2]
+    assert tracks.inherited.tolist() == [False, True]
+    assert tracks.final.all()
+    np.testing.assert_array_equal(tracks.posterior[1], np.eye(N_CLASSES)[BACKGROUND])
+
+
+@pytest.mark.parametrize(
+    "follower",
+    [
+        lambda: gone(object_class=CAR),
+        lambda: gone(CONVENTIONAL),
+        lambda: gone(association="paper"),
+        lambda: gone(background_map=BackgroundMapConfig(capacity=0)),
+    ],
+    ids=["a car", "no class is final", "the paper's association", "no capacity"],
+)
+def test_what_is_not_remembered_is_classified(follower):
+    assert run(follower(), [[FAR, POST]]) == 1
+
+
+WALL = [[box(10, 3, 12, 2.0, 1.8)]] * 4
+PART = [[box(10, 3.6, 12, 0.8, 1.8), box(10, 2.8 - 0.15 * i, 0.5, 0.5, 1.7)] for i in range(8)]
+"""A pedestrian who was segmented with a wall walks away from it."""
+
+
+def test_background_that_leaves_its_place_is_classified():
+    follower = Follower()
+    run(follower, WALL)
+    assert run(follower, PART[:2]) == 0
+    assert follower.tracks.inherited.tolist() == [False, True]
+    assert run(follower, PART[2:]) == 1
+    assert not follower.tracks.inherited.any()
+
+
+def test_a_withdrawn_class_is_open():
+    follower = Follower()
+    run(follower, WALL + PART[:2])
+    for i, boxes in enumerate(PART[2:], 6):
+        follower.follow(*frame_of(boxes, i, EYE))
+    tracks = follower.tracks
+    assert follower.states == ["tracked", "unmatched"]
+    assert tracks.final.tolist() == [True, False]
+    np.testing.assert_allclose(tracks.posterior[1], 1 / N_CLASSES)
+
+
+def test_a_class_that_a_view_confirmed_holds_away_from_the_place():
+    follower = Follower()
+    run(follower, WALL + PART[:2])
+    set_class(follower.tracks, 1, BACKGROUND)
+    assert run(follower, PART[2:]) == 0
+    assert follower.states == ["tracked", "tracked"]
+    assert not follower.tracks.inherited.any()
