@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.car_merging import CarMerger
+from modt.segmentation.car_merging import StripMerger
 from modt.segmentation.clusters import ClusterSizes
 from modt.segmentation.groups import Groups
 from modt.segmentation.point_columns import PointColumns
@@ -18,7 +18,7 @@ PERSON = (0.35, 0.5, 0.0, 1.75)
 
 
 def merger(**config):
-    return CarMerger(SensorConfig(), SegmentationConfig(**config))
+    return StripMerger(SensorConfig(), SegmentationConfig(**config))
 
 
 def strips(rng, n):

@@ -50,10 +50,10 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
     "PersonSplitter": ("people split by azimuth and depth", values(_PERSONS, min_points=1000)),
     "person columns are filled": ("by as many returns", values(_PERSONS, min_fill=0.0)),
     "person depth steps": ("split people behind one another", values(_PERSONS, depth_step_m=5.0)),
-    "CarMerger": ("strips of a car merged", values(_CARS, min_points=1000)),
-    "CarMerger leaves people": ("strips that may be people", values(_CARS, max_person_width_m=0.0)),
-    "CarMerger bounds elevation": ("of strips", values(_CARS, min_gap_beams=-20.0, max_gap_beams=20.0)),
-    "CarMerger ends near by": ("where cars are whole", values(_CARS, max_beams=200.0)),
+    "StripMerger": ("strips of a car merged", values(_CARS, min_points=1000)),
+    "StripMerger leaves people": ("strips that may be people", values(_CARS, max_person_width_m=0.0)),
+    "StripMerger bounds elevation": ("of strips", values(_CARS, min_gap_beams=-20.0, max_gap_beams=20.0)),
+    "StripMerger ends near by": ("where cars are whole", values(_CARS, max_beams=200.0)),
     "view margin": ("points beyond a limited view", values("segmentation.view_margin", margin_m=0.0)),
     "few cells for headings": ("at most 32 (saves CPU)", values("segmentation.boxes", max_cells=10_000)),
     "Reunion": ("fragments stay with one track", values("tracking.fragments", min_coverage=1.0)),
@@ -102,10 +102,10 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
 }
 """What each is, and its switch."""
 PAIRS = (
-    ("CarMerger", "CarMerging"),
-    ("CarMerger", "Reunion"),
+    ("StripMerger", "CarMerging"),
+    ("StripMerger", "Reunion"),
     ("Reunion", "CarMerging"),
-    ("CarMerger", "Reunion", "CarMerging"),
+    ("StripMerger", "Reunion", "CarMerging"),
     ("PersonSplitter", "ExpectedSplitting"),
     ("second matching", "Reunion"),
     ("box update", "mismatch"),

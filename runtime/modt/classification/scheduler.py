@@ -68,7 +68,7 @@ class Scheduler:
     """Greedy selection by worth.
 
     A call is worth more for an uncertain posterior, a view that differs from the last key view, and a near and whole
-    object; and more with each frame of waiting, so that every call that fits into one frame's budget is made at last.
+    object; and more with each frame of waiting: every call that fits into one frame's budget is made eventually.
 
     Args:
         config: weights of the worth.
@@ -98,13 +98,13 @@ class Scheduler:
 
     def worth(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Float64:
         """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
-        config, own = self._config, tracks.proposal[rows]
+        config, proposal_rows = self._config, tracks.proposal[rows]
         posterior = np.clip(tracks.posterior[rows], 1e-12, 1.0)
         uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / np.log(N_CLASSES)
-        count, key = proposals.count[own], tracks.key_points[rows]
-        novelty = np.minimum(np.abs(count - key) / np.maximum(key, 1), 1.0)
-        nearness = np.exp(-np.hypot(*proposals.box[own, :2].T) / config.range_scale_m)
-        whole = np.where(proposals.truncated[own], config.partial_view_factor, 1.0)
+        count, points_at_key_view = proposals.count[proposal_rows], tracks.key_points[rows]
+        novelty = np.minimum(np.abs(count - points_at_key_view) / np.maximum(points_at_key_view, 1), 1.0)
+        nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / config.range_scale_m)
+        whole = np.where(proposals.truncated[proposal_rows], config.partial_view_factor, 1.0)
         value: Float64 = whole * (
             config.uncertainty_weight * uncertainty
             + config.nearness_weight * nearness

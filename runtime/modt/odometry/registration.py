@@ -19,8 +19,8 @@ from modt.types import Float64, Int
 
 _SCALES = (8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 """Factors to the scale of the errors in the iterations of a fit: coarse to fine, against local minima."""
-_ROUNDS = 4
-"""Choices of pairs where the prediction may be far off, each with as many of the scales."""
+_MATCH_ROUNDS = 4
+"""Rounds of matching and fitting of a wide search; each fit takes as many of the scales, the coarsest."""
 _MIN_LANDMARKS = 3
 """A planar motion needs two; one more is a check."""
 
@@ -39,9 +39,9 @@ class Fit:
     inliers: int
     pairs: int
 
-    def supported(self, share: float) -> bool:
+    def supported(self, min_inlier_share: float) -> bool:
         """Whether more than this share of the pairs are inliers."""
-        return self.inliers >= _MIN_LANDMARKS and self.inliers > share * self.pairs
+        return self.inliers >= _MIN_LANDMARKS and self.inliers > min_inlier_share * self.pairs
 
 
 class Registration:
@@ -56,40 +56,42 @@ class Registration:
         self._initialised = self._motion_known = False
         self._inliers = self._attempts = 0
 
-    def correct(self, landmarks: Landmarks, observations: Observations, share: Float64 | float = 1.0) -> Float64:
+    def correct(
+        self, landmarks: Landmarks, observations: Observations, motion_share: Float64 | float = 1.0
+    ) -> Float64:
         """Motion in the world that brings the observations onto the landmarks.
 
         Args:
             landmarks: of the frames before.
             observations: of the frame, placed by the predicted pose.
-            share: of the motion that applies to each of them (P,), as SweepSkew.share.
+            motion_share: (P,) share of the motion that applies to each observation, as SweepSkew.share.
 
         Returns:
             (4, 4) motion of the pose; identity where nothing supports another.
         """
-        limit = self.config
-        jacobian = _jacobian(observations) * share
+        config = self.config
+        jacobian = _jacobian(observations) * motion_share
         rest = np.zeros(3)
         fit = None
         if self._motion_known:
-            fit = self._solve(landmarks, observations, jacobian, rest, limit.gate_m, _SCALES, choices=1)
-        enough = limit.inlier_drop * self._inliers
-        if fit is None or not fit.supported(limit.inlier_ratio) or fit.inliers < enough:  # look farther
-            far = self._search(landmarks, observations, jacobian, rest)
-            if self._initialised and far is not None and not far.supported(limit.min_agreement):
-                again = self._search(landmarks, observations, jacobian, far.motion)
-                far = again if again is not None and again.inliers > far.inliers else far
-            if fit is None or (far is not None and far.inliers > fit.inliers):
-                fit = far
+            fit = self._solve(landmarks, observations, jacobian, rest, config.gate_m, _SCALES, match_rounds=1)
+        enough = config.inlier_drop * self._inliers
+        if fit is None or not fit.supported(config.inlier_ratio) or fit.inliers < enough:  # look farther
+            wide_fit = self._search(landmarks, observations, jacobian, rest)
+            if self._initialised and wide_fit is not None and not wide_fit.supported(config.min_agreement):
+                retry = self._search(landmarks, observations, jacobian, wide_fit.motion)
+                wide_fit = retry if retry is not None and retry.inliers > wide_fit.inliers else wide_fit
+            if fit is None or (wide_fit is not None and wide_fit.inliers > fit.inliers):
+                fit = wide_fit
         self._inliers = 0 if fit is None else fit.inliers
-        self._motion_known = fit is not None and fit.supported(limit.min_agreement)
+        self._motion_known = fit is not None and fit.supported(config.min_agreement)
         self._initialised |= self._motion_known
         if fit is None:
             return np.eye(4)
-        if np.hypot(*fit.motion[:2]) > limit.reach_m or abs(fit.motion[2]) > limit.max_turn_rad:
+        if np.hypot(*fit.motion[:2]) > config.reach_m or abs(fit.motion[2]) > config.max_turn_rad:
             self._motion_known = False
             return np.eye(4)
-        return _about(fit.motion, observations.sensor_xy)
+        return _turn_about_sensor(fit.motion, observations.sensor_xy)
 
     def _search(
         self, landmarks: Landmarks, observations: Observations, jacobian: Float64, motion: Float64
@@ -99,16 +101,9 @@ class Registration:
         self._attempts += initial and len(landmarks) > 0
         step = self.config.initial_turn_rad
         starts = [[0.0, 0.0, k * step] for k in (0, 1, -1, 2, -2, 3, -3)] if initial else [motion]
+        reach_m, scales = self.config.reach_m, _SCALES[:_MATCH_ROUNDS]
         fits = (
-            self._solve(
-                landmarks,
-                observations,
-                jacobian,
-                np.asarray(start),
-                self.config.reach_m,
-                _SCALES[:_ROUNDS],
-                choices=_ROUNDS,
-            )
+            self._solve(landmarks, observations, jacobian, np.asarray(start), reach_m, scales, _MATCH_ROUNDS)
             for start in starts
         )
         return max((fit for fit in fits if fit is not None), key=lambda fit: fit.inliers, default=None)
@@ -121,10 +116,10 @@ class Registration:
         motion: Float64,
         reach_m: float,
         scales: tuple[float, ...],
-        choices: int,
+        match_rounds: int,
     ) -> Fit | None:
-        """Motion fitted to pairs within reach of a first one, after a number of choices of the pairs."""
-        limit = self.config
+        """Motion fitted to pairs within reach of a first one, matched anew in each round."""
+        config = self.config
         near = observations.kdop + np.tensordot(motion, jacobian, 1)
         i, j = _pairs(landmarks.kdop, near, reach_m)
         if len(i) < _MIN_LANDMARKS:
@@ -132,21 +127,23 @@ class Registration:
         if not self._initialised:
             a, b = landmarks.kdop[:, i], near[:, j]
             shift, (size, _, _) = shift_between(a, b), shape_similarity(a, b)
-            vote = _vote(shift[size < limit.max_size_difference], limit.reach_m, limit.vote_cell_m)
+            vote = _vote(shift[size < config.max_size_difference], config.reach_m, config.vote_cell_m)
             motion = motion + np.append(-vote, 0.0)
         a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
-        gain, young = b - a, np.where(landmarks.established, 0.0, limit.young_sigma_m)
-        sigma = limit.end_sigma_m + limit.end_sigma_per_m * observations.range_m[j]
+        outward_shift, young = b - a, np.where(landmarks.established, 0.0, config.young_sigma_m)
+        sigma = config.end_sigma_m + config.end_sigma_per_m * observations.range_m[j]
         variance = young[i] ** 2 + sigma**2
-        for _ in range(choices):
+        for _ in range(match_rounds):
             moved = b + np.tensordot(motion, jacobian, 1)
             shift = shift_between(a, moved)
             size, overlap, _ = shape_similarity(a, moved)
             best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
-            motion = _fit(gain.take(best, axis=1), jacobian.take(best, axis=2), variance[best], motion, scales)
+            motion = _fit(
+                outward_shift.take(best, axis=1), jacobian.take(best, axis=2), variance[best], motion, scales
+            )
         a, b, jacobian = a.take(best, axis=1), b.take(best, axis=1), jacobian.take(best, axis=2)
         shift = shift_between(a, b + np.tensordot(motion, jacobian, 1))
-        inliers = int((np.hypot(shift[:, 0], shift[:, 1]) < limit.inlier_m).sum())
+        inliers = int((np.hypot(shift[:, 0], shift[:, 1]) < config.inlier_m).sum())
         return Fit(motion, inliers, len(best))
 
 
@@ -186,14 +183,16 @@ def _mutual(i: Int, j: Int, cost: Float64) -> Int:
     return np.flatnonzero((best_of_i[i] == k) & (best_of_j[j] == k))
 
 
-def _fit(gain: Float64, jacobian: Float64, variance: Float64, motion: Float64, scales: tuple[float, ...]) -> Float64:
+def _fit(
+    outward_shift: Float64, jacobian: Float64, variance: Float64, motion: Float64, scales: tuple[float, ...]
+) -> Float64:
     """Motion that undoes the displacement of the ends of k-DOPs, by iteratively reweighted least squares.
 
     An end that comes into view moves while the other stays: each end has its own weight, of a Cauchy distribution. A
     millionth of the weights pulls towards no motion, so that the normal equations are never singular.
 
     Args:
-        gain: (8, K) displacement outward [m].
+        outward_shift: (8, K) displacement of each end outward, from landmark to observation [m].
         jacobian: (3, 8, K), as of _jacobian.
         variance: (K,) square of the scale of each pair's errors [m2].
         motion: (3,) first guess.
@@ -202,13 +201,14 @@ def _fit(gain: Float64, jacobian: Float64, variance: Float64, motion: Float64, s
     Returns:
         (3,) x, y [m] and turn [rad].
     """
-    J, g, variance = jacobian.reshape(3, -1), gain.ravel(), np.tile(variance, 8)
-    products = np.concatenate([J[0] * J, J[1] * J[1:], J[2:] * J[2], g * J])
+    J, shift, variance = jacobian.reshape(3, -1), outward_shift.ravel(), np.tile(variance, 8)
+    products = np.concatenate([J[0] * J, J[1] * J[1:], J[2:] * J[2], shift * J])
     for scale in scales:
         left = motion @ J
-        left += g
+        left += shift
         left *= left
         left += scale**2 * variance
+        # Normal equations of x, y and turn t: weighted sums over products of two rows of J, or of one and the shift
         xx, xy, xt, yy, yt, tt, x, y, t = (products @ (1.0 / left)).tolist()
         little = 1e-6 * (xx + yy + tt)
         normal = np.array([[xx + little, xy, xt], [xy, yy + little, yt], [xt, yt, tt + little]])
@@ -216,7 +216,7 @@ def _fit(gain: Float64, jacobian: Float64, variance: Float64, motion: Float64, s
     return motion
 
 
-def _about(motion: Float64, sensor_xy: Float64) -> Float64:
+def _turn_about_sensor(motion: Float64, sensor_xy: Float64) -> Float64:
     """(4, 4) turn about the position of the sensor, then shift."""
     R = rotation_zyx(0.0, 0.0, motion[2])
     position = np.array([sensor_xy[0], sensor_xy[1], 0.0])

@@ -14,10 +14,10 @@ from modt.segmentation.view_bounds import DIRECTION, ELEVATION, HEIGHT, RANGE, V
 from modt.types import Bool, Float32, Int
 
 
-class CarMerger:
+class StripMerger:
     """Merges the strips of one car.
 
-    Clusters across the direction straight to the right, where pseudo-angles begin anew, are not merged.
+    A car across the negative y axis, the seam at which pseudo-angles begin anew, is not merged.
 
     Args:
         sensor: beam spacing.
@@ -29,11 +29,11 @@ class CarMerger:
         beam = float(np.tan(np.deg2rad(sensor.elevation_step_deg)))
         self.gap = c.min_gap_beams * beam, c.max_gap_beams * beam
         self.max_diagonal_m = min(c.max_diagonal_m, config.max_extent_m)
-        self.min_sqrt_range = np.float32(np.sqrt(c.visible_m / (c.max_beams * beam)))
+        self.min_sqrt_range = np.float32(np.sqrt(c.visible_m / (c.max_beams * beam)))  # as sizes.sqrt_range
 
-    def merge(self, clusters: Clusters, sizes: ClusterSizes, valid: Bool) -> Int:
-        """(G,) cluster into which each of the (G,) valid ones is merged, itself where it is not merged."""
-        target, candidate = np.arange(clusters.n), valid & self.candidates(sizes)
+    def merge(self, clusters: Clusters, sizes: ClusterSizes, mergeable: Bool) -> Int:
+        """(G,) cluster into which each is merged, itself where it is not; only the (G,) mergeable ones are."""
+        target, candidate = np.arange(clusters.n), mergeable & self.candidates(sizes)
         rows = np.flatnonzero(candidate)
         if len(rows):
             groups = Groups.from_labels(consecutive(candidate)[clusters.of_cell], len(rows))
@@ -52,16 +52,16 @@ class CarMerger:
         return candidate
 
     def targets(self, bounds: ViewBounds) -> Int:
-        """(G,) first of the clusters that make one car with each, itself where it is no strip."""
-        own = np.arange(len(bounds))
-        first = own.copy()
+        """(G,) first of the clusters that make one car with each, itself where it is not merged."""
+        self_index = np.arange(len(bounds))
+        representative = self_index.copy()
         front, back = self.pairs(bounds)
         if len(front):
-            _propagate_min(first, front, back)
-            number = (np.cumsum(first == own) - 1)[first]
-            cars = bounds.union(Groups.from_labels(number, int(number.max()) + 1))
-            first = np.where(self.fits(cars)[number], first, own)
-        return first
+            _propagate_min(representative, front, back)
+            car_id = (np.cumsum(representative == self_index) - 1)[representative]
+            cars = bounds.union(Groups.from_labels(car_id, int(car_id.max()) + 1))
+            representative = np.where(self.fits(cars)[car_id], representative, self_index)
+        return representative
 
     def pairs(self, bounds: ViewBounds) -> tuple[Int, Int]:
         """Nearer and farther cluster of each pair of strips of one car."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.car_merging import CarMerger
+from modt.segmentation.car_merging import StripMerger
 from modt.segmentation.cells import Cells, connect, occupied_cells
 from modt.segmentation.clusters import Clusters, ClusterSizes, diagonals
 from modt.segmentation.grids import SqrtRangeGrid
@@ -36,7 +36,7 @@ class Clusterer:
         self.gap_per_range = np.float32(config.clusters.max_gap_beams * beam_rad)
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
-        self.splitter, self.merger = PersonSplitter(sensor, config), CarMerger(sensor, config)
+        self.splitter, self.merger = PersonSplitter(sensor, config), StripMerger(sensor, config)
 
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""

@@ -35,34 +35,34 @@ class Reunion:
         self.config, self.min_hits = config, min_hits
 
     def reunite(self, tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
-        """The matches, with the parts of objects reassigned."""
+        """The matches after older tracks have swapped their proposals for larger parts of their objects."""
         if not len(observations):
             return matches
-        proposal = np.full(len(tracks), NONE, np.int64)
-        owner = np.full(len(observations), NONE, np.int64)
-        proposal[matches.rows], owner[matches.proposals] = matches.proposals, matches.rows
-        incomplete = self._incomplete(tracks, observations, proposal)
-        older, parts = self._parts(tracks, observations, incomplete, proposal, owner)
-        rows, proposals = swap_proposals(older, parts, proposal, owner)
+        proposal_of_track = np.full(len(tracks), NONE, np.int64)
+        track_of_proposal = np.full(len(observations), NONE, np.int64)
+        proposal_of_track[matches.rows], track_of_proposal[matches.proposals] = matches.proposals, matches.rows
+        incomplete = self._incomplete(tracks, observations, proposal_of_track)
+        older, parts = self._parts(tracks, observations, incomplete, proposal_of_track, track_of_proposal)
+        rows, proposals = swap_proposals(older, parts, proposal_of_track, track_of_proposal)
         return matches.reassigned(tracks, rows, proposals) if len(rows) else matches
 
-    def _incomplete(self, tracks: TrackTable, observations: Observations, proposal: Int) -> Int:
-        """Rows, oldest first, of what was seen more than once and is now lost, or smaller than its known extent."""
-        now, known = width_sum(observations.kdop)[proposal], width_sum(tracks.envelope.T.copy())
-        less = (proposal == NONE) | (known > self.config.shrink * now)
-        rows: Int = ((tracks.hits > 1) & less).nonzero()[0]  # tracks are in the order of their birth
+    def _incomplete(self, tracks: TrackTable, observations: Observations, proposal_of_track: Int) -> Int:
+        """Rows, oldest first, of tracks seen more than once with no proposal, or one below the known extent."""
+        now, known = width_sum(observations.kdop)[proposal_of_track], width_sum(tracks.envelope.T.copy())
+        incomplete = (proposal_of_track == NONE) | (known > self.config.shrink * now)
+        rows: Int = ((tracks.hits > 1) & incomplete).nonzero()[0]  # tracks are in the order of their birth
         return rows
 
     def _parts(
-        self, tracks: TrackTable, observations: Observations, rows: Int, proposal: Int, owner: Int
+        self, tracks: TrackTable, observations: Observations, row: Int, proposal_of_track: Int, track_of_proposal: Int
     ) -> tuple[Int, Int]:
         """Pairs of a row and a proposal: a track, and a larger part of its object that it is not matched with."""
-        if not len(rows):
-            return rows, rows
-        known = tracks.known_kdops(rows)
+        if not len(row):
+            return row, row
+        known = tracks.known_kdops(row)
         i, part = overlapping_pairs(known, observations.kdop)
-        older, other = rows[i], owner[part]
-        size = np.where(proposal == NONE, 0, observations.count[proposal])
+        older, other = row[i], track_of_proposal[part]
+        size = np.where(proposal_of_track == NONE, 0, observations.count[proposal_of_track])
         younger = (other == NONE) | (tracks.id[other] > tracks.id[older])
         larger = (younger & (other != older) & (observations.count[part] > size[older])).nonzero()[0]
         bulky = (observations.box[part[larger], 3] > _PERSON_M) & (tracks.box[older[larger], 3] > _PERSON_M)
@@ -70,28 +70,28 @@ class Reunion:
         i, older, part = i[larger], older[larger], part[larger]
         box = tracks.box.take(older, axis=0)
         box[:, :2] += tracks.x.take(older, axis=0)[:, :2] - tracks.anchor.take(older, axis=0)
-        related = _fit(box, observations.box.take(part, axis=0), _MAX_SIZE_M[tracks.last_class[older]])
+        related = _fit_together(box, observations.box.take(part, axis=0), _MAX_SIZE_M[tracks.last_class[older]])
         kdop = observations.kdop.take(part, axis=1)
         within = coverage(kdop, known.take(i, axis=1)) > self.config.min_coverage
         around = coverage(tracks.predicted_kdops(older), kdop) > self.config.min_coverage
-        related &= (within | around) & _one_class(tracks, older, owner[part])
+        related &= (within | around) & _may_be_one_class(tracks, older, track_of_proposal[part])
         return older[related], part[related]
 
     def _gives_way(self, tracks: TrackTable, older: Int, other: Int) -> Bool:
-        """(k,) whether a part that may be a person goes to the older track."""
+        """(k,) whether a part has no established track (other NONE: no track), or the older track is a final car."""
         car = tracks.final[older] & (tracks.last_class[older] == ObjectClass.CAR.value)
-        way: Bool = (other == NONE) | (tracks.hits[other] < self.min_hits) | car
-        return way
+        gives_way: Bool = (other == NONE) | (tracks.hits[other] < self.min_hits) | car
+        return gives_way
 
 
-def swap_proposals(older: Int, parts: Int, proposal: Int, owner: Int) -> tuple[Int, Int]:
-    """Reassignment in which older tracks take parts and leave their own proposals to the former owners, once each.
+def swap_proposals(older: Int, parts: Int, proposal_of_track: Int, track_of_proposal: Int) -> tuple[Int, Int]:
+    """Reassignment: an older track takes a part and leaves its own proposal to the part's former track, each once.
 
     Args:
         older: (K,) rows that may take a part, the first in order served first.
         parts: (K,) proposal that each may take.
-        proposal: (M,) of each track, NONE for none.
-        owner: (P,) track of each proposal, NONE for none.
+        proposal_of_track: (M,) proposal of each track, NONE for none.
+        track_of_proposal: (P,) track of each proposal, NONE for none.
 
     Returns:
         (R,) rows, ascending, and the proposal of each now, NONE for none.
@@ -99,25 +99,25 @@ def swap_proposals(older: Int, parts: Int, proposal: Int, owner: Int) -> tuple[I
     has: dict[int, int] = {}
     taken: set[int] = set()
     for row, part in zip(older.tolist(), parts.tolist(), strict=True):
-        former = int(owner[part])
+        former = int(track_of_proposal[part])
         if part in taken or row in has or former in has:
             continue
         has[row] = part
         if former != NONE:
-            has[former] = int(proposal[row])
+            has[former] = int(proposal_of_track[row])
         taken.add(part)
     rows = sorted(has)
     return np.array(rows, np.int64), np.array([has[row] for row in rows], np.int64)
 
 
-def _one_class(tracks: TrackTable, older: Int, other: Int) -> Bool:
+def _may_be_one_class(tracks: TrackTable, older: Int, other: Int) -> Bool:
     """(k,) whether two tracks (other NONE: no track) may be of one class: background and cars are easily confused."""
     a, b = tracks.last_class[older], tracks.last_class[other]
-    alike: Bool = (other == NONE) | ~tracks.final[other] | (a == b) | ~(_PERSON[a] | _PERSON[b])
-    return alike
+    one_class: Bool = (other == NONE) | ~tracks.final[other] | (a == b) | ~(_PERSON[a] | _PERSON[b])
+    return one_class
 
 
-def _fit(a: Float64, b: Float64, size: Float64) -> Bool:
+def _fit_together(a: Float64, b: Float64, size: Float64) -> Bool:
     """(k,) whether boxes a and b (k, 7) lie within one box of a size (k, 2), along the heading of the longer."""
     yaw = np.where(a[:, 3] > b[:, 3], a[:, 6], b[:, 6])
     c, s = np.cos(yaw), np.sin(yaw)

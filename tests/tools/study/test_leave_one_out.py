@@ -31,10 +31,10 @@ def test_interval_of_equal_differences_is_a_point_and_drives_without_a_figure_ar
 def test_table_marks_what_lies_beyond_its_interval():
     differences = np.zeros((3, 1, len(FIGURES)))
     differences[:, 0, 0], differences[:, 0, 1] = (-1, -2, -3), (-1, 0, 1)
-    row = table(["CarMerger"], differences).splitlines()[2].split(" | ")
+    row = table(["StripMerger"], differences).splitlines()[2].split(" | ")
     assert row[2].startswith("**-2.00 (")
     assert row[3].startswith("+0.00 (")
-    line = brief(["CarMerger"], differences).splitlines()[2]
+    line = brief(["StripMerger"], differences).splitlines()[2]
     assert "recall -2.00" in line
     assert "said" not in line
 
@@ -44,7 +44,7 @@ def test_mechanisms_earn_figures_on_a_simulated_drive():
     drive = simulated("street", "vlp-16", 2.0, 300)
     figures = dict(zip(FIGURES, run(drive, "accurate"), strict=True))
     assert all(0 < figures[name] <= 100 for name in ("recall", "said", "precision", "AP", "life"))
-    merger, reunion = study(drive, "accurate", ["CarMerger", "Reunion"])
+    merger, reunion = study(drive, "accurate", ["StripMerger", "Reunion"])
     assert merger[FIGURES.index("recall")] < 0
     assert reunion[FIGURES.index("recall")] == 0  # tracking changes no segment that it does not regroup
     assert reunion[FIGURES.index("breaks")] > 0
