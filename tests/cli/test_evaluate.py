@@ -46,7 +46,7 @@ def test_runs_are_pooled_by_sensor(drives, tmp_path):
 def test_report_and_what_else_counts(drives, tmp_path):
     done = modt("evaluate", *drives["vlp-16"], cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for title in ("segmentation", "average precision", "precision as said", "recall as said", "tracks", "metrics"):
+    for title in ("segmentation", "average precision", "precision of", "recall with", "tracks", "metrics"):
         assert title in done.stdout
     called = []
     for options in ((), ("--sector", "180", "--count", "cut")):

@@ -5,7 +5,7 @@ from modt.energy.meters.meter import Kind
 from modt.energy.savings import UnitCosts
 from modt.pipeline import STAGES
 from modt.reporting.comparison import COUNTS
-from modt.reporting.gamma import RunCosts, mean, saving, unit_costs
+from modt.reporting.gamma import RunCosts, estimate_gamma, mean, unit_costs
 from modt.reporting.quantity import Quantity, format_number, quantity, to_json
 
 TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
@@ -50,15 +50,15 @@ def test_unit_costs_are_found_from_varied_load() -> None:
 
 
 def test_prediction_equals_measurement_at_constant_unit_costs() -> None:
-    found = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
+    found = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
     assert found.predicted.value == pytest.approx(found.measured.value)
     assert found.deviation.value == pytest.approx(0.0, abs=1e-9)
     assert found.prediction.explain(found.measured.value)[-1].change == pytest.approx(0.0, abs=1e-6)
 
 
 def test_intervals_cover_the_truth_with_noise() -> None:
-    truth = saving(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured.value
-    found = saving(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
+    truth = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured.value
+    found = estimate_gamma(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
     assert found.measured.low < truth < found.measured.high
     assert found.predicted.low < truth < found.predicted.high
     assert found.deviation.low < 0 < found.deviation.high
@@ -67,7 +67,7 @@ def test_intervals_cover_the_truth_with_noise() -> None:
 def test_uncounted_cost_is_unexplained() -> None:
     dear = run(FEW)
     dear.cost[:, STAGES.index("segmentation")] *= 2
-    found = saving(run(EVERY), dear, varied(), np.random.default_rng(0))
+    found = estimate_gamma(run(EVERY), dear, varied(), np.random.default_rng(0))
     terms = found.prediction.explain(found.measured.value)
     assert terms[-1].change == pytest.approx(found.measured.value - found.predicted.value)
     assert terms[-1].change < -0.1
@@ -95,7 +95,8 @@ def test_quantity_without_a_value_is_unavailable() -> None:
     assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
     assert quantity(float("nan")).value is None
     assert quantity(float("inf")).text() == "unavailable"
-    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "1.00e J (0.500 to 1.50)"
+    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "~1.00 J (0.500 to 1.50)"
+    assert quantity(440.0, "mJ", interval=(439.9, 440.1)).text() == "440 mJ"
 
 
 def test_trees_of_quantities_become_plain_data() -> None:

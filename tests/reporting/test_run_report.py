@@ -209,7 +209,7 @@ def test_every_figure_carries_its_kind(run):
 
 def test_text_has_results_first_and_fits_a_terminal(run):
     text = run_text(run_tree(run))
-    assert text.splitlines()[2].startswith("  energy a frame: 300 mJ ")
+    assert text.splitlines()[3].startswith("  energy a frame: 300 mJ; ")
     assert max(map(len, text.splitlines())) <= 100
     assert "In brackets: 95 %" in text
 

@@ -126,6 +126,7 @@ class Session:
                 "stream": self.stream.info.name,
                 "mode": self.request.mode,
                 "fov": self.request.fov,
+                "profile": self.request.profile,
                 "elapsed_s": elapsed_s,
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * self.stream.info.period_s / elapsed_s,

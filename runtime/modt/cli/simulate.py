@@ -45,5 +45,6 @@ def run(arguments: argparse.Namespace) -> int:
     except OSError as error:
         remedy = "free or unlock the disk, or give another --out"
         raise ModtError(out, f"cannot be written ({error.strerror or error})", remedy) from None
-    print(writer.drive)
+    print(f"KITTI raw drive: {writer.drive}\nSemanticKITTI sequence: {writer.sequence}")
+    print(f"next: modt replay {writer.drive} --profile {arguments.sensor}")
     return 0

@@ -22,9 +22,7 @@ class ClassScore:
 
     objects: int  # of the class, one count an object and frame
     average_precision: float | None  # area under the envelope of precision over recall
-    curve: tuple[
-        tuple[float, float, float], ...
-    ]  # threshold, precision, recall where it first reaches each twentieth
+    curve: tuple[tuple[float, float, float], ...]  # threshold, precision, recall at each new twentieth
     called: int  # proposals that the program says are of the class
     precision: float | None  # share of them that lie on an object of the class
     segmentable: int  # objects of the class that are judged for segmentation

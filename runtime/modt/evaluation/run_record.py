@@ -47,7 +47,7 @@ class RunRecord:
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
         if not (path / LABELS).is_dir():
-            raise MisuseError(path, "holds no labels of points", "run it again with `modt replay --labels`")
+            raise MisuseError(path, "holds no point labels of its own", "run it again with `modt replay --labels`")
         words = [word for argument in command for word in argument.split("=", 1)]
         sensor = Path(words[words.index("--profile") + 1]).stem if "--profile" in words else DEFAULT
         return cls(path, Path(stream) if stream else None, fov, sensor)

@@ -1,4 +1,4 @@
-"""How long objects are followed: life and its breaks, and the field's metrics as TrackEval computes them."""
+"""How long objects are followed: life and its breaks, and HOTA, CLEAR and Identity as TrackEval computes them."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from modt.types import NONE, Int
 
 SIMILARITY_THRESHOLD = 0.25
 """Similarity from which CLEAR and Identity count a match."""
-STAY = 3
-"""Frames on an object that make a track its own, for mis-associations."""
+MIN_FRAMES_OWNED = 3
+"""Frames for which a track must follow an object to own it; one that owns several is a mis-association."""
 
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """Mean frames that a track follows an object (N_go), of those ideal."""
+    """Mean number of frames for which a track follows an object (N_go), beside that of faultless tracking."""
 
-    objects: int  # that are there to be followed
-    frames: int  # in which they are
-    life: float | None  # frames followed over objects and discontinuities
-    ideal: float | None  # frames over objects
-    ratio: float | None  # of the two
+    objects: int  # objects counted
+    frames: int  # frames counted, summed over the objects
+    life: float | None  # frames followed / (objects + discontinuities)
+    ideal: float | None  # frames / objects
+    ratio: float | None  # life / ideal
 
 
 def _life(objects: int, frames: int, followed: int, discontinuities: int) -> Life:
@@ -38,20 +38,24 @@ def _life(objects: int, frames: int, followed: int, discontinuities: int) -> Lif
 
 @dataclass(frozen=True, slots=True)
 class TrackScore:
-    """Objects of one kind over all frames."""
+    """How well the objects of one kind are followed over all frames.
 
-    life: Life  # misses count as misses
+    At a discontinuity, another track follows the object than when it was last followed. If that track had followed it
+    earlier, this counts as returned; if not, but the track existed before, as taken over; if it is new, as neither.
+    """
+
+    life: Life  # over the frames in which the object has points enough to be followed, whether it is or not
     life_as_seen: Life  # over the objects and frames that are followed
-    labelled: Life  # objects and frames that are labelled, whatever points they have; its ideal is that of Table III
+    labelled: Life  # over all labelled frames, whatever points the object has there; Table III gives this ideal
     followed: float | None  # share of the frames in which an object is followed
     discontinuities: int  # times that another track than before follows an object
-    taken_over: int  # of these, by a track that was there before
-    returned: int  # of these, by one that had followed the object before
-    mis_associations: int  # tracks that follow more than one object for STAY frames or more
+    taken_over: int  # of these, by a track from elsewhere
+    returned: int  # of these, by a track that had followed the object before
+    mis_associations: int  # tracks that follow more than one object for MIN_FRAMES_OWNED frames or more each
 
 
 def track_scores(objects: Rows, proposals: Rows) -> dict[str, TrackScore]:
-    """Of all objects, by class and by labelled type; nothing where none has an identity."""
+    """Scores of all objects, of each class and of each labelled type; empty where no object has an identity."""
     rows = objects[(objects["class"] > 0) & (objects["role"] != Role.IGNORED) & (objects["id"] != NONE)]
     first: dict[tuple[int, int], int] = {}
     for drive, track, frame in proposals[["drive", "track", "frame"]].tolist():
@@ -60,8 +64,8 @@ def track_scores(objects: Rows, proposals: Rows) -> dict[str, TrackScore]:
     return {name: _score(rows[which], first) for name, which in groups.items() if which.any()}
 
 
-def _score(labelled: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore:
-    rows = labelled[labelled["to_follow"]]
+def _score(all_rows: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore:
+    rows = all_rows[all_rows["to_follow"]]
     seen = rows[rows["track"] != NONE]
     histories: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for drive, id_, frame, track in seen[["drive", "id", "frame", "track"]].tolist():
@@ -75,11 +79,11 @@ def _score(labelled: Rows, first_seen: dict[tuple[int, int], int]) -> TrackScore
             returned += track != before and track in past
             taken += track not in past and first_seen[drive, track] < frame
     frames_of = Counter(seen[["drive", "track", "id"]].tolist())
-    owned = Counter((drive, track) for (drive, track, _), n in frames_of.items() if n >= STAY)
+    owned = Counter((drive, track) for (drive, track, _), n in frames_of.items() if n >= MIN_FRAMES_OWNED)
     return TrackScore(
         life=_life(_count(rows), len(rows), len(seen), breaks),
         life_as_seen=_life(len(histories), len(seen), len(seen), breaks),
-        labelled=_life(_count(labelled), len(labelled), len(seen), breaks),
+        labelled=_life(_count(all_rows), len(all_rows), len(seen), breaks),
         followed=ratio(len(seen), len(rows)),
         discontinuities=breaks,
         taken_over=taken,

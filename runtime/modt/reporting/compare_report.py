@@ -13,17 +13,8 @@ from modt.energy.attribution import usable_windows
 from modt.energy.meters.meter import Facts, Kind
 from modt.energy.savings import OtherCosts, UnitCosts, predict
 from modt.pipeline import STAGES
+from modt.reporting import gamma
 from modt.reporting.comparison import COUNTS, Repetition, total
-from modt.reporting.gamma import (
-    RunCosts,
-    Saving,
-    interval,
-    mean,
-    other_costs,
-    prediction_tree,
-    saving,
-    unit_costs,
-)
 from modt.reporting.quantity import Quantity, estimate, quantity
 from modt.types import Float64
 
@@ -46,18 +37,20 @@ def compare_tree(
 ) -> dict[str, Any]:
     """Results of a comparison over repetitions of the same stream.
 
-    The first of the modes is tracking-by-detection; the varied run gives the unit costs. What the comparison is about
-    (stream, frames, conditions) is copied to the tree.
+    The first of the modes is tracking-by-detection; the run named `varied` gives the unit costs. What the
+    comparison is about (stream, frames, conditions) is copied to the tree.
     """
     random = np.random.default_rng(0)
     passes = {name: [repetition[name] for repetition in repetitions] for name in (*modes, varied)}
-    runs = {mode: RunCosts.median(passes[mode]) for mode in modes}
+    runs = {mode: gamma.RunCosts.median(passes[mode]) for mode in modes}
     windows = {mode: [line for run in passes[mode] for line in run.energy_lines] for mode in modes}
-    varied_run = RunCosts.concatenated(passes[varied])
+    load_varied_run = gamma.RunCosts.concatenated(passes[varied])
     baseline = runs[modes[0]]
     energy = {mode: _energy(run, windows[mode], basis, random) for mode, run in runs.items()}
     savings = {
-        mode: _saving(saving(baseline, runs[mode], varied_run, random), energy[modes[0]], energy[mode])
+        mode: _saving(
+            gamma.estimate_gamma(baseline, runs[mode], load_varied_run, random), energy[modes[0]], energy[mode]
+        )
         | {"gamma_calibrated": estimate(_calibrated(baseline, runs[mode], basis))}
         for mode in modes[1:]
     }
@@ -69,7 +62,7 @@ def compare_tree(
         "meter": {"name": meter.name, "kind": meter.kind.value, "idle_W": board.idle_W, "busy_W": board.busy_W},
         "test": _PHYSICS if metered else _COUNTING,
         "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
-        "unit_costs": _costs(unit_costs(varied_run), baseline, board.active_W),
+        "unit_costs": _costs(gamma.unit_costs(load_varied_run), baseline, board.active_W),
         "savings": savings,
         "series_kind": Kind.MEASURED.value,
         "series": {mode: _series(runs[mode], repetitions[0][mode].lives) for mode in modes},
@@ -77,7 +70,7 @@ def compare_tree(
 
 
 def _energy(
-    run: RunCosts, windows: list[dict[str, Any]], basis: Basis, random: np.random.Generator
+    run: gamma.RunCosts, windows: list[dict[str, Any]], basis: Basis, random: np.random.Generator
 ) -> dict[str, Quantity]:
     """Energy a frame with and without idling [J]: of the meter where it was read, else of the model."""
     good = usable_windows(windows)
@@ -87,18 +80,18 @@ def _energy(
         net_J = gross_J - basis.board.idle_W * 1e-9 * np.array([line["wall_ns"] for line in good])
 
         def per_frame(energy_J: Float64) -> Quantity:
-            bounds = interval(len(good), lambda k: float(energy_J[k].sum() / max(frames[k].sum(), 1)), random)
+            bounds = gamma.interval(len(good), lambda k: float(energy_J[k].sum() / max(frames[k].sum(), 1)), random)
             return quantity(float(energy_J.sum() / frames.sum()), "J", Kind(good[0]["kind"]), bounds)
 
         return {"net_J": per_frame(net_J), "gross_J": per_frame(gross_J)}
     net_J = basis.board.active_W * run.cost.sum(axis=1)
     gross_J = net_J + basis.board.idle_W * basis.period_s
-    return {key: mean(J, "J", Kind.ESTIMATED, random) for key, J in (("net_J", net_J), ("gross_J", gross_J))}
+    return {key: gamma.mean(J, "J", Kind.ESTIMATED, random) for key, J in (("net_J", net_J), ("gross_J", gross_J))}
 
 
-def _work(run: RunCosts, net_J: Quantity, random: np.random.Generator) -> dict[str, Any]:
+def _work(run: gamma.RunCosts, net_J: Quantity, random: np.random.Generator) -> dict[str, Any]:
     def cpu_ms(cpu_s: Float64) -> Quantity:
-        return mean(1e3 * cpu_s, "ms", Kind.MEASURED, random)
+        return gamma.mean(1e3 * cpu_s, "ms", Kind.MEASURED, random)
 
     counts, total_s = total(run.counts), float(run.cost.sum(axis=1).mean())
     share = None if net_J.value is None or not total_s else net_J.value / total_s
@@ -121,12 +114,12 @@ def _work(run: RunCosts, net_J: Quantity, random: np.random.Generator) -> dict[s
     }
 
 
-def _saving(found: Saving, energy1: dict[str, Quantity], energy2: dict[str, Quantity]) -> dict[str, Any]:
+def _saving(found: gamma.GammaEstimate, energy1: dict[str, Quantity], energy2: dict[str, Quantity]) -> dict[str, Any]:
     net, gross = ((energy1[key].value, energy2[key].value) for key in ("net_J", "gross_J"))
     gamma_net, gamma_gross = (a / b if a is not None and b else None for a, b in (net, gross))
     saved_J = None if net[0] is None or net[1] is None else net[0] - net[1]
     kind, prediction = energy1["net_J"].kind, found.prediction
-    return prediction_tree(prediction, found.measured.value) | {
+    return gamma.prediction_tree(prediction, found.measured.value) | {
         "short_form_error": estimate(prediction.paper.short_form_error),
         "gamma_predicted": found.predicted,
         "gamma_measured_cpu": found.measured,
@@ -138,18 +131,20 @@ def _saving(found: Saving, energy1: dict[str, Quantity], energy2: dict[str, Quan
     }
 
 
-def _calibrated(baseline: RunCosts, run: RunCosts, basis: Basis) -> float | None:
+def _calibrated(baseline: gamma.RunCosts, run: gamma.RunCosts, basis: Basis) -> float | None:
     """Gamma from the joules of a calibration; stages not calibrated count by their CPU time."""
     if basis.board.coefficients is None:
         return None
     seg_J, class_J, point_J = basis.board.coefficients
     net_W = basis.board.active_W
-    other1, other2 = (OtherCosts(net_W * c.track, net_W * c.schedule) for c in map(other_costs, (baseline, run)))
+    other1, other2 = (
+        OtherCosts(net_W * c.track, net_W * c.schedule) for c in map(gamma.other_costs, (baseline, run))
+    )
     costs = UnitCosts(seg_J, other1.track, 0.0, class_J, point_J)
     return predict(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
 
 
-def _costs(costs: UnitCosts, baseline: RunCosts, net_W: float) -> dict[str, Quantity]:
+def _costs(costs: UnitCosts, baseline: gamma.RunCosts, net_W: float) -> dict[str, Quantity]:
     e_class = costs.e_class(total(baseline.counts))
     return {
         "E_seg": estimate(net_W * costs.seg, "J"),
@@ -165,7 +160,7 @@ def _costs(costs: UnitCosts, baseline: RunCosts, net_W: float) -> dict[str, Quan
     }
 
 
-def _series(run: RunCosts, lives: list[int]) -> dict[str, Any]:
+def _series(run: gamma.RunCosts, lives: list[int]) -> dict[str, Any]:
     return {
         "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
         "proposals": run.counts[:, COUNTS.index("proposals")].tolist(),

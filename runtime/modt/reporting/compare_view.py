@@ -56,8 +56,8 @@ def _verdict(saving: dict[str, Any]) -> str:
     interval = f"{100 * deviation.low:+.1f} to {100 * deviation.high:+.1f}"
     return (
         f"predicted {saving['gamma_predicted'].text()}; "
-        f"the prediction {holds}: deviation {100 * deviation.value:+.1f}e % ({interval}); "
-        f"at a = {saving['a'].marked()} the error of gamma = N_go is {100 * short.value:+.0f}e %"
+        f"the prediction {holds}: deviation ~{100 * deviation.value:+.1f} % ({interval}); "
+        f"at a = {saving['a'].marked()} the error of gamma = N_go is ~{100 * short.value:+.0f} %"
     )
 
 

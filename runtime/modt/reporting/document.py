@@ -31,13 +31,13 @@ class Document:
 
     def text(self) -> str:
         """Lines of 100 columns at most, results first."""
-        lines = [self.title, ""]
+        lines = [self.title, *_wrapped(LEGEND), ""]
         for name, value, note in self.results:
             lines += _wrapped(f"{name}: {value.text()}; {note}")
         lines += ["", *(f"  {fact}" for fact in self.about)]
         for table in self.tables:
             lines += ["", *_aligned(table)]
-        return "\n".join([*lines, "", *_wrapped(self.test), *_wrapped(LEGEND)])
+        return "\n".join([*lines, "", *_wrapped(self.test)])
 
 
 def _wrapped(text: str) -> list[str]:

@@ -68,7 +68,7 @@ def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quanti
 def gamma_terms(title: str, saving: dict[str, Any]) -> Table:
     """Table of the terms from gamma = N_go to the ratio of the runs."""
     short = ["the short form, gamma = N_go", "", saving["gamma_short"]]
-    rows = [[term["name"], f"{term['change'].value:+.3f}e", term["gamma"]] for term in saving["terms"]]
+    rows = [[term["name"], f"~{term['change'].value:+.3f}", term["gamma"]] for term in saving["terms"]]
     return Table([title, "change", "gamma"], [short, *rows])
 
 

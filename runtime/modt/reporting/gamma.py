@@ -41,7 +41,7 @@ class RunCosts:
 
     @classmethod
     def concatenated(cls, runs: Sequence[ModeRun]) -> Self:
-        """Repetitions of work that differs, one after another."""
+        """Runs whose counts differ, such as those of varied load: their frames one after another."""
         return cls(np.concatenate([run.counts() for run in runs]), np.concatenate([run.cpu_s() for run in runs]))
 
     def take(self, frames: Int) -> RunCosts:
@@ -50,7 +50,7 @@ class RunCosts:
 
 
 @dataclass(frozen=True, slots=True)
-class Saving:
+class GammaEstimate:
     """Gamma of one mode over tracking-by-detection, with intervals at 95 % over resampled frames."""
 
     prediction: Prediction
@@ -59,36 +59,38 @@ class Saving:
     deviation: Quantity  # predicted / measured - 1
 
 
-def unit_costs(varied: RunCosts) -> UnitCosts:
+def unit_costs(load_varied_run: RunCosts) -> UnitCosts:
     """Costs of units of work, from a run whose classification load varied from frame to frame."""
-    cost = varied.cost
-    X = varied.counts[:, _LOAD].astype(float)
+    cost = load_varied_run.cost
+    X = load_varied_run.counts[:, _LOAD].astype(float)
     busy = X[:, 0] > 0
     scale = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
     solved = np.linalg.lstsq(X[busy] / scale, cost[busy, CLASS], rcond=None)[0] / scale if busy.any() else np.zeros(3)
     return UnitCosts(float(cost[:, SEG].mean()), float(cost[:, TRACK].sum(axis=1).mean()), *solved.tolist())
 
 
-def saving(baseline: RunCosts, run: RunCosts, varied: RunCosts, random: np.random.Generator) -> Saving:
+def estimate_gamma(
+    baseline: RunCosts, run: RunCosts, load_varied_run: RunCosts, random: np.random.Generator
+) -> GammaEstimate:
     """Predicted and measured gamma of a run on the F frames of tracking-by-detection.
 
-    The unit costs are of a third run: the same frames once or several times, under varied load.
+    The unit costs come from a third run, over the same frames once or several times, whose load was varied.
     """
     n = len(baseline.counts)
-    passes = len(varied.counts) // n
+    passes = len(load_varied_run.counts) // n
 
-    def both(frames: Int) -> tuple[Prediction, float]:
+    def predicted_and_measured(frames: Int) -> tuple[Prediction, float]:
         a, b = baseline.take(frames), run.take(frames)
-        costs = unit_costs(varied.take((frames + n * np.arange(passes)[:, None]).ravel()))
+        costs = unit_costs(load_varied_run.take((frames + n * np.arange(passes)[:, None]).ravel()))
         prediction = predict(total(a.counts), total(b.counts), costs, other_costs(a), other_costs(b))
         return prediction, float(a.cost.sum() / b.cost.sum())
 
-    prediction, ratio = both(np.arange(n))
+    prediction, ratio = predicted_and_measured(np.arange(n))
     gamma = prediction.model.gamma
-    resampled = [both(_blocks(n, random)) for _ in range(_RESAMPLES)]
+    resampled = [predicted_and_measured(_blocks(n, random)) for _ in range(_RESAMPLES)]
     gammas = np.array([found.model.gamma for found, _ in resampled])
     ratios = np.array([found for _, found in resampled])
-    return Saving(
+    return GammaEstimate(
         prediction,
         predicted=estimate(gamma, "", _interval(gammas)),
         measured=quantity(ratio, "", Kind.MEASURED, _interval(ratios)),
@@ -123,8 +125,8 @@ def mean(values: Float64, unit: str, kind: Kind, random: np.random.Generator) ->
 
 def other_costs(run: RunCosts) -> OtherCosts:
     """Mean costs a frame of the stages that Equation 2 leaves out."""
-    mean = run.cost.mean(axis=0)
-    return OtherCosts(float(mean[TRACK].sum()), float(mean[SCHEDULE].sum()))
+    cost = run.cost.mean(axis=0)
+    return OtherCosts(float(cost[TRACK].sum()), float(cost[SCHEDULE].sum()))
 
 
 def _blocks(n: int, random: np.random.Generator) -> Int:

@@ -8,8 +8,8 @@ from typing import Any
 
 from modt.energy.meters.meter import Kind
 
-_MARK = {Kind.MEASURED: "", Kind.INTEGRATED: "i", Kind.ESTIMATED: "e"}
-LEGEND = "Figures are measured, but for e estimated, i integrated, ? unavailable. In brackets: 95 %."
+_MARKS = {Kind.MEASURED: "", Kind.INTEGRATED: "i:", Kind.ESTIMATED: "~"}
+LEGEND = "No mark: measured; ~ estimated; i: integrated from power samples. In brackets: 95 % intervals."
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,20 +33,20 @@ class Quantity:
         return replace(self, value=value, unit=unit, low=low, high=high)
 
     def marked(self) -> str:
-        """Value, letter of its kind (LEGEND) and unit."""
-        return "unavailable" if self.value is None else self._number(_MARK[self.kind])
+        """Mark of its kind (LEGEND), value and unit."""
+        return "unavailable" if self.value is None else _MARKS[self.kind] + self._number()
 
     def text(self) -> str:
-        """As marked, with the interval."""
-        interval = "" if self.low is None else f" ({format_number(self.low)} to {format_number(self.high)})"
-        return self.marked() + interval
+        """As marked, with the interval if its ends differ in the digits shown."""
+        low, high = format_number(self.low), format_number(self.high)
+        return self.marked() + (f" ({low} to {high})" if low != high else "")
 
     def with_kind(self) -> str:
         """Value, unit and kind in brackets."""
         return "unavailable" if self.value is None else f"{self._number()} ({self.kind})"
 
-    def _number(self, mark: str = "") -> str:
-        return f"{format_number(self.value)}{mark} {self.unit}".rstrip()
+    def _number(self) -> str:
+        return f"{format_number(self.value)} {self.unit}".rstrip()
 
 
 def quantity(

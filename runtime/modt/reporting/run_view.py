@@ -56,7 +56,8 @@ def _stages(tree: dict[str, Any]) -> Table:
         energy: list[Cell] = ["-", "-"]
         if name in parts:
             energy = [parts[name].scaled(1e3, "mJ"), parts[name].scaled(100 / whole, "%")]
-        rows.append([name, *energy, *(times[name][key] if name in times else "-" for key in keys)])
+        work = {key: q for key, q in times.get(name, {}).items() if key != "points" or q.value}
+        rows.append([name, *energy, *(work.get(key, "-") for key in keys)])
     return Table(["stage", "energy a frame", "share", *keys.values()], rows)
 
 

@@ -13,15 +13,14 @@ def summary_text(summary: dict[str, Any]) -> str:
     tracks, objects = summary["tracks"], summary["foreground_tracks"]
     lines = [
         f"{run.get('stream', 'run')}: {summary['frames']} frames, mode {run.get('mode', '?')}, "
-        f"field of view {run.get('fov', '?')}",
+        f"field of view {run.get('fov', '?')}, profile {run.get('profile', '?')}",
         "",
         f"  proposals          {summary['proposals']:>9}   {_number(summary['proposals_per_frame'])} a frame",
         f"  tracks             {tracks['count']:>9}   N_go {_number(tracks['N_go'])} frames",
         f"    of objects       {objects['count']:>9}   N_go {_number(objects['N_go'])} frames",
-        f"  classified         {summary['classifications']:>9}   of "
-        f"{summary['classifications_by_tracking_by_detection']} by tracking-by-detection: "
-        f"beta {_percent(summary['beta'])}",
-        f"  deferred           {summary['deferred']:>9}   by the budget, to a later frame",
+        f"  classifications    {summary['classifications']:>9}   one per proposal and frame would be "
+        f"{summary['classifications_by_tracking_by_detection']} (beta {_percent(summary['beta'])})",
+        f"  deferred           {summary['deferred']:>9}   to a later frame, by the budget of calls a frame",
         "",
         f"  {'stage':<16}{'calls':>8}{'items':>9}{'cpu ms':>9}{'wall ms':>9}{'p95':>8}{'p99':>8}{'max':>8}   a frame",
     ]
@@ -58,9 +57,9 @@ def summary_text(summary: dict[str, Any]) -> str:
 
 def _host_line(host: dict[str, Any]) -> str:
     core = "any core" if host["core"] is None else f"core {host['core']}"
-    verified = "verified" if host["one_core_verified"] else "NOT kept to one core"
-    others = f"{host['threads']} threads, {host['other_threads_cpu_s']:.2f} s of CPU in other threads"
-    return f"  {core} ({verified}; {others}), peak memory {host['peak_rss_mb']:.0f} MB"
+    kept = "verified: one thread did the work" if host["one_core_verified"] else "NOT kept to one core"
+    others = f"{host['threads']} threads exist, all but the main one used {host['other_threads_cpu_s']:.2f} s of CPU"
+    return f"  {core} ({kept}; {others}), peak memory {host['peak_rss_mb']:.0f} MB"
 
 
 def _number(value: float | None) -> str:
