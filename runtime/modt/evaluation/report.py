@@ -38,11 +38,8 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
         yield LEGEND
     yield from _table("segmentation: recall [%] by range [m], and counts", [*e.ranges, "objects", *FAILURES], rows)
     for title, key, count in CLASS_TABLES:
-        rows = []
-        for c, score in whole.classification.items():
-            scores = [(band.classification[c], getattr(band.classification[c], key)) for band in bands]
-            shares = [_percent(share if share or s.objects or s.segmentable else None) for s, share in scores]
-            rows.append([c, *shares, getattr(score, count)])
+        shares = {c: [_percent(getattr(band.classification[c], key)) for band in bands] for c in whole.classification}
+        rows = [[c, *shares[c], getattr(score, count)] for c, score in whole.classification.items()]
         yield from _table(title, [*e.ranges, count], rows)
     errors = {"proposals": e.calibration_error, "objects": e.calibration_error_of_objects}
     errors |= {c: score.calibration_error for c, score in whole.classification.items()}
