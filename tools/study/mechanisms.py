@@ -59,6 +59,7 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
     "Reunion": ("fragments stay with one track", values("tracking.fragments", min_coverage=1.0)),
     "ExpectedSplitting": ("objects split off what they touch", values("tracking.split", min_coverage=1.0)),
     "CarMerging": ("parts of known cars merged", values("tracking.merge", min_coverage=1.0)),
+    "BackgroundMap": ("background is remembered", values("tracking.background_map", capacity=0)),
     "mean k-DOP": ("of the last frames", values("tracking", mean_kdop_decay=0.0)),
     "envelope decay": ("an extent not seen again shrinks", values("tracking", envelope_decay=1.0)),
     "envelope": ("known extent, not the last one", values("tracking", envelope_decay=0.0)),
