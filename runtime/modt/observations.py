@@ -23,7 +23,7 @@ class Observations:
         bottom, top: (P,) heights of the lowest and the highest point [m].
         count: (P,) points.
         range_m: (P,) distance from the sensor.
-        partial: (P,) cut by the field of view, or regrouped.
+        partial: (P,) truncated, merged or split off.
         sensor_xy: (2,) position of the sensor [m].
     """
 

@@ -47,7 +47,7 @@ class KdopAssociationConfig(StageConfig):
     sigma_m: float = number(0.06, 0.001, 5.0, "m", "of a measured position, at range 0 of a thing without extent")
     sigma_per_range: float = number(0.001, 0.0, 1.0, "", "its growth with range")
     sigma_per_extent: float = number(0.03, 0.0, 1.0, "", "its growth with the mean width, up to 3 m of it")
-    partial_factor: float = number(1.5, 1.0, 10.0, "", "its growth where the k-DOP is cut or hidden in part")
+    partial_factor: float = number(1.5, 1.0, 10.0, "", "its growth where truncated, merged or split off")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -55,7 +55,7 @@ class Grouping:
         source: (Q,) proposal whose columns each takes over.
         changed: (C,) those of the Q whose members changed.
         yaw: (C,) heading of their boxes [rad, sensor frame].
-        partial: (n,) those of the Q of which a part is missing or hidden.
+        partial: (n,) those of the Q that are merged or split off.
     """
 
     runs: Sequence[slice | Int]
