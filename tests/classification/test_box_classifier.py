@@ -24,7 +24,7 @@ def test_features_of_crops_and_proposals_agree() -> None:
     frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
     proposals = Segmenter(SegmentationConfig(), sensor, FieldOfView()).segment(frame.points)
     crops = gather(frame.points, proposals, np.arange(len(proposals)), 100_000)
-    beam_sr = beam_solid_angle_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
+    beam_sr = beam_solid_angle_sr(sensor, proposals.box)
     expected = box_features(proposals.count, proposals.box, SENSOR_HEIGHT_M, beam_sr)
     assert len(crops) > 50
     off = np.abs(crop_features(crops) - expected)

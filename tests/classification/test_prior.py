@@ -13,7 +13,6 @@ from modt.classification.box_classifier import (
     N_FEATURES,
     MlpBoxClassifier,
     NoBoxClassifier,
-    beam_solid_angle_sr,
     box_features,
     from_metadata,
     to_metadata,
@@ -60,8 +59,8 @@ def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
 
 def test_features_are_independent_of_the_resolution() -> None:
     near = standing(40, 20.0, 4.0, 1.6, 1.4)
-    fine = box_features(np.array([160]), near.box, 1.73, beam_solid_angle_sr(0.1, 0.2))
-    coarse = box_features(np.array([40]), near.box, 1.73, beam_solid_angle_sr(0.2, 0.4))
+    fine = box_features(np.array([160]), near.box, 1.73, np.deg2rad(0.1) * np.deg2rad(0.2))
+    coarse = box_features(np.array([40]), near.box, 1.73, np.deg2rad(0.2) * np.deg2rad(0.4))
     np.testing.assert_allclose(fine, coarse)
 
 

@@ -19,8 +19,8 @@ def within_distance(plane, radius):
     return connected_components(graph, directed=False)[1]
 
 
-def flood_fill(cells, beam_rad, config):
-    """(C,) component of each cell, filled from seed to seed."""
+def flood_fill(cells, beam_m, config):
+    """(C,) component of each cell, filled from seed to seed; (C,) beam_m is the vertical distance of beams."""
     row, column, low, high = cells.row, cells.column, cells.low, cells.high
     at = {(r, c): i for i, (r, c) in enumerate(zip(row.tolist(), column.tolist(), strict=True))}
     component = np.full(len(row), -1)
@@ -34,7 +34,7 @@ def flood_fill(cells, beam_rad, config):
                 if j is not None and component[j] < 0:
                     first = min(i, j, key=lambda k: (row[k], column[k]))
                     gap = max(low[i], low[j]) - min(high[i], high[j])
-                    if gap < config.max_gap_m + config.max_gap_beams * beam_rad * cells.sqrt_range[first] ** 2:
+                    if gap < config.max_gap_m + config.max_gap_beams * beam_m[first]:
                         todo.append(j)
     return component
 

@@ -134,8 +134,9 @@ def test_two_objects_stay_two(pair):
 def test_near_clusters_are_not_merged():
     stage = merger()
     size, points = np.ones(3, np.float32), np.full(3, 50.0)
-    sqrt_range = np.sqrt(np.array([10.0, 24.0, 27.0], np.float32))
-    sizes = ClusterSizes(points, size, 0 * size, size, sqrt_range, np.zeros(3, np.bool_))
+    range_m = np.array([10.0, 24.0, 27.0], np.float32)
+    beam_m = range_m * np.float32(BEAM)
+    sizes = ClusterSizes(points, size, 0 * size, size, np.sqrt(range_m), beam_m, np.zeros(3, np.bool_))
     assert stage.candidates(sizes).tolist() == [False, False, True]
 
 

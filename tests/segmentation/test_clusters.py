@@ -30,14 +30,13 @@ def clusterer(**config):
 
 
 def cells_of(grid, points, height):
-    cells, _, cell = occupied_cells(grid, *grid.row_column(points), height, height, points.sqrt_range)
-    return cells, cell
+    cells, sample, cell = occupied_cells(grid, *grid.row_column(points), height, height)
+    return cells, cell, np.float32(BEAM_RAD) * np.square(points.sqrt_range[sample])
 
 
-def components(grid, cells):
+def components(grid, cells, beam_m):
     gap = SegmentationConfig().clusters
-    max_gap = np.float32(gap.max_gap_m) + np.float32(gap.max_gap_beams * BEAM_RAD) * np.square(cells.sqrt_range)
-    return connect(grid, cells, max_gap)
+    return connect(grid, cells, np.float32(gap.max_gap_m) + np.float32(gap.max_gap_beams) * beam_m)
 
 
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 250), sigma=st.floats(0.05, 3.0))
@@ -47,9 +46,9 @@ def test_components_equal_those_of_a_flood_fill(seed, n, sigma):
     if not len(points):
         return
     grid = SqrtRangeGrid(STEP, 80.0)
-    cells, _ = cells_of(grid, points, points.z + 1.7)
-    slow = reference.flood_fill(cells, BEAM_RAD, SegmentationConfig().clusters)
-    assert reference.same_partition(components(grid, cells), slow)
+    cells, _, beam_m = cells_of(grid, points, points.z + 1.7)
+    slow = reference.flood_fill(cells, beam_m, SegmentationConfig().clusters)
+    assert reference.same_partition(components(grid, cells, beam_m), slow)
 
 
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 400), sigma=st.floats(0.05, 3.0))
@@ -60,8 +59,8 @@ def test_the_grid_lies_between_two_euclidean_radii(seed, n, sigma):
     if not len(points):
         return
     grid = SqrtRangeGrid(STEP, 80.0)
-    cells, cell = cells_of(grid, points, np.zeros(len(points), np.float32))
-    fast = components(grid, cells)[cell]
+    cells, cell, beam_m = cells_of(grid, points, np.zeros(len(points), np.float32))
+    fast = components(grid, cells, beam_m)[cell]
     plane = np.stack([points.x, points.y], axis=1).astype(np.float64) / points.sqrt_range[:, None]
     assert reference.refines(reference.within_distance(plane, STEP * 0.999), fast)
     assert reference.refines(fast, reference.within_distance(plane, 2 * STEP * 1.001))

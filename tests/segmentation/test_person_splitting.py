@@ -22,7 +22,10 @@ def split(points, group, candidate=None):
     n = int(group.max()) + 1
     clusters = Clusters(cloud, points[:, 2], cell, None, cell, group, n)
     candidate = np.ones(n, np.bool_) if candidate is None else candidate
-    return PersonSplitter(SensorConfig(), SegmentationConfig()).split(clusters, candidate)
+    sensor, count = SensorConfig(), np.bincount(group)
+    middle = (np.bincount(group, points[:, k]) / count for k in (0, 1))
+    beam_m = np.hypot(*middle) * np.deg2rad(sensor.elevation_step_deg)
+    return PersonSplitter(sensor, SegmentationConfig()).split(clusters, candidate, beam_m)
 
 
 def crowd(rng, n):

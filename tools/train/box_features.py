@@ -6,6 +6,7 @@ import numpy as np
 
 from modt.classification.box_classifier import beam_solid_angle_sr, box_features
 from modt.classification.crops import Crops
+from modt.config import SensorConfig
 from modt.config.segmentation import BoxConfig
 from modt.geometry import upright_boxes
 from modt.segmentation.box_fitting import fit_headings
@@ -24,8 +25,8 @@ def crop_features(crops: Crops) -> Float64:
     groups = Groups(np.arange(len(x)), crops.offsets)
     box = upright_boxes(np.stack([x, y, z]), groups.offsets, fit_headings(x, y, groups, BoxConfig().noise_m))
     beams = Beams()
-    beam_sr = beam_solid_angle_sr(beams.azimuth_deg, beams.elevation_deg)
-    return box_features(crops.count, box, SENSOR_HEIGHT_M, beam_sr)
+    sensor = SensorConfig(azimuth_step_deg=beams.azimuth_deg, elevation_step_deg=beams.elevation_deg)
+    return box_features(crops.count, box, SENSOR_HEIGHT_M, beam_solid_angle_sr(sensor, box))
 
 
 def dataset_features(data: Dataset, rows: Int) -> Float64:

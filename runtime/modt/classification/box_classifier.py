@@ -50,12 +50,14 @@ class MlpBoxClassifier:
 BoxClassifier = NoBoxClassifier | MlpBoxClassifier
 
 
-def beam_solid_angle_sr(azimuth_step_deg: float, elevation_step_deg: float) -> float:
-    """Solid angle between neighbouring beams [sr]."""
-    return float(np.deg2rad(azimuth_step_deg) * np.deg2rad(elevation_step_deg))
+def beam_solid_angle_sr(sensor: SensorConfig, box: Float64) -> Float64:
+    """(P,) or () solid angle between neighbouring beams at (P, 7) boxes, sensor frame [sr]."""
+    tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
+    elevation_step_rad = sensor.beams.step_rad(tangent.astype(np.float32))
+    return np.asarray(np.deg2rad(sensor.azimuth_step_deg) * elevation_step_rad, np.float64)
 
 
-def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: float) -> Float64:
+def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: Float64) -> Float64:
     """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
 
     The area in place of the number of points makes the features independent of the sensor's resolution.
@@ -64,7 +66,7 @@ def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: floa
         count: (P,) points.
         box: (P, 7) sensor frame.
         sensor_height_m: of the sensor above the ground.
-        beam_sr: solid angle of one point [sr].
+        beam_sr: (P,) or () solid angle of a point [sr].
     """
     distance = np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
     foot = box[:, 2] - box[:, 5] / 2 + sensor_height_m
@@ -84,9 +86,10 @@ def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: floa
 
 def proposal_features(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
     """(R, 7) box features of the given proposals."""
-    beam_sr = beam_solid_angle_sr(sensor.azimuth_step_deg, sensor.elevation_step_deg)
-    height_m = sensor_height_m(proposals, sensor)
-    return box_features(proposals.count[which], proposals.box[which], height_m, beam_sr)
+    box = proposals.box[which]
+    return box_features(
+        proposals.count[which], box, sensor_height_m(proposals, sensor), beam_solid_angle_sr(sensor, box)
+    )
 
 
 def to_metadata(layers: Layers, pool_weight: float) -> str:

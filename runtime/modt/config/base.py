@@ -22,6 +22,13 @@ def number(default: float | None, low: float, high: float, unit: str, meaning: s
     return field(default=default, metadata={"low": low, "high": high, "unit": unit, "meaning": meaning})
 
 
+def numbers(low: float, high: float, most: int, unit: str, meaning: str) -> Any:
+    """Field of up to `most` numbers within bounds, none by default."""
+    return field(
+        default=None, metadata={"low": low, "high": high, "least": 2, "most": most, "unit": unit, "meaning": meaning}
+    )
+
+
 def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
     """Field of one of some names."""
     return field(default=default, metadata={"options": options, "meaning": meaning})
@@ -68,13 +75,18 @@ def _check(key: str, value: object, kind: str, bounds: dict[str, Any]) -> None:
 
 
 def _check_numbers(key: str, value: object, whole: bool, bounds: dict[str, Any]) -> None:
-    numbers = value if "length" in bounds and isinstance(value, tuple) else (value,)
+    several = "length" in bounds or "most" in bounds
+    numbers = value if several and isinstance(value, tuple) else (value,)
     noun = "a whole number" if whole else "a number"
     span = f"{noun} from {bounds['low']:g} to {bounds['high']:g}"
     if "length" in bounds:
         span = f"{bounds['length']} values, each {span}"
         if len(numbers) != bounds["length"]:
             raise ValueRangeError(key, f"{value!r} does not fit", f"give {span}")
+    if "most" in bounds:
+        span = f"{bounds['least']} to {bounds['most']} values, each {span}"
+        if not bounds["least"] <= len(numbers) <= bounds["most"]:
+            raise ValueRangeError(key, f"{len(numbers)} values", f"give {span}")
     remedy = f"give {span} {bounds.get('unit', '')}".rstrip()
     for number in numbers:
         if isinstance(number, bool) or not isinstance(number, int if whole else (int, float)):

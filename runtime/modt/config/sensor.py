@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.config.base import StageConfig, choice, number
+from modt.config.base import StageConfig, choice, number, numbers
+from modt.geometry.beams import Beams, BeamTable, EvenBeams
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -14,9 +15,19 @@ class SensorConfig(StageConfig):
     height_m: float | None = number(1.73, 0.05, 5.0, "m", "above the ground; null: estimated from the stream")
     min_range_m: float = number(2.0, 0.0, 20.0, "m", "of the points used; nearer ones are on the robot itself")
     max_range_m: float = number(80.0, 1.0, 400.0, "m", "of the points used")
-    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "between neighbouring beams, typical")
+    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "between neighbouring beams that are evenly spaced")
+    elevations_deg: tuple[float, ...] | None = numbers(
+        -90.0, 90.0, 512, "deg", "of all beams, in any order; null: evenly spaced"
+    )
     azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
     period_s: float = number(0.1, 0.001, 10.0, "s", "between the scans of a folder, which has no stamps")
     reflectance: str = choice(
         "none", ("none", "hdl-64e"), "scale; models use only the one they learnt; none: not used"
     )
+
+    @property
+    def beams(self) -> Beams:
+        """Spacing of the beams."""
+        if self.elevations_deg is None:
+            return EvenBeams(self.elevation_step_deg)
+        return BeamTable(self.elevations_deg)

@@ -26,10 +26,8 @@ class StripMerger:
 
     def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
         self.config = c = config.car_merging
-        beam = float(np.tan(np.deg2rad(sensor.elevation_step_deg)))
-        self.gap = c.min_gap_beams * beam, c.max_gap_beams * beam
+        self.beams = sensor.beams
         self.max_diagonal_m = min(c.max_diagonal_m, config.max_extent_m)
-        self.min_sqrt_range = np.float32(np.sqrt(c.visible_m / (c.max_beams * beam)))  # as sizes.sqrt_range
 
     def merge(self, clusters: Clusters, sizes: ClusterSizes, mergeable: Bool) -> Int:
         """(G,) cluster into which each is merged, itself where it is not; only the (G,) mergeable ones are."""
@@ -48,7 +46,7 @@ class StripMerger:
         """(G,) clusters that can be a strip of a car."""
         c = self.config
         candidate: Bool = (sizes.points >= c.min_points) & (sizes.extent_m < c.max_diagonal_m)
-        candidate &= (sizes.top_m < c.max_top_m) & (sizes.sqrt_range > self.min_sqrt_range)
+        candidate &= (sizes.top_m < c.max_top_m) & (c.max_beams * sizes.beam_m > c.visible_m)
         return candidate
 
     def targets(self, bounds: ViewBounds) -> Int:
@@ -70,9 +68,10 @@ class StripMerger:
         near = bounds.min[RANGE]
         swap = near[other] < near[one]
         front, back = np.where(swap, other, one), np.where(swap, one, other)
-        step = bounds.min[ELEVATION][back] - bounds.max[ELEVATION][front]
+        foot = bounds.min[ELEVATION][back]
+        beams = (foot - bounds.max[ELEVATION][front]) / self.beams.step_rad(foot)
         adjacent = near[back] - bounds.max[RANGE][front] < c.max_gap_m
-        adjacent &= (step > self.gap[0]) & (step < self.gap[1])
+        adjacent &= (beams > c.min_gap_beams) & (beams < c.max_gap_beams)
         person = self.person_like(bounds)
         adjacent &= ~(person[front] | person[back])
         front, back = front[adjacent], back[adjacent]

@@ -21,23 +21,22 @@ class Cells:
     column: Int32  # (C,) of the grid
     low: Float32  # (C,) least height of the points above ground [m]
     high: Float32  # (C,) greatest height of the points above ground [m]
-    sqrt_range: Float32  # (C,) square root of the range of the last point [sqrt(m)]
 
     def __len__(self) -> int:
         return len(self.row)
 
     def take(self, rows: Int) -> Cells:
         """Cells by index."""
-        return Cells(self.row[rows], self.column[rows], self.low[rows], self.high[rows], self.sqrt_range[rows])
+        return Cells(self.row[rows], self.column[rows], self.low[rows], self.high[rows])
 
 
 def occupied_cells(
-    grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32, sqrt_range: Float32
+    grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32
 ) -> tuple[Cells, Int, Int]:
     """Cells of (K,) entries (points, or cells of a finer grid), (C,) last entry of each, (K,) cell of each entry."""
     sample, cell = grid.occupied(grid.flat_index(row, column))
     bounds = label_min(low, cell, len(sample)), label_max(high, cell, len(sample))
-    return Cells(row[sample], column[sample], *bounds, sqrt_range[sample]), sample, cell
+    return Cells(row[sample], column[sample], *bounds), sample, cell
 
 
 def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:

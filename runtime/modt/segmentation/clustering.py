@@ -30,10 +30,9 @@ class Clusterer:
 
     def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
         step = config.cell_m / np.sqrt(10.0)
-        beam_rad = float(np.deg2rad(sensor.elevation_step_deg))
-        self.config = config
+        self.config, self.beams = config, sensor.beams
         self.gap_m = np.float32(config.clusters.max_gap_m)
-        self.gap_per_range = np.float32(config.clusters.max_gap_beams * beam_rad)
+        self.gap_beams = np.float32(config.clusters.max_gap_beams)
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
         self.splitter, self.merger = PersonSplitter(sensor, config), StripMerger(sensor, config)
@@ -41,11 +40,11 @@ class Clusterer:
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
         row, column = self.fine.row_column(points)
-        cells, sample, cell = occupied_cells(self.fine, row, column, height, height, points.sqrt_range)
+        cells, sample, cell = occupied_cells(self.fine, row, column, height, height)
         cluster, sizes = self._connect(cells, points.take(sample), np.bincount(cell))
         n, valid = len(sizes), self._valid(sizes)
         clusters = Clusters(points, height, cell, cells, sample, cluster, n)
-        split, total = self.splitter.split(clusters, valid & self.splitter.candidates(sizes))
+        split, total = self.splitter.split(clusters, valid & self.splitter.candidates(sizes), sizes.beam_m)
         mergeable = valid | ~sizes.is_part
         mergeable[cluster[split >= n]] = False
         target = self.merger.merge(clusters, sizes, mergeable)
@@ -55,28 +54,36 @@ class Clusterer:
 
     def _connect(self, cells: Cells, points: PointColumns, count: Int) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and (C,) its number of points; sizes of the clusters."""
-        cluster = self._connect_coarse(cells)
+        beam_m = self._beam_m(points)
+        cluster = self._connect_coarse(cells, beam_m)
         extent = diagonals(points.x, points.y, cluster)
         oversized = np.flatnonzero((extent >= self.config.max_extent_m)[cluster])
-        part = self._components(self.fine, cells.take(oversized))
+        part = self._components(self.fine, cells.take(oversized), beam_m[oversized])
         cluster[oversized] = part + len(extent)
         extents = np.append(extent, diagonals(points.x[oversized], points.y[oversized], part))
         n = len(extents)
         n_points = np.bincount(cluster, count, n).astype(np.int64)
         bottom, top = label_min(cells.low, cluster, n), label_max(cells.high, cluster, n)
-        sqrt_range = np.zeros(n, np.float32)
-        sqrt_range[cluster] = cells.sqrt_range
-        return cluster, ClusterSizes(n_points, extents, bottom, top, sqrt_range, np.arange(n) >= len(extent))
+        one_cell = np.zeros(n, np.int64)
+        one_cell[cluster] = np.arange(len(cells))
+        sqrt_range, is_part = points.sqrt_range[one_cell], np.arange(n) >= len(extent)
+        return cluster, ClusterSizes(n_points, extents, bottom, top, sqrt_range, beam_m[one_cell], is_part)
 
-    def _connect_coarse(self, fine: Cells) -> Int:
+    def _beam_m(self, points: PointColumns) -> Float32:
+        """(C,) vertical distance of neighbouring beams at each point [m]."""
+        range_m = points.sqrt_range * points.sqrt_range
+        beam_m: Float32 = self.beams.step_rad(points.z / range_m) * range_m
+        return beam_m
+
+    def _connect_coarse(self, fine: Cells, beam_m: Float32) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell of which it is a quarter."""
         row, column = fine.row >> 1, fine.column >> 1
-        cells, _, coarse = occupied_cells(self.coarse, row, column, fine.low, fine.high, fine.sqrt_range)
-        return self._components(self.coarse, cells)[coarse]
+        cells, sample, coarse = occupied_cells(self.coarse, row, column, fine.low, fine.high)
+        return self._components(self.coarse, cells, beam_m[sample])[coarse]
 
-    def _components(self, grid: SqrtRangeGrid, cells: Cells) -> Int:
+    def _components(self, grid: SqrtRangeGrid, cells: Cells, beam_m: Float32) -> Int:
         """(C,) connected component of each cell."""
-        return connect(grid, cells, self.gap_m + self.gap_per_range * np.square(cells.sqrt_range))
+        return connect(grid, cells, self.gap_m + self.gap_beams * beam_m)
 
     def _valid(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""

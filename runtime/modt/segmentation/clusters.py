@@ -21,6 +21,7 @@ class ClusterSizes:
     bottom_m: Float32  # (G,) least height above ground [m]
     top_m: Float32  # (G,) greatest height above ground [m]
     sqrt_range: Float32  # (G,) square root of the range of one cell [sqrt(m)]
+    beam_m: Float32  # (G,) vertical distance of neighbouring beams at that cell [m]
     is_part: Bool  # (G,) part of an oversized cluster
 
     def __len__(self) -> int:

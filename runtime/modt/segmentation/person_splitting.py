@@ -42,28 +42,34 @@ class PersonSplitter:
 
     def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
         self.config = c = config.person_splitting
-        self.beam_rad = float(np.deg2rad(sensor.elevation_step_deg))
         self.azimuth_rad = float(np.deg2rad(sensor.azimuth_step_deg))
         self.min_points = max(c.min_points, config.min_points)
-        self.max_sqrt_range = np.float32(np.sqrt(c.visible_m / (c.min_beams * self.beam_rad)))
 
     def candidates(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters that can be a person and something else."""
         c, extent = self.config, sizes.extent_m
         candidate: Bool = (extent > c.min_extent_m) & (extent < c.max_extent_m) & (sizes.top_m > c.min_top_m)
-        candidate &= (sizes.points >= 2 * self.min_points) & (sizes.sqrt_range < self.max_sqrt_range)
+        candidate &= (sizes.points >= 2 * self.min_points) & (c.min_beams * sizes.beam_m < c.visible_m)
         candidate &= np.square(sizes.sqrt_range) > c.min_range_extents * extent
         return candidate
 
-    def split(self, clusters: Clusters, candidate: Bool) -> tuple[Int, int]:
-        """(C,) cluster of each cell after splitting the (n,) candidates; number of clusters, new ones from n."""
+    def split(self, clusters: Clusters, candidate: Bool, beam_m: Float32) -> tuple[Int, int]:
+        """(C,) cluster of each cell after splitting the (n,) candidates; number of clusters, new ones from n.
+
+        Args:
+            clusters: all.
+            candidate: (n,) those to split.
+            beam_m: (n,) vertical distance of neighbouring beams.
+        """
         cluster, n = clusters.of_cell, clusters.n
         rows = np.flatnonzero(candidate[cluster].take(clusters.cell))
         if not len(rows):
             return cluster, n
         cell, points = clusters.cell[rows], clusters.points
         group = consecutive(candidate)[cluster[cell]]
-        column, columns = self.project(points.x[rows], points.y[rows], clusters.height[rows], group)
+        column, columns = self.project(
+            points.x[rows], points.y[rows], clusters.height[rows], group, beam_m[candidate]
+        )
         boundaries = self.boundaries(columns)
         if not len(boundaries):
             return cluster, n
@@ -73,8 +79,13 @@ class PersonSplitter:
         split[cell[left]] = n + side[left]
         return split, n + len(boundaries)
 
-    def project(self, x: Float32, y: Float32, height: Float32, group: Int) -> tuple[Int, AzimuthColumns]:
-        """(K,) azimuth column of each point, and the columns, given the (K,) groups 0 to G - 1 of the points."""
+    def project(
+        self, x: Float32, y: Float32, height: Float32, group: Int, beam_m: Float32
+    ) -> tuple[Int, AzimuthColumns]:
+        """(K,) azimuth column of each point, and the columns, given the (K,) groups 0 to G - 1 of the points.
+
+        beam_m is the (G,) vertical distance of neighbouring beams.
+        """
         c = self.config
         count = np.bincount(group)
         middle = np.bincount(group, x) / count, np.bincount(group, y) / count
@@ -94,7 +105,7 @@ class PersonSplitter:
         np.minimum.at(near, column, depth)
         np.maximum.at(top, column, height)
         mean = np.bincount(column, depth, n) / np.maximum(returns, 1)
-        expected = c.visible_m / (range_m * self.beam_rad) * step / self.azimuth_rad
+        expected = c.visible_m / beam_m.astype(np.float64) * step / self.azimuth_rad
         owner = np.repeat(np.arange(len(count)), 2 * half)
         return column, AzimuthColumns(owner, (step * range_m)[owner], returns, expected[owner], near, mean, top)
 

@@ -27,7 +27,7 @@ class HeightEstimator:
         self.grid = PolarGrid(max_range_m)
         range_m = np.repeat(self.grid.range_m, SECTORS).astype(np.float64)
         self.flat_m = c.flat_m + c.flat_slope * 2 * RING_STEP * np.sqrt(range_m)
-        self.horizon_m = c.horizon_beams * np.deg2rad(sensor.elevation_step_deg) * range_m
+        self.horizon_m = c.horizon_beams * float(sensor.beams.step_rad(np.zeros(1, np.float32)).item()) * range_m
         self.estimates_m: list[float] = []
 
     def height_m(self, points: PointColumns) -> float:

@@ -229,6 +229,8 @@ def others(key: Key) -> Iterator[Any]:
     value, facts = value_of(BASE, key.path), key.facts
     if "options" in facts:
         yield from (option for option in facts["options"] if option != value)
+    elif "most" in facts:
+        yield tuple(np.linspace(-15.0, 15.0, 7).tolist())
     elif key.kind == "str":
         yield "pointnet-synthetic" if key.path == "classification.model" else "another"
     else:
