@@ -1,7 +1,5 @@
 """Reference versions of the vectorised code, in loops."""
 
-from itertools import pairwise
-
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
@@ -9,7 +7,6 @@ from scipy.spatial import cKDTree
 
 from modt.segmentation.box_fitting import HEADINGS
 from modt.segmentation.grids import SECTORS
-from modt.segmentation.person_splitting import MIN_DEPTH_M
 
 
 def within_distance(plane, radius):
@@ -39,22 +36,26 @@ def flood_fill(cells, beam_m, config):
     return component
 
 
-def trace(lowest, range_m, height_m, config):
+def trace(lowest, stands, range_m, height_m, config):
     """(rings, SECTORS) ground cells, ray by ray and ring by ring."""
-    max_slope, max_bend = (np.tan(np.deg2rad(v)) for v in (config.max_slope_deg, config.ground.max_bend_deg))
-    gain = config.ground.slope_gain
+    c = config.ground
+    max_slope, max_bend, start_bend = (
+        np.tan(np.deg2rad(v)) for v in (config.max_slope_deg, c.max_bend_deg, c.start_bend_deg)
+    )
     found = np.zeros(lowest.shape, bool)
     for ray in range(SECTORS):
-        height, at, slope, bend = -height_m, 0.0, 0.0, max_slope
+        height, at, slope, bend = -height_m, 0.0, 0.0, start_bend
         for ring in range(len(range_m)):
             here = lowest[ring, ray]
             if not np.isfinite(here):
                 continue
             gap = range_m[ring] - at
-            reach = min(gap, config.ground.max_gap_m)
-            if abs(here - height - slope * reach) < reach * bend + config.ground.noise_m:
+            reach = min(gap, c.max_gap_m)
+            off = here - height - slope * reach
+            above = c.noise_m if stands[ring, ray] else reach * bend + c.noise_m
+            if -gap * bend - c.noise_m < off < above:
                 found[ring, ray] = True
-                slope = float(np.clip(slope + gain * ((here - height) / gap - slope), -max_slope, max_slope))
+                slope = float(np.clip(slope + c.slope_gain * ((here - height) / gap - slope), -max_slope, max_slope))
                 height, at, bend = here, range_m[ring], max_bend
     return found
 
@@ -78,44 +79,6 @@ def same_partition(one, other):
 def refines(fine, coarse):
     """Whether each group of the first is inside one of the second."""
     return len(np.unique(np.stack([fine, coarse]), axis=1).T) == len(np.unique(fine))
-
-
-def person_boundaries(x, y, height, sensor, config):
-    """(K,) azimuth column of each point of one cluster, and the columns at which it is split, run by run."""
-    step_rad, beam_rad = np.deg2rad(sensor.azimuth_step_deg), np.deg2rad(sensor.elevation_step_deg)
-    mx, my = x.mean(), y.mean()
-    away = np.hypot(mx, my)
-    c, s = np.float32(mx / away), np.float32(my / away)
-    step = max(step_rad, config.column_m / away)
-    depth = x * c + y * s
-    column = np.floor((y * c - x * s) / (np.maximum(depth, MIN_DEPTH_M) * np.float32(step))).astype(int)
-    expected = config.visible_m / (away * beam_rad) * step / step_rad
-    runs = []
-    for here in range(column.min(), column.max() + 1):
-        own = np.flatnonzero(column == here)
-        if len(own) < max(config.min_fill * expected, 1.0):
-            continue
-        beside = runs and runs[-1][-1][0] == here - 1
-        if beside and abs(runs[-1][-1][1] - depth[own].mean(dtype=float)) <= config.depth_step_m:
-            runs[-1].append((here, depth[own].mean(dtype=float), own))
-        else:
-            runs.append([(here, depth[own].mean(dtype=float), own)])
-    parts = []
-    for run in runs:
-        own = np.concatenate([c[2] for c in run])
-        near = np.array([depth[c[2]].min() for c in run])
-        width, top = len(run) * step * away, height[own].max()
-        if width <= config.min_width_m or len(own) < config.min_points:
-            continue
-        person = width < config.max_width_m and config.min_top_m < top < config.max_top_m
-        person = person and depth[own].mean(dtype=float) - near.min() < config.max_mean_depth_m
-        parts.append((run[0][0], run[-1][0], near.mean(dtype=float), person))
-    boundaries = []
-    for right, left in pairwise(parts):
-        apart = left[0] - right[1] > config.min_gap_columns or abs(left[2] - right[2]) > config.depth_step_m
-        if apart and (right[3] or left[3]):
-            boundaries.append((right[1] + left[0] + 1) // 2)
-    return column, boundaries
 
 
 def car_targets(bounds, beam, config):

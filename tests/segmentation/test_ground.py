@@ -69,6 +69,37 @@ def test_the_side_of_a_far_car_is_not_ground(x, y, width):
     assert np.allclose(height[on == 1], points[on == 1, 2] + HEIGHT_M, atol=0.1)
 
 
+@pytest.mark.parametrize("beside_m", [2.0, 3.0, 4.0])
+def test_the_flank_of_a_car_beside_a_sensor_with_few_low_beams_is_not_ground(beside_m):
+    elevation = np.deg2rad([-25.0, -19.0, -14.0, -12.0, -10.0, -8.0, *np.arange(-6.0, 2.0, 0.17)])
+    car = (0.0, beside_m + 0.9, 4.5, 1.8, 0.2, 1.5)
+    points, on = scans.scan([car, (0.0, beside_m + 6.0, 4.5, 1.8, 0.2, 1.5)], 2.13, elevation)
+    height = ground(height_m=2.13).height_above(PointColumns.from_array(points), 2.13)
+    assert np.allclose(height[on > 0], points[on > 0, 2] + 2.13, atol=0.2)
+
+
+def test_the_flank_of_a_car_that_two_beams_meet_is_not_ground():
+    elevation = np.deg2rad(np.arange(-15.0, 16.0, 2.0))
+    points, on = scans.scan([(21.0, 0.0, 1.8, 4.5, 0.2, 1.5)], 0.8, elevation)
+    height = ground(height_m=0.8, min_range_m=0.4).height_above(PointColumns.from_array(points), 0.8)
+    assert np.allclose(height[on > 0], points[on > 0, 2] + 0.8, atol=0.15)
+
+
+def test_ground_that_begins_again_lower_behind_a_crest_is_found():
+    def crest(x, y):
+        return -HEIGHT_M - 0.06 * np.clip(np.hypot(x, y) - 10, 0, None)
+
+    direction = scans.rays(step_deg=1.0)
+    hit = scans.floor_ranges(direction, crest)
+    hidden = (hit * np.hypot(direction[:, 0], direction[:, 1]) > 12.0) & (
+        hit * np.hypot(direction[:, 0], direction[:, 1]) < 25.0
+    )
+    seen = np.isfinite(hit) & ~hidden
+    points = (direction[seen] * hit[seen, None]).astype(np.float32)
+    height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)
+    assert (np.abs(height) < 0.25).mean() > 0.97
+
+
 def test_floor_of_a_small_robot():
     points, on = scans.scan(
         [(3.0, 0.0, 0.4, 0.4, 0.0, 1.7), (0.0, 4.0, 8.0, 0.2, 0.0, 2.5)], 0.3, np.deg2rad(np.linspace(-25, 15, 32))
@@ -93,8 +124,9 @@ def test_tracing_equals_a_loop_over_rays_and_rings(seed):
     fast = ground()
     lowest = rng.normal(-HEIGHT_M, 0.25, (fast.grid.rings, SECTORS)).astype(np.float32)
     lowest[rng.random(lowest.shape) < 0.3] = np.inf
-    expected = reference.trace(lowest, fast.grid.range_m.astype(float), HEIGHT_M, CONFIG)
-    is_ground = fast.trace(lowest, HEIGHT_M)
+    stands = rng.random(lowest.shape) < 0.2
+    expected = reference.trace(lowest, stands, fast.grid.range_m.astype(float), HEIGHT_M, CONFIG)
+    is_ground = fast.trace(lowest, stands, HEIGHT_M)
     assert (is_ground == expected).mean() > 0.999  # float32 against float64 at the bound
 
 

@@ -20,8 +20,6 @@ class SensorHeightConfig(StageConfig):
     max_range_m: float = number(15.0, 1.0, 100.0, "m", "of the ground cells used")
     bin_m: float = number(0.05, 0.005, 0.5, "m", "of the histogram of depths below the sensor")
     min_cells: int = number(12, 1, 1000, "", "in three bins that count as ground")
-    flat_m: float = number(0.1, 0.0, 1.0, "m", "height range of the returns of a flat cell ...")
-    flat_slope: float = number(0.2, 0.0, 2.0, "", "... and what it grows by with the width of the cell")
     horizon_beams: float = number(2.0, 0.0, 20.0, "beams", "below the horizon, whose returns are left out")
 
 
@@ -31,9 +29,14 @@ class GroundConfig(StageConfig):
 
     noise_m: float = number(0.1, 0.0, 1.0, "m", "residual of a lowest return on the plane of its ray")
     max_bend_deg: float = number(4.0, 0.0, 45.0, "deg", "change of slope between two ground cells of a ray")
+    start_bend_deg: float = number(
+        6.0, 0.0, 45.0, "deg", "tilt of the sensor on the ground beneath it, to the first cell"
+    )
     slope_gain: float = number(0.2, 0.01, 1.0, "", "weight of the newest slope in the running slope of a ray")
     start_m: float = number(0.3, 0.0, 2.0, "m", "deviation of the ground below the sensor from the sensor height")
     max_gap_m: float = number(6.0, 0.1, 100.0, "m", "between ground cells, beyond which tolerance stops growing")
+    flat_m: float = number(0.1, 0.0, 1.0, "m", "height range of the returns of a flat cell ...")
+    flat_slope: float = number(0.2, 0.0, 2.0, "", "... and what it grows by with the width of the cell")
     flank_sectors: int = number(3, 1, 60, "", "to the left and right of a ray, whose median bounds its surface")
     flank_m: float = number(0.25, 0.0, 100.0, "m", "above that median, from where on a surface is a vehicle's side")
 
@@ -44,29 +47,28 @@ class ClusterConfig(StageConfig):
 
     max_gap_m: float = number(0.3, 0.0, 5.0, "m", "vertical gap between neighbouring cells of one cluster ...")
     max_gap_beams: float = number(2.0, 0.0, 20.0, "beams", "... and what it grows by, at the range of the cell")
+    min_line_points: int = number(
+        15, 1, 1000, "", "of a cluster lower than min_height_m: an object that one beam meets"
+    )
+    min_line_top_m: float = number(0.5, 0.0, 5.0, "m", "top above ground of such a cluster")
     min_part_top_m: float = number(0.9, 0.0, 5.0, "m", "top above ground of a part of an oversized cluster")
     min_part_points: int = number(15, 1, 1000, "", "of a part of an oversized cluster")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PersonSplitConfig(StageConfig):
-    """Splitting of a person from neighbouring people and objects at gaps in azimuth or depth."""
+    """A person split off the cluster of what is near, on the fine grid."""
 
-    min_extent_m: float = number(0.8, 0.0, 10.0, "m", "of a cluster that is split")
-    max_extent_m: float = number(3.0, 0.1, 20.0, "m", "of a cluster that is split")
-    min_range_extents: float = number(1.5, 0.0, 10.0, "", "range over extent: nearer clusters surround the sensor")
+    min_cluster_m: float = number(0.8, 0.0, 10.0, "m", "extent of a cluster that may hold a person and more")
+    min_cell_returns: float = number(
+        0.9, 0.0, 10.0, "", "width of a fine cell over the spacing of returns; else one object is split"
+    )
+    min_extent_m: float = number(0.2, 0.0, 2.0, "m", "of a person from above")
+    max_extent_m: float = number(1.3, 0.1, 3.0, "m", "of a person from above, in stride")
     min_top_m: float = number(1.1, 0.0, 3.0, "m", "head of a person above ground: a child of five")
     max_top_m: float = number(2.2, 0.5, 5.0, "m", "head of a person above ground: a tall person on a kerb")
-    min_width_m: float = number(0.2, 0.0, 2.0, "m", "of a person from the side")
-    max_width_m: float = number(0.85, 0.1, 3.0, "m", "of a person from the front")
-    max_mean_depth_m: float = number(0.35, 0.0, 5.0, "m", "mean return behind the nearest; a car's roof exceeds it")
-    min_points: int = number(8, 1, 1000, "", "of each side of a split; at least segmentation.min_points")
-    visible_m: float = number(1.5, 0.1, 3.0, "m", "height of a person clear of the ground")
-    min_beams: float = number(4.0, 1.0, 100.0, "beams", "on that height; fewer look like half a car")
-    min_fill: float = number(0.3, 0.0, 1.0, "", "returns of a filled column over those expected of a person")
-    column_m: float = number(0.06, 0.005, 1.0, "m", "least width of an azimuth column")
-    min_gap_columns: int = number(2, 1, 100, "", "empty columns of a gap; a single one may be a lost return")
-    depth_step_m: float = number(0.4, 0.0, 5.0, "m", "between neighbouring columns on two objects")
+    min_height_m: float = number(0.5, 0.0, 3.0, "m", "top less bottom of what is seen of a person")
+    min_points: int = number(8, 1, 1000, "", "of a person")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +118,7 @@ class SegmentationConfig(StageConfig):
     max_height_m: float = number(2.6, 0.3, 20.0, "m", "highest point of an object above ground")
     cell_m: float = number(0.105, 0.01, 2.0, "m", "side of a cell at 10 m; grows as the square root of range")
     min_points: int = number(5, 1, 1000, "", "of a proposal")
-    max_extent_m: float = number(13.0, 0.5, 50.0, "m", "longest side of a proposal")
+    max_extent_m: float = number(9.0, 0.5, 50.0, "m", "longest side of a proposal")
     min_height_m: float = number(0.2, 0.0, 3.0, "m", "lowest proposal")
     sensor_height: SensorHeightConfig = mechanism(SensorHeightConfig)
     ground: GroundConfig = mechanism(GroundConfig)

@@ -9,10 +9,9 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.car_merging import StripMerger
 from modt.segmentation.cells import Cells, connect, occupied_cells
-from modt.segmentation.clusters import Clusters, ClusterSizes, diagonals
+from modt.segmentation.clusters import Clusters, ClusterSizes
 from modt.segmentation.grids import SqrtRangeGrid
-from modt.segmentation.groups import consecutive, label_max, label_min
-from modt.segmentation.person_splitting import PersonSplitter
+from modt.segmentation.groups import consecutive
 from modt.segmentation.point_columns import PointColumns
 from modt.types import Bool, Float32, Int
 
@@ -20,8 +19,9 @@ from modt.types import Bool, Float32, Int
 class Clusterer:
     """Clusters of points that can be objects.
 
-    A coarse grid connects objects with sparse returns. An oversized cluster (a wall, a hedge and who stands in front
-    of it) is clustered again on a grid of half the spacing; parts that stand out from it are kept.
+    A coarse grid connects objects with sparse returns. What it may connect too much is clustered again on a grid of
+    half the spacing: of an oversized cluster (a wall, a hedge) the parts that stand out are kept; off a cluster that
+    may hold a person and more the parts that may be a person are split.
 
     Args:
         sensor: range and beam spacing.
@@ -35,39 +35,54 @@ class Clusterer:
         self.gap_beams = np.float32(config.clusters.max_gap_beams)
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
-        self.splitter, self.merger = PersonSplitter(sensor, config), StripMerger(sensor, config)
+        self.merger = StripMerger(sensor, config)
+        spacing = config.person_splitting.min_cell_returns * np.deg2rad(sensor.azimuth_step_deg)
+        self.max_split_sqrt_range = np.float32(self.fine.step / spacing)  # a cell is as wide as step * sqrt(range)
 
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
         row, column = self.fine.row_column(points)
         cells, sample, cell = occupied_cells(self.fine, row, column, height, height)
         cluster, sizes = self._connect(cells, points.take(sample), np.bincount(cell))
-        n, valid = len(sizes), self._valid(sizes)
-        clusters = Clusters(points, height, cell, cells, sample, cluster, n)
-        split, total = self.splitter.split(clusters, valid & self.splitter.candidates(sizes), sizes.beam_m)
-        mergeable = valid | ~sizes.is_part
-        mergeable[cluster[split >= n]] = False
-        target = self.merger.merge(clusters, sizes, mergeable)
-        valid = np.append(self._valid(sizes.merged(target)), np.ones(total - n, np.bool_))
-        of_cell = consecutive(valid)[np.append(target, np.arange(n, total))[split]]
-        return replace(clusters, of_cell=of_cell, n=int(valid.sum()))
+        clusters = Clusters(points, height, cell, cells, sample, cluster, len(sizes))
+        target = self.merger.merge(clusters, sizes, self._valid(sizes) | ~sizes.is_part)
+        valid = self._valid(sizes.merged(target))
+        return replace(clusters, of_cell=consecutive(valid)[target][cluster], n=int(valid.sum()))
 
     def _connect(self, cells: Cells, points: PointColumns, count: Int) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each and (C,) its number of points; sizes of the clusters."""
         beam_m = self._beam_m(points)
         cluster = self._connect_coarse(cells, beam_m)
-        extent = diagonals(points.x, points.y, cluster)
-        oversized = np.flatnonzero((extent >= self.config.max_extent_m)[cluster])
-        part = self._components(self.fine, cells.take(oversized), beam_m[oversized])
-        cluster[oversized] = part + len(extent)
-        extents = np.append(extent, diagonals(points.x[oversized], points.y[oversized], part))
-        n = len(extents)
-        n_points = np.bincount(cluster, count, n).astype(np.int64)
-        bottom, top = label_min(cells.low, cluster, n), label_max(cells.high, cluster, n)
-        one_cell = np.zeros(n, np.int64)
-        one_cell[cluster] = np.arange(len(cells))
-        sqrt_range, is_part = points.sqrt_range[one_cell], np.arange(n) >= len(extent)
-        return cluster, ClusterSizes(n_points, extents, bottom, top, sqrt_range, beam_m[one_cell], is_part)
+        coarse = ClusterSizes.of_cells(cells, points, count, beam_m, cluster)
+        oversized = coarse.extent_m >= self.config.max_extent_m
+        rows = np.flatnonzero((oversized | self._may_hold_person(coarse))[cluster])
+        part = self._components(self.fine, cells.take(rows), beam_m[rows])
+        parts = ClusterSizes.of_cells(cells.take(rows), points.take(rows), count[rows], beam_m[rows], part)
+        owner = np.zeros(len(parts), np.int64)
+        owner[part] = cluster[rows]
+        of_oversized = oversized[owner]
+        split = of_oversized | self._may_be_person(parts)
+        cluster[rows] = np.where(split[part], part + len(coarse), cluster[rows])
+        whole = np.bincount(owner, parts.points * split, len(coarse))
+        coarse, parts = (
+            replace(coarse, points=coarse.points - whole.astype(np.int64)),
+            replace(parts, points=parts.points * split, is_part=of_oversized),
+        )
+        return cluster, coarse.followed_by(parts)
+
+    def _may_hold_person(self, sizes: ClusterSizes) -> Bool:
+        """(G,) clusters that may hold a person and more, near enough for the fine grid to hold an object together."""
+        c = self.config.person_splitting
+        may: Bool = (sizes.extent_m > c.min_cluster_m) & (sizes.top_m > c.min_top_m)
+        may &= (sizes.points >= 2 * c.min_points) & (sizes.sqrt_range < self.max_split_sqrt_range)
+        return may
+
+    def _may_be_person(self, sizes: ClusterSizes) -> Bool:
+        """(G,) parts of a person's size."""
+        c, extent, top = self.config.person_splitting, sizes.extent_m, sizes.top_m
+        may: Bool = (extent > c.min_extent_m) & (extent < c.max_extent_m) & (sizes.points >= c.min_points)
+        may &= (top > c.min_top_m) & (top < c.max_top_m) & (top - sizes.bottom_m > c.min_height_m)
+        return may
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""
@@ -89,6 +104,7 @@ class Clusterer:
         """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""
         config, c = self.config, self.config.clusters
         valid: Bool = (sizes.points >= config.min_points) & (sizes.extent_m < config.max_extent_m)
-        valid &= sizes.top_m - sizes.bottom_m >= config.min_height_m
+        line = (sizes.points >= c.min_line_points) & (sizes.top_m > c.min_line_top_m)
+        valid &= line | (sizes.top_m - sizes.bottom_m >= config.min_height_m)
         valid &= ~sizes.is_part | ((sizes.top_m >= c.min_part_top_m) & (sizes.points >= c.min_part_points))
         return valid

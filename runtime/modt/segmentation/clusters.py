@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 
@@ -26,6 +27,36 @@ class ClusterSizes:
 
     def __len__(self) -> int:
         return len(self.points)
+
+    @classmethod
+    def of_cells(cls, cells: Cells, points: PointColumns, count: Int, beam_m: Float32, cluster: Int) -> Self:
+        """Sizes of the clusters of (C,) cells.
+
+        Args:
+            cells: of all clusters.
+            points: (C,) one of each cell.
+            count: (C,) points of each cell.
+            beam_m: (C,) vertical distance of neighbouring beams there [m].
+            cluster: (C,) cluster of each cell.
+        """
+        extent_m = diagonals(points.x, points.y, cluster)
+        n = len(extent_m)
+        one_cell = np.zeros(n, np.int64)
+        one_cell[cluster] = np.arange(len(cluster))
+        return cls(
+            points=np.bincount(cluster, count, n).astype(np.int64),
+            extent_m=extent_m,
+            bottom_m=label_min(cells.low, cluster, n),
+            top_m=label_max(cells.high, cluster, n),
+            sqrt_range=points.sqrt_range.take(one_cell),
+            beam_m=beam_m.take(one_cell),
+            is_part=np.zeros(n, np.bool_),
+        )
+
+    def followed_by(self, other: Self) -> Self:
+        """These clusters, then the others."""
+        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+        return type(self)(*(np.concatenate(pair) for pair in pairs))
 
     def merged(self, target: Int) -> ClusterSizes:
         """Sizes after merging each cluster into its (G,) target; those merged into another are empty.

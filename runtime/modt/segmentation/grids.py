@@ -39,6 +39,7 @@ class PolarGrid:
         self.size = self.rings * SECTORS
         edge = (np.arange(self.rings + 1) * RING_STEP) ** 2
         self.range_m: Float32 = ((edge[1:] + edge[:-1]) / 2).astype(np.float32)
+        self.ring_width_m = np.diff(edge)
 
     def cell(self, points: PointColumns) -> Int:
         """(N,) index of each point's cell: ring * SECTORS + sector."""

@@ -14,8 +14,10 @@ from modt.types import Bool, Float32, Int
 class GroundEstimator:
     """Height of each point above the ground below it.
 
-    The lowest return of a cell is ground if it continues the ground of its ray within a bounded change of slope. This
-    rejects objects, and reflections from below the ground. Cells without ground are interpolated along the ray.
+    The lowest return of a cell is ground if it continues the ground of its ray within a bounded change of slope, and
+    where something stands in the cell without any: the lowest return may then be a flank. Ground that begins again
+    farther away may lie lower by that slope all the way, since nothing else does. Cells without ground are
+    interpolated along the ray.
 
     Args:
         sensor: range.
@@ -25,6 +27,8 @@ class GroundEstimator:
     def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
         self.config = config.ground
         self.grid = PolarGrid(sensor.max_range_m)
+        flat_m = self.config.flat_m + self.config.flat_slope * self.grid.ring_width_m
+        self.flat_m: Float32 = flat_m[:, None].astype(np.float32)
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
         self.max_slope = float(np.tan(np.deg2rad(config.max_slope_deg)))
         self.max_bend = float(np.tan(np.deg2rad(self.config.max_bend_deg)))
@@ -33,7 +37,7 @@ class GroundEstimator:
         """(N,) height of each point above the ground [m]."""
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
-        is_ground = self.trace(lowest, sensor_height_m)
+        is_ground = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
         known = np.where(is_ground, lowest, np.float32(-sensor_height_m))
         surface = _median_across(self._interpolate(known, is_ground))
         beside = _median_across(surface, self.config.flank_sectors)
@@ -51,27 +55,37 @@ class GroundEstimator:
         z = np.where(plausible, points.z, np.float32(np.inf))
         return label_min(z, cell, self.grid.size).reshape(-1, SECTORS)
 
-    def trace(self, lowest: Float32, sensor_height_m: float) -> Bool:
+    def _stands(self, points: PointColumns, cell: Int, lowest: Float32) -> Bool:
+        """(rings, SECTORS) cells in which something stands: returns far above the lowest."""
+        flat = lowest + self.flat_m
+        stands = np.zeros(flat.shape, np.bool_)
+        stands.ravel()[cell[points.z > flat.ravel().take(cell)]] = True
+        return stands
+
+    def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> Bool:
         """(rings, SECTORS) ground cells.
 
         All rays advance together, ring by ring, from the foot of the sensor.
         """
         c = self.config
-        max_slope, gain, noise, max_gap = (
-            np.float32(v) for v in (self.max_slope, c.slope_gain, c.noise_m, c.max_gap_m)
+        max_slope, max_bend, gain, noise, max_gap = (
+            np.float32(v) for v in (self.max_slope, self.max_bend, c.slope_gain, c.noise_m, c.max_gap_m)
         )
+        start_bend = np.float32(np.tan(np.deg2rad(c.start_bend_deg)))
         last = np.zeros((4, SECTORS), np.float32)  # ground cell of each ray
         height, at, slope, bend = last
-        height[:], bend[:] = -sensor_height_m, max_slope
+        height[:], bend[:] = -sensor_height_m, start_bend
         step = np.zeros_like(last)
-        step[3] = self.max_bend
-        is_ground = np.zeros(lowest.shape, np.bool_)
+        step[3] = max_bend
+        flat, is_ground = ~stands, np.zeros(lowest.shape, np.bool_)
         for ring in np.flatnonzero(np.isfinite(lowest).any(axis=1)).tolist():
             here, range_m = lowest[ring], self.grid.range_m[ring]
             gap = range_m - at
             reach = np.minimum(gap, max_gap)
             rise = here - height
-            found = np.less(np.abs(rise - slope * reach), reach * bend + noise, out=is_ground[ring])
+            off = rise - slope * reach
+            found = np.less(off, reach * bend * flat[ring] + noise, out=is_ground[ring])
+            found &= off > -(gap * bend + noise)
             step[0], step[1] = here, range_m
             step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -max_slope), max_slope)
             np.copyto(last, step, where=found)

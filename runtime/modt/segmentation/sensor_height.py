@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.grids import RING_STEP, SECTORS, PolarGrid
+from modt.segmentation.grids import SECTORS, PolarGrid
 from modt.segmentation.groups import label_max, label_min
 from modt.segmentation.point_columns import PointColumns
 
@@ -17,7 +17,7 @@ class HeightEstimator:
 
     Args:
         sensor: range and beam spacing.
-        config: the keys of `sensor_height`.
+        config: the keys of `sensor_height`, and of `ground` those of a flat cell.
     """
 
     def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
@@ -26,7 +26,7 @@ class HeightEstimator:
         self.near, self.far = np.sqrt(sensor.min_range_m), np.sqrt(max_range_m)
         self.grid = PolarGrid(max_range_m)
         range_m = np.repeat(self.grid.range_m, SECTORS).astype(np.float64)
-        self.flat_m = c.flat_m + c.flat_slope * 2 * RING_STEP * np.sqrt(range_m)
+        self.flat_m = config.ground.flat_m + config.ground.flat_slope * np.repeat(self.grid.ring_width_m, SECTORS)
         self.horizon_m = c.horizon_beams * float(sensor.beams.step_rad(np.zeros(1, np.float32)).item()) * range_m
         self.estimates_m: list[float] = []
 
