@@ -2,9 +2,10 @@
 
     python -m tools.study.box_tracking --detections FOLDER... --labels label_02 [--online] [--cut MIN:MAX:STEP]
 
-Matches are by 3D IoU; as in KITTI, boxes on neighbouring classes, on objects that do not count, in DontCare areas and of
-less than 25 pixels are left out. `as written` is by the default cut, `best cut` by the one of highest HOTA, and `left
-out` judges each sequence by the cut that is best on all others. The sequence of drive 0005 takes no part.
+Matches are by 3D IoU; as in KITTI, boxes on neighbouring classes, on objects that do not count, in DontCare areas and
+of less than 25 pixels are left out, and sequences without objects of the class. `as written` is by the default cut,
+`best cut` by the one of highest HOTA, `left out` judges each sequence by the cut that is best on all others. The
+sequence of drive 0005 takes no part.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from modt.types import Bool, Float64, Int
 from tools.options import parser
 
 NEIGHBOURS = {"Pedestrian": ("Person_sitting", "Person"), "Car": ("Van",), "Cyclist": ()}
+FIGURES = ("HOTA", "AssA", "DetA", "MOTA", "IDF1")
 MIN_HEIGHT_PX, MIN_IOU, TEST = 25, 0.25, "0000"
 
 Objects = dict[int, list[list[str]]]
@@ -85,14 +87,9 @@ def judge(sequences: Sequence[Detections], labels: Path, sure: float | None, *, 
 
 def show(kind: str, what: str, judged: Judged) -> None:
     """Print a line for all, odd and even sequences."""
-    for half, part in (
-        ("all", judged),
-        *((h, [n for n in judged if int(n) % 2 == k]) for k, h in enumerate(("even", "odd"))),
-    ):
-        scores = track_metrics([judged[name] for name in part])
-        figures = "  ".join(
-            f"{name} {100 * scores.get(name, np.nan):5.1f}" for name in ("HOTA", "AssA", "DetA", "MOTA", "IDF1")
-        )
+    for half, rest in (("all", (0, 1)), ("odd", (1,)), ("even", (0,))):
+        scores = track_metrics([judged[name] for name in judged if int(name) % 2 in rest])
+        figures = "  ".join(f"{name} {100 * scores.get(name, np.nan):5.1f}" for name in FIGURES)
         print(f"{kind:<11}{what:<14}{half:<5}{figures}  switches {scores.get('id_switches', 0):.0f}", flush=True)
 
 

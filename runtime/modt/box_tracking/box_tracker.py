@@ -78,7 +78,7 @@ class BoxTracker:
         sigma = self.config.filter.acceleration_sigma_mps2
         self._x, self._P = constant_velocity.predict(self._x, self._P, sigma, dt_s)
         # A gate that widened while a track is missed would end by taking the detection of something else.
-        self._reach = np.where(self._missed == 0, self._P[:, 0], self._reach)
+        np.copyto(self._reach, self._P[:, 0], where=self._missed == 0)
 
     def _match(self, boxes: Float64, variance: Float64, strong: Bool) -> tuple[Int, Int]:
         """Rows and detections of the pairs: strong detections first, the others with the remaining tracks."""
@@ -138,8 +138,10 @@ class BoxTracker:
 
     def _report(self) -> BoxTracks:
         config = self.config.confidence
-        confidence = self._score + config.age_bonus * np.log(self._hits)
-        rows = np.flatnonzero((self._source != NONE) & (confidence >= config.report_above))
+        rows = np.flatnonzero(self._source != NONE)
+        confidence = self._score[rows] + config.age_bonus * np.log(self._hits[rows])
+        sure = confidence >= config.report_above
+        rows = rows[sure]
         box = self._box[rows]
         box[:, :2] = self._x[rows, :2]
-        return BoxTracks(self._id[rows], box, confidence[rows], self._source[rows])
+        return BoxTracks(self._id[rows], box, confidence[sure], self._source[rows])

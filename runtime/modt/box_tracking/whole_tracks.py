@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -42,7 +42,8 @@ class TrackedBoxes:
     @classmethod
     def join(cls, parts: Iterable[TrackedBoxes]) -> TrackedBoxes:
         """The boxes of all parts."""
-        return cls(*(np.concatenate(columns) for columns in zip(*map(astuple, parts), strict=True)))
+        whole = list(parts)
+        return cls(*(np.concatenate([getattr(part, f.name) for part in whole]) for f in fields(cls)))
 
 
 def confident(found: TrackedBoxes, least: float) -> TrackedBoxes:
@@ -51,7 +52,7 @@ def confident(found: TrackedBoxes, least: float) -> TrackedBoxes:
 
 
 def of_one_class(found: TrackedBoxes, object_class: Int) -> TrackedBoxes:
-    """The tracks without those of which most boxes, of the given classes (n,), lie on a surer track of another class."""
+    """The tracks, of classes (n,), without those of which most boxes lie on a surer track of another class."""
     mean = _mean(found.id, found.confidence)
     place = np.column_stack([found.box[:, :2], 2 * REACH_M * found.frame])
     a, b = cKDTree(place).query_pairs(REACH_M, output_type="ndarray").T
@@ -70,7 +71,7 @@ def _mean(ids: Int, values: Float64) -> Float64:
 
 
 def bridged(found: TrackedBoxes, max_gap: int) -> TrackedBoxes:
-    """The boxes, ordered by frame, and those interpolated linearly where a track is missing for max_gap frames at most."""
+    """The boxes, ordered by frame, with those interpolated where a track is missing for max_gap frames at most."""
     found = found.take(np.lexsort((found.frame, found.id)))
     gap = np.diff(found.frame) - 1
     before = np.flatnonzero((np.diff(found.id) == 0) & (gap > 0) & (gap <= max_gap))

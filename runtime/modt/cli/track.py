@@ -74,8 +74,8 @@ def follow(
     """KITTI tracking results of a sequence, and the number of its tracks.
 
     Tracks are judged whole: by their mean confidence, and by whether a surer one of another class follows the same
-    object; their short gaps are filled. Online, each frame is written as the tracker reports it. The (n, 4, 4) poses are T_world_camera, None without ego-motion; the minimum confidence is that
-    of the type where none is given.
+    object; their short gaps are filled. Online, each frame is written as the tracker reports it. The (n, 4, 4) poses
+    are T_world_camera, None without ego-motion; the minimum confidence is that of the type where none is given.
     """
     from dataclasses import replace
 
@@ -126,9 +126,10 @@ def _reports(
         seen = detections.box[rows]
         boxes = seen if T_world_level is None else transform_boxes(T_world_level[frame], seen)
         found = tracker.step(frame * period_s, boxes, detections.score[rows], np.hypot(seen[:, 0], seen[:, 1]))
-        image_box = detections.image_box[rows][found.source]
-        frames = np.full(len(found.id), frame)
-        reports.append(TrackedBoxes(frames, found.id, image_box, found.box, found.confidence))
+        if len(found.id):
+            image_box = detections.image_box[rows][found.source]
+            frames = np.full(len(found.id), frame)
+            reports.append(TrackedBoxes(frames, found.id, image_box, found.box, found.confidence))
     return TrackedBoxes.join(reports)
 
 
