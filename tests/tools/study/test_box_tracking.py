@@ -13,7 +13,7 @@ def line(id_, kind, x, occluded=0, top=100):
 
 def test_boxes_on_what_does_not_count_are_left_out():
     truth = [line(1, "Pedestrian", 0), line(2, "Person", 5), line(3, "Pedestrian", 10, occluded=3)]
-    truth.append("0 -1 DontCare -1 -1 -10 195 90 225 170 -1 -1 -1 -1000 -1000 -1000 -10".split())
+    truth.append(["0", "-1", "DontCare", *["-1"] * 3, "195", "90", "225", "170", *["-1"] * 7])
     tracked = [
         line(7, "Pedestrian", x, top=top)
         for x, top in ((0.1, 100), (5, 100), (10, 100), (20, 100), (30, 100), (40, 140))
