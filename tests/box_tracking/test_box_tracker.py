@@ -12,10 +12,9 @@ from modt.config.box_tracking import (
     BoxTrackingConfig,
     box_tracking_config,
 )
-from modt.types import NONE
 
 REPORT_ALL = BoxConfidenceConfig(report_above=-100.0)
-CONFIG = BoxTrackingConfig(report_missed=2, confidence=REPORT_ALL)
+CONFIG = BoxTrackingConfig(confidence=REPORT_ALL)
 
 
 def confident(**values):
@@ -46,12 +45,22 @@ def test_two_cars_passing_each_other_keep_their_ids():
     np.testing.assert_allclose(r.box[order, 0], [34, 16], atol=0.3)
 
 
-def test_missed_detections_are_bridged_by_the_prediction():
+def test_a_track_outlives_missed_detections_unreported():
     frames = [[car(10 + 1.5 * i, 0)] if i not in (8, 9) else [] for i in range(12)]
-    during, after = follow(frames[:10]), follow(frames)
-    assert list(during.source) == [NONE]
-    np.testing.assert_allclose(during.box[0, 0], 10 + 1.5 * 9, atol=0.6)
-    assert list(after.id) == [0]
+    assert list(follow(frames[:10]).id) == []
+    assert list(follow(frames).id) == [0]
+
+
+@pytest.mark.parametrize(("missed", "ids"), [(5, [0]), (30, [0]), (31, [1])])
+def test_a_track_is_deleted_after_max_missed_frames(missed, ids):
+    assert list(follow([[car(10, 0)]] * 9 + [[]] * missed + [[car(10, 0)]]).id) == ids
+
+
+@pytest.mark.parametrize("missed", [0, 9, 29])
+def test_the_gate_does_not_widen_while_a_track_is_missed(missed):
+    seen = [[car(10, 0)]] * 9 + [[]] * missed
+    assert list(follow([*seen, [car(10, 2.5)]]).id) == [0]
+    assert list(follow([*seen, [car(10, 5.5)]]).id) == [1]
 
 
 def test_a_rotating_sensor_keeps_its_tracks():
@@ -116,8 +125,7 @@ def test_each_detection_has_exactly_one_track(scene):
     tracker = BoxTracker(CONFIG)
     for i, places in enumerate(scene):
         r = step(tracker, i, [car(x, y) for x, y in places])
-        seen = r.source[r.source != NONE]
-        assert sorted(seen) == list(range(len(places)))
+        assert sorted(r.source) == list(range(len(places)))
         assert len(set(r.id)) == len(r.id)
         assert np.isfinite(r.box).all()
 

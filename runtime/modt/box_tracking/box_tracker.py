@@ -28,7 +28,7 @@ class BoxTracks:
     id: Int  # (K,) of the tracks
     box: Float64  # (K, 7) smoothed, world frame
     confidence: Float64  # (K,) in the track
-    source: Int  # (K,) index of the associated detection, NONE where the box is a prediction
+    source: Int  # (K,) index of the associated detection
 
 
 def assign(cost: Float64) -> tuple[Int, Int]:
@@ -47,7 +47,7 @@ class BoxTracker:
         self._stamp_s: float | None = None
         self._id, self._hits, self._missed, self._source = (np.zeros(0, np.int64) for _ in range(4))
         self._x, self._P = np.zeros((0, 4)), np.zeros((0, 3))
-        self._box, self._score = np.zeros((0, 7)), np.zeros(0)
+        self._box, self._score, self._reach = np.zeros((0, 7)), np.zeros(0), np.zeros(0)
 
     def step(self, stamp_s: float, boxes: Float64, score: Float64, range_m: Float64) -> BoxTracks:
         """Update the tracks with the detections of a frame: boxes (D, 7) in the world frame.
@@ -77,6 +77,8 @@ class BoxTracker:
         self._stamp_s = stamp_s
         sigma = self.config.filter.acceleration_sigma_mps2
         self._x, self._P = constant_velocity.predict(self._x, self._P, sigma, dt_s)
+        # A gate that widened while a track is missed would end by taking the detection of something else.
+        np.copyto(self._reach, self._P[:, 0], where=self._missed == 0)
 
     def _match(self, boxes: Float64, variance: Float64, strong: Bool) -> tuple[Int, Int]:
         """Rows and detections of the pairs: strong detections first, the others with the remaining tracks."""
@@ -94,7 +96,7 @@ class BoxTracker:
         """(T, D) cost of each pair."""
         config = self.config.association
         dx, dy = boxes[:, 0] - self._x[:, 0, None], boxes[:, 1] - self._x[:, 1, None]
-        gate_m2 = config.gate * (self._P[:, :1] + variance) + np.square(config.length_share * self._box[:, 3:4])
+        gate_m2 = config.gate * (self._reach[:, None] + variance) + np.square(config.length_share * self._box[:, 3:4])
         dz = np.abs(boxes[:, 2] - self._box[:, 2, None])
         turn = np.abs(np.sin(boxes[:, 6] - self._box[:, 6, None]))
         return np.asarray((dx * dx + dy * dy) / gate_m2 + config.height_weight_per_m * dz + config.yaw_weight * turn)
@@ -132,11 +134,14 @@ class BoxTracker:
         self._P = join([self._P[keep], P])
         self._box = join([self._box[keep], boxes[new]])
         self._score = join([self._score[keep], score[new]])
+        self._reach = join([self._reach[keep], np.zeros(n)])
 
     def _report(self) -> BoxTracks:
         config = self.config.confidence
-        confidence = self._score + config.age_bonus * np.log(self._hits)
-        rows = np.flatnonzero((confidence >= config.report_above) & (self._missed <= self.config.report_missed))
+        rows = np.flatnonzero(self._source != NONE)
+        confidence = self._score[rows] + config.age_bonus * np.log(self._hits[rows])
+        sure = confidence >= config.report_above
+        rows = rows[sure]
         box = self._box[rows]
         box[:, :2] = self._x[rows, :2]
-        return BoxTracks(self._id[rows], box, confidence[rows], self._source[rows])
+        return BoxTracks(self._id[rows], box, confidence[sure], self._source[rows])

@@ -15,7 +15,7 @@ class BoxFilterConfig(StageConfig):
     position_sigma_m: float = number(0.2, 0.01, 5.0, "m", "of a detected centre of score zero")
     score_scale: float = number(10.0, 0.1, 1e6, "", "increase of the score that divides that sigma by e")
     acceleration_sigma_mps2: float = number(10.0, 0.01, 50.0, "m/s2", "process noise, with the sensor's own motion")
-    initial_speed_sigma_mps: float = number(20.0, 0.1, 50.0, "m/s", "of a new track, along each axis")
+    initial_speed_sigma_mps: float = number(10.0, 0.1, 50.0, "m/s", "of a new track, along each axis")
     size_gain: float = number(0.3, 0.0, 1.0, "", "least weight of a new measurement of the size")
     height_gain: float = number(0.7, 0.0, 1.0, "", "weight of a new measurement of the height of the centre")
     yaw_gain: float = number(0.7, 0.0, 1.0, "", "weight of a new measurement of the yaw")
@@ -35,7 +35,8 @@ class BoxAssociationConfig(StageConfig):
 class BoxConfidenceConfig(StageConfig):
     """Confidence in a track: its smoothed score, raised by range and age."""
 
-    report_above: float = number(6.5, -1e3, 1e3, "", "least confidence of a reported track")
+    report_above: float = number(6.5, -1e3, 1e3, "", "least confidence of a track in a frame in which it is reported")
+    keep_above: float = number(8.5, -1e3, 1e3, "", "least mean confidence of a track that is written")
     range_bonus_per_m: float = number(0.1, 0.0, 10.0, "1/m", "added to the score of a detection per metre of range")
     age_bonus: float = number(0.5, 0.0, 10.0, "", "added per unit of the logarithm of the number of detections")
     score_gain: float = number(0.5, 0.0, 1.0, "", "least weight of a new detection's score")
@@ -46,8 +47,8 @@ class BoxTrackingConfig(StageConfig):
     """Tracking of the boxes of one class."""
 
     min_birth_score: float = number(0.0, -1e3, 1e3, "", "least score of a detection that starts a track")
-    max_missed: int = number(8, 0, 100, "frames", "without a detection after which a track is deleted")
-    report_missed: int = number(0, 0, 100, "frames", "without a detection during which its prediction is reported")
+    max_missed: int = number(30, 0, 100, "frames", "without a detection after which a track is deleted")
+    max_gap: int = number(3, 0, 100, "frames", "without a report that are filled afterwards")
     filter: BoxFilterConfig = mechanism(BoxFilterConfig)
     association: BoxAssociationConfig = mechanism(BoxAssociationConfig)
     confidence: BoxConfidenceConfig = mechanism(BoxConfidenceConfig)
@@ -55,9 +56,13 @@ class BoxTrackingConfig(StageConfig):
 
 BOX_TRACKING = {
     ObjectClass.PEDESTRIAN: BoxTrackingConfig(
-        filter=BoxFilterConfig(yaw_gain=0.5), confidence=BoxConfidenceConfig(report_above=4.0)
+        max_gap=1,
+        filter=BoxFilterConfig(yaw_gain=0.5),
+        confidence=BoxConfidenceConfig(report_above=1.0, keep_above=3.8, range_bonus_per_m=0.0),
     ),
-    ObjectClass.CYCLIST: BoxTrackingConfig(confidence=BoxConfidenceConfig(report_above=1.0, range_bonus_per_m=0.0)),
+    ObjectClass.CYCLIST: BoxTrackingConfig(
+        confidence=BoxConfidenceConfig(report_above=1.0, keep_above=4.2, range_bonus_per_m=0.0)
+    ),
 }
 """Configuration of the classes that differ from the default, tuned on PointRCNN's KITTI detections."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +84,7 @@ class KittiResults:
 
 
 def box_lines(
-    frame: Int, kitti_type: str, ids: Int, image_box: Float64, hwlxyzry: Float64, score: Float64
+    frame: Int, kitti_type: Sequence[str], ids: Int, image_box: Float64, hwlxyzry: Float64, score: Float64
 ) -> list[str]:
     """Lines of KITTI's tracking format with a score, for n boxes of another detector.
 
@@ -93,7 +94,7 @@ def box_lines(
     alpha = wrap(hwlxyzry[:, 6] - np.arctan2(hwlxyzry[:, 3], hwlxyzry[:, 5]))
     columns = (frame, ids, alpha, image_box, hwlxyzry, score)
     return [
-        f"{f} {i} {kitti_type} 0 0 {a:.4f} {b[0]:.2f} {b[1]:.2f} {b[2]:.2f} {b[3]:.2f} "
+        f"{f} {i} {kind} 0 0 {a:.4f} {b[0]:.2f} {b[1]:.2f} {b[2]:.2f} {b[3]:.2f} "
         f"{d[0]:.4f} {d[1]:.4f} {d[2]:.4f} {d[3]:.4f} {d[4]:.4f} {d[5]:.4f} {d[6]:.4f} {s:.4f}\n"
-        for f, i, a, b, d, s in zip(*(column.tolist() for column in columns), strict=True)
+        for kind, f, i, a, b, d, s in zip(kitti_type, *(column.tolist() for column in columns), strict=True)
     ]

@@ -9,8 +9,9 @@ detector lie between 0 and 1 they are probabilities and are converted to that sc
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,20 @@ def read(paths: Sequence[Path]) -> list[Detections]:
         )
         for path, table in zip(paths, tables, strict=True)
     ]
+
+
+def merge(detectors: Iterable[Iterable[Detections]]) -> list[Detections]:
+    """The sequences of all detectors, those of one name as one, ordered by name."""
+    named: dict[str, list[Detections]] = {}
+    for sequence in chain.from_iterable(detectors):
+        named.setdefault(sequence.name, []).append(sequence)
+    return [_merged(name, named[name]) for name in sorted(named)]
+
+
+def _merged(name: str, parts: list[Detections]) -> Detections:
+    columns = (np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Detections)[1:])
+    whole = Detections(name, *columns)
+    return whole.take(np.argsort(whole.frame, kind="stable"))
 
 
 def _table(path: Path) -> Float64:
