@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from modt import profile
 from modt.sensor_fit.recognition import recognise
@@ -54,6 +56,14 @@ def test_another_mount_changes_the_height_alone():
 def test_few_points_fit_any_profile():
     points = np.random.default_rng(0).uniform(-20, 20, (500, 4)).astype(np.float32)
     assert recognise(points, profile.load()).differences == ()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20_000), st.floats(1e-3, 200.0), st.floats(1e-3, 200.0))
+@settings(max_examples=30)
+def test_any_cloud_is_recognised_or_not_but_no_error(seed, n, reach_m, rise_m):
+    points = np.random.default_rng(seed).normal(0, 1, (n, 4)).astype(np.float32) * [reach_m, reach_m, rise_m, 0]
+    found = recognise(points.astype(np.float32), profile.load())
+    assert found.fitted == profile.load() or found.differences
 
 
 @pytest.mark.kitti

@@ -19,12 +19,13 @@ class BlindSectors:
 
     def __init__(self, bounds_deg: Sequence[float], range_m: float) -> None:
         self.bounds_deg, self.range_m = np.reshape(np.asarray(bounds_deg, np.float32), (-1, 2)), range_m
+        turn = np.diff(self.bounds_deg)[:, 0]
+        self.width_deg = np.where(turn >= 360, 360, turn % 360)
 
     def contain(self, points: Float32) -> Bool:
         """(N,) points that lie in a sector."""
         inside: Bool = np.hypot(points[:, 0], points[:, 1]) < self.range_m
         near = np.flatnonzero(inside)
         azimuth_deg = np.rad2deg(np.arctan2(points[near, 1], points[near, 0]))[:, None]
-        first, last = self.bounds_deg.T
-        inside[near] = ((azimuth_deg - first) % 360 <= (last - first) % 360).any(axis=1)
+        inside[near] = ((azimuth_deg - self.bounds_deg[:, 0]) % 360 <= self.width_deg).any(axis=1)
         return inside

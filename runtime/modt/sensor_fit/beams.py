@@ -36,6 +36,7 @@ MIN_MASS = 3e-4  # of a beam, share of all points
 MIN_GAP, GAPS_AROUND = 0.5, 7  # between beams, share of the median of the gaps around
 MIN_CONTRAST = 0.6  # share of the points in the peaks, above the valleys, of a sensor that has beams
 ONE_ORIGIN_CONTRAST = 0.995  # share from which other origins are not tried
+MAX_BEAMS = 512
 MAX_ASPECT = 8.0  # azimuth step over the spacing of beams; beyond it the peaks are chance
 CELL_DEG = (2.0, 4.0)  # elevation and azimuth of a cell in which returns are counted
 
@@ -72,7 +73,7 @@ def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> Bea
         aside = [points[np.abs(points[:, 1]) > ASIDE * np.abs(points[:, 0])] for points in far]
         seen = aside if sum(map(len, aside)) > MIN_ASIDE * sum(map(len, far)) else far
         rings, far = _Rings.of_points(np.concatenate(seen), origins_m), seen
-    if rings.contrast < MIN_CONTRAST:
+    if rings.contrast < MIN_CONTRAST or len(rings.peaks) > MAX_BEAMS:
         return _without_beams(far)
     elevations_deg = np.rad2deg(np.arctan((rings.peaks + 0.5) * BIN - STEEPEST))
     spacing_deg, step_deg = float(np.median(np.diff(elevations_deg))), _azimuth_step_deg(far, rings)

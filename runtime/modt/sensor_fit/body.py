@@ -10,6 +10,7 @@ import numpy as np
 from modt.types import Bool, Float32, Float64, Int
 
 CELL_DEG = 2.0
+COLUMNS = int(360 / CELL_DEG)
 REACH_M = 3.0  # of the robot around its sensor
 STEADY_M = 0.03  # range of a fixed cell changes by less, from the 10 % to the 90 % quantile
 MIN_SHARE = 0.8  # of the sweeps in which a fixed cell has a return
@@ -45,7 +46,7 @@ def find_body(sweeps: Sequence[Float32], height_m: float) -> Body | None:
         np.where(np.isfinite(nearest), nearest, np.nan)[:, cells], [0.1, 0.5, 0.9], axis=0
     )
     fixed = high - low < STEADY_M
-    elevation = np.deg2rad((cells // _COLUMNS + 0.5) * CELL_DEG - 90)
+    elevation = np.deg2rad((cells // COLUMNS + 0.5) * CELL_DEG - 90)
     rise_m = range_m * np.tan(elevation)
     clear = (rise_m > MIN_CLEARANCE_M - height_m) & (rise_m < MAX_ABOVE_M)
     away = (range_m > REACH_M) & clear
@@ -54,21 +55,18 @@ def find_body(sweeps: Sequence[Float32], height_m: float) -> Body | None:
     own = fixed & clear & (range_m < REACH_M)
     if not own.any():
         return Body(np.zeros((0, 2)), 0.0)
-    column: Bool = np.zeros(_COLUMNS, np.bool_)
-    column[cells[own] % _COLUMNS] = True
+    column: Bool = np.zeros(COLUMNS, np.bool_)
+    column[cells[own] % COLUMNS] = True
     return Body(_sectors(column), float(range_m[own].max()) + MARGIN_M)
-
-
-_COLUMNS = int(360 / CELL_DEG)
 
 
 def _nearest(points: Float32) -> Float64:
     """Nearest horizontal range in each cell of elevation and azimuth [m], infinite where there is none."""
     range_m = np.hypot(points[:, 0], points[:, 1])
     row = ((np.rad2deg(np.arctan2(points[:, 2], range_m)) + 90) // CELL_DEG).astype(np.int64)
-    column: Int = (np.rad2deg(np.arctan2(points[:, 1], points[:, 0])) % 360 // CELL_DEG).astype(np.int64) % _COLUMNS
-    out = np.full(_COLUMNS // 2 * _COLUMNS + _COLUMNS, np.inf)
-    np.minimum.at(out, row * _COLUMNS + column, range_m)
+    column: Int = (np.rad2deg(np.arctan2(points[:, 1], points[:, 0])) % 360 // CELL_DEG).astype(np.int64) % COLUMNS
+    out = np.full(COLUMNS // 2 * COLUMNS + COLUMNS, np.inf)
+    np.minimum.at(out, row * COLUMNS + column, range_m)
     return out
 
 

@@ -19,6 +19,9 @@ from modt.types import Float32
 MAX_RANGE_M = 100.0
 """Objects farther away have too few returns to be known."""
 MAX_MIN_RANGE_M = 2.0
+HEIGHTS_M = (0.05, 5.0)
+MAX_SPACING_DEG = 10.0
+"""What a profile can state."""
 EVEN_DEG, EVEN_SHARE = 0.05, 0.05
 """Deviation from even spacing of beams that a table is not worth: the greater of the two, and of the spacing."""
 SURE_CONTRAST = 0.985
@@ -66,7 +69,8 @@ def _beam_findings(pattern: BeamPattern) -> Iterator[Finding]:
     found, step_deg = pattern.elevations_deg, round(pattern.azimuth_step_deg, 3)
     if not len(found):
         said = "no beams: spacing of the returns of a sweep, in any direction"
-        yield Finding("sensor", "elevation_step_deg", round(pattern.spacing_deg, 3), said)
+        step_deg = min(step_deg, MAX_SPACING_DEG)
+        yield Finding("sensor", "elevation_step_deg", step_deg, said)
         yield Finding("sensor", "azimuth_step_deg", step_deg, "the same")
         return
     mean_deg = float(np.ptp(found)) / (len(found) - 1)
@@ -74,7 +78,7 @@ def _beam_findings(pattern: BeamPattern) -> Iterator[Finding]:
     sure = pattern.contrast > SURE_CONTRAST
     said += "" if sure else "; blurred, perhaps by compensation for motion: take a recording at a walking pace"
     if np.abs(np.diff(found) - mean_deg).max() < max(EVEN_DEG, EVEN_SHARE * mean_deg):
-        yield Finding("sensor", "elevation_step_deg", round(mean_deg, 3), said, sure)
+        yield Finding("sensor", "elevation_step_deg", min(round(mean_deg, 3), MAX_SPACING_DEG), said, sure)
     else:
         table = tuple(np.round(found[::-1], 2).tolist())
         yield Finding("sensor", "elevations_deg", table, f"{said}; a beam that met nothing is not among them", sure)
@@ -116,7 +120,7 @@ def empty_sectors(points: Float32) -> str:
 def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Height of the sensor above the ground."""
     height_m = ground_height_m(recording.sweeps, config.sensor, config.segmentation)
-    if height_m is None:
+    if height_m is None or not HEIGHTS_M[0] <= height_m <= HEIGHTS_M[1]:
         yield Finding("sensor", "height_m", None, "no flat ground in sight: estimated as it comes", sure=False)
     else:
         yield Finding(
