@@ -90,3 +90,18 @@ def test_an_unknown_mode_is_named():
         modt.Pipeline.from_profile("vlp-16", mode="fast")
     with pytest.raises(AttributeError, match="nothing"):
         _ = modt.nothing
+
+
+def test_without_a_profile_the_first_sweep_tells_the_sensor(frames, caplog):
+    library = modt.Pipeline.from_profile()
+    library.step(frames[0].points, 0.0)
+    assert library.config.sensor.elevation_step_deg == pytest.approx(2.0, rel=0.02)
+    assert [record.message.count("used instead") for record in caplog.records] == [1]
+
+
+def test_a_profile_that_was_asked_for_is_kept_and_warned_of(frames, caplog):
+    library = modt.Pipeline.from_profile("os1-64")
+    for frame in frames[:3]:
+        library.step(frame.points, frame.stamp_s)
+    assert library.config == load("os1-64")
+    assert [record.message.count("profile os1-64 is not of this sensor") for record in caplog.records] == [1]

@@ -50,6 +50,7 @@ def test_dump_and_parse_are_inverse():
         ("fusion:\n  point_change: [1, 2]\n", ["p.yaml:2", "point_change", "4 values"]),
         ("sensor:\n  elevations_deg: [1]\n", ["p.yaml:2", "elevations_deg", "2 to 512 values"]),
         ("sensor:\n  elevations_deg: [1, 91]\n", ["p.yaml:2", "elevations_deg", "91 is out of range"]),
+        ("sensor:\n  blind_sectors_deg: [1, 2, 3]\n", ["p.yaml:2", "blind_sectors_deg", "no pairs"]),
         ("sensor:\n  elevations_deg: 1\n", ["p.yaml:2", "elevations_deg", "2 to 512 values"]),
         ("fusion:\n  object_threshold: high\n", ["p.yaml:2", "object_threshold"]),
         ("fusion: 3\n", ["p.yaml:1", "no mapping"]),

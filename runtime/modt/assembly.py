@@ -16,12 +16,14 @@ from modt.config import FusionConfig, ProfileConfig
 from modt.energy.instrumentation import CountingClassifier
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
+from modt.geometry.blind_sectors import BlindSectors
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Fusion, Pipeline
+from modt.pipeline import Segmenter as SegmenterStage
 from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
 from modt.tracking.tracker import Tracker
-from modt.types import UNLIMITED, Budget
+from modt.types import UNLIMITED, Budget, Float32, Proposals
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,27 @@ MODES = {
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 
 
+@dataclass(frozen=True, slots=True)
+class SightedSegmenter:
+    """A segmenter to which points of blind sectors are no returns: they lie at the origin."""
+
+    segmenter: SegmenterStage
+    sectors: BlindSectors
+
+    def segment(self, points: Float32) -> Proposals:
+        """Proposals of (N, 4) points."""
+        kept = points.copy()
+        kept[self.sectors.contain(points), :3] = 0.0
+        return self.segmenter.segment(kept)
+
+
+def _segmenter(profile: ProfileConfig, fov: FieldOfView) -> SegmenterStage:
+    sensor, segmenter = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov)
+    if sensor.blind_sectors_deg is None:
+        return segmenter
+    return SightedSegmenter(segmenter, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
+
+
 def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
     """The stages of a mode.
 
@@ -64,7 +87,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     prior = make_prior(network.boxes, network.reflectance, profile.fusion.prior, profile.sensor)
     classifier = TimedClassifier(network, cost, time.thread_time_ns)
     return Pipeline(
-        segmenter=Segmenter(profile.segmentation, profile.sensor, fov),
+        segmenter=_segmenter(profile, fov),
         odometry=Odometry(profile.odometry),
         tracker=Tracker(profile.tracking, mode.machine),
         fusion=mode.fusion(profile.fusion, prior),

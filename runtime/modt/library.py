@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
@@ -15,9 +16,12 @@ from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
+from modt.sensor_fit.recognition import recognise
 from modt.sources.pose_file import pose_defect
 from modt.sources.scan_file import sanitised
 from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,20 +93,34 @@ class Pipeline:
     def __init__(self, config: ProfileConfig, mode: str = "accurate") -> None:
         if mode not in assembly.MODES:
             raise MisuseError(f"mode {mode!r}", "unknown", f"use one of {', '.join(assembly.MODES)}")
-        chosen = assembly.MODES[mode]
-        self.config, self.mode = config, mode
-        self._pipeline = assembly.pipeline(chosen, config, FieldOfView(), NullLedger())
-        self._budget = chosen.budget(config)
+        self.mode, self._name, self._free = mode, "given", False
+        self._use(config)
         self._index, self._stamp_s = 0, -np.inf
 
+    def _use(self, config: ProfileConfig) -> None:
+        chosen = assembly.MODES[self.mode]
+        self.config = config
+        self._pipeline = assembly.pipeline(chosen, config, FieldOfView(), NullLedger())
+        self._budget = chosen.budget(config)
+
+    def _recognise(self, points: Float32) -> None:
+        """Warn of a profile that the first sweep does not fit; replace it if it was not asked for."""
+        found = recognise(points, self.config)
+        if found.differences:
+            log.warning("%s", found.warning(self._name, replaced=self._free))
+            if self._free:
+                self._use(found.fitted)
+
     @classmethod
-    def from_profile(cls, name: str | Path = profile.DEFAULT, mode: str = "accurate") -> Self:
-        """Pipeline of a profile, by its name or file.
+    def from_profile(cls, name: str | Path | None = None, mode: str = "accurate") -> Self:
+        """Pipeline of a profile, by its name or file; without one the default's, or what the first sweep shows.
 
         Raises:
             MisuseError: no such profile or mode, or a profile with an error; it names the line.
         """
-        return cls(profile.load(str(name)), mode)
+        pipeline = cls(profile.load(str(name) if name else None), mode)
+        pipeline._name, pipeline._free = str(name or profile.DEFAULT), name is None
+        return pipeline
 
     def step(
         self, points: ArrayLike, stamp_s: float, T_world_sensor: ArrayLike | None = None, *, turn_s: float = 0.0
@@ -128,6 +146,8 @@ class Pipeline:
             cause = pose_defect(pose) if pose.shape == (4, 4) else f"of shape {pose.shape}"
             raise MisuseError("T_world_sensor", str(cause), "give a rigid (4, 4) transform from sensor to world")
         frame = Frame(self._index, float(stamp_s), _checked(points), pose, turn_s=turn_s)
+        if self._index == 0:
+            self._recognise(frame.points)
         self._index, self._stamp_s = self._index + 1, float(stamp_s)
         result = self._pipeline.step(frame, self._budget)
         tracks, visible = result.tracks, result.tracks.proposal != NONE

@@ -17,14 +17,14 @@ from modt.errors import MisuseError
 DEFAULT = "hdl-64e"
 
 
-def load(name: str = DEFAULT) -> ProfileConfig:
-    """Read a profile by name or path.
+def load(name: str | None = None) -> ProfileConfig:
+    """Read a profile by name or path, without one the default.
 
     Raises:
         MisuseError: no such profile, unreadable, not YAML, an unknown key or a value out of range, with the
             line and the nearest valid key.
     """
-    path = assets.find("profiles", name, ".yaml")
+    path = assets.find("profiles", name or DEFAULT, ".yaml")
     try:
         return parse(path.read_text(encoding="utf-8"), path)
     except (OSError, UnicodeDecodeError) as error:

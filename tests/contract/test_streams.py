@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from modt.config import OdometryConfig
+from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
@@ -40,6 +41,7 @@ SOURCES = {
     "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoPoses()),
     "listed": listed,
     "sent": sent,
+    "peeked": lambda root: PeekedStream(open_stream(layouts.bare(root))),
     "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
 }
 

@@ -22,8 +22,21 @@ def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
         choice = argparse.ArgumentParser(prog=prog).add_subparsers()
         for command in commands:
             command.add_parser(choice)
-        summaries = {action.dest: action.help or "" for action in choice._choices_actions}
-        yield from ((summaries[name], parser) for name, parser in choice.choices.items())
+        yield from leaves(choice)
+
+
+Choice = argparse._SubParsersAction  # of commands, without a public name
+
+
+def leaves(choice: Choice[argparse.ArgumentParser]) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """The same of the commands of a choice, and of the groups among them."""
+    summaries = {action.dest: action.help or "" for action in choice._choices_actions}
+    for name, parser in choice.choices.items():
+        groups = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+        for group in groups:
+            yield from leaves(group)
+        if not groups:
+            yield summaries[name], parser
 
 
 def cells(parser: argparse.ArgumentParser, action: argparse.Action) -> tuple[str, str]:

@@ -21,6 +21,7 @@ PAGE = ("sensor", "classification", "scheduler", "odometry", "energy")
 """Stages whose own keys are on the page."""
 
 CONDITIONS = {
+    "sensor.blind_range_m": "sensor.blind_sectors_deg",
     "sensor.period_s": "a folder of scans",
     "segmentation.sensor_height": "sensor.height_m: null",
     "segmentation.sensor_height.default_m": "sensor.height_m: null, no ground in sight",

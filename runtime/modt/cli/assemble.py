@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import argparse
+import logging
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 from modt import profile
-from modt.config import OdometryConfig
+from modt.config import OdometryConfig, ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
+from modt.sensor_fit.recognition import Recognition, recognise
 from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream
 from modt.sources.synthetic_stream import SyntheticStream
+from modt.types import Frame
 
 EMBEDDED_SECONDS = 10.0
 RECORDED, NONE = "recording", "none"
 """Odometries that need no address."""
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,7 +31,7 @@ class Request:
 
     path: Path | None = None
     mode: str = "accurate"
-    profile: str = profile.DEFAULT
+    profile: str | None = None
     fov: str = "full"
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
@@ -58,6 +62,20 @@ def stream(request: Request) -> Stream:
         asked = f"{first}:{'' if last is None else last}"
         raise MisuseError(whole.info.name, f"no frames in {asked}", f"it holds {whole.info.n_frames} frames")
     return cut
+
+
+def recognised(request: Request, first: Frame | None) -> tuple[ProfileConfig, Recognition]:
+    """The profile of a stream by its first frame, and what differs from the one asked for, which is warned of.
+
+    What is found takes the place of the default profile, never of one that was asked for.
+    """
+    config, free = profile.load(request.profile), request.profile is None
+    if first is None:
+        return config, Recognition((), None, config)
+    found = recognise(first.points, config)
+    if found.differences:
+        log.warning("%s", found.warning(request.profile or profile.DEFAULT, replaced=free))
+    return found.fitted if free else config, found
 
 
 def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSource:

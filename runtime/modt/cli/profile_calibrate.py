@@ -50,11 +50,12 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.segmentation.segmenter import Segmenter
     from modt.sinks.output import writing
 
-    loaded = profile.load(arguments.profile)
-    stream = assemble.stream(assemble.Request.of(arguments))
+    request = assemble.Request.of(arguments)
+    stream = assemble.stream(request)
     scans = list(stream)
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
+    loaded, _ = assemble.recognised(request, scans[0])
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch)

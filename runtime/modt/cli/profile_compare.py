@@ -30,7 +30,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare."""
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt import profile
     from modt.cli import assemble, metering
     from modt.cli.mode_runs import MODES, VARIED, Comparison
     from modt.energy.conditions import Conditions
@@ -40,12 +39,13 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
 
-    loaded = profile.load(arguments.profile)
-    request, board = assemble.Request.of(arguments), loaded.energy
+    request = assemble.Request.of(arguments)
+    stream = assemble.stream(request)
+    loaded, _ = assemble.recognised(request, next(iter(stream), None))
+    board, info = loaded.energy, stream.info
     meters = metering.discovery(board).choose(arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED
     comparison = Comparison(request, loaded, pinned, meters if metered else (), arguments.turn)
-    info = assemble.stream(request).info
     repetitions = []
     for number in range(arguments.repeat):
         if sys.stderr.isatty():

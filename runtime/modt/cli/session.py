@@ -18,6 +18,7 @@ from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
 from modt.sinks.output import Sink
 from modt.sinks.run_directory import RunDirectory
+from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_source import PosedStream
 from modt.supervisor import Supervisor
 from modt.types import FrameResult, Proposals
@@ -33,9 +34,10 @@ class Session:
 
     def __init__(self, request: assemble.Request, out: Path | None, core: int | None, command: list[str]) -> None:
         self.request, self.core = request, core
-        self.profile = profile.load(request.profile)
         self.mode = assembly.MODES[request.mode]
-        found = assemble.stream(request)
+        found = PeekedStream(assemble.stream(request))
+        self.profile, self.recognition = assemble.recognised(request, found.first)
+        self.profile_name = request.profile or self.recognition.default_name
         self.odometry = assemble.odometry(request, found, self.profile.odometry)
         self.stream = PosedStream(found, self.odometry)
         fov = assemble.field_of_view(request, self.stream)
@@ -114,6 +116,11 @@ class Session:
             "versions": host.versions(),
             "model": self.pipeline.classifier.facts(),
             "host": host.description(),
+            "recognition": {
+                "used": self.profile_name,
+                "differences": list(self.recognition.differences),
+                "nearest": self.recognition.nearest,
+            },
             "profile": profile.dump(self.profile),
         }
         self.directory.describe(profile.to_yaml(facts))
@@ -126,7 +133,7 @@ class Session:
                 "stream": self.stream.info.name,
                 "mode": self.request.mode,
                 "fov": self.request.fov,
-                "profile": self.request.profile,
+                "profile": self.profile_name,
                 "elapsed_s": elapsed_s,
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * self.stream.info.period_s / elapsed_s,

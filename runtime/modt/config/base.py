@@ -22,11 +22,10 @@ def number(default: float | None, low: float, high: float, unit: str, meaning: s
     return field(default=default, metadata={"low": low, "high": high, "unit": unit, "meaning": meaning})
 
 
-def numbers(low: float, high: float, most: int, unit: str, meaning: str) -> Any:
-    """Field of up to `most` numbers within bounds, none by default."""
-    return field(
-        default=None, metadata={"low": low, "high": high, "least": 2, "most": most, "unit": unit, "meaning": meaning}
-    )
+def numbers(low: float, high: float, most: int, unit: str, meaning: str, *, pairs: bool = False) -> Any:
+    """Field of two to `most` numbers within bounds, or of an even number of them, none by default."""
+    facts = {"low": low, "high": high, "least": 2, "most": most, "unit": unit, "meaning": meaning}
+    return field(default=None, metadata={**facts, "pairs": pairs})
 
 
 def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
@@ -87,6 +86,8 @@ def _check_numbers(key: str, value: object, whole: bool, bounds: dict[str, Any])
         span = f"{bounds['least']} to {bounds['most']} values, each {span}"
         if not bounds["least"] <= len(numbers) <= bounds["most"]:
             raise ValueRangeError(key, f"{len(numbers)} values", f"give {span}")
+        if bounds["pairs"] and len(numbers) % 2:
+            raise ValueRangeError(key, f"{len(numbers)} values are no pairs", "give from and to of each, in one list")
     remedy = f"give {span} {bounds.get('unit', '')}".rstrip()
     for number in numbers:
         if isinstance(number, bool) or not isinstance(number, int if whole else (int, float)):

@@ -20,6 +20,10 @@ class SensorConfig(StageConfig):
         -90.0, 90.0, 512, "deg", "of all beams, in any order; null: evenly spaced"
     )
     azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
+    blind_sectors_deg: tuple[float, ...] | None = numbers(
+        -360.0, 360.0, 64, "deg", "from, to of each, counter-clockwise: onto the robot", pairs=True
+    )
+    blind_range_m: float = number(3.0, 0.1, 20.0, "m", "of returns left out in these sectors, at most")
     period_s: float = number(0.1, 0.001, 10.0, "s", "between the scans of a folder, which has no stamps")
     reflectance: str = choice(
         "none", ("none", "hdl-64e"), "scale; models use only the one they learnt; none: not used"

@@ -49,7 +49,8 @@ class RunRecord:
         if not (path / LABELS).is_dir():
             raise MisuseError(path, "holds no point labels of its own", "run it again with `modt replay --labels`")
         words = [word for argument in command for word in argument.split("=", 1)]
-        sensor = Path(words[words.index("--profile") + 1]).stem if "--profile" in words else DEFAULT
+        used = facts.get("recognition", {}).get("used", DEFAULT)
+        sensor = Path(words[words.index("--profile") + 1]).stem if "--profile" in words else used
         return cls(path, Path(stream) if stream else None, fov, sensor)
 
     def frames(self, truth: Truth) -> Iterator[JudgedFrame]:

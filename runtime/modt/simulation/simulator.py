@@ -72,13 +72,16 @@ class Simulator:
         offset = np.append(self._intensity_offset[solids.body, solids.material], np.float32(0))
         distance, intensity, ray = self.receiver.receive(image.distance, material, image.solid, offset, rng)
         row, column = np.divmod(ray, self.sensor.shape[1])
+        fired = self.sensor.pattern.fires(row, column, index)
+        ray, row, column, intensity = ray[fired], row[fired], column[fired], intensity[fired]
         s = distance.ravel()[ray]
         jitter = rng.standard_normal(len(s), np.float32) * np.float32(self.sensor.azimuth_sigma_rad)
+        rise = rng.standard_normal(len(s), np.float32) * np.float32(self.sensor.elevation_sigma_rad)
         cos, sin = self.caster.cos[column], self.caster.sin[column]
         points = np.empty((len(s), 4), np.float32)
         points[:, 0] = s * (cos - jitter * sin)
         points[:, 1] = s * (sin + jitter * cos)
-        points[:, 2] = s * self.caster.tangent[row, 0] + self.caster.origin[row, 0]
+        points[:, 2] = s * (self.caster.tangent[row, 0] + rise) + self.caster.origin[row, 0]
         points[:, 3] = intensity
         instance = np.append(solids.body, NONE)[image.solid.ravel()[ray]]
         if self.distort:

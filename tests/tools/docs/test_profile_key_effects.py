@@ -169,6 +169,14 @@ def scan_folder(config: ProfileConfig, folder: Path) -> str:
     return str([frame.stamp_s for frame in assemble.stream(request)])
 
 
+def near_blind(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), changed(config, "sensor.blind_sectors_deg", (-60.0, 60.0)))
+
+
+def far_blind(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(3, 1.0), changed(config, "sensor.blind_range_m", 20.0))
+
+
 def windows(config: ProfileConfig, _folder: Path) -> str:
     """Windows of a machine that sleeps, and whose calendar is set, for half a second each."""
     now = {"wall": 0, "asleep": 0, "calendar": 0}
@@ -188,6 +196,7 @@ SCENARIOS: dict[str, Scenario] = {
     "": street,
     "a folder of scans": scan_folder,
     "sensor.height_m: null": unknown_height,
+    "sensor.blind_sectors_deg": near_blind,
     "sensor.height_m: null, no ground in sight": no_ground,
     "--fov camera": camera,
     "association: paper": paper,
@@ -209,6 +218,7 @@ SCENARIOS: dict[str, Scenario] = {
 
 
 RARE: dict[str, Scenario] = {
+    "sensor.blind_sectors_deg": far_blind,
     "segmentation.ground.start_m": long_street,
     "segmentation.person_splitting.min_gap_columns": long_street,
     "segmentation.car_merging.min_person_top_m": long_street,
@@ -230,7 +240,7 @@ def others(key: Key) -> Iterator[Any]:
     if "options" in facts:
         yield from (option for option in facts["options"] if option != value)
     elif "most" in facts:
-        yield tuple(np.linspace(-15.0, 15.0, 7).tolist())
+        yield tuple(np.linspace(-15.0, 15.0, 8).tolist())
     elif key.kind == "str":
         yield "pointnet-synthetic" if key.path == "classification.model" else "another"
     else:

@@ -1,0 +1,60 @@
+"""`modt profile fit`: the profile of an unknown sensor, from a recording of it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from modt.cli import options
+from modt.errors import MisuseError, ModtError
+
+MOST_FRAMES = 1000
+"""Frames of a recording of which the sweeps are taken."""
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("fit", help="fit a profile to a recording of an unknown sensor")
+    stream = "KITTI drive, sequence or folder of .bin scans; best of a drive that moves"
+    p.add_argument("path", type=Path, metavar="RECORDING", help=stream)
+    p.add_argument("--name", metavar="NAME", help="of the profile (default: that of the recording)")
+    p.add_argument("--out", type=Path, metavar="FILE", help="default: NAME.yaml")
+    count = options.integer(1, MOST_FRAMES, "a count")
+    spread = f"spread evenly over its first {MOST_FRAMES} frames"
+    p.add_argument("--sweeps", type=count, default=20, metavar="N", help=f"{spread} (default: %(default)s)")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Fit."""
+    from itertools import islice
+
+    from modt.sensor_fit.finding import Recording
+    from modt.sensor_fit.fit import fit
+    from modt.sensor_fit.profile_text import doubts, profile_text
+    from modt.sinks.output import writing
+    from modt.sources.recognise import open_stream
+
+    stream = open_stream(arguments.path)
+    name = arguments.name or stream.info.name.replace(" ", "-")
+    out: Path = arguments.out or Path(f"{name}.yaml")
+    if out.exists():
+        raise MisuseError(out, "exists already", "remove it, or give another --out")
+    step = max(1, min(stream.info.n_frames or MOST_FRAMES, MOST_FRAMES) // arguments.sweeps)
+    stamps_s, sweeps = [], []
+    for number, frame in enumerate(islice(stream, step * arguments.sweeps)):
+        stamps_s.append(frame.stamp_s)
+        if number % step == 0:
+            sweeps.append(frame.points[(frame.points[:, :2] != 0).any(axis=1)])
+    if not sum(map(len, sweeps)):
+        raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
+    _, findings = fit(Recording(sweeps, stamps_s))
+    title = f"{name}, fitted by `modt profile fit` to {len(sweeps)} of {len(stamps_s)} sweeps of {stream.info.name}."
+    text = profile_text(title, findings)
+    with writing(out):
+        out.write_text(text, encoding="utf-8")
+    print(text)
+    for doubt in doubts(findings):
+        print(f"  not sure of {doubt}")
+    print(f"  written to {out}; use it as --profile {out}")
+    return 0

@@ -1,0 +1,17 @@
+"""`modt profile`: commands on profiles."""
+
+from __future__ import annotations
+
+import argparse
+
+from modt.cli import profile_fit
+
+COMMANDS = (profile_fit,)
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the group and its commands."""
+    p = commands.add_parser("profile", help="make the profile of a sensor")
+    group = p.add_subparsers(dest="profile_command", required=True, metavar="COMMAND")
+    for command in COMMANDS:
+        command.add_parser(group)

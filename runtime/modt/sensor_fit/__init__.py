@@ -1,0 +1,1 @@
+"""The profile of a sensor, from a recording of it."""

@@ -1,0 +1,176 @@
+"""Elevations of a sensor's beams, from the points alone.
+
+Points of a beam lie on a cone: z = height of its origin + range * tangent of its elevation. In the histogram of the
+tangents each beam is a peak, blurred where sweeps are compensated for motion, and where its origin is not that of the
+frame: of several heights of the origin, each point takes the one of the highest peaks about it (a Hough transform).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
+from scipy.signal import find_peaks
+
+from modt.geometry.beams import Beams, BeamTable, EvenBeams
+from modt.types import Float32, Float64, Int
+
+BIN = np.deg2rad(0.01)  # of the histogram, tangent
+STEEPEST = 2.75  # tangent: 70 degrees
+N_BINS = int(2 * STEEPEST / BIN)
+SMOOTH_BINS = 2.0  # standard deviation
+WINDOW_BINS = 250  # half of that about a point in which the peaks of its origin are judged
+ORIGINS_M = np.arange(0.0, 0.26, 0.01)  # heights of beams' origins above that of the frame
+FRAME_ORIGIN_FAVOUR = 1.1  # factor on the peaks of the frame's own origin
+COARSE_ORIGINS_M = ORIGINS_M[::2]
+MIN_POINTS = 1000
+ASIDE = np.tan(np.deg2rad(60.0))  # compensation for a drive ahead moves what lies to the side along its ring
+MIN_ASIDE = 0.1  # share of the points there from which the others are left out
+MIN_RANGE_M = 1.0  # nearer points may be on the robot
+FULL_WEIGHT_M = 20.0  # range from which all points count alike; errors of position blur nearer ones
+MIN_PROMINENCE = 0.35  # of a peak, share of its height
+MIN_MASS = 3e-4  # of a beam, share of all points
+MIN_GAP, GAPS_AROUND = 0.5, 7  # between beams, share of the median of the gaps around
+MIN_CONTRAST = 0.6  # share of the points in the peaks, above the valleys, of a sensor that has beams
+ONE_ORIGIN_CONTRAST = 0.995  # share from which other origins are not tried
+MAX_BEAMS = 512
+MAX_ASPECT = 8.0  # azimuth step over the spacing of beams; beyond it the peaks are chance
+CELL_DEG = (2.0, 4.0)  # elevation and azimuth of a cell in which returns are counted
+
+
+@dataclass(frozen=True, slots=True)
+class BeamPattern:
+    """Beams, or the mean spacing of the returns of a sensor without any.
+
+    Attributes:
+        elevations_deg: (B,) ascending; none where no beams are seen.
+        spacing_deg: between neighbouring beams, median; without beams between neighbouring returns.
+        azimuth_step_deg: between neighbouring returns of a beam.
+        contrast: share of the points in the peaks of the beams, above the valleys; 0 without beams.
+    """
+
+    elevations_deg: Float64
+    spacing_deg: float
+    azimuth_step_deg: float
+    contrast: float = 0.0
+
+    @property
+    def beams(self) -> Beams:
+        """Spacing of the beams."""
+        return BeamTable(self.elevations_deg.tolist()) if len(self.elevations_deg) else EvenBeams(self.spacing_deg)
+
+
+def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> BeamPattern | None:
+    """Beams of sweeps of (N, 4) points; None where there are too few points to tell."""
+    far = [points[np.hypot(points[:, 0], points[:, 1]) > MIN_RANGE_M] for points in sweeps]
+    if sum(map(len, far)) < MIN_POINTS:
+        return None
+    rings = _Rings.of_points(np.concatenate(far), origins_m[:1])
+    if rings.contrast < ONE_ORIGIN_CONTRAST:
+        aside = [points[np.abs(points[:, 1]) > ASIDE * np.abs(points[:, 0])] for points in far]
+        seen = aside if sum(map(len, aside)) > MIN_ASIDE * sum(map(len, far)) else far
+        rings, far = _Rings.of_points(np.concatenate(seen), origins_m), seen
+    if rings.contrast < MIN_CONTRAST or len(rings.peaks) > MAX_BEAMS:
+        return _without_beams(far)
+    elevations_deg = np.rad2deg(np.arctan((rings.peaks + 0.5) * BIN - STEEPEST))
+    spacing_deg, step_deg = float(np.median(np.diff(elevations_deg))), _azimuth_step_deg(far, rings)
+    if step_deg > MAX_ASPECT * spacing_deg:
+        return _without_beams(far)
+    return BeamPattern(elevations_deg, spacing_deg, step_deg, rings.contrast)
+
+
+@dataclass(frozen=True, slots=True)
+class _Rings:
+    bins: Int  # (N,) of each point, by its best origin
+    peaks: Int  # (B,) bins of the beams
+    contrast: float  # share of the points above the line through the valleys between the peaks
+
+    @classmethod
+    def of_points(cls, points: Float32, origins_m: Float64) -> Self:
+        """Rings of (N, 4) points whose beams may start at some heights."""
+        range_m = np.hypot(points[:, 0], points[:, 1])
+        weight = np.minimum(range_m, np.float32(FULL_WEIGHT_M))
+        best: Int = np.zeros(len(points), np.int64)
+        score = np.zeros(len(points), np.float32)
+        per_m = np.float32(1 / BIN) / range_m
+        for origin_m in origins_m.tolist():
+            bins = ((points[:, 2] - np.float32(origin_m)) * per_m + np.float32(STEEPEST / BIN)).astype(np.int64)
+            np.clip(bins, 0, N_BINS - 1, out=bins)
+            count = _histogram(bins, weight)
+            height = _mean(count * count) / np.maximum(_mean(count), 1e-6)
+            own = (height * (1.0 if origin_m else FRAME_ORIGIN_FAVOUR)).astype(np.float32)[bins]
+            better = own > score
+            score[better], best[better] = own[better], bins[better]
+        count = _histogram(best, weight)
+        peaks = _peaks(count)
+        return cls(best, peaks, _contrast(count, peaks))
+
+
+def _histogram(bins: Int, weight: Float32) -> Float64:
+    return np.asarray(gaussian_filter1d(np.bincount(bins, weight, N_BINS), SMOOTH_BINS))
+
+
+def _mean(count: Float64) -> Float64:
+    return np.asarray(uniform_filter1d(uniform_filter1d(count, WINDOW_BINS), WINDOW_BINS))
+
+
+def _peaks(count: Float64) -> Int:
+    """(B,) bins of the beams."""
+    peaks, shape = find_peaks(count, prominence=1e-9)
+    peaks = peaks[shape["prominences"] > MIN_PROMINENCE * count[peaks]]
+    if not len(peaks):
+        return np.zeros(0, np.int64)
+    mass = np.add.reduceat(count, np.append(0, (peaks[1:] + peaks[:-1]) // 2))
+    kept = mass > MIN_MASS * count.sum()
+    peaks, mass = peaks[kept], mass[kept]
+    while len(peaks) > 3:  # a gap far narrower than those around is within a blurred beam
+        gap = np.diff(peaks)
+        usual = median_filter(gap, GAPS_AROUND)
+        narrowest = int(np.argmin(gap / usual))
+        if gap[narrowest] >= MIN_GAP * usual[narrowest]:
+            break
+        lesser = narrowest + int(mass[narrowest] > mass[narrowest + 1])
+        mass[2 * narrowest + 1 - lesser] += mass[lesser]
+        peaks, mass = np.delete(peaks, lesser), np.delete(mass, lesser)
+    return np.asarray(peaks, np.int64)
+
+
+def _contrast(count: Float64, peaks: Int) -> float:
+    if len(peaks) < 4:
+        return 0.0
+    valley = np.minimum.reduceat(count, peaks)[:-1]
+    inner = slice(int(peaks[0]), int(peaks[-1]))
+    floor = np.interp(np.arange(inner.start, inner.stop), (peaks[1:] + peaks[:-1]) / 2, valley)
+    return float(1 - np.minimum(floor, count[inner]).sum() / count[inner].sum())
+
+
+def _azimuth_step_deg(sweeps: Sequence[Float32], rings: _Rings) -> float:
+    """Most frequent step between neighbouring returns of a ring, of points that are those of the rings."""
+    points = np.concatenate(sweeps)
+    sweep = np.repeat(np.arange(len(sweeps)), [len(points) for points in sweeps])
+    ring = sweep * len(rings.peaks) + np.searchsorted((rings.peaks[1:] + rings.peaks[:-1]) / 2, rings.bins)
+    azimuth_deg = np.rad2deg(np.arctan2(points[:, 1], points[:, 0]))
+    order = np.lexsort((azimuth_deg, ring))
+    step = np.diff(azimuth_deg[order])[np.diff(ring[order]) == 0]
+    bins = (step[(step > 0.03) & (step < 5.0)] * 100).astype(np.int64)
+    if not len(bins):
+        return 5.0
+    mode = int(np.argmax(gaussian_filter1d(np.bincount(bins).astype(np.float64), 1.0))) / 100
+    near = step[np.abs(step - mode - 0.005) < 0.3 * mode + 0.01]
+    return float(np.mean(near))
+
+
+def _without_beams(sweeps: Sequence[Float32]) -> BeamPattern:
+    """The root of the solid angle of a return, where a sweep has returns, as spacing."""
+    spacings = []
+    for points in sweeps:
+        elevation = np.rad2deg(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))) + 90
+        azimuth = np.rad2deg(np.arctan2(points[:, 1], points[:, 0])) + 180
+        cell = (elevation // CELL_DEG[0]).astype(np.int64) * 91 + (azimuth // CELL_DEG[1]).astype(np.int64)
+        count = np.bincount(cell)
+        spacings.append(np.sqrt(np.prod(CELL_DEG) / np.median(count[count > 0])))
+    spacing_deg = float(np.median(spacings))
+    return BeamPattern(np.zeros(0), spacing_deg, spacing_deg)

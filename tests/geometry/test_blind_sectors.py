@@ -1,0 +1,48 @@
+"""Sectors in which the sensor sees the robot, and segmentation without them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from modt import assembly, profile
+from modt.energy.ledger import NullLedger
+from modt.geometry import FieldOfView
+from modt.geometry.blind_sectors import BlindSectors
+from tests.sensor_fit.recordings import recording, with_mast
+
+
+def at(azimuth_deg, range_m):
+    azimuth = np.deg2rad(np.asarray(azimuth_deg, np.float32))
+    return np.stack([range_m * np.cos(azimuth), range_m * np.sin(azimuth), 0 * azimuth], axis=1).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("bounds_deg", "inside_deg", "outside_deg"),
+    [
+        ((10, 20), [11, 19], [9, 21, -15, 190]),
+        ((170, -170), [175, 180, -175], [165, -165, 0]),
+        ((350, 370), [-5, 5], [-11, 11]),
+        ((-180, 180), [-179, -90, 0, 90, 179], []),
+        ((10, 20, -20, -10), [15, -15], [0, 180]),
+    ],
+)
+def test_sectors_go_counter_clockwise(bounds_deg, inside_deg, outside_deg):
+    sectors = BlindSectors(bounds_deg, 2.0)
+    assert sectors.contain(at(inside_deg, 1.9)).all()
+    assert not sectors.contain(at(inside_deg, 2.1)).any()
+    assert not sectors.contain(at(outside_deg, 1.9)).any()
+
+
+def test_the_robot_itself_is_no_proposal():
+    points = with_mast(recording("vlp-16"), 150.0, 1.9).sweeps[0]
+    config = profile.load("vlp-16")
+    sensor = dataclasses.replace(config.sensor, blind_sectors_deg=(140.0, 160.0), blind_range_m=2.5)
+    sighted = dataclasses.replace(config, sensor=sensor)
+    mode = assembly.MODES["accurate"]
+    stages = [assembly.pipeline(mode, c, FieldOfView(), NullLedger()) for c in (config, sighted)]
+    members = [stage.segmenter.segment(points).members for stage in stages]
+    mast = len(points) - 800
+    assert (members[0] >= mast).any()
+    assert not (members[1] >= mast).any()
+    assert len(members[1]) > 0.8 * (members[0] < mast).sum()

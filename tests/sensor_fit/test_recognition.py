@@ -1,0 +1,75 @@
+"""Profiles against the first sweep."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modt import profile
+from modt.sensor_fit.recognition import recognise
+from modt.simulation.sensors import SENSORS
+from modt.sources.scan_file import read_scan
+from tests.sensor_fit.recordings import recording
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_a_sensor_fits_its_profile(name):
+    config = profile.load(name)
+    found = recognise(recording(name).sweeps[0], config)
+    assert found.differences == ()
+    assert found.fitted == config
+
+
+@pytest.mark.parametrize("name", [name for name in SENSORS if name != "hdl-64e"])
+def test_another_sensor_is_told_from_the_default_and_named(name):
+    found = recognise(recording(name).sweeps[0], profile.load())
+    assert found.differences
+    assert found.nearest == name
+    line = found.warning("hdl-64e", replaced=True)
+    assert f"--profile {name}" in line
+    assert "modt profile fit" in line
+    assert "\n" not in line
+
+
+def test_what_is_found_takes_the_place_of_the_profile():
+    own, found = profile.load("vlp-16"), recognise(recording("vlp-16").sweeps[0], profile.load()).fitted
+    assert found.sensor.elevation_step_deg == pytest.approx(own.sensor.elevation_step_deg, rel=0.02)
+    assert found.sensor.azimuth_step_deg == pytest.approx(own.sensor.azimuth_step_deg, rel=0.02)
+    assert found.sensor.height_m == pytest.approx(own.sensor.height_m, abs=0.15)
+    assert found.sensor.min_range_m <= found.sensor.height_m
+    assert found.sensor.reflectance == "none"
+    assert found.segmentation.cell_m > profile.load().segmentation.cell_m
+    assert found.fusion == own.fusion  # not those that rest on reflectance
+
+
+def test_another_mount_changes_the_height_alone():
+    own = profile.load()
+    lower = dataclasses.replace(own, sensor=dataclasses.replace(own.sensor, height_m=1.0))
+    found = recognise(recording("hdl-64e").sweeps[0], lower)
+    assert len(found.differences) == 1
+    assert found.fitted.sensor.height_m == pytest.approx(1.73, abs=0.1)
+    assert found.fitted == dataclasses.replace(own, sensor=found.fitted.sensor)
+
+
+def test_few_points_fit_any_profile():
+    points = np.random.default_rng(0).uniform(-20, 20, (500, 4)).astype(np.float32)
+    assert recognise(points, profile.load()).differences == ()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 20_000), st.floats(1e-3, 200.0), st.floats(1e-3, 200.0))
+@settings(max_examples=30)
+def test_any_cloud_is_recognised_or_not_but_no_error(seed, n, reach_m, rise_m):
+    points = np.random.default_rng(seed).normal(0, 1, (n, 4)).astype(np.float32) * [reach_m, reach_m, rise_m, 0]
+    found = recognise(points.astype(np.float32), profile.load())
+    assert found.fitted == profile.load() or found.differences
+
+
+@pytest.mark.kitti
+def test_every_kitti_scan_is_of_the_default(kitti_root):
+    objects, drives = "object/training*/velodyne/*.bin", "raw/*/*/velodyne_points/data/*.bin"
+    scans = [*kitti_root.glob(objects), *kitti_root.glob(drives)]
+    config = profile.load()
+    assert len(scans) > 100
+    assert [s.name for s in scans[::4] if recognise(read_scan(s)[0], config).differences] == []
