@@ -1,18 +1,20 @@
-"""Labelled scans of KITTI (object, raw, odometry) and Argoverse 2 in one form."""
+"""Labelled scans of KITTI (object, raw, odometry), Argoverse 2 and PandaSet in one form, each with its sensor."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from modt import profile
 from modt.classes import CLASSES, ObjectClass, class_of_kitti
+from modt.config import ProfileConfig, SensorConfig
 from modt.evaluation import overlap
-from modt.evaluation.truth import Regions
-from modt.geometry import FieldOfView
+from modt.evaluation.truth import PANDASET_TYPES, Regions, Role
+from modt.geometry import Camera, FieldOfView
 from modt.sources.kitti_calibration import camera_of_raw, camera_of_sequence
 from modt.sources.kitti_labels import DONT_CARE, read_labels, read_tracklets
 from modt.types import Bool, Float32, Float64, Int
@@ -24,10 +26,36 @@ SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.sema
 SEMANTIC_UNKNOWN = (0, 1, 13, 15, 16, 20, 32, 99, 255, 256, 257, 259)
 """Labels without a known class: unlabelled, and vehicles that KITTI's object labels classify differently."""
 ARGOVERSE_CLASS = {"REGULAR_VEHICLE": "Car", "PEDESTRIAN": "Pedestrian", "BICYCLIST": "Cyclist"}
-ARGOVERSE_SENSOR_M = np.array([1.35, 0.0, 1.4], np.float32)
-"""Sensor position in the vehicle frame: at the heads, at the height above the ground of KITTI's sensor."""
-ARGOVERSE_EGO_VEHICLE_M = 2.5
-"""Radius of the returns from the carrying vehicle."""
+ARGOVERSE = ProfileConfig(
+    sensor=SensorConfig(height_m=1.95, min_range_m=2.5, elevation_step_deg=0.33, azimuth_step_deg=0.2)
+)
+"""Two heads of 32 beams, one between the beams of the other."""
+ARGOVERSE_SENSOR_M = np.array([1.35, 0.0, 1.57], np.float32)
+"""Between the heads, in the frame of the vehicle."""
+PANDAR64 = ProfileConfig(
+    sensor=SensorConfig(height_m=2.13, max_range_m=100.0, elevation_step_deg=0.167, azimuth_step_deg=0.2)
+)
+PANDASET_SENSOR_M = {
+    "world-000040": (-30.0, 34.1, 1.79),
+    "world-000070": (-50.0, 59.3, 1.67),
+    "world-000100": (0.57, 0.54, 1.85),
+}
+"""Middle of the circles on the ground in scans that are not in the frame of the vehicle."""
+PANDASET_VEHICLE_SENSOR_M = (0.79, 0.0, 1.85)
+PANDASET_DRIVE = dict.fromkeys(("000000", "world-000040", "world-000070"), "000000")
+"""Scans of one drive, by the sizes of the objects."""
+PANDASET_UNKNOWN = (
+    "Animals - Other", "Emergency Vehicle", "Motorized Scooter", "Other Vehicle - Pedicab", "Personal Mobility Device",
+    "Tram / Subway",
+)  # fmt: skip
+"""Types between the classes."""
+TWO_WHEELERS, RIDDEN_M = ("Bicycle", "Motorcycle", "TYPE_CYCLIST"), 1.5
+"""Cuboids of both parked and ridden ones; these are taller than RIDDEN_M."""
+MIN_FIT = 0.9
+"""Of the scans of `training_more`, found by fitting the labelled boxes."""
+THINNED = {2: "hdl-32e", 4: "vlp-16"}
+"""Every n-th beam of an HDL-64E, segmented as a sensor of as many beams."""
+FULL_SCAN_BEAMS = 64
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
 
@@ -45,6 +73,8 @@ class Scan:
         fov: region with complete labels.
         unlabelled: (N,) points without a label.
         track_ids: of each object, constant over a drive; empty where not labelled.
+        sensor: name of the sensor, by which results are grouped.
+        profile: of the sensor.
     """
 
     name: str
@@ -56,6 +86,30 @@ class Scan:
     fov: FieldOfView
     unlabelled: Bool
     track_ids: tuple[int, ...] = ()
+    sensor: str = profile.DEFAULT
+    profile: ProfileConfig = field(default_factory=profile.load)
+
+    def only(self, kept: Bool) -> Scan:
+        """The scan with the points of a mask (N,) alone."""
+        row = np.cumsum(kept) - 1
+        objects = tuple(row[own[kept[own]]] for own in self.objects)
+        return replace(self, points=self.points[kept], objects=objects, unlabelled=self.unlabelled[kept])
+
+
+def thinned(scan: Scan, step: int) -> Scan:
+    """A scan of an HDL-64E with every step-th beam alone, by the sensor that this would be."""
+    config = profile.load(THINNED[step])
+    sensor = scan.profile.sensor
+    sensor = replace(sensor, elevation_step_deg=step * sensor.elevation_step_deg)
+    name = f"{scan.sensor}, {FULL_SCAN_BEAMS // step} beams"
+    part = scan.only(beams(scan.points) % step == 0)
+    return replace(part, name=f"{scan.name}/{step}", sensor=name, profile=replace(config, sensor=sensor))
+
+
+def beams(points: Float32) -> Int:
+    """(N,) beam of each point of KITTI's scans, which are stored beam by beam: the azimuth jumps back between two."""
+    azimuth = np.arctan2(points[:, 1], points[:, 0]) % (2 * np.pi)
+    return np.append(0, np.cumsum(np.diff(azimuth) < -np.pi))
 
 
 def points_in_box(points: Float32, box: Float64) -> Bool:
@@ -94,19 +148,28 @@ def scan_from_boxes(
 
 
 def object_scans(folder: Path) -> Iterator[Scan]:
-    """Scans of the KITTI object benchmark: folder/velodyne*, folder/label_2, folder/calib."""
+    """Scans of the KITTI object benchmark: folder/velodyne*, folder/label_2, folder/calib.
+
+    Where folder/INDEX.tsv states the fit of a scan to its labels, poor ones are left out.
+    """
     table = folder.parent / "training_all_labels" / "frame_to_raw.tsv"
-    rows = (line.split("\t") for line in table.read_text(encoding="utf-8").splitlines())
-    drive_of = {row[0]: row[2] for row in rows}
+    drive_of = {row[0]: row[2] for row in _rows(table)}
+    index = folder / "INDEX.tsv"
+    poor = {row[0] for row in _rows(index)[1:] if float(row[3]) < MIN_FIT} if index.exists() else set()
     for path in sorted(folder.glob("velodyne*/*.bin"), key=lambda p: p.stem):
         drive = drive_of[path.stem]
         assert drive != TEST_DRIVE, path
-        yield object_scan(path, folder / "label_2" / f"{path.stem}.txt", folder / "calib" / f"{path.stem}.txt", drive)
+        if path.stem not in poor:
+            camera = camera_of_sequence(folder / "calib" / f"{path.stem}.txt")
+            yield object_scan(path, folder / "label_2" / f"{path.stem}.txt", camera, drive)
 
 
-def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
+def _rows(table: Path) -> list[list[str]]:
+    return [line.split("\t") for line in table.read_text(encoding="utf-8").splitlines()]
+
+
+def object_scan(path: Path, label: Path, camera: Camera, drive: str) -> Scan:
     """One scan of the object benchmark."""
-    camera = camera_of_sequence(calib)
     points = np.fromfile(path, np.float32).reshape(-1, 4)
     labels = read_labels(label, camera, tracking=False)
     objects = [item for item in labels if item.type_ != DONT_CARE]
@@ -152,23 +215,62 @@ def semantic_scans(folder: Path) -> Iterator[Scan]:
 
 
 def argoverse_scans(folder: Path) -> Iterator[Scan]:
-    """Sweeps of Argoverse 2 (two heads of 32 beams), labelled over the full circle: folder/*.npz, folder/*.csv.
-
-    Their origin, the rear axle, is moved to ARGOVERSE_SENSOR_M.
-    """
+    """Sweeps of Argoverse 2, labelled over the full circle: folder/*.npz, folder/*.csv."""
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as file:
             points = file["points"].astype(np.float32)
         points[:, :3] -= ARGOVERSE_SENSOR_M
-        points[:, 3] = 0.0  # on another scale
-        points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_EGO_VEHICLE_M]
         with path.with_suffix(".csv").open(encoding="utf-8") as rows:
             objects = [row for row in csv.DictReader(rows) if int(row["points"]) > 0]
         columns = ("x_m", "y_m", "z_centre_m", "length_m", "width_m", "height_m", "yaw_rad")
-        boxes = np.array([[float(row[c]) for c in columns] for row in objects])
+        boxes = on_bottom(np.array([[float(row[c]) for c in columns] for row in objects]))
         boxes[:, :3] -= ARGOVERSE_SENSOR_M
-        boxes[:, 2] -= boxes[:, 5] / 2
         kinds = [ARGOVERSE_CLASS.get(row["category"], "") for row in objects]
         drive = f"argoverse2/{path.stem.split('_')[0]}"
         none = np.zeros(len(points), np.bool_)
-        yield scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
+        scan = scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
+        yield replace(scan, sensor="argoverse2", profile=ARGOVERSE)
+
+
+def pandaset_scans(folder: Path) -> Iterator[Scan]:
+    """Scans of PandaSet, labelled over the full circle: folder/scans/*.bin, folder/*.csv.
+
+    Types between the classes, such as lorries, count as unlabelled.
+    """
+    for path in sorted((folder / "scans").glob("*.bin")):
+        position = np.array(PANDASET_SENSOR_M.get(path.stem, PANDASET_VEHICLE_SENSOR_M), np.float32)
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        points[:, :3] -= position
+        with (folder / f"{path.stem}.csv").open(encoding="utf-8") as rows:
+            cuboids = list(csv.DictReader(rows))
+        columns = ("x", "y", "z", "length", "width", "height", "yaw")
+        boxes = on_bottom(np.array([[float(row[c]) for c in columns] for row in cuboids]))
+        boxes[:, :3] -= position
+        kinds = [_pandaset_class(row["class"], float(row["height"])) for row in cuboids]
+        objects = [np.flatnonzero(points_in_box(points, box)) for box in boxes]
+        known = [k for k, kind in enumerate(kinds) if kind is not None]
+        unlabelled = np.zeros(len(points), np.bool_)
+        for own, kind in zip(objects, kinds, strict=True):
+            unlabelled[own] |= kind is None
+        yield Scan(
+            name=f"pandaset/{path.stem}",
+            drive=f"pandaset/{PANDASET_DRIVE.get(path.stem, path.stem)}",
+            points=points,
+            objects=tuple(objects[k] for k in known),
+            kinds=tuple(kind for kind in kinds if kind is not None),
+            boxes=boxes[known],
+            fov=FieldOfView(),
+            unlabelled=unlabelled,
+            sensor="pandar64",
+            profile=PANDAR64,
+        )
+
+
+def _pandaset_class(name: str, height_m: float) -> ObjectClass | None:
+    """Class of a cuboid; None between the classes."""
+    if name in TWO_WHEELERS:
+        return ObjectClass.CYCLIST if height_m > RIDDEN_M else ObjectClass.BACKGROUND
+    if not name.startswith("TYPE_"):
+        name = name.replace("_", " ")  # the tables differ
+    object_class, role = PANDASET_TYPES.get(name, (ObjectClass.BACKGROUND, Role.COUNTED))
+    return None if role != Role.COUNTED or name in PANDASET_UNKNOWN else object_class

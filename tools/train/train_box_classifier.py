@@ -20,7 +20,7 @@ from modt.classification.mlp import Layers, logits
 from modt.evaluation.class_score import average_precision
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
-from tools.train.augment import Beams, augment, subsample
+from tools.train.augment import augment, subsample
 from tools.train.batches import draw_batch, sampling_pools
 from tools.train.box_features import crop_features, dataset_features
 from tools.train.dataset import Dataset, load
@@ -44,8 +44,8 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
 
     def batch() -> Batch:
         chosen = np.concatenate([draw_batch(pools, rng), draw_batch(pools, rng)])
-        crops = augment(subsample(data.take(chosen), MAX_POINTS, rng), Beams(), rng)
-        return Batch(crop_features(crops), data.label[chosen])
+        crops = subsample(data.take(chosen), MAX_POINTS, rng)
+        return Batch(crop_features(*augment(crops, data.sensors.take(chosen), rng)), data.label[chosen])
 
     return train_mlp(batch, sample, steps, rate=1e-2, decay=1e-3)
 

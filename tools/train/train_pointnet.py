@@ -28,9 +28,9 @@ from modt.evaluation.class_score import average_precision, confusion, top_calibr
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier, train_reflectance_classifier
-from tools.train.augment import Beams, augment, subsample
+from tools.train.augment import augment, subsample
 from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
-from tools.train.dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
+from tools.train.dataset import UNLABELLED, Dataset, Sensors, load
 from tools.train.distillation import EnsembleTargets, LabelTargets, TargetSource
 from tools.train.held_out import HeldOut, Model, out_of_fold
 from tools.train.network import PointNet
@@ -43,23 +43,23 @@ UNLABELLED_BATCH_SIZE = 102
 """Unlabelled crops of a step, with teachers."""
 
 
-def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
+def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]:
     """Input of the network: (K, 3) canonical points, crop after crop, and (R,) points of each crop."""
-    local = canonical(crops, SENSOR_HEIGHT_M)
+    local = canonical(crops, sensors.height_m)
     return torch.from_numpy(local.xyz), torch.from_numpy(local.count)
 
 
 def train(
-    data: Dataset, rows: Int, steps: int, seed: int, state: Path | None, source: TargetSource
+    data: Dataset, trainable: Int, steps: int, seed: int, state: Path | None, source: TargetSource
 ) -> tuple[PointNet, list[float]]:
-    """Train on rows of the data set, resuming from the file `state`; the network and its loss, mean of 50 steps."""
+    """Train on rows `trainable`, resuming from the file `state`; the network and its loss, mean of 50 steps."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     net = PointNet()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
     criterion = torch.nn.CrossEntropyLoss()
-    pools = sampling_pools(data, rows)
+    pools = sampling_pools(data, trainable)
     losses: list[float] = []
     first = 0
     if state is not None and state.exists():
@@ -74,8 +74,9 @@ def train(
     for step in range(first, steps):
         labelled = draw_batch(pools, rng)
         unlabelled = source.draw_unlabelled(rng)
-        crops = subsample(data.take(np.append(labelled, unlabelled)), MAX_POINTS, rng)
-        batch = tensors(subsample(augment(crops, Beams(), rng), POINTS, rng))
+        rows = np.append(labelled, unlabelled)
+        crops, sensors = augment(subsample(data.take(rows), MAX_POINTS, rng), data.sensors.take(rows), rng)
+        batch = tensors(subsample(crops, POINTS, rng), sensors)
         loss = criterion(net(*batch), source.targets(*batch, data.label[labelled], unlabelled))
         optimiser.zero_grad()
         loss.backward()
@@ -141,7 +142,7 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     """(R, 4) of rows of the data set, without augmentation."""
     rng = np.random.default_rng(0)
     parts = np.split(rows, np.arange(BATCH_SIZE, len(rows), BATCH_SIZE))
-    out: Float64 = torch.cat([net(*tensors(subsample(data.take(p), POINTS, rng))) for p in parts]).double().numpy()
+    out: Float64 = torch.cat([net(*tensors(subsample(data.take(p), POINTS, rng), data.sensors.take(p))) for p in parts]).double().numpy()
     return out
 
 

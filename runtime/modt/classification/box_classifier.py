@@ -55,7 +55,9 @@ def beam_solid_angle_sr(azimuth_step_deg: float, elevation_step_deg: float) -> f
     return float(np.deg2rad(azimuth_step_deg) * np.deg2rad(elevation_step_deg))
 
 
-def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: float) -> Float64:
+def box_features(
+    count: Int, box: Float64, sensor_height_m: float | Float64, beam_sr: float | Float64
+) -> Float64:
     """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
 
     The area in place of the number of points makes the features independent of the sensor's resolution.
@@ -63,8 +65,8 @@ def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: floa
     Args:
         count: (P,) points.
         box: (P, 7) sensor frame.
-        sensor_height_m: of the sensor above the ground.
-        beam_sr: solid angle of one point [sr].
+        sensor_height_m: of the sensor above the ground, one for all or (P,).
+        beam_sr: solid angle of one point [sr], one for all or (P,).
     """
     distance = np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
     foot = box[:, 2] - box[:, 5] / 2 + sensor_height_m
