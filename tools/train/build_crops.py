@@ -123,8 +123,8 @@ class CropWriter:
         stage = dataclasses.replace(stage, cell_m=stage.cell_m * scale)
         proposals = Segmenter(stage, sensor, scan.fov).segment(scan.points)
         labels = label(scan, proposals)
-        objects = (labels.kind > 0) & ~labels.partial
-        of_interest = {PASTED: objects, UNLABELLED: labels.unknown & (labels.kind == 0) & ~labels.partial}
+        whole = (labels.kind > 0) & ~labels.partial
+        of_interest = {PASTED: whole, UNLABELLED: labels.unknown & (labels.kind == 0) & ~labels.partial}
         kept = np.flatnonzero(of_interest.get(variant, np.ones(len(proposals), np.bool_)))
         crops = gather(scan.points, proposals, kept, MAX_POINTS)
         n = len(kept)
@@ -138,7 +138,11 @@ class CropWriter:
             kinds, points = np.array(scan.kinds, np.int64), points_in_view(scan)
             objects = np.flatnonzero((kinds > ObjectClass.BACKGROUND) & (points >= MIN_DETECTABLE_POINTS))
             own = labels.whole[objects]
-            truth = {"label": kinds[objects], "points": points[objects], "row": np.where(own < 0, own, own + self.rows)}
+            truth = {
+                "label": kinds[objects],
+                "points": points[objects],
+                "row": np.where(own < 0, own, own + self.rows),
+            }
             truth |= {key: np.full(len(objects), getattr(scan, key)) for key in ("drive", "sensor")}
             row |= {f"truth_{key}": value for key, value in truth.items()}
         for key, value in row.items():

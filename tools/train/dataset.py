@@ -132,7 +132,7 @@ def load(*paths: Path) -> Dataset:
     drive, drive_of_truth, _ = _numbers(joined["drive"], joined["truth_drive"])
     sensor, sensor_of_truth, names = _numbers(joined["sensor"], joined["truth_sensor"])
     first = np.cumsum([0, *(len(part["label"]) for part in parts)])
-    own = [np.where(part["truth_row"] == NONE, NONE, part["truth_row"] + n) for part, n in zip(parts, first)]
+    row = [np.where(p["truth_row"] == NONE, NONE, p["truth_row"] + n) for p, n in zip(parts, first, strict=False)]
     return Dataset(
         crops=Crops(joined["xyz"], np.append(0, np.cumsum(count))),
         sensors=Sensors(joined["height_m"], joined["azimuth_deg"], joined["elevation_deg"]),
@@ -150,7 +150,7 @@ def load(*paths: Path) -> Dataset:
             joined["truth_points"],
             drive_of_truth,
             sensor_of_truth,
-            np.concatenate(own).astype(np.int64),
+            np.concatenate(row).astype(np.int64),
         ),
         sensor_names=names,
         provenance=[json.loads(str(part["provenance"])) for part in parts],

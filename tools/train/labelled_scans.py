@@ -45,8 +45,8 @@ PANDASET_VEHICLE_SENSOR_M = (0.79, 0.0, 1.85)
 PANDASET_DRIVE = dict.fromkeys(("000000", "world-000040", "world-000070"), "000000")
 """Scans of one drive, by the sizes of the objects."""
 PANDASET_UNKNOWN = (
-    "Animals - Other", "Emergency Vehicle", "Motorized Scooter", "Other Vehicle - Pedicab", "Personal Mobility Device",
-    "Tram / Subway",
+    "Animals - Other", "Emergency Vehicle", "Motorized Scooter", "Other Vehicle - Pedicab",
+    "Personal Mobility Device", "Tram / Subway",
 )  # fmt: skip
 """Types between the classes."""
 TWO_WHEELERS, RIDDEN_M = ("Bicycle", "Motorcycle", "TYPE_CYCLIST"), 1.5

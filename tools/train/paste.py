@@ -91,7 +91,9 @@ def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generat
             )
 
 
-def _place(cut: ObjectCut, scene: Float32, sensor: SensorConfig, rng: Generator) -> tuple[Float32, Float64, Bool] | None:
+def _place(
+    cut: ObjectCut, scene: Float32, sensor: SensorConfig, rng: Generator
+) -> tuple[Float32, Float64, Bool] | None:
     """Points and box at a random free place, and a mask of the scene points occluded there; None if not possible."""
     angle = rng.uniform(-np.pi, np.pi)
     rho = float(np.hypot(*cut.box[:2]))

@@ -55,9 +55,7 @@ def beam_solid_angle_sr(azimuth_step_deg: float, elevation_step_deg: float) -> f
     return float(np.deg2rad(azimuth_step_deg) * np.deg2rad(elevation_step_deg))
 
 
-def box_features(
-    count: Int, box: Float64, sensor_height_m: float | Float64, beam_sr: float | Float64
-) -> Float64:
+def box_features(count: Int, box: Float64, sensor_height_m: float | Float64, beam_sr: float | Float64) -> Float64:
     """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
 
     The area in place of the number of points makes the features independent of the sensor's resolution.

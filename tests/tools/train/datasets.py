@@ -8,19 +8,29 @@ import numpy as np
 
 from modt.classes import ObjectClass
 from modt.classification.crops import Crops
+from modt.config import SensorConfig
 from modt.geometry import FieldOfView
-from modt.types import N_REFLECTANCE, Bool, Float32, Int
-from tools.train.dataset import Dataset
+from modt.types import N_REFLECTANCE, NONE, Bool, Float32, Int
+from tools.train.dataset import Dataset, LabelledObjects, Sensors
 from tools.train.labelled_scans import Scan
 
 
 def data_of(crops: Crops, label: Int, **columns: Any) -> Dataset:
     """Crops of one real drive, whole and without reflectance, except for the columns given."""
     n = len(crops)
-    false, zero, empty = np.zeros(n, np.bool_), np.zeros(n, np.int64), np.zeros(0, np.int64)
-    table: dict[str, Any] = {"partial": false, "unknown": false, "tall": false, "variant": zero, "drive": zero}
-    table |= {"reflectance": np.full((n, N_REFLECTANCE), np.nan), "truth_label": empty, "truth_drive": empty}
-    return Dataset(crops, label, **(table | {"provenance": [], "sha256": []} | columns))
+    false, zero = np.zeros(n, np.bool_), np.zeros(n, np.int64)
+    table: dict[str, Any] = {"sensors": Sensors.of(SensorConfig(), n), "owner": label}
+    table |= {"partial": false, "unknown": false, "tall": false, "variant": zero, "drive": zero, "sensor": zero}
+    table |= {"reflectance": np.full((n, N_REFLECTANCE), np.nan), "truth": truth_of(zero[:0], zero[:0])}
+    table |= {"sensor_names": ("hdl-64e",), "provenance": [], "sha256": []}
+    return Dataset(crops, label=label, **(table | columns))
+
+
+def truth_of(label: Int, drive: Int, **columns: Any) -> LabelledObjects:
+    """Objects of 30 points of one sensor, without crops, except for the columns given."""
+    n = len(label)
+    table: dict[str, Any] = {"points": np.full(n, 30), "sensor": np.zeros(n, np.int64), "row": np.full(n, NONE)}
+    return LabelledObjects(label=label, drive=drive, **(table | columns))
 
 
 def scan_of(points: Float32, objects: list[Int], kinds: list[ObjectClass], unlabelled: Bool) -> Scan:
