@@ -1,6 +1,6 @@
 """Build a data set of crops from real scans: proposals of the segmentation, labelled by overlap with objects.
 
-    python -m tools.train.build_crops OUT.npz --kitti ROOT [--paste N]
+    python -m tools.train.build_crops OUT.npz [--kitti ROOT [--paste N]] [--scans FOLDER --profile PROFILE]
 
 A proposal takes the class of an object if they share more than half of the points of each. Fragments and merged
 objects are marked partial, proposals outside the annotated regions unknown. Neither is used for training; unknown
@@ -14,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from argparse import ArgumentParser
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,7 @@ from typing import Any
 import numpy as np
 
 import modt
+from modt import profile
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.crops import gather
 from modt.geometry import FieldOfView
@@ -33,6 +35,7 @@ from tools.train.labelled_scans import (
     THINNED,
     Scan,
     argoverse_scans,
+    folder_scans,
     object_scans,
     pandaset_scans,
     raw_scans,
@@ -206,13 +209,26 @@ def add_kitti(writer: CropWriter, root: Path, pastes: int, seed: int) -> None:
             writer.add(made, PASTED)
 
 
+def add_sources(parser: ArgumentParser) -> None:
+    """Add the options that name labelled scans."""
+    parser.add_argument("--kitti", type=Path, help="KITTI root, with argoverse2/ and pandaset/ beside object/")
+    parser.add_argument(
+        "--scans", type=Path, help="your own scans: velodyne/, label_2/ and, for a camera's view, calib/"
+    )
+    parser.add_argument("--profile", default=profile.DEFAULT, help="of their sensor")
+
+
 def main() -> None:
     parser = crops_parser(__doc__, seed=0)
-    parser.add_argument("--kitti", type=Path, required=True, help="KITTI root")
-    parser.add_argument("--paste", type=int, default=0, help="pasting attempts in each real scan")
+    add_sources(parser)
+    parser.add_argument("--paste", type=int, default=0, help="pasting attempts in each scan of KITTI")
     args = parser.parse_args()
     writer = CropWriter()
-    add_kitti(writer, args.kitti, args.paste, args.seed)
+    if args.kitti:
+        add_kitti(writer, args.kitti, args.paste, args.seed)
+    if args.scans:
+        for scan in folder_scans(args.scans, Path(args.profile).stem, profile.load(args.profile)):
+            add_labelled(writer, scan)
     print(json.dumps(writer.save(args.out, {"paste": args.paste, "seed": args.seed})))
 
 

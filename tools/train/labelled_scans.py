@@ -12,6 +12,7 @@ import numpy as np
 from modt import profile
 from modt.classes import CLASSES, ObjectClass, class_of_kitti
 from modt.config import ProfileConfig, SensorConfig
+from modt.errors import MisuseError
 from modt.evaluation import overlap
 from modt.evaluation.truth import PANDASET_TYPES, Regions, Role
 from modt.geometry import Camera, FieldOfView
@@ -56,6 +57,8 @@ MIN_FIT = 0.9
 THINNED = {2: "hdl-32e", 4: "vlp-16"}
 """Every n-th beam of an HDL-64E, segmented as a sensor of as many beams."""
 FULL_SCAN_BEAMS = 64
+AT_SENSOR = Camera(np.eye(3, 4), np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]), 1.0, 1.0)
+"""Axes of a camera at the sensor."""
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
 
@@ -177,6 +180,37 @@ def object_scan(path: Path, label: Path, camera: Camera, drive: str) -> Scan:
     unlabelled = Regions(edges, camera).contains(points)
     boxes, kinds = [on_bottom(item.box).tolist() for item in objects], [item.type_ for item in objects]
     return scan_from_boxes(path.stem, drive, points, boxes, kinds, FieldOfView.of_camera(camera), unlabelled)
+
+
+def folder_scans(folder: Path, sensor: str, config: ProfileConfig) -> Iterator[Scan]:
+    """Scans in the layout of the KITTI object benchmark: folder/velodyne/*.bin, folder/label_2, folder/calib.
+
+    Without calib/ the labels are complete over the full circle, in a camera frame at the sensor (x right, y down, z
+    forward). Scans named DRIVE_NUMBER are of one drive.
+
+    Args:
+        folder: of the scans.
+        sensor: its name.
+        config: its profile.
+
+    Raises:
+        MisuseError: no scans, or a label or calibration file is missing or invalid.
+    """
+    paths = sorted((folder / "velodyne").glob("*.bin"))
+    if not paths:
+        raise MisuseError(folder, "no scans", "give a folder with velodyne/*.bin and label_2/*.txt")
+    for path in paths:
+        label, calib = folder / "label_2" / f"{path.stem}.txt", folder / "calib" / f"{path.stem}.txt"
+        drive = path.stem.rpartition("_")[0] or path.stem
+        if calib.parent.is_dir():
+            scan = object_scan(path, label, camera_of_sequence(calib), drive)
+        else:
+            points = np.fromfile(path, np.float32).reshape(-1, 4)
+            labels = [item for item in read_labels(label, AT_SENSOR, tracking=False) if item.type_ != DONT_CARE]
+            boxes, kinds = [on_bottom(item.box).tolist() for item in labels], [item.type_ for item in labels]
+            none = np.zeros(len(points), np.bool_)
+            scan = scan_from_boxes(path.stem, drive, points, boxes, kinds, FieldOfView(), none)
+        yield replace(scan, sensor=sensor, profile=config)
 
 
 def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
