@@ -3,9 +3,9 @@
     python -m tools.train.build_models WORK_DIR [--kitti ROOT] [--scans FOLDER --profile PROFILE]
 
 Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/pointnet-kitti. With --scans it builds
-WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data. Scans have
-the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the validation. Without
-calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z forward).
+WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data. The scans
+have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the validation.
+Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z forward).
 Interrupted training resumes.
 """
 
@@ -23,16 +23,16 @@ SENSOR = "hdl-64e"
 """Sensor that measured the reflectance of the crops."""
 WORLDS, PASTES = 120, 60
 KITTI_DATA = (
-    "106 + 2 and 49 more object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR "
-    "2013; SemanticKITTI labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 sweeps "
-    "of Argoverse 2 (B. Wilson et al., 2021) and 9 scans of PandaSet (Hesai and Scale AI, CC BY 4.0), as our "
+    "106 + 2 and 53 more object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR "
+    "2013; SemanticKITTI labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 "
+    "sweeps of Argoverse 2 (B. Wilson et al., 2021) and 9 scans of PandaSet (Hesai and Scale AI, CC BY 4.0), as our "
     "segmentation cuts them up, including the part of KITTI's outside the camera view, KITTI's objects pasted into "
     "other scans and moved to other ranges, and the synthetic world, part of it with objects placed by KITTI's label "
     "files; nothing of drive 0005"
 )
 SYNTHETIC_DATA = (
-    "the synthetic world alone, by every simulated sensor: no recordings; the reflectance of its materials is matched "
-    "to KITTI's object frames"
+    "the synthetic world alone, by every simulated sensor: no recordings; the reflectance of its materials is "
+    "matched to KITTI's object frames"
 )
 KITTI_LICENCE = "CC BY-NC-SA 3.0, as its data: not for commercial use"
 

@@ -52,8 +52,8 @@ PANDASET_UNKNOWN = (
 """Types between the classes."""
 TWO_WHEELERS, RIDDEN_M = ("Bicycle", "Motorcycle", "TYPE_CYCLIST"), 1.5
 """Cuboids of both parked and ridden ones; these are taller than RIDDEN_M."""
-MIN_FIT = 0.9
-"""Of the scans of `training_more`, found by fitting the labelled boxes."""
+MISMATCHED = ("002894",)
+"""Scans of `training_more` that are not those of their labels: boxes in plain view are empty, cars have no box."""
 THINNED = {2: "hdl-32e", 4: "vlp-16"}
 """Every n-th beam of an HDL-64E, segmented as a sensor of as many beams."""
 FULL_SCAN_BEAMS = 64
@@ -151,24 +151,16 @@ def scan_from_boxes(
 
 
 def object_scans(folder: Path) -> Iterator[Scan]:
-    """Scans of the KITTI object benchmark: folder/velodyne*, folder/label_2, folder/calib.
-
-    Where folder/INDEX.tsv states the fit of a scan to its labels, poor ones are left out.
-    """
+    """Scans of the KITTI object benchmark: folder/velodyne*, folder/label_2, folder/calib."""
     table = folder.parent / "training_all_labels" / "frame_to_raw.tsv"
-    drive_of = {row[0]: row[2] for row in _rows(table)}
-    index = folder / "INDEX.tsv"
-    poor = {row[0] for row in _rows(index)[1:] if float(row[3]) < MIN_FIT} if index.exists() else set()
+    rows = (line.split("\t") for line in table.read_text(encoding="utf-8").splitlines())
+    drive_of = {row[0]: row[2] for row in rows}
     for path in sorted(folder.glob("velodyne*/*.bin"), key=lambda p: p.stem):
         drive = drive_of[path.stem]
         assert drive != TEST_DRIVE, path
-        if path.stem not in poor:
+        if path.stem not in MISMATCHED:
             camera = camera_of_sequence(folder / "calib" / f"{path.stem}.txt")
             yield object_scan(path, folder / "label_2" / f"{path.stem}.txt", camera, drive)
-
-
-def _rows(table: Path) -> list[list[str]]:
-    return [line.split("\t") for line in table.read_text(encoding="utf-8").splitlines()]
 
 
 def object_scan(path: Path, label: Path, camera: Camera, drive: str) -> Scan:
