@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.random import Generator
 from scipy.optimize import minimize_scalar
 from scipy.special import log_softmax
 
@@ -23,7 +24,7 @@ from modt.classification.mlp import Layers, logits
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train.augment import augment, subsample
-from tools.train.batches import draw_batch, sampling_pools
+from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
 from tools.train.box_features import crop_features, dataset_features
 from tools.train.dataset import Dataset, load
 from tools.train.held_out import Model, load_network, out_of_fold
@@ -32,7 +33,8 @@ from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
 
-STEPS = 1000
+STEPS, AUGMENTED_BATCHES = 2000, 250
+"""Of the training, and batches that are augmented for it: augmentation costs more than a step."""
 MAX_POINTS = 400
 """Maximum number of points of a crop before augmentation."""
 THRESHOLDS = (0.005, 0.01, 0.02, 0.05, 0.1)
@@ -43,14 +45,21 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     pools = sampling_pools(data, rows)
-    sample = dataset_features(data, np.concatenate([draw_batch(pools, rng) for _ in range(16)]))
+    drawn = [draw_batch(pools, rng) for _ in range(AUGMENTED_BATCHES)]
+    feature = np.concatenate([_augmented_features(data, own, rng) for own in drawn])
+    label = data.label[np.concatenate(drawn)]
 
     def batch() -> Batch:
-        chosen = np.concatenate([draw_batch(pools, rng), draw_batch(pools, rng)])
-        crops = subsample(data.take(chosen), MAX_POINTS, rng)
-        return Batch(crop_features(*augment(crops, data.sensors.take(chosen), rng)), data.label[chosen])
+        chosen = rng.integers(0, len(label), 2 * BATCH_SIZE)
+        return Batch(feature[chosen], label[chosen])
 
-    return train_mlp(batch, sample, steps, rate=1e-2, decay=1e-3)
+    return train_mlp(batch, feature, steps, rate=1e-2, decay=1e-3)
+
+
+def _augmented_features(data: Dataset, rows: Int, rng: Generator) -> Float64:
+    """(R, 7) features of rows of the data set, augmented."""
+    crops = subsample(data.take(rows), MAX_POINTS, rng)
+    return crop_features(*augment(crops, data.sensors.take(rows), rng))
 
 
 def cross_validate(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modt.classes import ObjectClass
+from modt.classes import CLASSES, ObjectClass
 from modt.classification.crops import Crops
 from modt.config import SensorConfig
 from modt.geometry import FieldOfView
@@ -37,3 +39,18 @@ def scan_of(points: Float32, objects: list[Int], kinds: list[ObjectClass], unlab
     """A scan over the full circle whose objects have no boxes."""
     boxes = np.full((len(objects), 7), np.nan)
     return Scan("scan", "drive", points, tuple(objects), tuple(kinds), boxes, FieldOfView(), unlabelled)
+
+
+def write_folder(folder: Path, scans: Iterable[Scan]) -> None:
+    """Write scans as DRIVE_NUMBER in KITTI's object layout, without calibration."""
+    for name in ("velodyne", "label_2"):
+        (folder / name).mkdir(parents=True)
+    for number, scan in enumerate(scans):
+        stem = f"{scan.drive}_{number:06d}"
+        scan.points.tofile(folder / "velodyne" / f"{stem}.bin")
+        lines = [
+            f"{CLASSES[kind].kitti[0]} 0 0 0 0 0 1 1 {h} {w} {length} {-y} {-z} {x} {-yaw - np.pi / 2}\n"
+            for kind, (x, y, z, length, w, h, yaw) in zip(scan.kinds, scan.boxes.tolist(), strict=True)
+            if kind
+        ]
+        (folder / "label_2" / f"{stem}.txt").write_text("".join(lines), encoding="utf-8")

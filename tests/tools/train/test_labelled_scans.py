@@ -5,11 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from modt.classes import ObjectClass
 from modt.config import SensorConfig
-from tests.tools.train.datasets import scan_of
-from tools.train.labelled_scans import argoverse_scans, beams, pandaset_scans, points_in_box, thinned
+from modt.errors import MisuseError
+from modt.sources.synthetic_stream import K
+from tests.tools.train.datasets import scan_of, write_folder
+from tools.train.labelled_scans import (
+    AT_SENSOR,
+    argoverse_scans,
+    beams,
+    folder_scans,
+    pandaset_scans,
+    points_in_box,
+    thinned,
+)
+from tools.train.synthetic_scans import simulated_scans
 
 
 def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path: Path) -> None:
@@ -69,3 +81,41 @@ def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole() -> 
     assert scan.unlabelled.sum() == 5
     assert scan.profile.sensor.elevation_step_deg == 2 * SensorConfig().elevation_step_deg
     assert scan.sensor == "hdl-64e, 32 beams"
+
+
+def test_scans_in_a_folder_are_those_that_were_written(tmp_path: Path) -> None:
+    made = list(simulated_scans(["street"], [3], [0.0, 0.5], camera=False, sensors=["vlp-16"]))
+    write_folder(tmp_path, made)
+    found = list(folder_scans(tmp_path, "mine", made[0].profile))
+    assert [scan.drive for scan in found] == ["street-3", "street-3"]
+    for scan, original in zip(found, made, strict=True):
+        assert (scan.sensor, scan.profile) == ("mine", original.profile)
+        assert (scan.points == original.points).all()
+        assert scan.fov.full
+        shown = [k for k, kind in enumerate(original.kinds) if kind]
+        assert scan.kinds == tuple(original.kinds[k] for k in shown)
+        off = scan.boxes - original.boxes[shown]
+        off[:, 6] = np.sin(off[:, 6] / 2)
+        assert np.abs(off).max() < 0.01
+    with pytest.raises(MisuseError, match="no scans"):
+        next(folder_scans(tmp_path / "label_2", "mine", made[0].profile))
+    (tmp_path / "label_2" / "street-3_000001.txt").unlink()
+    with pytest.raises(MisuseError, match="street-3_000001"):
+        list(folder_scans(tmp_path, "mine", made[0].profile))
+
+
+def test_the_calibration_of_a_folder_states_where_labels_are_complete(tmp_path: Path) -> None:
+    (scan,) = simulated_scans(["street"], [3], [0.0], camera=True, sensors=["vlp-16"])
+    write_folder(tmp_path, [scan])
+    (tmp_path / "calib").mkdir()
+    lines = {
+        "P2": np.c_[K[:, :3], np.zeros(3)],
+        "R0_rect": np.eye(3),
+        "Tr_velo_to_cam": AT_SENSOR.T_camera_sensor[:3],
+    }
+    text = "".join(f"{key}: {' '.join(map(str, value.ravel()))}\n" for key, value in lines.items())
+    (tmp_path / "calib" / "street-3_000000.txt").write_text(text)
+    (found,) = folder_scans(tmp_path, "mine", scan.profile)
+    seen = found.fov.contains(found.points)
+    assert 0.1 < seen.mean() < 0.4
+    assert (found.unlabelled == ~seen).all()
