@@ -54,12 +54,22 @@ def cut_objects(scans: Iterable[Scan]) -> list[ObjectCut]:
 
 
 def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generator) -> Iterator[Scan]:
-    """A scan with pasted objects for each source drive, the other points unlabelled; at most `attempts` objects."""
+    """A scan with pasted objects for each of a few source drives, the other points unlabelled.
+
+    Args:
+        scan: to paste into.
+        cuts: objects, of any drive.
+        attempts: number of objects that are tried.
+        rng: of the choice of drives, objects and places.
+    """
     by_class = {kind: [cut for cut in cuts if cut.kind == kind] for kind in CLASS_SHARE}
+    sources = {rng.choice(sorted({cut.drive for cut in same})).item() for same in by_class.values() if same}
     by_drive: dict[str, list[ObjectCut]] = {}
     for kind in rng.choice(list(CLASS_SHARE), attempts, p=list(CLASS_SHARE.values())):
-        cut = by_class[ObjectClass(kind)][rng.integers(len(by_class[ObjectClass(kind)]))]
-        by_drive.setdefault(cut.drive, []).append(cut)
+        candidates = [cut for cut in by_class[ObjectClass(kind)] if cut.drive in sources]
+        if candidates:
+            cut = candidates[rng.integers(len(candidates))]
+            by_drive.setdefault(cut.drive, []).append(cut)
     for drive, chosen in by_drive.items():
         points, boxes, kinds = scan.points, [], []
         objects: list[Int] = []
