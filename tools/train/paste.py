@@ -125,16 +125,28 @@ def _place(
     if factor > 1.03:
         _, first = np.unique(cells, return_index=True)
         points, cells = points[first], cells[first]
-    scene_cells = _cells(scene, sensor)
-    distance, scene_distance = np.linalg.norm(points[:, :3], axis=1), np.linalg.norm(scene[:, :3], axis=1)
+    sector = np.flatnonzero(_around(scene, points))
+    beside = scene[sector]
+    scene_cells = _cells(beside, sensor)
+    distance, scene_distance = np.linalg.norm(points[:, :3], axis=1), np.linalg.norm(beside[:, :3], axis=1)
     front = np.flatnonzero((scene_distance < distance.min() - OCCLUSION_MARGIN_M) & (scene_distance > 2.0))
     visible = ~np.isin(cells, _dilate(scene_cells[front]))
     points, cells = points[visible], cells[visible]
     if visible.sum() < max(MIN_POINTS, 0.2 * len(visible)):
         return None
-    hidden = np.isin(scene_cells, _dilate(cells)) & (scene_distance > distance.mean())
+    hidden = np.zeros(len(scene), np.bool_)
+    hidden[sector] = np.isin(scene_cells, _dilate(cells)) & (scene_distance > distance.mean())
     box = np.array([*target, ground, *cut.box[3:6], cut.box[6] + angle])
     return points, box, hidden
+
+
+def _around(scene: Float32, points: Float32) -> Bool:
+    """(N,) points of the scene in the directions of the points of an object, with a margin."""
+    bearing = points[:, :2] / np.hypot(points[:, 0], points[:, 1])[:, None]
+    middle = bearing.mean(axis=0) / np.linalg.norm(bearing.mean(axis=0))
+    cos_half = np.cos(np.arccos(np.clip(bearing @ middle, -1.0, 1.0)).max() + np.deg2rad(1.0))
+    within: Bool = scene[:, :2] @ middle > cos_half * np.hypot(scene[:, 0], scene[:, 1])
+    return within
 
 
 def _cells(points: Float32, sensor: SensorConfig) -> Int:
