@@ -5,8 +5,6 @@ from __future__ import annotations
 from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from pathlib import Path
 
-from modt import profile
-
 
 def parser(description: str | None) -> ArgumentParser:
     """A parser whose description is the module's docstring, line breaks kept."""
@@ -17,7 +15,6 @@ def crops_parser(description: str | None, seed: int) -> ArgumentParser:
     """Options of a tool that writes a data set of crops."""
     options = parser(description)
     options.add_argument("out", type=Path, help="file to write (.npz)")
-    options.add_argument("--profile", default=profile.DEFAULT)
     options.add_argument("--seed", type=int, default=seed)
     return options
 

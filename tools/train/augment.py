@@ -1,4 +1,4 @@
-"""Augmentation of crops: range, sensor resolution, occlusion, size, heading, slope, dropped returns.
+"""Augmentation of crops: range, resolution of the sensor, occlusion, size, heading, slope, dropped returns.
 
 All transforms act in the sensor frame, where ranges and beams are defined, and on every class alike, so that no
 artefact of the augmentation reveals the class.
@@ -6,45 +6,42 @@ artefact of the augmentation reveals the class.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
 
 from modt.classification.crops import Crops
 from modt.types import Bool, Float64, Int
-from tools.train.dataset import SENSOR_HEIGHT_M
+from tools.train.dataset import Sensors
 
 MAX_RANGE_M = 75.0
 MIN_POINTS = 6
 """Minimum number of points of an augmented crop; a step that would leave fewer is skipped."""
 
 
-@dataclass(frozen=True)
-class Beams:
-    """Angular resolution of the simulated sensor."""
-
-    azimuth_deg: float = 0.17
-    elevation_deg: float = 0.42
+BEAM_STEPS, BEAM_STEP_SHARE = (1, 2, 4), (0.5, 0.3, 0.2)
+"""One beam in so many is kept of a crop, and the share of the crops."""
+MAX_ELEVATION_DEG = 2.0
+"""Between the beams that are kept."""
 
 
-def augment(crops: Crops, beams: Beams, rng: Generator) -> Crops:
-    """Augment each crop once."""
+def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sensors]:
+    """Augment each crop once; the crops and the sensors that would measure them so, none finer than its own."""
     n, count = len(crops), crops.count
     owner = np.repeat(np.arange(n), count)
     xyz = crops.xyz.astype(np.float64)
     centre = np.stack([np.add.reduceat(xyz[:, k], crops.offsets[:-1]) / count for k in range(3)], axis=1)
-    xyz = _deform(xyz, centre, owner, rng)
+    xyz = _deform(xyz, centre, owner, sensors.height_m, rng)
     xyz = _change_range(xyz, centre, owner, rng)
-    keep = _one_return_per_beam(xyz, owner, beams, rng)
+    keep, sensors = _one_return_per_beam(xyz, owner, sensors, rng)
     keep = _keep_enough(keep, _occlude(xyz, owner, keep, n, rng), owner, n)
     keep = _keep_enough(keep, rng.random(len(owner)) < 1 - rng.uniform(0, 0.35, n)[owner] ** 1.5, owner, n)
     xyz += rng.normal(0, 0.012, xyz.shape)
     rho = np.hypot(*centre[:, :2].T)
     xyz[:, 2] += (rng.normal(0, 1, n) * (0.05 + 0.004 * rho))[owner]
-    return Crops(
-        xyz[keep].astype(np.float32), np.append(0, np.cumsum(np.bincount(owner[keep], minlength=n))).astype(np.int64)
-    )
+    offsets = np.append(0, np.cumsum(np.bincount(owner[keep], minlength=n)))
+    return Crops(xyz[keep].astype(np.float32), offsets), sensors
 
 
 def subsample(crops: Crops, limit: int, rng: Generator) -> Crops:
@@ -55,7 +52,7 @@ def subsample(crops: Crops, limit: int, rng: Generator) -> Crops:
     return Crops(crops.xyz[kept], np.append(0, np.cumsum(np.minimum(crops.count, limit))))
 
 
-def _deform(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float64:
+def _deform(xyz: Float64, centre: Float64, owner: Int, height_m: Float64, rng: Generator) -> Float64:
     """Mirror about the line of sight, rotate slightly, scale."""
     n = len(centre)
     bearing = np.arctan2(centre[:, 1], centre[:, 0])
@@ -64,7 +61,7 @@ def _deform(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> Float6
     local = _rotate(local, rng.normal(0, np.deg2rad(6), n)[owner])
     size = rng.uniform(0.9, 1.1, n)
     local[:, :2] *= size[owner, None]
-    ground = -SENSOR_HEIGHT_M
+    ground = -height_m[owner]
     local[:, 2] = ground + (local[:, 2] - ground) * (size * rng.uniform(0.96, 1.04, n))[owner]
     out: Float64 = _rotate(local, bearing[owner]) + np.c_[centre[:, :2], np.zeros(n)][owner]
     return out
@@ -85,19 +82,27 @@ def _change_range(xyz: Float64, centre: Float64, owner: Int, rng: Generator) -> 
     return moved
 
 
-def _one_return_per_beam(xyz: Float64, owner: Int, beams: Beams, rng: Generator) -> Bool:
-    """(K,) mask with one random point for each cell of azimuth and elevation."""
-    azimuth = np.rad2deg(np.arctan2(xyz[:, 1], xyz[:, 0])) / beams.azimuth_deg
-    elevation = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))) / beams.elevation_deg
-    phase = rng.random((owner.max(initial=0) + 1, 2)) if len(owner) else np.zeros((0, 2))
-    cell = np.stack([azimuth, elevation], axis=1) + phase[owner]
-    key = (owner.astype(np.int64) << 32) | (np.floor(cell[:, 0]).astype(np.int64) + 8192 << 16)
-    key |= np.floor(cell[:, 1]).astype(np.int64) + 8192
+def _one_return_per_beam(xyz: Float64, owner: Int, sensors: Sensors, rng: Generator) -> tuple[Bool, Sensors]:
+    """(K,) mask of one random point for each beam and azimuth, of some crops every second or fourth beam alone.
+
+    A crop keeps all its points or all its beams where too few would be left.
+    """
+    n = len(sensors.height_m)
+    azimuth = np.rad2deg(np.arctan2(xyz[:, 1], xyz[:, 0])) / sensors.azimuth_deg[owner]
+    elevation = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))) / sensors.elevation_deg[owner]
+    cell = np.stack([azimuth, elevation], axis=1) + rng.random((n, 2))[owner]
+    column, beam = np.floor(cell).astype(np.int64).T + 32768
+    key = owner << 32 | column << 16 | beam
     order = rng.permutation(len(key))
     _, first = np.unique(key[order], return_index=True)
     keep = np.zeros(len(key), np.bool_)
     keep[order[first]] = True
-    return _keep_enough(np.ones(len(key), np.bool_), keep, owner, int(owner.max(initial=-1)) + 1)
+    keep = _keep_enough(np.ones(len(key), np.bool_), keep, owner, n)
+    step = rng.choice(BEAM_STEPS, n, p=BEAM_STEP_SHARE)
+    step[sensors.elevation_deg * step > MAX_ELEVATION_DEG] = 1
+    thin = _keep_enough(keep, (beam + rng.integers(0, 4, n)[owner]) % step[owner] == 0, owner, n)
+    kept = np.bincount(owner[thin], minlength=n) == np.bincount(owner[keep], minlength=n)
+    return thin, replace(sensors, elevation_deg=np.where(kept, 1, step) * sensors.elevation_deg)
 
 
 def _occlude(xyz: Float64, owner: Int, keep: Bool, n: int, rng: Generator) -> Bool:

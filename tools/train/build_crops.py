@@ -1,11 +1,12 @@
 """Build a data set of crops from real scans: proposals of the segmentation, labelled by overlap with objects.
 
-    python -m tools.train.build_crops OUT.npz --kitti ROOT [--paste N]
+    python -m tools.train.build_crops OUT.npz [--kitti ROOT [--paste N]] [--scans FOLDER --profile PROFILE]
 
 A proposal takes the class of an object if they share more than half of the points of each. Fragments and merged
 objects are marked partial, proposals outside the annotated regions unknown. Neither is used for training; unknown
 ones are not validated either. Proposals outside KITTI's camera view are stored without labels, for distillation
-(tools.train.distillation). The file contains its provenance.
+(tools.train.distillation). Every scan is segmented by the profile of its sensor; KITTI's are thinned to 32 and to 16
+beams too. The file contains its provenance.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from argparse import ArgumentParser
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,15 +24,24 @@ import numpy as np
 
 import modt
 from modt import profile
-from modt.classes import ObjectClass
+from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.crops import gather
-from modt.config import ProfileConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.types import N_REFLECTANCE, Bool, Float64, Int, Proposals
+from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
 from tools.options import crops_parser
-from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, UNLABELLED
-from tools.train.labelled_scans import Scan, argoverse_scans, object_scans, raw_scans, semantic_scans
+from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, UNLABELLED, Sensors
+from tools.train.labelled_scans import (
+    THINNED,
+    Scan,
+    argoverse_scans,
+    folder_scans,
+    object_scans,
+    pandaset_scans,
+    raw_scans,
+    semantic_scans,
+    thinned,
+)
 from tools.train.paste import cut_objects, paste_objects
 
 CELL_SCALES = (0.75, 1.4)
@@ -51,12 +62,16 @@ class Labels:
         partial: (R,) fragment or merged objects.
         unknown: (R,) excluded from validation: outside the annotated regions, or an object with too few points.
         tall: (R,) vehicles of at least TALL_M; rare, and different in shape from other cars.
+        owner: (R,) class whose objects hold more than half of its points, whole or not.
+        whole: (B,) the proposal of each object, NONE where it has none of its own.
     """
 
     kind: Int
     partial: Bool
     unknown: Bool
     tall: Bool
+    owner: Int
+    whole: Int
 
 
 def label(scan: Scan, proposals: Proposals) -> Labels:
@@ -67,18 +82,23 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
     outside = np.bincount(number[scan.unlabelled & (number >= 0)], minlength=len(proposals))
     partial, tall = np.zeros(len(proposals), np.bool_), np.zeros(len(proposals), np.bool_)
     unknown = outside > 0.5 * size
-    for members, object_class, box, valid in zip(scan.objects, scan.kinds, scan.boxes, detectable(scan), strict=True):
+    held, whole_of = np.zeros((len(proposals), N_CLASSES)), np.full(len(scan.objects), NONE)
+    valid = points_in_view(scan) >= MIN_DETECTABLE_POINTS
+    for k, (members, object_class, box) in enumerate(zip(scan.objects, scan.kinds, scan.boxes, strict=True)):
         if len(members) < MIN_BOX_POINTS:
             continue
         own = number[members]
         shared = np.bincount(own[own >= 0], minlength=len(proposals))
+        held[:, object_class] += shared
         whole = (shared > 0.5 * size) & (shared > 0.5 * len(own))
         kind[whole] = object_class
         tall[whole] = object_class == ObjectClass.CAR and box[5] > TALL_M
         partial |= (shared > 0.2 * size) & ~whole
         partial[whole] = False
-        unknown[whole] = not valid
-    return Labels(kind, partial, unknown, tall)
+        unknown[whole] = not valid[k]
+        whole_of[k] = np.flatnonzero(whole)[0] if whole.any() else NONE
+    owner = np.where(held.max(axis=1) > 0.5 * size, held.argmax(axis=1), ObjectClass.BACKGROUND)
+    return Labels(kind, partial, unknown, tall, owner, whole_of)
 
 
 def reflectance_of(proposals: Proposals) -> Float64:
@@ -88,46 +108,56 @@ def reflectance_of(proposals: Proposals) -> Float64:
     return proposals.reflectance
 
 
-def detectable(scan: Scan) -> Bool:
-    """(B,) objects with enough points in the annotated field of view."""
-    points = [int(scan.fov.contains(scan.points[own]).sum()) for own in scan.objects]
-    return np.array([n >= MIN_DETECTABLE_POINTS for n in points], np.bool_)
+def points_in_view(scan: Scan) -> Int:
+    """(B,) points of each object in the annotated field of view."""
+    return np.array([scan.fov.contains(scan.points[own]).sum() for own in scan.objects], np.int64)
 
 
 class CropWriter:
     """Collects crops and writes the data set."""
 
-    def __init__(self, config: ProfileConfig) -> None:
-        self.config = config
+    def __init__(self) -> None:
         self.columns: dict[str, list[Any]] = {}
+        self.rows = 0
 
     def add(self, scan: Scan, variant: int, scale: float = 1.0, *, validation: bool = False) -> None:
         """Add the proposals of a scan at `scale` times the profile's cell size; for validation with its objects."""
-        stage = dataclasses.replace(self.config.segmentation, cell_m=self.config.segmentation.cell_m * scale)
-        proposals = Segmenter(stage, self.config.sensor, scan.fov).segment(scan.points)
+        stage, sensor = scan.profile.segmentation, scan.profile.sensor
+        stage = dataclasses.replace(stage, cell_m=stage.cell_m * scale)
+        proposals = Segmenter(stage, sensor, scan.fov).segment(scan.points)
         labels = label(scan, proposals)
-        objects = (labels.kind > 0) & ~labels.partial
-        of_interest = {PASTED: objects, UNLABELLED: labels.unknown & (labels.kind == 0) & ~labels.partial}
+        whole = (labels.kind > 0) & ~labels.partial
+        of_interest = {PASTED: whole, UNLABELLED: labels.unknown & (labels.kind == 0) & ~labels.partial}
         kept = np.flatnonzero(of_interest.get(variant, np.ones(len(proposals), np.bool_)))
         crops = gather(scan.points, proposals, kept, MAX_POINTS)
         n = len(kept)
         row: dict[str, Any] = {"xyz": crops.xyz, "count": crops.count, "label": labels.kind[kept].astype(np.int8)}
         row |= {"partial": labels.partial[kept], "unknown": labels.unknown[kept], "tall": labels.tall[kept]}
         row |= {"variant": np.full(n, variant, np.int8), "reflectance": reflectance_of(proposals)[kept]}
-        row |= {"scan": np.array([scan.name] * n, np.str_), "drive": np.array([scan.drive] * n, np.str_)}
+        row |= {"owner": labels.owner[kept].astype(np.int8)}
+        row |= {key: np.full(n, getattr(scan, key)) for key in ("name", "drive", "sensor")}
+        row |= dataclasses.asdict(Sensors.of(sensor, proposals.box[kept]))
         if validation:
-            truth = np.array(scan.kinds, np.int64)[detectable(scan)]
-            truth = truth[truth > ObjectClass.BACKGROUND]
-            row |= {"truth_label": truth.astype(np.int8), "truth_drive": np.array([scan.drive] * len(truth), np.str_)}
+            kinds, points = np.array(scan.kinds, np.int64), points_in_view(scan)
+            objects = np.flatnonzero((kinds > ObjectClass.BACKGROUND) & (points >= MIN_DETECTABLE_POINTS))
+            own = labels.whole[objects]
+            truth = {
+                "label": kinds[objects],
+                "points": points[objects],
+                "row": np.where(own < 0, own, own + self.rows),
+            }
+            truth |= {key: np.full(len(objects), getattr(scan, key)) for key in ("drive", "sensor")}
+            row |= {f"truth_{key}": value for key, value in truth.items()}
         for key, value in row.items():
             self.columns.setdefault(key, []).append(value)
+        self.rows += n
 
     def save(self, path: Path, provenance: dict[str, object]) -> dict[str, object]:
         """Write the file; returns its hash and the number of trainable crops by variant and class."""
         table: dict[str, Any] = {key: np.concatenate(parts) for key, parts in self.columns.items()}
         table["offsets"] = np.append(0, np.cumsum(table.pop("count")))
-        table.setdefault("truth_label", np.zeros(0, np.int8))
-        table.setdefault("truth_drive", np.zeros(0, np.str_))
+        for key in ("label", "points", "row", "drive", "sensor"):
+            table.setdefault(f"truth_{key}", np.zeros(0, np.str_ if key in {"drive", "sensor"} else np.int64))
         trainable = ~table["partial"] & ~(table["unknown"] & (table["label"] == 0))
         tally = {
             name: np.bincount(table["label"][trainable & (table["variant"] == v)], minlength=4).tolist()
@@ -138,29 +168,39 @@ class CropWriter:
                 ("synthetic", SYNTHETIC),
             )
         }
-        provenance |= {"scans": len(np.unique(table["scan"])), "crops": tally, "modt": modt.__version__}
+        provenance |= {"scans": len(np.unique(table["name"])), "crops": tally, "modt": modt.__version__}
         provenance |= {"unlabelled": int(np.count_nonzero(table["variant"] == UNLABELLED))}
-        provenance |= {"profile": profile.dump(self.config)}
+        provenance |= {"sensors": np.unique(table["sensor"]).tolist()}
         np.savez_compressed(path, provenance=np.array(json.dumps(provenance)), **table)
         return {"sha256": hashlib.sha256(path.read_bytes()).hexdigest(), **tally}
 
 
 def kitti(root: Path) -> Iterator[Scan]:
     """Labelled scans of KITTI except those of the test drive."""
-    yield from object_scans(root / "object" / "training")
+    for folder in ("training", "training_more"):
+        yield from object_scans(root / "object" / folder)
     yield from raw_scans(root / "raw" / "2011_09_26" / "2011_09_26_drive_0001_sync")
+
+
+def add_labelled(writer: CropWriter, scan: Scan) -> None:
+    """Add a scan, for validation and, in finer and coarser clusters, for training."""
+    writer.add(scan, SHIPPED, validation=True)
+    for scale in CELL_SCALES:
+        writer.add(scan, CLUSTERED, scale)
 
 
 def add_kitti(writer: CropWriter, root: Path, pastes: int, seed: int) -> None:
     """Add real scans, and real scans with pasted objects."""
     scans = list(kitti(root))
     for scan in scans:
-        writer.add(scan, SHIPPED, validation=True)
-        for scale in CELL_SCALES:
-            writer.add(scan, CLUSTERED, scale)
+        add_labelled(writer, scan)
         writer.add(dataclasses.replace(scan, fov=FieldOfView()), UNLABELLED)
-    for scan in (*semantic_scans(root / "odometry"), *argoverse_scans(root / "argoverse2")):
+        for step in THINNED:
+            add_labelled(writer, thinned(scan, step))
+    for scan in semantic_scans(root / "odometry"):
         writer.add(scan, CLUSTERED)
+    for scan in (*argoverse_scans(root / "argoverse2"), *pandaset_scans(root / "pandaset")):
+        add_labelled(writer, scan)
     cuts = cut_objects(scans)
     rng = np.random.default_rng(seed)
     hosts: Iterable[Scan] = [scan for scan in scans if len(scan.points) > 60_000]
@@ -169,13 +209,26 @@ def add_kitti(writer: CropWriter, root: Path, pastes: int, seed: int) -> None:
             writer.add(made, PASTED)
 
 
+def add_sources(parser: ArgumentParser) -> None:
+    """Add the options that name labelled scans."""
+    parser.add_argument("--kitti", type=Path, help="KITTI root, with argoverse2/ and pandaset/ beside object/")
+    parser.add_argument(
+        "--scans", type=Path, help="your own scans: velodyne/, label_2/ and, for a camera's view, calib/"
+    )
+    parser.add_argument("--profile", default=profile.DEFAULT, help="of their sensor")
+
+
 def main() -> None:
     parser = crops_parser(__doc__, seed=0)
-    parser.add_argument("--kitti", type=Path, required=True, help="KITTI root")
-    parser.add_argument("--paste", type=int, default=0, help="pasting attempts in each real scan")
+    add_sources(parser)
+    parser.add_argument("--paste", type=int, default=0, help="pasting attempts in each scan of KITTI")
     args = parser.parse_args()
-    writer = CropWriter(profile.load(args.profile))
-    add_kitti(writer, args.kitti, args.paste, args.seed)
+    writer = CropWriter()
+    if args.kitti:
+        add_kitti(writer, args.kitti, args.paste, args.seed)
+    if args.scans:
+        for scan in folder_scans(args.scans, Path(args.profile).stem, profile.load(args.profile)):
+            add_labelled(writer, scan)
     print(json.dumps(writer.save(args.out, {"paste": args.paste, "seed": args.seed})))
 
 

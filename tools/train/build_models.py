@@ -1,8 +1,12 @@
-"""Rebuild the models in models/ from scratch: crops, training, export, cards (extra [train]).
+"""Build models from scratch: crops, training, export, cards (extra [train]).
 
-    python -m tools.train.build_models WORK_DIR [--kitti ROOT]
+    python -m tools.train.build_models WORK_DIR [--kitti ROOT] [--scans FOLDER --profile PROFILE]
 
-Builds pointnet-synthetic, and pointnet-kitti where KITTI's data are given. Interrupted training resumes.
+Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/pointnet-kitti. With --scans it builds
+WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data. The scans
+have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the validation.
+Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z forward).
+Interrupted training resumes.
 """
 
 from __future__ import annotations
@@ -12,52 +16,82 @@ import sys
 from pathlib import Path
 
 from tools.options import parser
+from tools.train.build_crops import add_sources
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 SENSOR = "hdl-64e"
 """Sensor that measured the reflectance of the crops."""
-WORLDS, PASTES, TEACHERS = "120", "120", "2"
+WORLDS, PASTES = 120, 120
 KITTI_DATA = (
-    "106 + 2 object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; "
-    "SemanticKITTI labels, J. Behley et al., ICCV 2019) and 3 sweeps of Argoverse 2 (B. Wilson et al., 2021), as our "
-    "segmentation cuts them up, including the part of the former outside the camera view, their objects pasted into "
+    "106 + 2 and 53 more object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR "
+    "2013; SemanticKITTI labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 "
+    "sweeps of Argoverse 2 (B. Wilson et al., 2021) and 9 scans of PandaSet (Hesai and Scale AI, CC BY 4.0), as our "
+    "segmentation cuts them up, including the part of KITTI's outside the camera view, KITTI's objects pasted into "
     "other scans and moved to other ranges, and the synthetic world, part of it with objects placed by KITTI's label "
     "files; nothing of drive 0005"
 )
 SYNTHETIC_DATA = (
-    "the synthetic world alone: no recordings; the reflectance of its materials is matched to KITTI's object frames"
+    "the synthetic world alone, by every simulated sensor: no recordings; the reflectance of its materials is "
+    "matched to KITTI's object frames"
 )
+KITTI_LICENCE = "CC BY-NC-SA 3.0, as its data: not for commercial use"
 
 
-def run(name: str, *arguments: str | Path) -> None:
+def run(name: str, *arguments: str | Path | int) -> None:
     command = [sys.executable, "-m", f"tools.train.{name}", *map(str, arguments)]
     print("+", *command[1:], flush=True)
     subprocess.run(command, check=True)
 
 
+def build(folder: Path, crops: list[Path], out: Path, schedule: list[str], data: str, licence: str) -> None:
+    """Train and export a model with its card.
+
+    Args:
+        folder: for the trained weights.
+        crops: data sets.
+        out: the model.
+        schedule: options of train_pointnet.
+        data: description of the data, for the card.
+        licence: for the card.
+    """
+    folds = schedule[schedule.index("--folds") :][:2]
+    run("train_pointnet", folder, *crops, *schedule)
+    run("train_box_classifier", folder, *crops, *folds)
+    run("train_reflectance_classifier", folder, *crops, "--sensor", SENSOR, *folds)
+    run("export_pointnet", folder, out, "--data", data, "--licence", licence)
+
+
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("work", type=Path, help="folder for crops and trained weights")
-    options.add_argument("--kitti", type=Path, help="KITTI root")
+    options.add_argument("--steps", type=int, default=4000, help="of the network (default: %(default)s)")
+    add_sources(options)
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
-    free, placed, real = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti"))
-    run("build_synthetic_crops", free, "--worlds", WORLDS)
-    run("train_pointnet", args.work / "synthetic", free, "--epochs", "6", "--fold-epochs", "3", "--folds", "2")
-    run("train_box_classifier", args.work / "synthetic", free)
-    run("train_reflectance_classifier", args.work / "synthetic", free, "--sensor", SENSOR, "--folds", "2")
-    run("export_pointnet", args.work / "synthetic", MODELS / "pointnet-synthetic.onnx",
-        "--data", SYNTHETIC_DATA, "--licence", "Apache-2.0: free for any use")  # fmt: skip
+    free, placed, real, own = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti", "scans"))
+    steps = str(args.steps)
+    fewer = str(round(0.4 * args.steps))
+    schedule = ["--steps", steps, "--fold-steps", fewer, "--folds", "3", "--teachers", "2"]
     if args.kitti:
         run("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
-        run("build_synthetic_crops", placed, "--worlds", WORLDS,
-            "--labels", args.kitti / "object" / "training_all_labels")  # fmt: skip
-        run("train_pointnet", args.work / "kitti", real, placed,
-            "--epochs", "100", "--fold-epochs", "40", "--folds", "3", "--teachers", TEACHERS)  # fmt: skip
-        run("train_box_classifier", args.work / "kitti", real, placed)
-        run("train_reflectance_classifier", args.work / "kitti", real, placed, "--sensor", SENSOR)
-        run("export_pointnet", args.work / "kitti", MODELS / "pointnet-kitti.onnx",
-            "--data", KITTI_DATA, "--licence", "CC BY-NC-SA 3.0, as its data: not for commercial use")  # fmt: skip
+        labels = args.kitti / "object" / "training_all_labels"
+        run("build_synthetic_crops", placed, "--worlds", WORLDS, "--labels", labels)
+    if args.kitti is None or args.scans is None:
+        run("build_synthetic_crops", free, "--worlds", WORLDS)
+    if args.scans:
+        run("build_crops", own, "--scans", args.scans, "--profile", args.profile)
+        crops, data = [own, real, placed] if args.kitti else [own, free], f"scans of {args.scans.name}; "
+        licence = KITTI_LICENCE if args.kitti else "that of the scans"
+        data += KITTI_DATA if args.kitti else SYNTHETIC_DATA
+        build(args.work / "scans", crops, args.work / "pointnet-scans.onnx", schedule, data, licence)
+        return
+    short = ["--steps", fewer, "--fold-steps", fewer, "--folds", "2"]
+    licence = "Apache-2.0: free for any use"
+    build(args.work / "synthetic", [free], MODELS / "pointnet-synthetic.onnx", short, SYNTHETIC_DATA, licence)
+    if args.kitti:
+        build(
+            args.work / "kitti", [real, placed], MODELS / "pointnet-kitti.onnx", schedule, KITTI_DATA, KITTI_LICENCE
+        )
 
 
 if __name__ == "__main__":

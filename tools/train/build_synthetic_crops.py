@@ -3,16 +3,17 @@
     python -m tools.train.build_synthetic_crops OUT.npz [--worlds N]
                          [--labels KITTI_ROOT/object/training_all_labels] [--seed S]
 
-Worlds are streets and crossings; with --labels the same number again is built from KITTI label files, whose ranges,
-headings and occlusions are those of real objects.
+Worlds are streets and crossings, seen by every simulated sensor in turn; with --labels the same number again is built
+from KITTI label files, whose ranges, headings and occlusions are those of real objects.
 """
 
 from __future__ import annotations
 
 import json
+from itertools import chain, cycle
 from pathlib import Path
 
-from modt import profile
+from modt.simulation.sensors import SENSORS
 from tools.options import crops_parser
 from tools.train.build_crops import CropWriter
 from tools.train.dataset import SYNTHETIC
@@ -28,13 +29,14 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=100, help="of each kind")
     parser.add_argument("--labels", type=Path, help="folder with label_2/ and frame_to_raw.tsv")
     args = parser.parse_args()
-    writer = CropWriter(profile.load(args.profile))
+    writer = CropWriter()
     first = args.seed * 100_000
-    for k, scan in enumerate(simulated_scans(SCENES, range(first, first + args.worlds // 2), TIMES_S, camera=False)):
-        writer.add(scan, SYNTHETIC, CELL_SCALES[k % 4])
+    sensors, seeds = tuple(SENSORS), range(first, first + args.worlds)
+    scans = simulated_scans(SCENES, seeds[: args.worlds // 2], TIMES_S, camera=False, sensors=sensors)
     if args.labels:
-        for k, scan in enumerate(scans_from_labels(label_files(args.labels), range(first, first + args.worlds))):
-            writer.add(scan, SYNTHETIC, CELL_SCALES[k % 4])
+        scans = chain(scans, scans_from_labels(label_files(args.labels), seeds, sensors))
+    for scan, scale in zip(scans, cycle(CELL_SCALES), strict=False):
+        writer.add(scan, SYNTHETIC, scale)
     provenance: dict[str, object] = {"synthetic": args.worlds, "placed": bool(args.labels), "seed": args.seed}
     print(json.dumps(writer.save(args.out, provenance)))
 

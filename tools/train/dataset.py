@@ -9,18 +9,66 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.classes import N_CLASSES
 from modt.classification.crops import Crops
+from modt.config import SensorConfig
 from modt.types import NONE, Bool, Float64, Int
 
 SHIPPED, CLUSTERED, PASTED, SYNTHETIC, UNLABELLED = range(5)
 """Variants of crops: real scans under the default segmentation; real scans under other cell sizes; real scans with
 pasted objects; synthetic sweeps; unlabelled parts of real scans. All but the first are for training alone."""
 
-SENSOR_HEIGHT_M = 1.73
-"""Height of the sensor above the ground in KITTI and in the simulation."""
-NOT_CONCATENATED = ("offsets", "provenance")
+NOT_CONCATENATED = ("offsets", "provenance", "truth_row")
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Mount and resolution of the sensor of each crop.
+
+    Attributes:
+        height_m: (R,) above the ground.
+        azimuth_deg, elevation_deg: (R,) between neighbouring returns of a beam, and between neighbouring beams there.
+    """
+
+    height_m: Float64
+    azimuth_deg: Float64
+    elevation_deg: Float64
+
+    @classmethod
+    def of(cls, config: SensorConfig, box: Float64) -> Sensors:
+        """The same sensor for crops in (R, 7) boxes, sensor frame."""
+        height_m = SensorConfig().height_m if config.height_m is None else config.height_m
+        tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
+        columns = height_m, config.azimuth_step_deg, np.rad2deg(config.beams.step_rad(tangent.astype(np.float32)))
+        return cls(*(np.full(len(box), value, np.float64) for value in columns))
+
+    @property
+    def beam_sr(self) -> Float64:
+        """(R,) solid angle of a point [sr]."""
+        return np.deg2rad(self.azimuth_deg) * np.deg2rad(self.elevation_deg)
+
+    def take(self, rows: Int) -> Sensors:
+        """Those of rows."""
+        return Sensors(self.height_m[rows], self.azimuth_deg[rows], self.elevation_deg[rows])
+
+
+@dataclass(frozen=True)
+class LabelledObjects:
+    """Labelled objects of the validation, those missed by the segmentation included.
+
+    Attributes:
+        label, points: (T,) class, and number of points in the annotated field of view.
+        drive, sensor: (T,) as of the crops.
+        row: (T,) the crop that is the whole object, NONE where it has none.
+    """
+
+    label: Int
+    points: Int
+    drive: Int
+    sensor: Int
+    row: Int
 
 
 @dataclass(frozen=True)
@@ -29,24 +77,30 @@ class Dataset:
 
     Attributes:
         crops: R crops.
-        label, partial, unknown, tall: (R,) as in tools.train.build_crops.Labels.
+        sensors: of the crops.
+        label, owner, partial, unknown, tall: (R,) as in tools.train.build_crops.Labels.
         variant, drive: (R,) of each crop.
+        sensor: (R,) of each crop, its place in `sensor_names`.
         reflectance: (R, 5) statistics of the returns; NaN where unknown or measured by another sensor.
-        truth_label, truth_drive: (T,) of each labelled object, those missed by the segmentation included.
+        truth: labelled objects of the validation.
+        sensor_names: of the sensors.
         provenance: options and counts of each file.
         sha256: of each file.
     """
 
     crops: Crops
+    sensors: Sensors
     label: Int
+    owner: Int
     partial: Bool
     unknown: Bool
     tall: Bool
     variant: Int
     drive: Int
+    sensor: Int
     reflectance: Float64
-    truth_label: Int
-    truth_drive: Int
+    truth: LabelledObjects
+    sensor_names: tuple[str, ...]
     provenance: list[dict[str, Any]]
     sha256: list[str]
 
@@ -76,28 +130,45 @@ def load(*paths: Path) -> Dataset:
             parts.append({key: file[key] for key in file.files})
     joined = {key: np.concatenate([part[key] for part in parts]) for key in parts[0] if key not in NOT_CONCATENATED}
     count = np.concatenate([np.diff(part["offsets"]) for part in parts])
-    _, drive = np.unique(np.concatenate([joined["drive"], joined["truth_drive"]]), return_inverse=True)
-    n = len(joined["label"])
+    drive, drive_of_truth, _ = _numbers(joined["drive"], joined["truth_drive"])
+    sensor, sensor_of_truth, names = _numbers(joined["sensor"], joined["truth_sensor"])
+    first = np.cumsum([0, *(len(part["label"]) for part in parts)])
+    row = [np.where(p["truth_row"] == NONE, NONE, p["truth_row"] + n) for p, n in zip(parts, first, strict=False)]
     return Dataset(
         crops=Crops(joined["xyz"], np.append(0, np.cumsum(count))),
+        sensors=Sensors(joined["height_m"], joined["azimuth_deg"], joined["elevation_deg"]),
         label=joined["label"].astype(np.int64),
+        owner=joined["owner"].astype(np.int64),
         partial=joined["partial"],
         unknown=joined["unknown"],
         tall=joined["tall"],
         variant=joined["variant"].astype(np.int64),
-        drive=drive[:n],
+        drive=drive,
+        sensor=sensor,
         reflectance=joined["reflectance"],
-        truth_label=joined["truth_label"].astype(np.int64),
-        truth_drive=drive[n:],
+        truth=LabelledObjects(
+            joined["truth_label"].astype(np.int64),
+            joined["truth_points"],
+            drive_of_truth,
+            sensor_of_truth,
+            np.concatenate(row).astype(np.int64),
+        ),
+        sensor_names=names,
         provenance=[json.loads(str(part["provenance"])) for part in parts],
         sha256=[hashlib.sha256(path.read_bytes()).hexdigest() for path in paths],
     )
 
 
+def _numbers(of_crops: NDArray[np.str_], of_truth: NDArray[np.str_]) -> tuple[Int, Int, tuple[str, ...]]:
+    """Places in the sorted names of crops and truth, and these names."""
+    names, number = np.unique(np.concatenate([of_crops, of_truth]), return_inverse=True)
+    return number[: len(of_crops)], number[len(of_crops) :], tuple(names.tolist())
+
+
 def folds(data: Dataset, k: int) -> Int:
     """(D,) fold of each drive, rare classes balanced over folds; NONE for drives used in every training set."""
-    has_truth = len(data.truth_drive) > 0
-    drive, label = (data.truth_drive, data.truth_label) if has_truth else (data.drive, data.label)
+    has_truth = len(data.truth.drive) > 0
+    drive, label = (data.truth.drive, data.truth.label) if has_truth else (data.drive, data.label)
     weight = np.zeros((int(max(data.drive.max(), drive.max())) + 1, N_CLASSES))
     np.add.at(weight, (drive, label), 1.0)
     weight /= weight.sum(axis=0).clip(1)

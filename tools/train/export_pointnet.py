@@ -22,9 +22,12 @@ from onnx import TensorProto, helper, numpy_helper
 from modt.classes import CLASS_NAMES
 from modt.classification import box_classifier, reflectance_classifier
 from tools.options import parser
+from tools.train.scores import MIN_OBJECT_POINTS, PRECISIONS
 from tools.train.weights import Layer, load_layers
 
 N_SHARED = 3
+CLASS_FREQUENCY_KEY = "class_frequency"
+"""Key, in the metadata, of the class frequency that the posterior assumes."""
 OPSET, IR = 17, 8
 
 
@@ -68,6 +71,7 @@ def graph(layers: list[Layer], *, pool_first: bool = True) -> onnx.ModelProto:
 
 def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str) -> str:
     """Model card in Markdown."""
+    calibration, frequency = report["calibration"], report["class_frequency"]
     lines = [
         f"# {name}",
         "",
@@ -81,20 +85,24 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
         "- output: probability of each class, softmax with the calibration folded in",
         f"- data: {data}",
         *(
-            f"- crops: {made['scans']} scans, {_tally(made)}; sha256 {digest}"
+            f"- crops: {made['scans']} scans ({', '.join(made['sensors'])}), {_tally(made)}; sha256 {digest}"
             for made, digest in zip(report["provenance"], report["crops_sha256"], strict=True)
         ),
-        f"- training: tools.train.train_pointnet, seed {report['seed']}, {report['epochs']} epochs, "
+        f"- training: tools.train.train_pointnet, seed {report['seed']}, {report['steps']} steps, "
         f"{report['teachers']} teachers, torch {report['torch']}, {report['cpu_s']} s on one core",
-        f"- calibration: temperature {report['calibration']['temperature']}, "
-        f"class offsets {report['calibration']['offset']}",
+        f"- calibration: temperature {calibration['temperature']}, class offsets {calibration['offset']}; fitted "
+        "with every sensor at equal weight",
+        f"- class frequency that the posterior assumes: {_shares(frequency)}",
         "",
+        *_by_sensor(report),
+        "## What the box rules out",
+        "",
+        "Share of each class whose object probability from the box is below the first column, out of fold:",
+        "",
+        *_threshold_table(report["boxes"]["ruled_out"]),
     ]
-    if "cross_validation" in report:
-        lines += ["## Out of fold (drives never split)", "", *_scores(report["cross_validation"])]
     if "reflectance" in report:
-        lines += ["## With box and reflectance, out of fold", "", *_reflectance_section(report["reflectance"])]
-    lines += ["## The box alone, out of fold", "", *_box_section(report["boxes"])]
+        lines += ["From box and reflectance:", "", *_threshold_table(report["reflectance"]["ruled_out"])]
     return "\n".join(lines)
 
 
@@ -104,59 +112,58 @@ def _tally(made: dict[str, Any]) -> str:
     return ", ".join([*tally, f"{made['unlabelled']} unlabelled"] if made["unlabelled"] else tally)
 
 
-def _scores(scores: dict[str, Any]) -> list[str]:
-    precision, objects = scores["average_precision"], scores["objects"]
-    rows = [f"| {c} | {objects[c]} | {100 * precision[c]:.1f} % |" for c in CLASS_NAMES[1:]]
-    return [
-        "Average precision over proposals; objects missed by the segmentation count as false negatives.",
+def _shares(values: list[float]) -> str:
+    return ", ".join(f"{name} {100 * value:.1f} %" for name, value in zip(CLASS_NAMES, values, strict=True))
+
+
+def _by_sensor(report: dict[str, Any]) -> list[str]:
+    """Tables of the out-of-fold scores (tools.train.scores), method by method and sensor by sensor."""
+    boxes, told = report["boxes"], report.get("reflectance")
+    share = boxes["share"]
+    methods = {
+        "network": report["cross_validation"],
+        "box": boxes["cross_validation"],
+        f"network to the power {1 - share:.2f}, box {share}": boxes["pool"],
+    }
+    if told:
+        name = f"network {1 - told['share']:.2f}, box {told['share']}, reflectance {told['weight']}"
+        methods |= {"box and reflectance": told["cross_validation"], name: told["pool"]}
+    lines = [
+        "## Out of fold, by sensor (drives never split)",
         "",
-        "| class | objects | AP |",
-        "|---|---|---|",
-        *rows,
+        "Car / pedestrian / cyclist. AP: average precision over proposals; objects that the segmentation missed are",
+        "false negatives. Log loss, calibration error of the likeliest class, and temperature (what is left to",
+        "divide the logits by): under the class frequency of the sensor's proposals. Recall: of objects of",
+        f"{MIN_OBJECT_POINTS} points, found and called right at this precision; in brackets, of those that have a",
+        "proposal of their own.",
         "",
-        f"Expected calibration error {scores['ece']} (before calibration {scores['ece_uncalibrated']}).",
-        "",
-        *_confusion_table(scores["confusion"]),
     ]
+    for method, scores in methods.items():
+        lines += [f"### By {method}", "", f"| sensor | objects | AP | {' | '.join(_POSTERIOR)} | recall at "]
+        lines[-1] += " | at ".join(str(p) for p in PRECISIONS) + " |"
+        lines += ["|---|" + "---|" * (2 + len(_POSTERIOR) + len(PRECISIONS)), *map(_row, scores.items()), ""]
+    return lines
 
 
-def _confusion_table(confusion: list[list[int]]) -> list[str]:
-    rows = [f"| {c} | " + " | ".join(map(str, row)) + " |" for c, row in zip(CLASS_NAMES, confusion, strict=True)]
-    return ["| true, predicted | " + " | ".join(CLASS_NAMES) + " |", "|---|" + "---|" * len(CLASS_NAMES), *rows, ""]
+_POSTERIOR = ("log loss", "calibration error", "temperature")
 
 
-def _listed(precision: dict[str, float]) -> str:
-    return ", ".join(f"{name} {100 * value:.1f} %" for name, value in precision.items())
-
-
-def _reflectance_section(report: dict[str, Any]) -> list[str]:
-    pool = report["network"]
-    return [
-        f"Reflectance classifier (modt.classification.reflectance_classifier) in the metadata, for the sensor "
-        f"{report['sensor']}; not applied to other sensors.",
-        "",
-        f"- log-linear pool, network to the power {1 - report['share']:.2f}, box {report['share']}, reflectance "
-        f"{report['weight']}: average precision {_listed(pool['average_precision'])}, calibration error "
-        f"{pool['ece']}, log loss {pool['log_loss']} ({pool['log_loss_without']} for the network alone)",
-        f"- pool without reflectance: network to the power {1 - report['share_without']:.2f}, box "
-        f"{report['share_without']}",
-        f"- box and reflectance: average precision {_listed(report['box']['average_precision'])}",
-        "",
-        *_confusion_table(pool["confusion"]),
-        "Share of each class whose object probability from box and reflectance is below the first column:",
-        "",
-        *_threshold_table(report["box"]["ruled_out"]),
+def _row(item: tuple[str, dict[str, Any]]) -> str:
+    sensor, of = item
+    recalls = [of["recall"][str(precision)] for precision in PRECISIONS]
+    cells = [
+        " / ".join(str(recalls[0][c]["objects"]) if c in recalls[0] else "0" for c in CLASS_NAMES[1:]),
+        " / ".join(f"{100 * of['average_precision'][c]:.0f}" for c in CLASS_NAMES[1:]),
+        str(of["log_loss"]),
+        str(of["calibration_error"]["likeliest"]),
+        str(of["temperature"]),
+        *(" / ".join(_percent(recall.get(c)) for c in CLASS_NAMES[1:]) for recall in recalls),
     ]
+    return f"| {sensor} | " + " | ".join(cells) + " |"
 
 
-def _box_section(boxes: dict[str, Any]) -> list[str]:
-    return [
-        f"Box classifier (modt.classification.box_classifier) in the metadata; average precision "
-        f"{_listed(boxes['average_precision'])}.",
-        "Share of each class whose object probability from the box is below the first column:",
-        "",
-        *_threshold_table(boxes["ruled_out"]),
-    ]
+def _percent(recall: dict[str, float] | None) -> str:
+    return "-" if recall is None else f"{100 * recall['of_all']:.0f} ({100 * recall['of_found']:.0f})"
 
 
 def _threshold_table(ruled_out: list[dict[str, Any]]) -> list[str]:
@@ -177,7 +184,7 @@ def main() -> None:
     network = graph(load_layers(args.trained / "weights.npz"))
     report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
     report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
-    metadata, share = {}, 0.0
+    metadata = {CLASS_FREQUENCY_KEY: json.dumps(report["class_frequency"])}
     if (args.trained / "reflectance.json").exists():
         fused = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
         report["reflectance"] = fused
@@ -185,8 +192,9 @@ def main() -> None:
         metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
             layers, fused["share"], fused["weight"], fused["sensor"]
         )
-        share = fused["share_without"]
-    metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(load_layers(args.trained / "boxes.npz"), share)
+    metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(
+        load_layers(args.trained / "boxes.npz"), report["boxes"]["share"]
+    )
     helper.set_model_props(network, metadata)
     model = network.SerializeToString(deterministic=True)
     args.out.write_bytes(model)

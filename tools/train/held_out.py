@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.types import Bool, Float64, Int
-from tools.train.dataset import Dataset, folds
+from modt.types import NONE, Bool, Float64, Int
+from tools.train.dataset import Dataset, LabelledObjects, folds
 from tools.train.temperature_scaling import Calibration, fit_calibration
 
 Model = Callable[[Int], Float64]
@@ -17,21 +18,74 @@ Model = Callable[[Int], Float64]
 
 
 @dataclass(frozen=True)
-class HeldOut:
-    """Predictions for the validation crops: those of real scans where the data set has any.
+class Validation:
+    """The crops that are validated: those of real scans, where the data set has any.
 
     Attributes:
-        logits: (R, 4) of each crop.
-        label: (R,) its class.
-        unambiguous: (R,) clearly one object, or clearly none.
-        truth: (4,) labelled objects of each class, those missed by the segmentation included.
-        calibration: fitted to the unambiguous crops.
+        rows: (R,) of the data set.
+        label, owner: (R,) class, and class whose objects hold most of the points.
+        clear: (R,) clearly one object, or clearly none.
+        sensor: (R,) as in the data set.
+        sensor_names: of the data set.
+        truth: labelled objects; their rows are among the R.
     """
 
-    logits: Float64
+    rows: Int
     label: Int
-    unambiguous: Bool
-    truth: Int
+    owner: Int
+    clear: Bool
+    sensor: Int
+    sensor_names: tuple[str, ...]
+    truth: LabelledObjects
+
+    @classmethod
+    def of(cls, data: Dataset) -> Validation:
+        """Of a data set."""
+        rows = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
+        place = np.full(len(data) + 1, NONE)  # the last one is that of NONE
+        place[rows] = np.arange(len(rows))
+        return cls(
+            rows,
+            data.label[rows],
+            data.owner[rows],
+            ~data.partial[rows],
+            data.sensor[rows],
+            data.sensor_names,
+            replace(data.truth, row=place[data.truth.row]),
+        )
+
+    @property
+    def weight(self) -> Float64:
+        """(R,) of the clear crops; every sensor counts as much as the others."""
+        number = np.bincount(self.sensor[self.clear], minlength=len(self.sensor_names))
+        weight: Float64 = self.clear / number[self.sensor].clip(1)
+        return weight / weight.sum()
+
+    @property
+    def class_frequency(self) -> Float64:
+        """(4,) of the weighted crops: what a posterior calibrated to them assumes."""
+        return np.asarray(np.bincount(self.label, self.weight, N_CLASSES), np.float64)
+
+    def weight_of(self, rows: Bool) -> Float64:
+        """(R,) of clear crops of a mask, by class as frequent as all are."""
+        weight = self.weight * rows
+        frequency = np.bincount(self.label, weight, N_CLASSES)
+        weight *= (self.class_frequency / np.where(frequency > 0, frequency, 1.0))[self.label]
+        return weight / weight.sum()
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Predictions for the validation crops.
+
+    Attributes:
+        validation: the crops.
+        logits: (R, 4) of each.
+        calibration: fitted to the clear ones.
+    """
+
+    validation: Validation
+    logits: Float64
     calibration: Calibration
 
     @property
@@ -49,13 +103,18 @@ def out_of_fold(data: Dataset, k: int, train: Callable[[Bool, int], Model]) -> H
         train: returns a model trained on a mask (R,) of rows, for each fold.
     """
     fold = folds(data, k)
-    rows = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
-    out = np.zeros((len(rows), N_CLASSES))
+    valid = Validation.of(data)
+    out = np.zeros((len(valid.rows), N_CLASSES))
     for i in range(k):
         model = train(fold[data.drive] != i, i)
-        mine = np.flatnonzero(fold[data.drive[rows]] == i)
-        out[mine] = model(rows[mine])
-    label, clear = data.label[rows], ~data.partial[rows]
-    present = np.isin(data.truth_drive, data.drive[rows])
-    truth = np.bincount(data.truth_label[present] if present.any() else label, minlength=N_CLASSES)
-    return HeldOut(out, label, clear, truth, fit_calibration(out[clear], label[clear]))
+        mine = np.flatnonzero(fold[data.drive[valid.rows]] == i)
+        out[mine] = model(valid.rows[mine])
+    return HeldOut(valid, out, fit_calibration(out, valid.label, valid.weight))
+
+
+def load_network(folder: Path, data: Dataset) -> Float64:
+    """(R, 4) out-of-fold probabilities of the PointNet, written by tools.train.train_pointnet for the same crops."""
+    with np.load(folder / "held_out.npz") as file:
+        assert file["crops"].tolist() == data.sha256, "held_out.npz belongs to other crops"
+        probability: Float64 = file["probability"]
+    return probability

@@ -63,13 +63,13 @@ def read_placements(path: Path) -> list[Placement]:
     ]
 
 
-def label_scene(path: Path, seed: int) -> Simulator:
-    """Simulator of a scan of an HDL-64E in the world of a label file.
+def label_scene(path: Path, seed: int, name: str = "hdl-64e") -> Simulator:
+    """Simulator of a scan of a sensor in the world of a label file.
 
     Raises:
         MisuseError: the file is unreadable or no label file.
     """
-    model = sensor("hdl-64e")
+    model = sensor(name)
     world = _placed(read_placements(path), np.random.default_rng([seed, 0]), model.period_s, model.height_m)
     return Simulator(world, model, seed)
 

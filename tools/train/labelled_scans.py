@@ -1,18 +1,21 @@
-"""Labelled scans of KITTI (object, raw, odometry) and Argoverse 2 in one form."""
+"""Labelled scans of KITTI (object, raw, odometry), Argoverse 2 and PandaSet in one form, each with its sensor."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
+from modt import profile
 from modt.classes import CLASSES, ObjectClass, class_of_kitti
+from modt.config import ProfileConfig, SensorConfig
+from modt.errors import MisuseError
 from modt.evaluation import overlap
-from modt.evaluation.truth import Regions
-from modt.geometry import FieldOfView
+from modt.evaluation.truth import PANDASET_TYPES, Regions, Role
+from modt.geometry import Camera, FieldOfView
 from modt.sources.kitti_calibration import camera_of_raw, camera_of_sequence
 from modt.sources.kitti_labels import DONT_CARE, read_labels, read_tracklets
 from modt.types import Bool, Float32, Float64, Int
@@ -24,10 +27,36 @@ SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.sema
 SEMANTIC_UNKNOWN = (0, 1, 13, 15, 16, 20, 32, 99, 255, 256, 257, 259)
 """Labels without a known class: unlabelled, and vehicles that KITTI's object labels classify differently."""
 ARGOVERSE_CLASS = {"REGULAR_VEHICLE": "Car", "PEDESTRIAN": "Pedestrian", "BICYCLIST": "Cyclist"}
-ARGOVERSE_SENSOR_M = np.array([1.35, 0.0, 1.4], np.float32)
-"""Sensor position in the vehicle frame: at the heads, at the height above the ground of KITTI's sensor."""
-ARGOVERSE_EGO_VEHICLE_M = 2.5
-"""Radius of the returns from the carrying vehicle."""
+ARGOVERSE = ProfileConfig(
+    sensor=SensorConfig(height_m=1.95, min_range_m=2.5, elevation_step_deg=0.33, azimuth_step_deg=0.2)
+)
+"""Two heads of 32 beams, one between the beams of the other."""
+ARGOVERSE_SENSOR_M = np.array([1.35, 0.0, 1.57], np.float32)
+"""Between the heads, in the frame of the vehicle."""
+PANDAR64 = profile.load("pandar64")
+PANDASET_SENSOR_M = {
+    "world-000040": (-30.0, 34.1, 1.79),
+    "world-000070": (-50.0, 59.3, 1.67),
+    "world-000100": (0.57, 0.54, 1.85),
+}
+"""Middle of the circles on the ground in scans that are not in the frame of the vehicle."""
+PANDASET_VEHICLE_SENSOR_M = (0.79, 0.0, 1.85)
+PANDASET_DRIVE = dict.fromkeys(("000000", "world-000040", "world-000070"), "000000")
+"""Scans of one drive, by the sizes of the objects."""
+PANDASET_UNKNOWN = (
+    "Animals - Other", "Emergency Vehicle", "Motorized Scooter", "Other Vehicle - Pedicab",
+    "Personal Mobility Device", "Tram / Subway",
+)  # fmt: skip
+"""Types between the classes."""
+TWO_WHEELERS, RIDDEN_M = ("Bicycle", "Motorcycle", "TYPE_CYCLIST"), 1.5
+"""Cuboids of both parked and ridden ones; these are taller than RIDDEN_M."""
+MISMATCHED = ("002894",)
+"""Scans of `training_more` that are not those of their labels: boxes in plain view are empty, cars have no box."""
+THINNED = {2: 0.12, 4: 0.14}
+"""Side of a cell at 10 m [m] where every n-th beam of an HDL-64E is kept."""
+FULL_SCAN_BEAMS = 64
+AT_SENSOR = Camera(np.eye(3, 4), np.array([[0.0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]]), 1.0, 1.0)
+"""Axes of a camera at the sensor."""
 TEST_DRIVE = "2011_09_26_drive_0005_sync"
 
 
@@ -45,6 +74,8 @@ class Scan:
         fov: region with complete labels.
         unlabelled: (N,) points without a label.
         track_ids: of each object, constant over a drive; empty where not labelled.
+        sensor: name of the sensor, by which results are grouped.
+        profile: of the sensor.
     """
 
     name: str
@@ -56,6 +87,35 @@ class Scan:
     fov: FieldOfView
     unlabelled: Bool
     track_ids: tuple[int, ...] = ()
+    sensor: str = profile.DEFAULT
+    profile: ProfileConfig = field(default_factory=profile.load)
+
+    def only(self, kept: Bool) -> Scan:
+        """The scan with the points of a mask (N,) alone."""
+        row = np.cumsum(kept) - 1
+        objects = tuple(row[own[kept[own]]] for own in self.objects)
+        return replace(self, points=self.points[kept], objects=objects, unlabelled=self.unlabelled[kept])
+
+
+def thinned(scan: Scan, step: int) -> Scan:
+    """A scan of an HDL-64E with every step-th beam alone, by the sensor that this would be."""
+    config = scan.profile
+    sensor = replace(config.sensor, elevation_step_deg=step * config.sensor.elevation_step_deg)
+    segmentation = replace(config.segmentation, cell_m=THINNED[step])
+    name = f"{scan.sensor}, {FULL_SCAN_BEAMS // step} beams"
+    part = scan.only(beams(scan.points) % step == 0)
+    return replace(
+        part,
+        name=f"{scan.name}/{step}",
+        sensor=name,
+        profile=replace(config, sensor=sensor, segmentation=segmentation),
+    )
+
+
+def beams(points: Float32) -> Int:
+    """(N,) beam of each point of KITTI's scans, which are stored beam by beam: the azimuth jumps back between two."""
+    azimuth = np.arctan2(points[:, 1], points[:, 0]) % (2 * np.pi)
+    return np.append(0, np.cumsum(np.diff(azimuth) < -np.pi))
 
 
 def points_in_box(points: Float32, box: Float64) -> Bool:
@@ -101,12 +161,13 @@ def object_scans(folder: Path) -> Iterator[Scan]:
     for path in sorted(folder.glob("velodyne*/*.bin"), key=lambda p: p.stem):
         drive = drive_of[path.stem]
         assert drive != TEST_DRIVE, path
-        yield object_scan(path, folder / "label_2" / f"{path.stem}.txt", folder / "calib" / f"{path.stem}.txt", drive)
+        if path.stem not in MISMATCHED:
+            camera = camera_of_sequence(folder / "calib" / f"{path.stem}.txt")
+            yield object_scan(path, folder / "label_2" / f"{path.stem}.txt", camera, drive)
 
 
-def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
+def object_scan(path: Path, label: Path, camera: Camera, drive: str) -> Scan:
     """One scan of the object benchmark."""
-    camera = camera_of_sequence(calib)
     points = np.fromfile(path, np.float32).reshape(-1, 4)
     labels = read_labels(label, camera, tracking=False)
     objects = [item for item in labels if item.type_ != DONT_CARE]
@@ -114,6 +175,37 @@ def object_scan(path: Path, label: Path, calib: Path, drive: str) -> Scan:
     unlabelled = Regions(edges, camera).contains(points)
     boxes, kinds = [on_bottom(item.box).tolist() for item in objects], [item.type_ for item in objects]
     return scan_from_boxes(path.stem, drive, points, boxes, kinds, FieldOfView.of_camera(camera), unlabelled)
+
+
+def folder_scans(folder: Path, sensor: str, config: ProfileConfig) -> Iterator[Scan]:
+    """Scans in the layout of the KITTI object benchmark: folder/velodyne/*.bin, folder/label_2, folder/calib.
+
+    Without calib/ the labels are complete over the full circle, in a camera frame at the sensor (x right, y down, z
+    forward). Scans named DRIVE_NUMBER are of one drive.
+
+    Args:
+        folder: of the scans.
+        sensor: its name.
+        config: its profile.
+
+    Raises:
+        MisuseError: no scans, or a label or calibration file is missing or invalid.
+    """
+    paths = sorted((folder / "velodyne").glob("*.bin"))
+    if not paths:
+        raise MisuseError(folder, "no scans", "give a folder with velodyne/*.bin and label_2/*.txt")
+    for path in paths:
+        label, calib = folder / "label_2" / f"{path.stem}.txt", folder / "calib" / f"{path.stem}.txt"
+        drive = path.stem.rpartition("_")[0] or path.stem
+        if calib.parent.is_dir():
+            scan = object_scan(path, label, camera_of_sequence(calib), drive)
+        else:
+            points = np.fromfile(path, np.float32).reshape(-1, 4)
+            labels = [item for item in read_labels(label, AT_SENSOR, tracking=False) if item.type_ != DONT_CARE]
+            boxes, kinds = [on_bottom(item.box).tolist() for item in labels], [item.type_ for item in labels]
+            none = np.zeros(len(points), np.bool_)
+            scan = scan_from_boxes(path.stem, drive, points, boxes, kinds, FieldOfView(), none)
+        yield replace(scan, sensor=sensor, profile=config)
 
 
 def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
@@ -152,23 +244,62 @@ def semantic_scans(folder: Path) -> Iterator[Scan]:
 
 
 def argoverse_scans(folder: Path) -> Iterator[Scan]:
-    """Sweeps of Argoverse 2 (two heads of 32 beams), labelled over the full circle: folder/*.npz, folder/*.csv.
-
-    Their origin, the rear axle, is moved to ARGOVERSE_SENSOR_M.
-    """
+    """Sweeps of Argoverse 2, labelled over the full circle: folder/*.npz, folder/*.csv."""
     for path in sorted(folder.glob("*.npz")):
         with np.load(path) as file:
             points = file["points"].astype(np.float32)
         points[:, :3] -= ARGOVERSE_SENSOR_M
-        points[:, 3] = 0.0  # on another scale
-        points = points[np.hypot(points[:, 0], points[:, 1]) > ARGOVERSE_EGO_VEHICLE_M]
         with path.with_suffix(".csv").open(encoding="utf-8") as rows:
             objects = [row for row in csv.DictReader(rows) if int(row["points"]) > 0]
         columns = ("x_m", "y_m", "z_centre_m", "length_m", "width_m", "height_m", "yaw_rad")
-        boxes = np.array([[float(row[c]) for c in columns] for row in objects])
+        boxes = on_bottom(np.array([[float(row[c]) for c in columns] for row in objects]))
         boxes[:, :3] -= ARGOVERSE_SENSOR_M
-        boxes[:, 2] -= boxes[:, 5] / 2
         kinds = [ARGOVERSE_CLASS.get(row["category"], "") for row in objects]
         drive = f"argoverse2/{path.stem.split('_')[0]}"
         none = np.zeros(len(points), np.bool_)
-        yield scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
+        scan = scan_from_boxes(f"argoverse2/{path.stem}", drive, points, boxes.tolist(), kinds, FieldOfView(), none)
+        yield replace(scan, sensor="argoverse2", profile=ARGOVERSE)
+
+
+def pandaset_scans(folder: Path) -> Iterator[Scan]:
+    """Scans of PandaSet, labelled over the full circle: folder/scans/*.bin, folder/*.csv.
+
+    Types between the classes, such as lorries, count as unlabelled.
+    """
+    for path in sorted((folder / "scans").glob("*.bin")):
+        position = np.array(PANDASET_SENSOR_M.get(path.stem, PANDASET_VEHICLE_SENSOR_M), np.float32)
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        points[:, :3] -= position
+        with (folder / f"{path.stem}.csv").open(encoding="utf-8") as rows:
+            cuboids = list(csv.DictReader(rows))
+        columns = ("x", "y", "z", "length", "width", "height", "yaw")
+        boxes = on_bottom(np.array([[float(row[c]) for c in columns] for row in cuboids]))
+        boxes[:, :3] -= position
+        kinds = [_pandaset_class(row["class"], float(row["height"])) for row in cuboids]
+        objects = [np.flatnonzero(points_in_box(points, box)) for box in boxes]
+        known = [k for k, kind in enumerate(kinds) if kind is not None]
+        unlabelled = np.zeros(len(points), np.bool_)
+        for own, kind in zip(objects, kinds, strict=True):
+            unlabelled[own] |= kind is None
+        yield Scan(
+            name=f"pandaset/{path.stem}",
+            drive=f"pandaset/{PANDASET_DRIVE.get(path.stem, path.stem)}",
+            points=points,
+            objects=tuple(objects[k] for k in known),
+            kinds=tuple(kind for kind in kinds if kind is not None),
+            boxes=boxes[known],
+            fov=FieldOfView(),
+            unlabelled=unlabelled,
+            sensor="pandar64",
+            profile=PANDAR64,
+        )
+
+
+def _pandaset_class(name: str, height_m: float) -> ObjectClass | None:
+    """Class of a cuboid; None between the classes."""
+    if name in TWO_WHEELERS:
+        return ObjectClass.CYCLIST if height_m > RIDDEN_M else ObjectClass.BACKGROUND
+    if not name.startswith("TYPE_"):
+        name = name.replace("_", " ")  # the tables differ
+    object_class, role = PANDASET_TYPES.get(name, (ObjectClass.BACKGROUND, Role.COUNTED))
+    return None if role != Role.COUNTED or name in PANDASET_UNKNOWN else object_class

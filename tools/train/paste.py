@@ -14,10 +14,10 @@ import numpy as np
 from numpy.random import Generator
 
 from modt.classes import ObjectClass
+from modt.config import SensorConfig
 from modt.evaluation.overlap import PAD_M
 from modt.geometry import FieldOfView
 from modt.types import Bool, Float32, Float64, Int
-from tools.train.augment import Beams
 from tools.train.labelled_scans import Scan
 
 MIN_POINTS, CLEARANCE_M, OCCLUSION_MARGIN_M = 8, 0.4, 0.4
@@ -54,18 +54,27 @@ def cut_objects(scans: Iterable[Scan]) -> list[ObjectCut]:
 
 
 def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generator) -> Iterator[Scan]:
-    """A scan with pasted objects for each source drive, the other points unlabelled; at most `attempts` objects."""
+    """A scan with pasted objects for each of a few source drives, the other points unlabelled.
+
+    Args:
+        scan: to paste into.
+        cuts: objects, of any drive.
+        attempts: number of objects that are tried.
+        rng: of the choice of drives, objects and places.
+    """
     by_class = {kind: [cut for cut in cuts if cut.kind == kind] for kind in CLASS_SHARE}
+    sources = {rng.choice(sorted({cut.drive for cut in same})).item() for same in by_class.values() if same}
     by_drive: dict[str, list[ObjectCut]] = {}
     for kind in rng.choice(list(CLASS_SHARE), attempts, p=list(CLASS_SHARE.values())):
-        cut = by_class[ObjectClass(kind)][rng.integers(len(by_class[ObjectClass(kind)]))]
-        by_drive.setdefault(cut.drive, []).append(cut)
-    beams = Beams()
+        candidates = [cut for cut in by_class[ObjectClass(kind)] if cut.drive in sources]
+        if candidates:
+            cut = candidates[rng.integers(len(candidates))]
+            by_drive.setdefault(cut.drive, []).append(cut)
     for drive, chosen in by_drive.items():
         points, boxes, kinds = scan.points, [], []
         objects: list[Int] = []
         for cut in chosen:
-            placed = _place(cut, points, beams, rng)
+            placed = _place(cut, points, scan.profile.sensor, rng)
             if placed is None:
                 continue
             own, box, hidden = placed
@@ -92,7 +101,9 @@ def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generat
             )
 
 
-def _place(cut: ObjectCut, scene: Float32, beams: Beams, rng: Generator) -> tuple[Float32, Float64, Bool] | None:
+def _place(
+    cut: ObjectCut, scene: Float32, sensor: SensorConfig, rng: Generator
+) -> tuple[Float32, Float64, Bool] | None:
     """Points and box at a random free place, and a mask of the scene points occluded there; None if not possible."""
     angle = rng.uniform(-np.pi, np.pi)
     rho = float(np.hypot(*cut.box[:2]))
@@ -110,25 +121,37 @@ def _place(cut: ObjectCut, scene: Float32, beams: Beams, rng: Generator) -> tupl
     points = cut.points.copy()
     points[:, 0], points[:, 1] = c * xy[:, 0] - s * xy[:, 1], s * xy[:, 0] + c * xy[:, 1]
     points[:, 2] += ground - cut.box[2]
-    cells = _cells(points, beams)
+    cells = _cells(points, sensor)
     if factor > 1.03:
         _, first = np.unique(cells, return_index=True)
         points, cells = points[first], cells[first]
-    scene_cells = _cells(scene, beams)
-    distance, scene_distance = np.linalg.norm(points[:, :3], axis=1), np.linalg.norm(scene[:, :3], axis=1)
+    sector = np.flatnonzero(_around(scene, points))
+    beside = scene[sector]
+    scene_cells = _cells(beside, sensor)
+    distance, scene_distance = np.linalg.norm(points[:, :3], axis=1), np.linalg.norm(beside[:, :3], axis=1)
     front = np.flatnonzero((scene_distance < distance.min() - OCCLUSION_MARGIN_M) & (scene_distance > 2.0))
     visible = ~np.isin(cells, _dilate(scene_cells[front]))
     points, cells = points[visible], cells[visible]
     if visible.sum() < max(MIN_POINTS, 0.2 * len(visible)):
         return None
-    hidden = np.isin(scene_cells, _dilate(cells)) & (scene_distance > distance.mean())
+    hidden = np.zeros(len(scene), np.bool_)
+    hidden[sector] = np.isin(scene_cells, _dilate(cells)) & (scene_distance > distance.mean())
     box = np.array([*target, ground, *cut.box[3:6], cut.box[6] + angle])
     return points, box, hidden
 
 
-def _cells(points: Float32, beams: Beams) -> Int:
-    azimuth = np.rad2deg(np.arctan2(points[:, 1], points[:, 0])) / beams.azimuth_deg
-    elevation = np.rad2deg(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))) / beams.elevation_deg
+def _around(scene: Float32, points: Float32) -> Bool:
+    """(N,) points of the scene in the directions of the points of an object, with a margin."""
+    bearing = points[:, :2] / np.hypot(points[:, 0], points[:, 1])[:, None]
+    middle = bearing.mean(axis=0) / np.linalg.norm(bearing.mean(axis=0))
+    cos_half = np.cos(np.arccos(np.clip(bearing @ middle, -1.0, 1.0)).max() + np.deg2rad(1.0))
+    within: Bool = scene[:, :2] @ middle > cos_half * np.hypot(scene[:, 0], scene[:, 1])
+    return within
+
+
+def _cells(points: Float32, sensor: SensorConfig) -> Int:
+    azimuth = np.rad2deg(np.arctan2(points[:, 1], points[:, 0])) / sensor.azimuth_step_deg
+    elevation = np.rad2deg(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))) / sensor.elevation_step_deg
     return (np.floor(azimuth).astype(np.int64) << 16) + np.floor(elevation).astype(np.int64) + 8192
 
 

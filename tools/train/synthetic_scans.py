@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
 
+from modt import profile
 from modt.geometry import FieldOfView
 from modt.simulation.simulator import Truth
 from modt.sources.synthetic_stream import CAMERA, SyntheticStream
@@ -18,7 +20,9 @@ PEOPLE = ("Pedestrian", "Cyclist", "Person_sitting")
 SECONDS = 4.0
 
 
-def labelled_scan(frame: Frame, truth: Truth, name: str, world: str, *, camera: bool) -> Scan:
+def labelled_scan(
+    frame: Frame, truth: Truth, name: str, world: str, *, camera: bool, sensor: str = profile.DEFAULT
+) -> Scan:
     """A simulated sweep as a labelled scan, in the camera's view or over the full circle."""
     order = np.argsort(truth.instance, kind="stable")
     ends = np.searchsorted(truth.instance[order], truth.bodies, side="right")
@@ -33,28 +37,36 @@ def labelled_scan(frame: Frame, truth: Truth, name: str, world: str, *, camera: 
         FieldOfView.of_camera(CAMERA) if camera else FieldOfView(),
         np.zeros(len(frame.points), np.bool_),
         tuple(truth.bodies.tolist()),
+        sensor,
+        profile.load(sensor),
     )
 
 
 def simulated_scans(
-    scenes: Sequence[str], seeds: Sequence[int], times_s: Sequence[float], *, camera: bool
+    scenes: Sequence[str],
+    seeds: Sequence[int],
+    times_s: Sequence[float],
+    *,
+    camera: bool,
+    sensors: Sequence[str] = (profile.DEFAULT,),
 ) -> Iterator[Scan]:
-    """Sweeps at the given times of a short drive through each scene, for each seed."""
+    """Sweeps at the given times of a short drive through each scene, for each seed, by one sensor after another."""
+    in_turn = cycle(sensors)
     for seed in seeds:
         for scene in scenes:
-            simulator = SyntheticStream(scene, "hdl-64e", SECONDS, seed).simulator
+            simulator = SyntheticStream(scene, sensor := next(in_turn), SECONDS, seed).simulator
             for time_s in times_s:
                 frame, truth = simulator.sweep(round(time_s / simulator.sensor.period_s))
                 name = f"{scene}-{seed}"
-                yield labelled_scan(frame, truth, f"{name}/{frame.index}", name, camera=camera)
+                yield labelled_scan(frame, truth, f"{name}/{frame.index}", name, camera=camera, sensor=sensor)
 
 
-def scans_from_labels(files: Sequence[Path], seeds: Sequence[int]) -> Iterator[Scan]:
-    """A sweep of a world built from a random label file, for each seed."""
-    for seed in seeds:
+def scans_from_labels(files: Sequence[Path], seeds: Sequence[int], sensors: Sequence[str]) -> Iterator[Scan]:
+    """A sweep of a world built from a random label file, for each seed, by one sensor after another."""
+    for seed, sensor in zip(seeds, cycle(sensors), strict=False):
         path = files[int(np.random.default_rng(seed).integers(len(files)))]
-        frame, truth = label_scene(path, seed).sweep(0)
-        yield labelled_scan(frame, truth, f"{path.stem}-{seed}", f"placed-{seed}", camera=True)
+        frame, truth = label_scene(path, seed, sensor).sweep(0)
+        yield labelled_scan(frame, truth, f"{path.stem}-{seed}", f"placed-{seed}", camera=True, sensor=sensor)
 
 
 def label_files(folder: Path) -> list[Path]:

@@ -49,19 +49,20 @@ class Calibration:
         return {"temperature": round(self.temperature, 4), "offset": [round(float(v), 4) for v in self.offset]}
 
 
-def fit_calibration(logits: Float64, label: Int, base: Float64 | float = 0.0) -> Calibration:
-    """Maximum-likelihood calibration on held-out logits; the offsets absorb the class frequencies of proposals.
+def fit_calibration(logits: Float64, label: Int, weight: Float64, base: Float64 | float = 0.0) -> Calibration:
+    """Maximum-likelihood calibration on held-out logits; the offsets absorb the weighted class frequencies.
 
     Args:
         logits: (R, 4) uncalibrated.
         label: (R,) classes.
+        weight: (R,) of each, 1 in total.
         base: (R, 4) calibrated logits that they are added to.
     """
 
     def loss(theta: Float64) -> float:
         z = log_softmax(base + logits * np.exp(-theta[0]) + np.append(0.0, theta[1:]), axis=1)
-        prior = 0.05 * float(np.sum(theta**2)) / len(label)
-        return prior - float(z[np.arange(len(label)), label].mean())
+        prior = 0.05 * float(np.sum(theta**2)) / np.count_nonzero(weight)
+        return prior - float(weight @ z[np.arange(len(label)), label])
 
     found = minimize(loss, np.zeros(N_CLASSES), method="L-BFGS-B")
     return Calibration(float(np.exp(found.x[0])), np.append(0.0, found.x[1:]))

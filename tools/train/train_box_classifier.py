@@ -2,9 +2,10 @@
 
     python -m tools.train.train_box_classifier OUT_DIR CROPS.npz... [--steps N] [--folds K] [--seed S]
 
-Writes OUT_DIR/boxes.npz for export_pointnet and OUT_DIR/boxes.json: out-of-fold average precision and, for several
-thresholds, the share of each class below the threshold. Crops are augmented as for the PointNet, and the boxes fitted
-to the augmented crops.
+OUT_DIR holds the output of train_pointnet for the same crops and folds. Writes OUT_DIR/boxes.npz for export_pointnet
+and OUT_DIR/boxes.json: the share of the box in the pool with the network, out-of-fold scores by sensor of the box
+alone and of the pool and, for several thresholds, the share of each class below the threshold. Crops are augmented as
+for the PointNet, and the boxes fitted to the augmented crops.
 """
 
 from __future__ import annotations
@@ -14,22 +15,26 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.random import Generator
+from scipy.optimize import minimize_scalar
+from scipy.special import log_softmax
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.mlp import Layers, logits
-from modt.evaluation.class_score import average_precision
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
-from tools.train.augment import Beams, augment, subsample
-from tools.train.batches import draw_batch, sampling_pools
+from tools.train.augment import augment, subsample
+from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
 from tools.train.box_features import crop_features, dataset_features
 from tools.train.dataset import Dataset, load
-from tools.train.held_out import Model, out_of_fold
+from tools.train.held_out import Model, load_network, out_of_fold
 from tools.train.mlp_training import Batch, train_mlp
+from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
 
-STEPS = 1000
+STEPS, AUGMENTED_BATCHES = 2000, 250
+"""Of the training, and batches that are augmented for it: augmentation costs more than a step."""
 MAX_POINTS = 400
 """Maximum number of points of a crop before augmentation."""
 THRESHOLDS = (0.005, 0.01, 0.02, 0.05, 0.1)
@@ -40,29 +45,59 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> Layers:
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     pools = sampling_pools(data, rows)
-    sample = dataset_features(data, np.concatenate([draw_batch(pools, rng) for _ in range(16)]))
+    drawn = [draw_batch(pools, rng) for _ in range(AUGMENTED_BATCHES)]
+    feature = np.concatenate([_augmented_features(data, own, rng) for own in drawn])
+    label = data.label[np.concatenate(drawn)]
 
     def batch() -> Batch:
-        chosen = np.concatenate([draw_batch(pools, rng), draw_batch(pools, rng)])
-        crops = augment(subsample(data.take(chosen), MAX_POINTS, rng), Beams(), rng)
-        return Batch(crop_features(crops), data.label[chosen])
+        chosen = rng.integers(0, len(label), 2 * BATCH_SIZE)
+        return Batch(feature[chosen], label[chosen])
 
-    return train_mlp(batch, sample, steps, rate=1e-2, decay=1e-3)
+    return train_mlp(batch, feature, steps, rate=1e-2, decay=1e-3)
 
 
-def cross_validate(data: Dataset, k: int, steps: int, seed: int) -> tuple[Calibration, dict[str, Any]]:
-    """Calibration and scores from out-of-fold predictions."""
+def _augmented_features(data: Dataset, rows: Int, rng: Generator) -> Float64:
+    """(R, 7) features of rows of the data set, augmented."""
+    crops = subsample(data.take(rows), MAX_POINTS, rng)
+    return crop_features(*augment(crops, data.sensors.take(rows), rng))
+
+
+def cross_validate(
+    data: Dataset, network: Float64, k: int, steps: int, seed: int
+) -> tuple[Calibration, dict[str, Any]]:
+    """Calibration, share in the pool with the network, and scores from out-of-fold predictions.
+
+    Args:
+        data: all crops.
+        network: (R, 4) out-of-fold probabilities of the PointNet.
+        k: number of folds.
+        steps: training steps of a fold.
+        seed: of the first fold.
+    """
 
     def model(among: Bool, i: int) -> Model:
         layers = train(data, np.flatnonzero(among & data.trainable), steps, seed + i)
         return lambda rows: logits(layers, dataset_features(data, rows))
 
     held = out_of_fold(data, k, model)
-    probability, clear = held.probability, held.unambiguous
+    valid, box, shape = held.validation, np.log(held.probability), np.log(network)
+    share = fit_share(shape, box, valid.label, valid.weight)
     return held.calibration, {
-        "average_precision": average_precision(probability, held.label, held.truth),
-        "ruled_out": ruled_out(probability[clear], held.label[clear]),
+        "share": share,
+        "cross_validation": by_sensor(box, valid, valid.clear),
+        "pool": by_sensor((1.0 - share) * shape + share * box, valid, valid.clear),
+        "ruled_out": ruled_out(held.probability[valid.clear], valid.label[valid.clear]),
     }
+
+
+def fit_share(network: Float64, box: Float64, label: Int, weight: Float64) -> float:
+    """Share of the box, 0 to 1, that minimises the log loss of the pool of two log probabilities (R, 4)."""
+
+    def loss(share: float) -> float:
+        pool = log_softmax((1.0 - share) * network + share * box, axis=1)
+        return -float(weight @ pool[np.arange(len(label)), label])
+
+    return round(float(minimize_scalar(loss, bounds=(0.0, 1.0), method="bounded").x), 2)
 
 
 def ruled_out(probability: Float64, label: Int) -> list[dict[str, Any]]:
@@ -87,8 +122,8 @@ def main() -> None:
     args = parser.parse_args()
     make_torch_deterministic()
     data = load(*args.crops)
-    args.out.mkdir(parents=True, exist_ok=True)
-    calibration, report = cross_validate(data, args.folds, args.steps, args.seed)
+    network = load_network(args.out, data)
+    calibration, report = cross_validate(data, network, args.folds, args.steps, args.seed)
     layers = train(data, np.flatnonzero(data.trainable), args.steps, args.seed)
     save_layers(args.out / "boxes.npz", [*layers[:-1], calibration.fold_into(layers[-1])])
     (args.out / "boxes.json").write_text(

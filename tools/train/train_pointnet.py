@@ -1,14 +1,12 @@
 """Train the PointNet on a data set of crops; seeded and resumable (extra [train]).
 
-    python -m tools.train.train_pointnet OUT_DIR CROPS.npz... [--epochs N] [--folds K] [--teachers T] [--seed S]
+    python -m tools.train.train_pointnet OUT_DIR CROPS.npz... [--steps N] [--folds K] [--teachers T] [--seed S]
 
 Writes OUT_DIR/weights.npz for export_pointnet and OUT_DIR/report.json with the loss curve. With --folds the report
 has out-of-fold average precision, confusion and calibration (folds split by drive), OUT_DIR/held_out.npz has the
 out-of-fold probabilities for train_reflectance_classifier, and the calibration is folded into the last layer. With
 --teachers an ensemble of T networks, trained as long as those of the folds, provides the targets
-(tools.train.distillation), with the reflectance evidence of train_reflectance_classifier for unlabelled crops. An
-epoch draws as many crops as there are trainable ones of real scans (of any scans without real ones); the paper trains
-40 epochs (weak) and 100 (converged).
+(tools.train.distillation), with the reflectance evidence of train_reflectance_classifier for unlabelled crops.
 """
 
 from __future__ import annotations
@@ -21,19 +19,19 @@ from typing import Any
 import numpy as np
 import torch
 
-from modt.classes import CLASS_NAMES, N_CLASSES
+from modt.classes import N_CLASSES
 from modt.classification.crops import Crops, canonical
 from modt.classification.mlp import logits as layer_logits
-from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier, train_reflectance_classifier
-from tools.train.augment import Beams, augment, subsample
+from tools.train.augment import augment, subsample
 from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
-from tools.train.dataset import SENSOR_HEIGHT_M, UNLABELLED, Dataset, load
+from tools.train.dataset import UNLABELLED, Dataset, Sensors, load
 from tools.train.distillation import EnsembleTargets, LabelTargets, TargetSource
 from tools.train.held_out import HeldOut, Model, out_of_fold
 from tools.train.network import PointNet
+from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
 
@@ -43,23 +41,23 @@ UNLABELLED_BATCH_SIZE = 102
 """Unlabelled crops of a step, with teachers."""
 
 
-def tensors(crops: Crops) -> tuple[torch.Tensor, torch.Tensor]:
+def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]:
     """Input of the network: (K, 3) canonical points, crop after crop, and (R,) points of each crop."""
-    local = canonical(crops, SENSOR_HEIGHT_M)
+    local = canonical(crops, sensors.height_m)
     return torch.from_numpy(local.xyz), torch.from_numpy(local.count)
 
 
 def train(
-    data: Dataset, rows: Int, steps: int, seed: int, state: Path | None, source: TargetSource
+    data: Dataset, trainable: Int, steps: int, seed: int, state: Path | None, source: TargetSource
 ) -> tuple[PointNet, list[float]]:
-    """Train on rows of the data set, resuming from the file `state`; the network and its loss, mean of 50 steps."""
+    """Train on rows `trainable`, resuming from the file `state`; the network and its loss, mean of 50 steps."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
     net = PointNet()
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=0.02)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, 3e-3, total_steps=steps, pct_start=0.15)
     criterion = torch.nn.CrossEntropyLoss()
-    pools = sampling_pools(data, rows)
+    pools = sampling_pools(data, trainable)
     losses: list[float] = []
     first = 0
     if state is not None and state.exists():
@@ -74,8 +72,9 @@ def train(
     for step in range(first, steps):
         labelled = draw_batch(pools, rng)
         unlabelled = source.draw_unlabelled(rng)
-        crops = subsample(data.take(np.append(labelled, unlabelled)), MAX_POINTS, rng)
-        batch = tensors(subsample(augment(crops, Beams(), rng), POINTS, rng))
+        rows = np.append(labelled, unlabelled)
+        crops, sensors = augment(subsample(data.take(rows), MAX_POINTS, rng), data.sensors.take(rows), rng)
+        batch = tensors(subsample(crops, POINTS, rng), sensors)
         loss = criterion(net(*batch), source.targets(*batch, data.label[labelled], unlabelled))
         optimiser.zero_grad()
         loss.backward()
@@ -141,58 +140,52 @@ def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
     """(R, 4) of rows of the data set, without augmentation."""
     rng = np.random.default_rng(0)
     parts = np.split(rows, np.arange(BATCH_SIZE, len(rows), BATCH_SIZE))
-    out: Float64 = torch.cat([net(*tensors(subsample(data.take(p), POINTS, rng))) for p in parts]).double().numpy()
+    out: Float64 = (
+        torch.cat([net(*tensors(subsample(data.take(p), POINTS, rng), data.sensors.take(p))) for p in parts])
+        .double()
+        .numpy()
+    )
     return out
 
 
 def cross_validate(data: Dataset, k: int, steps: int, teachers: int, seed: int) -> tuple[HeldOut, dict[str, Any]]:
-    """Out-of-fold predictions and their scores; objects missed by the segmentation count as false negatives."""
+    """Out-of-fold predictions and their scores by sensor."""
 
     def model(among: Bool, i: int) -> Model:
         net, _ = train_with_teachers(data, among, (steps, steps), teachers, seed + i, None)
         return lambda rows: logits(net, data, rows)
 
     held = out_of_fold(data, k, model)
-    probability, clear = held.probability, held.unambiguous
-    label = held.label[clear]
-    return held, {
-        "average_precision": average_precision(probability, held.label, held.truth),
-        "objects": {name: int(n) for name, n in zip(CLASS_NAMES[1:], held.truth[1:], strict=True)},
-        "confusion": confusion(probability[clear], label),
-        "ece": top_calibration_error(probability[clear], label),
-        "ece_uncalibrated": top_calibration_error(Calibration.identity().apply(held.logits[clear]), label),
-    }
+    return held, by_sensor(np.log(held.probability), held.validation, held.validation.clear)
 
 
 def main() -> None:
     parser = training_parser(__doc__, folds=0)
-    parser.add_argument("--epochs", type=float, default=40)
-    parser.add_argument("--fold-epochs", type=float, help="of the networks of folds and teachers (default: --epochs)")
+    parser.add_argument("--steps", type=int, default=1600)
+    parser.add_argument("--fold-steps", type=int, help="of the networks of folds and teachers (default: --steps)")
     parser.add_argument("--teachers", type=int, default=0, help="number of networks in the ensemble")
     parser.add_argument("--calibrated", type=Path, help="report.json of a run with --folds, for its calibration")
     args = parser.parse_args()
     make_torch_deterministic()
     data = load(*args.crops)
+    fold_steps = args.fold_steps or args.steps
     args.out.mkdir(parents=True, exist_ok=True)
-    variant = data.variant[data.trainable]
-    per_epoch = np.count_nonzero(variant == variant.min()) / BATCH_SIZE
     started = time.process_time()
-    report: dict[str, Any] = {"seed": args.seed, "epochs": args.epochs, "teachers": args.teachers}
+    report: dict[str, Any] = {"seed": args.seed, "steps": args.steps, "teachers": args.teachers}
     report |= {"crops_sha256": data.sha256, "provenance": data.provenance, "torch": torch.__version__}
     calibration = Calibration.identity()
     if args.calibrated:
         earlier = json.loads(args.calibrated.read_text(encoding="utf-8"))
         calibration = Calibration.from_dict(earlier["calibration"])
-        report["cross_validation"] = earlier["cross_validation"]
+        report |= {key: earlier[key] for key in ("cross_validation", "class_frequency")}
     elif args.folds:
-        steps = round(per_epoch * (args.fold_epochs or args.epochs) * (1 - 1 / args.folds))
-        held, report["cross_validation"] = cross_validate(data, args.folds, steps, args.teachers, args.seed)
+        held, report["cross_validation"] = cross_validate(data, args.folds, fold_steps, args.teachers, args.seed)
         calibration = held.calibration
+        report["class_frequency"] = held.validation.class_frequency.round(4).tolist()
         np.savez(args.out / "held_out.npz", probability=held.probability, crops=data.sha256)
         print(json.dumps(report["cross_validation"]))
     everything = np.ones(len(data), np.bool_)
-    steps_of_both = round(per_epoch * args.epochs), round(per_epoch * (args.fold_epochs or args.epochs))
-    net, losses = train_with_teachers(data, everything, steps_of_both, args.teachers, args.seed, args.out)
+    net, losses = train_with_teachers(data, everything, (args.steps, fold_steps), args.teachers, args.seed, args.out)
     report |= {"loss": losses, "calibration": calibration.as_dict(), "cpu_s": round(time.process_time() - started)}
     layers = net.layers()
     layers[-1] = calibration.fold_into(layers[-1])

@@ -5,7 +5,7 @@
 
 OUT_DIR holds the output of train_pointnet and train_box_classifier for the same crops and folds. Writes
 OUT_DIR/reflectance.npz for export_pointnet and OUT_DIR/reflectance.json: the weights of box and reflectance in the
-pool with the network, and out-of-fold scores of box with reflectance and of all three.
+pool with the network, and out-of-fold scores by sensor of box with reflectance and of all three.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 import torch
 from scipy.optimize import minimize
-from scipy.special import softmax
+from scipy.special import log_softmax, softmax
 
 from modt.classification.mlp import Layers, logits
-from modt.evaluation.class_score import average_precision, confusion, top_calibration_error
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier
 from tools.train.batches import draw_batch, sampling_pools
 from tools.train.box_features import dataset_features
 from tools.train.dataset import Dataset, load
-from tools.train.held_out import Model, out_of_fold
+from tools.train.held_out import Model, Validation, load_network, out_of_fold
 from tools.train.mlp_training import Batch, train_mlp
+from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration, fit_calibration
 from tools.train.weights import load_layers, save_layers
 
@@ -49,11 +49,16 @@ class Features:
         self.all = np.hstack([self.box, data.reflectance])
 
 
+def has_reflectance(data: Dataset, rows: Int) -> Bool:
+    """(R,) whether the reflectance of rows is known."""
+    return np.asarray(np.isfinite(data.reflectance[rows]).all(axis=1))
+
+
 def train(data: Dataset, features: Features, rows: Int, boxes: Layers, steps: int, seed: int) -> Layers:
     """Train on rows of the data set; uncalibrated layers whose logits are added to those of the box layers."""
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
-    pools = sampling_pools(data, rows[np.isfinite(data.reflectance[rows]).all(axis=1)])
+    pools = sampling_pools(data, rows[has_reflectance(data, rows)])
     base = logits(boxes, features.box)
     sample = features.all[np.concatenate([draw_batch(pools, rng) for _ in range(16)])]
     scale = JITTER * sample.std(axis=0)
@@ -69,7 +74,9 @@ def train(data: Dataset, features: Features, rows: Int, boxes: Layers, steps: in
 def cross_validate(
     data: Dataset, features: Features, network: Float64, k: int, steps: int, seed: int
 ) -> tuple[Calibration, dict[str, Any]]:
-    """Calibration, pool weights and scores from out-of-fold predictions.
+    """Calibration, pool weights and scores from out-of-fold predictions for the crops with reflectance.
+
+    The evidence is fitted to crops weighted to the class frequency that box and network assume: it adds none.
 
     Args:
         data: all crops.
@@ -93,54 +100,43 @@ def cross_validate(
     def reflectance_model(among: Bool, i: int) -> Model:
         calibrated = [*boxes[i][:-1], by_box.calibration.fold_into(boxes[i][-1])]
         layers = train(data, features, np.flatnonzero(among & data.trainable), calibrated, steps, seed + i)
-        return lambda rows: logits(layers, features.all[rows])
+        return lambda rows: logits(layers, np.nan_to_num(features.all[rows]))
 
     held = out_of_fold(data, k, reflectance_model)
-    clear, label = held.unambiguous, held.label[held.unambiguous]
-    box = np.log(by_box.probability)
-    calibration = fit_calibration(held.logits[clear], label, box[clear])
-    both = calibration.apply(held.logits, box)
-    evidence = held.logits / calibration.temperature + calibration.offset
-    share, weight = fit_pool(np.log(network[clear]), box[clear], evidence[clear], label)
-    share_without, _ = fit_pool(np.log(network[clear]), box[clear], np.zeros_like(evidence[clear]), label)
-    pool = pooled(np.log(network), box, evidence, share, weight)
+    valid = held.validation
+    known = has_reflectance(data, valid.rows)
+    weight = valid.weight_of(known)
+    box, shape = np.log(by_box.probability), np.log(network)
+    calibration = fit_calibration(held.logits, valid.label, weight, box)
+    evidence = (held.logits / calibration.temperature + calibration.offset) * known[:, None]
+    share, power = fit_pool(shape, box, evidence, valid.label, weight)
+    clear = valid.clear & known
     return calibration, {
         "share": share,
-        "weight": weight,
-        "share_without": share_without,
-        "box": {
-            "average_precision": average_precision(both, held.label, held.truth),
-            "ruled_out": train_box_classifier.ruled_out(both[clear], label),
-        },
-        "network": {
-            "average_precision": average_precision(pool, held.label, held.truth),
-            "confusion": confusion(pool[clear], label),
-            "ece": top_calibration_error(pool[clear], label),
-            "log_loss": round(log_loss(pool[clear], label), 4),
-            "log_loss_without": round(log_loss(network[clear], label), 4),
-        },
+        "weight": power,
+        "cross_validation": by_sensor(box + evidence, valid, known),
+        "pool": by_sensor((1.0 - share) * shape + share * box + power * evidence, valid, known),
+        "ruled_out": train_box_classifier.ruled_out(softmax((box + evidence)[clear], axis=1), valid.label[clear]),
     }
 
 
-def pooled(network: Float64, box: Float64, evidence: Float64, share: float, weight: float) -> Float64:
-    """(R, 4) log-linear pool of the log probabilities (R, 4) of network and box and the evidence (R, 4)."""
-    probability: Float64 = softmax((1.0 - share) * network + share * box + weight * evidence, axis=1)
-    return probability
+def fit_pool(network: Float64, box: Float64, evidence: Float64, label: Int, weight: Float64) -> tuple[float, float]:
+    """Share of the box and power of the evidence, both in 0 to 1, that minimise the log loss of the pool.
 
-
-def fit_pool(network: Float64, box: Float64, evidence: Float64, label: Int) -> tuple[float, float]:
-    """Share of the box and weight of the evidence, both in 0 to 1, that minimise the log loss of the pool."""
+    Args:
+        network: (R, 4) log probabilities.
+        box: (R, 4) log probabilities.
+        evidence: (R, 4) log-likelihoods.
+        label: (R,) classes.
+        weight: (R,) of each, 1 in total.
+    """
 
     def loss(x: Float64) -> float:
-        return log_loss(pooled(network, box, evidence, float(x[0]), float(x[1])), label)
+        pool = log_softmax((1.0 - x[0]) * network + x[0] * box + x[1] * evidence, axis=1)
+        return -float(weight @ pool[np.arange(len(label)), label])
 
-    share, weight = minimize(loss, x0=(0.5, 0.5), bounds=((0.0, 1.0),) * 2).x.tolist()
-    return round(share, 2), round(weight, 2)
-
-
-def log_loss(probability: Float64, label: Int) -> float:
-    """Mean negative log probability of the true classes."""
-    return -float(np.log(probability[np.arange(len(label)), label]).mean())
+    share, power = minimize(loss, x0=(0.5, 0.5), bounds=((0.0, 1.0),) * 2).x.tolist()
+    return round(share, 2), round(power, 2)
 
 
 def main() -> None:
@@ -151,9 +147,10 @@ def main() -> None:
     make_torch_deterministic()
     data = load(*args.crops)
     features = Features(data)
-    with np.load(args.out / "held_out.npz") as file:
-        assert file["crops"].tolist() == data.sha256, "held_out.npz belongs to other crops"
-        network = file["probability"]
+    network = load_network(args.out, data)
+    if not has_reflectance(data, Validation.of(data).rows).any():
+        print("no reflectance to validate by: the model has no reflectance classifier")
+        return
     calibration, report = cross_validate(data, features, network, args.folds, args.steps, args.seed)
     boxes = load_layers(args.out / "boxes.npz")
     layers = train(data, features, np.flatnonzero(data.trainable), boxes, args.steps, args.seed)

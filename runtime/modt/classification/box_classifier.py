@@ -57,7 +57,7 @@ def beam_solid_angle_sr(sensor: SensorConfig, box: Float64) -> Float64:
     return np.asarray(np.deg2rad(sensor.azimuth_step_deg) * elevation_step_rad, np.float64)
 
 
-def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: Float64) -> Float64:
+def box_features(count: Int, box: Float64, sensor_height_m: float | Float64, beam_sr: Float64) -> Float64:
     """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
 
     The area in place of the number of points makes the features independent of the sensor's resolution.
@@ -65,7 +65,7 @@ def box_features(count: Int, box: Float64, sensor_height_m: float, beam_sr: Floa
     Args:
         count: (P,) points.
         box: (P, 7) sensor frame.
-        sensor_height_m: of the sensor above the ground.
+        sensor_height_m: of the sensor above the ground, one for all or (P,).
         beam_sr: (P,) or () solid angle of a point [sr].
     """
     distance = np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)

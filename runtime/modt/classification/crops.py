@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.config import SensorConfig
-from modt.types import Float32, Int, Proposals
+from modt.types import Float32, Float64, Int, Proposals
 
 # Definition of the canonical frame: fixed when a model is trained.
 _LOWEST_M = 0.3  # height of a standing object's lowest point: what is lower was removed with the ground
@@ -64,7 +64,7 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
     return Crops(points[members, :3], offsets)
 
 
-def canonical(crops: Crops, sensor_height_m: float) -> Crops:
+def canonical(crops: Crops, sensor_height_m: float | Float64) -> Crops:
     """Crops in the canonical frame: x along the line of sight, y to its left, z above the ground.
 
     The sensor sees the near side of an object, so in this frame a crop looks the same at every azimuth. The origin is
@@ -74,7 +74,7 @@ def canonical(crops: Crops, sensor_height_m: float) -> Crops:
 
     Args:
         crops: points in the sensor frame.
-        sensor_height_m: of the sensor above the ground beneath it.
+        sensor_height_m: of the sensor above the ground beneath it, one for all or (R,).
     """
     if not len(crops):
         return crops

@@ -6,9 +6,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.crops import gather
+from modt.classification.crops import Crops, gather
+from modt.config import SensorConfig
 from tests.classification.scenes import blobs
-from tools.train.augment import Beams, augment, subsample
+from tools.train.augment import augment, subsample
+from tools.train.dataset import Sensors
 
 
 @given(counts=st.lists(st.integers(6, 300), min_size=1, max_size=8), seed=st.integers(0, 200))
@@ -16,7 +18,8 @@ def test_augmentation_keeps_every_crop_and_enough_points(counts: list[int], seed
     rng = np.random.default_rng(seed)
     points, proposals = blobs(counts, rng)
     crops = gather(points, proposals, np.arange(len(counts)), 1000)
-    seen = subsample(augment(crops, Beams(), rng), 50, rng)
+    augmented, _ = augment(crops, Sensors.of(SensorConfig(), np.ones((len(crops), 7))), rng)
+    seen = subsample(augmented, 50, rng)
     assert len(seen) == len(counts)
     assert (seen.count >= 6).all()
     assert (seen.count <= np.minimum(counts, 50)).all()
@@ -26,5 +29,22 @@ def test_augmentation_keeps_every_crop_and_enough_points(counts: list[int], seed
 def test_augmentation_is_reproducible() -> None:
     points, proposals = blobs([40, 200], np.random.default_rng(0))
     crops = gather(points, proposals, np.arange(2), 1000)
-    once, again = (augment(crops, Beams(), np.random.default_rng(5)) for _ in range(2))
+    sensors = Sensors.of(SensorConfig(), np.ones((len(crops), 7)))
+    once, again = (augment(crops, sensors, np.random.default_rng(5))[0] for _ in range(2))
     assert once.xyz.tobytes() == again.xyz.tobytes()
+
+
+def test_no_augmented_crop_is_finer_than_its_sensor() -> None:
+    rng = np.random.default_rng(0)
+    azimuth, elevation = np.meshgrid(np.arange(-3, 3, 0.1), np.arange(-4.9, 0, 0.5))  # ten beams
+    a, e = np.deg2rad(azimuth.ravel()), np.deg2rad(elevation.ravel())
+    wall = np.c_[15 * np.cos(a), 15 * np.sin(a), 15 * np.tan(e)].astype(np.float32)
+    n = 200
+    crops = Crops(np.tile(wall, (n, 1)), np.arange(n + 1) * len(wall))
+    config = SensorConfig(elevation_step_deg=0.5, azimuth_step_deg=0.2)
+    augmented, sensors = augment(crops, Sensors.of(config, np.ones((n, 7))), rng)
+    step = sensors.elevation_deg / config.elevation_step_deg
+    assert sorted(set(step.tolist())) == [1, 2, 4]
+    mean = [augmented.count[step == k].mean() for k in (1, 2, 4)]
+    assert mean[0] < 0.5 * len(wall)  # no more than one return for each 0.2 degrees
+    np.testing.assert_allclose(mean[0] / mean[1:], [2, 4], rtol=0.25)

@@ -1,11 +1,11 @@
-"""LabelTargets of proposals."""
+"""Labels of proposals."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.types import Proposals
+from modt.types import NONE, Proposals
 from tests.tools.train.datasets import scan_of
 from tools.train.build_crops import label
 
@@ -24,6 +24,8 @@ def test_a_proposal_takes_the_class_of_the_object_it_overlaps_by_more_than_half(
     assert labels.kind.tolist() == [ObjectClass.CAR, 0, 0, 0]
     assert labels.partial.tolist() == [False, True, True, True]
     assert labels.unknown.tolist() == [True, False, False, False]  # nine points are too few to be judged by
+    assert labels.owner.tolist() == [ObjectClass.CAR, 0, ObjectClass.CYCLIST, ObjectClass.CYCLIST]
+    assert labels.whole.tolist() == [0, NONE, NONE]
 
 
 def test_unlabelled_proposals_are_unknown() -> None:

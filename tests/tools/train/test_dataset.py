@@ -6,7 +6,7 @@ import numpy as np
 
 from modt.classification.crops import Crops
 from modt.types import NONE
-from tests.tools.train.datasets import data_of
+from tests.tools.train.datasets import data_of, truth_of
 from tools.train.dataset import SHIPPED, SYNTHETIC, UNLABELLED, folds
 
 
@@ -15,9 +15,8 @@ def test_folds_split_real_scans_by_drive_and_leave_out_the_rest() -> None:
     variant = np.where(drive < 4, SHIPPED, SYNTHETIC)
     label = np.array([1, 0, 2, 1, 0, 1, 0, 3])
     crops = Crops(np.zeros((len(drive), 3), np.float32), np.arange(len(drive) + 1))
-    data = data_of(
-        crops, label, variant=variant, drive=drive, truth_label=np.array([1, 2, 1]), truth_drive=np.array([0, 1, 2])
-    )
+    truth = truth_of(np.array([1, 2, 1]), np.array([0, 1, 2]))
+    data = data_of(crops, label, variant=variant, drive=drive, truth=truth)
     fold = folds(data, 3)
     assert (fold[4:] == NONE).all()
     assert sorted(set(fold[:4].tolist())) == [0, 1, 2]

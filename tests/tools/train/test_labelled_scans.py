@@ -5,9 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from modt.classes import ObjectClass
-from tools.train.labelled_scans import argoverse_scans, points_in_box
+from modt.config import SensorConfig
+from modt.errors import MisuseError
+from modt.sources.synthetic_stream import K
+from tests.tools.train.datasets import scan_of, write_folder
+from tools.train.labelled_scans import (
+    AT_SENSOR,
+    argoverse_scans,
+    beams,
+    folder_scans,
+    pandaset_scans,
+    points_in_box,
+    thinned,
+)
+from tools.train.synthetic_scans import simulated_scans
 
 
 def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path: Path) -> None:
@@ -23,8 +37,8 @@ def test_argoverse_sweeps_are_in_the_sensor_frame(tmp_path: Path) -> None:
     (scan,) = argoverse_scans(tmp_path)
     assert scan.kinds == (ObjectClass.CAR, ObjectClass.BACKGROUND)
     assert scan.drive == "argoverse2/log"
-    np.testing.assert_allclose(scan.points[0, :3], [10.0, 0.0, -0.9], atol=1e-5)
-    np.testing.assert_allclose(scan.boxes[0, :3], [10.15, 0.5, -1.75], atol=1e-5)
+    np.testing.assert_allclose(scan.points[1, :3], [10.0, 0.0, -1.07], atol=1e-5)
+    np.testing.assert_allclose(scan.boxes[0, :3], [10.15, 0.5, -1.92], atol=1e-5)
     assert len(scan.objects[0]) == 30
 
 
@@ -32,3 +46,76 @@ def test_points_in_a_rotated_box_are_above_the_ground() -> None:
     box = np.array([10.0, 0.0, -1.7, 4.0, 2.0, 1.5, np.pi / 2])
     points = np.array([[10, 1.9, -1, 0], [11.9, 0, -1, 0], [10, 0, -1.6, 0], [10, 0, 0.5, 0]], np.float32)
     assert points_in_box(points, box).tolist() == [True, False, False, False]
+
+
+def test_pandaset_scans_are_in_the_sensor_frame_and_types_between_the_classes_unlabelled(tmp_path: Path) -> None:
+    (tmp_path / "scans").mkdir()
+    feet = np.array([[10.79, 0.0], [20.79, 0.0], [30.79, 0.0], [40.79, 0.0]])
+    points = np.c_[np.repeat(feet, 25, axis=0), np.tile(np.linspace(0.3, 1.1, 25), 4), np.full(100, 9)]
+    points.astype(np.float32).tofile(tmp_path / "scans" / "000001.bin")
+    (tmp_path / "000001.csv").write_text(
+        "class,x,y,z,length,width,height,yaw,points\n"
+        "Pedestrian_with_Object,10.79,0,0.6,0.8,0.8,1.9,0,25\n"
+        "Medium-sized_Truck,20.79,0,0.6,7,2.5,1.9,0,25\n"
+        "Bicycle,30.79,0,0.6,1.8,0.6,1.8,0,25\n"
+        "Bicycle,40.79,0,0.6,1.8,0.6,1.2,0,25\n"
+    )
+    (scan,) = pandaset_scans(tmp_path)
+    assert scan.sensor == "pandar64"
+    assert scan.kinds == (ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST, ObjectClass.BACKGROUND)
+    np.testing.assert_allclose(scan.boxes[:, :3], [[10, 0, -2.2], [30, 0, -2.15], [40, 0, -1.85]], atol=1e-6)
+    assert [len(own) for own in scan.objects] == [25, 25, 25]
+    assert np.flatnonzero(scan.unlabelled).tolist() == list(range(25, 50))
+
+
+def test_a_thinned_scan_has_every_second_beam_and_the_objects_of_the_whole() -> None:
+    azimuth = np.arange(0.1, 2 * np.pi, 0.1)
+    rho = np.repeat([20.0, 15.0, 10.0, 5.0], len(azimuth))  # beam by beam, from the top
+    a = np.tile(azimuth, 4)
+    points = np.c_[rho * np.cos(a), rho * np.sin(a), np.full(len(a), -1.7), np.zeros(len(a))].astype(np.float32)
+    assert beams(points).tolist() == np.repeat(np.arange(4), len(azimuth)).tolist()
+    here = np.flatnonzero(np.abs(a - 1.0) < 0.25)
+    scan = thinned(scan_of(points, [here], [ObjectClass.CAR], np.arange(len(a)) < 5), 2)
+    assert set(np.hypot(scan.points[:, 0], scan.points[:, 1]).round()) == {20, 10}
+    assert (scan.points[scan.objects[0]] == points[here[(rho[here] == 20) | (rho[here] == 10)]]).all()
+    assert scan.unlabelled.sum() == 5
+    assert scan.profile.sensor.elevation_step_deg == 2 * SensorConfig().elevation_step_deg
+    assert scan.sensor == "hdl-64e, 32 beams"
+
+
+def test_scans_in_a_folder_are_those_that_were_written(tmp_path: Path) -> None:
+    made = list(simulated_scans(["street"], [3], [0.0, 0.5], camera=False, sensors=["vlp-16"]))
+    write_folder(tmp_path, made)
+    found = list(folder_scans(tmp_path, "mine", made[0].profile))
+    assert [scan.drive for scan in found] == ["street-3", "street-3"]
+    for scan, original in zip(found, made, strict=True):
+        assert (scan.sensor, scan.profile) == ("mine", original.profile)
+        assert (scan.points == original.points).all()
+        assert scan.fov.full
+        shown = [k for k, kind in enumerate(original.kinds) if kind]
+        assert scan.kinds == tuple(original.kinds[k] for k in shown)
+        off = scan.boxes - original.boxes[shown]
+        off[:, 6] = np.sin(off[:, 6] / 2)
+        assert np.abs(off).max() < 0.01
+    with pytest.raises(MisuseError, match="no scans"):
+        next(folder_scans(tmp_path / "label_2", "mine", made[0].profile))
+    (tmp_path / "label_2" / "street-3_000001.txt").unlink()
+    with pytest.raises(MisuseError, match="street-3_000001"):
+        list(folder_scans(tmp_path, "mine", made[0].profile))
+
+
+def test_the_calibration_of_a_folder_states_where_labels_are_complete(tmp_path: Path) -> None:
+    (scan,) = simulated_scans(["street"], [3], [0.0], camera=True, sensors=["vlp-16"])
+    write_folder(tmp_path, [scan])
+    (tmp_path / "calib").mkdir()
+    lines = {
+        "P2": np.c_[K[:, :3], np.zeros(3)],
+        "R0_rect": np.eye(3),
+        "Tr_velo_to_cam": AT_SENSOR.T_camera_sensor[:3],
+    }
+    text = "".join(f"{key}: {' '.join(map(str, value.ravel()))}\n" for key, value in lines.items())
+    (tmp_path / "calib" / "street-3_000000.txt").write_text(text)
+    (found,) = folder_scans(tmp_path, "mine", scan.profile)
+    seen = found.fov.contains(found.points)
+    assert 0.1 < seen.mean() < 0.4
+    assert (found.unlabelled == ~seen).all()

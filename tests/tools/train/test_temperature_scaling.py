@@ -15,7 +15,7 @@ def test_calibration_recovers_temperature_and_class_offsets() -> None:
     share = Calibration.identity().apply(true)
     label = np.array([rng.choice(4, p=p) for p in share])
     distorted = 3 * (true - [2.0, 0, 0, 0])
-    found = fit_calibration(distorted, label)
+    found = fit_calibration(distorted, label, np.full(6000, 1 / 6000))
     assert found.temperature == pytest.approx(3.0, rel=0.1)
     assert found.offset[1:] == pytest.approx(np.full(3, -2.0), abs=0.2)
     assert top_calibration_error(found.apply(distorted), label) < 0.02

@@ -1,0 +1,39 @@
+"""From labelled scans to a model with its card."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import onnxruntime as ort
+import pytest
+
+from modt.classification.pointnet import PointNet
+from modt.config import ClassificationConfig, SensorConfig
+from tests.tools.train.datasets import write_folder
+from tools.train import build_models
+from tools.train.synthetic_scans import simulated_scans
+
+
+@pytest.mark.slow
+def test_one_command_trains_on_scans_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("torch", reason="extra [train] is not installed")
+    scans = simulated_scans(["street", "crossing"], [3, 4], [0.0], camera=False, sensors=["vlp-16"])
+    write_folder(tmp_path / "mine", scans)
+    monkeypatch.setattr(build_models, "WORLDS", 4)
+    options = ["--scans", str(tmp_path / "mine"), "--profile", "vlp-16", "--steps", "10"]
+    monkeypatch.setattr(sys, "argv", ["build_models", str(tmp_path), *options])
+    build_models.main()
+    path = tmp_path / "pointnet-scans.onnx"
+    PointNet(ClassificationConfig(model=str(path)), SensorConfig())  # checks the hash on the card
+    assert "| vlp-16 |" in path.with_suffix(".md").read_text(encoding="utf-8")
+    metadata = ort.InferenceSession(path).get_modelmeta().custom_metadata_map
+    frequency = json.loads(metadata["class_frequency"])
+    assert np.sum(frequency) == pytest.approx(1.0, abs=1e-3)
+    assert frequency[0] > 0.7
+    assert {path.name for path in build_models.MODELS.glob("pointnet-*.onnx")} == {
+        "pointnet-kitti.onnx",
+        "pointnet-synthetic.onnx",
+    }

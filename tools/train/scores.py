@@ -1,0 +1,114 @@
+"""Scores of out-of-fold predictions, sensor by sensor.
+
+The frequency of the classes differs by sensor and scene: log loss, calibration error and temperature are those of the
+posterior under the class frequency of the sensor's crops.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.special import log_softmax, softmax
+
+from modt.classes import CLASS_NAMES, N_CLASSES
+from modt.evaluation.class_score import (
+    average_precision,
+    expected_calibration_error,
+    precision_recall,
+    top_calibration_error,
+)
+from modt.types import NONE, Bool, Float64, Int
+from tools.train.held_out import Validation
+from tools.train.temperature_scaling import fit_calibration
+
+MIN_OBJECT_POINTS = 20
+"""Of the objects of recall at a precision."""
+PRECISIONS = (0.9, 0.8)
+
+
+def by_sensor(log_probability: Float64, valid: Validation, rows: Bool) -> dict[str, dict[str, Any]]:
+    """Scores of log posteriors (R, 4) for every sensor that measured a crop of a mask (R,)."""
+    return {
+        valid.sensor_names[s]: sensor_scores(log_probability, valid, valid.sensor == s)
+        for s in np.unique(valid.sensor[rows]).tolist()
+    }
+
+
+def sensor_scores(log_probability: Float64, valid: Validation, mine: Bool) -> dict[str, Any]:
+    """Scores of the crops of a mask (R,).
+
+    Keys: `average_precision` over all objects; `log_loss`; `log_loss_unadapted`, under the class frequency of the
+    calibration; `temperature`, by which the logits of this sensor are still to be divided; `calibration_error` of the
+    likeliest class and of each; `recall`, by precision and class, of the objects of MIN_OBJECT_POINTS points, found
+    and called right: `of_all` and `of_found`, those with a proposal of their own.
+    """
+    score = log_softmax(log_probability, axis=1)
+    clear = mine & valid.clear
+    label = valid.label[clear]
+    adapted = score[clear] + shift(np.bincount(label, minlength=N_CLASSES) / len(label), valid.class_frequency)
+    posterior = softmax(adapted, axis=1)
+    truth = valid.truth
+    objects = np.isin(truth.sensor, np.unique(valid.sensor[mine]))
+    number = np.bincount(truth.label[objects] if objects.any() else label, minlength=N_CLASSES)
+    rows = np.flatnonzero(mine)
+    probability = np.exp(score[rows])
+    recall = {
+        str(precision): {
+            name: recall_at(precision, score[:, c], valid.owner == c, mine, wanted, truth.row)
+            for c, name in enumerate(CLASS_NAMES[1:], 1)
+            if (wanted := objects & (truth.label == c) & (truth.points >= MIN_OBJECT_POINTS)).any()
+        }
+        for precision in PRECISIONS
+    }
+    return {
+        "proposals": np.bincount(label, minlength=N_CLASSES).tolist(),
+        "average_precision": average_precision(probability, valid.label[rows], number),
+        "log_loss": round(log_loss(adapted, label), 4),
+        "log_loss_unadapted": round(log_loss(score[clear], label), 4),
+        "temperature": round(fit_calibration(adapted, label, np.full(len(label), 1 / len(label))).temperature, 2),
+        "calibration_error": {
+            "likeliest": _rounded(top_calibration_error(posterior, label)),
+            **{
+                name: _rounded(expected_calibration_error(posterior[:, c], label == c))
+                for c, name in enumerate(CLASS_NAMES)
+            },
+        },
+        "recall": recall,
+    }
+
+
+def shift(frequency: Float64, assumed: Float64) -> Float64:
+    """(4,) to add to logits that assume a class frequency, for another one; absent classes stay."""
+    return np.log(np.where(frequency > 0, frequency, assumed).clip(1e-9) / assumed.clip(1e-9))
+
+
+def recall_at(
+    precision: float, score: Float64, right: Bool, mine: Bool, wanted: Bool, row: Int
+) -> dict[str, float | int]:
+    """Recall of a class at the least score whose proposals have a precision.
+
+    Args:
+        precision: to be reached.
+        score: (R,) of the class.
+        right: (R,) crops that lie on an object of the class.
+        mine: (R,) crops to look at.
+        wanted: (T,) objects to find.
+        row: (T,) crop that is the whole object, NONE where it has none.
+    """
+    threshold, reached, _ = precision_recall(score[mine], right[mine], 1)
+    enough = np.flatnonzero(reached >= precision)
+    least = threshold[enough[-1]] if len(enough) else np.inf
+    found = wanted & (row != NONE)
+    called = int((score[row[found]] >= least).sum())
+    n, with_own = int(wanted.sum()), int(found.sum())
+    return {"objects": n, "of_all": round(called / n, 4), "of_found": round(called / max(with_own, 1), 4)}
+
+
+def log_loss(log_posterior: Float64, label: Int) -> float:
+    """Mean negative log probability of the true classes, of log posteriors up to a constant each."""
+    return -float(log_softmax(log_posterior, axis=1)[np.arange(len(label)), label].mean())
+
+
+def _rounded(value: float | None) -> float | None:
+    return None if value is None else round(value, 4)
