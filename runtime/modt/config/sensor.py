@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from modt.config.base import StageConfig, choice, number, numbers
-from modt.geometry.beams import Beams, BeamTable, EvenBeams
+
+if TYPE_CHECKING:
+    from modt.geometry.beams import Beams
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,6 +35,8 @@ class SensorConfig(StageConfig):
     @property
     def beams(self) -> Beams:
         """Spacing of the beams."""
+        from modt.geometry.beams import BeamTable, EvenBeams  # NumPy, which commands import after they are pinned
+
         if self.elevations_deg is None:
             return EvenBeams(self.elevation_step_deg)
         return BeamTable(self.elevations_deg)

@@ -41,10 +41,12 @@ def _plane_height_m(points: Float32, mode_m: float, min_range_m: float) -> float
     level, z = np.column_stack([np.ones(len(lowest)), lowest[:, :2]]), lowest[:, 2]
     plane = np.array([-mode_m, 0.0, 0.0])
     for near_m in NEAR_PLANE_M:
-        ground = np.abs(z - level @ plane) < near_m
+        ground = np.abs(z - (level * plane).sum(axis=1)) < near_m
         if ground.sum() < MIN_CELLS:
             break
-        plane = np.linalg.lstsq(level[ground], z[ground], rcond=None)[0]
+        own = level[ground]  # sums without BLAS, which would start threads
+        normal, right = (own[:, :, None] * own[:, None]).sum(axis=0), (own * z[ground, None]).sum(axis=0)
+        plane = np.linalg.solve(normal, right)
     return -float(plane[0])
 
 
