@@ -37,6 +37,7 @@ def result(
     tracks.state[:] = [1] * len(owners) + [2] * len(lost)
     for id_, posterior in (posteriors or {}).items():
         tracks.posterior[tracks.id == id_] = posterior
+        tracks.object_class[tracks.id == id_] = np.argmax(posterior)
     points = np.arange(n_points * 4, dtype=np.float32).reshape(-1, 4)
     frame = Frame(index, index / 10, points)
     return FrameResult(frame, proposals(counts), tracks, STATES, classified, 0)

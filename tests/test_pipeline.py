@@ -63,6 +63,10 @@ class Stages:
         tracks.posterior[rows] = likelihood
         return np.arange(len(rows)) == 0
 
+    def decide(self, tracks):
+        self.calls.append(("decide",))
+        tracks.object_class[:] = tracks.posterior.argmax(axis=1)
+
     def conclude(self, rows, certain):
         self.calls.append(("conclude", rows.tolist(), certain.tolist()))
         return self.tracks.copy()
@@ -72,7 +76,7 @@ FRAME = Frame(7, 0.7, np.ones((9, 4), np.float32))
 
 
 def pipeline(stages):
-    return Pipeline(stages, stages, stages, stages, stages, stages, Ledger())
+    return Pipeline(stages, stages, stages, stages, stages, stages, stages, Ledger())
 
 
 def test_the_stages_run_once_and_in_order():
@@ -88,6 +92,7 @@ def test_the_stages_run_once_and_in_order():
         ("select", Budget(calls=5)),
         ("classify", [4, 3], [1, 0]),  # the proposals of rows 0 and 2, as regrouped by the tracker
         ("fuse", [0, 2], (2, 4)),
+        ("decide",),
         ("conclude", [0, 2], [True, False]),
     ]
     assert (result.n_classified, result.n_deferred) == (2, 0)
@@ -101,7 +106,7 @@ def test_without_a_selection_nothing_is_classified():
     pipe = pipeline(stages)
     result = pipe.step(FRAME)
     assert [c[0] for c in stages.calls] == [
-        "segment", "locate", "static_tracks", "follow", "asks", "select", "conclude"
+        "segment", "locate", "static_tracks", "follow", "asks", "select", "decide", "conclude"
     ]  # fmt: skip
     assert stages.calls[-1] == ("conclude", [], [])
     assert (result.n_classified, result.n_deferred) == (0, 2)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from modt import host
+from modt.classification.decision import Decision
 from modt.classification.fusion import EveryFrame, FirstView, KeyViews
 from modt.classification.instrumentation import TimedClassifier
 from modt.classification.pointnet import PointNet
-from modt.classification.prior import Prior, make_prior
+from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, ProfileConfig
 from modt.energy.instrumentation import CountingClassifier
@@ -84,14 +85,18 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     limits = profile.classification
     cost = LinearCost(limits.max_points, profile.scheduler.cost)
     network = PointNet(limits, profile.sensor)
-    prior = make_prior(network.boxes, network.reflectance, profile.fusion.prior, profile.sensor)
+    fusion = profile.fusion
+    if network.class_frequency is not None:
+        fusion = replace(fusion, prior=network.class_frequency)
+    prior = make_prior(network.boxes, network.reflectance, fusion.prior, profile.sensor)
     classifier = TimedClassifier(network, cost, time.thread_time_ns)
     return Pipeline(
         segmenter=_segmenter(profile, fov),
         odometry=Odometry(profile.odometry),
         tracker=Tracker(profile.tracking, mode.machine),
-        fusion=mode.fusion(profile.fusion, prior),
+        fusion=mode.fusion(fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost),
         classifier=CountingClassifier(classifier, ledger, limits.max_points, limits.batch),
+        decision=Decision(fusion.decision, with_background(fusion.prior)),
         ledger=ledger,
     )

@@ -89,6 +89,13 @@ class Fusion(Protocol):
         """Write the posterior of the rows; (R,) whether each is certain now."""
 
 
+class Decision(Protocol):
+    """Posteriors to classes."""
+
+    def decide(self, tracks: Tracks) -> None:
+        """Write the class that is said of every track."""
+
+
 @dataclass(frozen=True, slots=True)
 class Pipeline:
     """The stages in their order; a mode of the method is a choice of these parts."""
@@ -99,6 +106,7 @@ class Pipeline:
     fusion: Fusion
     scheduler: Scheduler
     classifier: Classifier
+    decision: Decision
     ledger: StageLedger
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
@@ -114,5 +122,6 @@ class Pipeline:
         if len(rows):
             likelihood = run(CLASSIFICATION, self.classifier.classify, frame.points, proposals, tracks.proposal[rows])
             certain = run(FUSION, self.fusion.fuse, tracks, proposals, rows, likelihood)
+        run(FUSION, self.decision.decide, tracks)
         final = run(TRACKING, self.tracker.conclude, rows, certain)
         return FrameResult(frame, proposals, final, self.tracker.state_names, len(rows), chosen.deferred)

@@ -157,6 +157,7 @@ class Tracks:
     key_points: Int = column(int)  # 0 before any key view
     key_extent: Float64 = column(float, 3)  # l, w, h of the box [m]
     waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
+    object_class: Int = column(int)  # the class that is said
 
     def __len__(self) -> int:
         return len(self.id)
@@ -168,11 +169,11 @@ class Tracks:
         return viewed
 
     @property
-    def object_class(self) -> Int:
-        """(M,) class: the one settled, whatever the box of the moment says; else the likeliest."""
+    def decisive_posterior(self) -> Float64:
+        """(M, 4) posterior that decides on the class: the one settled, whatever the box of the moment says."""
         settled = (self.final & self.viewed)[:, None]
-        object_class: Int = np.where(settled, self.key_posterior, self.posterior).argmax(axis=1)
-        return object_class
+        decisive: Float64 = np.where(settled, self.key_posterior, self.posterior)
+        return decisive
 
     @classmethod
     def blank(cls, m: int = 0) -> Self:

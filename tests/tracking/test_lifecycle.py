@@ -54,6 +54,9 @@ class Scripted:
     def classify(self, points, proposals, which):
         return np.full((len(which), 4), 0.25)
 
+    def decide(self, tracks):
+        pass
+
     def fuse(self, tracks, proposals, rows, likelihood):
         for row in rows:
             set_class(tracks, row, ObjectClass.BACKGROUND)
@@ -64,7 +67,7 @@ def live(machine, script):
     """State after every frame of a scene with one object, GONE when its track is deleted."""
     stub = Scripted()
     tracker = Tracker(TrackingConfig(max_missed=MAX_MISSED), machine)
-    pipeline = Pipeline(stub, Odometry(OdometryConfig()), tracker, stub, stub, stub, NullLedger())
+    pipeline = Pipeline(stub, Odometry(OdometryConfig()), tracker, stub, stub, stub, stub, NullLedger())
     states = []
     for i, step in enumerate(script):
         boxes = [] if step == HIDDEN else [box(11 if step == MOVED else 10, 2)]

@@ -107,7 +107,7 @@ PAIRS = (
     ("StripMerger", "Reunion"),
     ("Reunion", "CarMerging"),
     ("StripMerger", "Reunion", "CarMerging"),
-    ("PersonSplitter", "ExpectedSplitting"),
+    ("person splitting", "ExpectedSplitting"),
     ("second matching", "Reunion"),
     ("box update", "mismatch"),
 )

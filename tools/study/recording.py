@@ -191,6 +191,9 @@ class Playback:
         """(R, 4) recorded likelihoods."""
         return self._current.likelihood[which]
 
+    def decide(self, tracks: Tracks) -> None:
+        """Nothing: posteriors are judged."""
+
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) recorded priors."""
         return self._current.prior

@@ -21,13 +21,12 @@ from onnx import TensorProto, helper, numpy_helper
 
 from modt.classes import CLASS_NAMES
 from modt.classification import box_classifier, reflectance_classifier
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY
 from tools.options import parser
 from tools.train.scores import MIN_OBJECT_POINTS, PRECISIONS
 from tools.train.weights import Layer, load_layers
 
 N_SHARED = 3
-CLASS_FREQUENCY_KEY = "class_frequency"
-"""Key, in the metadata, of the class frequency that the posterior assumes."""
 OPSET, IR = 17, 8
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,8 @@ _MODEL_ERRORS = (
     ort_errors.NotImplemented,
     ort_errors.RuntimeException,
 )
+CLASS_FREQUENCY_KEY = "class_frequency"
+"""Key of the class frequency in the metadata of a model: (4,), background first."""
 _MIN_PROBABILITY = 1e-12  # keeps logarithms finite
 
 
@@ -47,6 +51,7 @@ class PointNet:
         sha256: its hash, equal to that in its card (the file beside it that ends in .md).
         boxes: box classifier of the model.
         reflectance: reflectance classifier of the model for this sensor.
+        class_frequency: of the objects' classes among proposals, which the posteriors assume; None where not stated.
 
     Raises:
         MisuseError: no such model, a hash that differs from the card's, not ONNX, not (batch, points, 3) to
@@ -64,6 +69,7 @@ class PointNet:
         try:
             self.boxes = box_classifier.from_metadata(metadata)
             self.reflectance = reflectance_classifier.from_metadata(metadata, sensor)
+            self.class_frequency = _class_frequency(metadata)
         except (KeyError, TypeError, ValueError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
             raise MisuseError(self.path, cause, "export the model again") from None
@@ -127,6 +133,16 @@ def _session(path: Path) -> ort.InferenceSession:
         cause = f"inputs and outputs of shape {' and '.join(map(str, shapes))}"
         raise MisuseError(path, cause, f"use a model of (batch, points, 3) to (batch, {N_CLASSES})")
     return session
+
+
+def _class_frequency(metadata: Mapping[str, str]) -> tuple[float, ...] | None:
+    text = metadata.get(CLASS_FREQUENCY_KEY)
+    if text is None:
+        return None
+    frequency = tuple(float(share) for share in json.loads(text))
+    if len(frequency) != N_CLASSES or min(frequency) <= 0:
+        raise ValueError(f"class frequency {text}")
+    return frequency[1:]
 
 
 def _fits(shape: tuple[int | str | None, ...], wanted: tuple[int | None, ...]) -> bool:

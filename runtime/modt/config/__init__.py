@@ -6,6 +6,7 @@ from modt.config.classification import (
     CallWorthConfig,
     ClassificationConfig,
     CostModelConfig,
+    DecisionConfig,
     FusionConfig,
     SchedulerConfig,
 )
@@ -31,6 +32,7 @@ __all__ = [
     "CallWorthConfig",
     "ClassificationConfig",
     "CostModelConfig",
+    "DecisionConfig",
     "EnergyConfig",
     "FilterConfig",
     "FragmentConfig",

@@ -40,6 +40,12 @@ def per_class(column: str, low: float, high: float, meaning: str, classes: tuple
     return field(default=values, metadata={"low": low, "high": high, "length": len(classes), "meaning": meaning})
 
 
+def shares(high: float, meaning: str) -> Any:
+    """Field of a share for each class of objects, none by default."""
+    meaning = f"{meaning}: {', '.join(CLASS_NAMES[c] for c in OBJECTS)}"
+    return field(default=None, metadata={"low": 0.0001, "high": high, "length": len(OBJECTS), "meaning": meaning})
+
+
 def mechanism(config: type[StageConfig]) -> Any:
     """Field of a mechanism's own configuration, a mapping in a profile."""
     return field(default_factory=config)

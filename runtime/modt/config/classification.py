@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from modt.classes import CLASSES
-from modt.config.base import StageConfig, mechanism, number, per_class
+from modt.config.base import StageConfig, mechanism, number, per_class, shares
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +52,21 @@ class SchedulerConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class DecisionConfig(StageConfig):
+    """The class that is said of a track."""
+
+    missed_cost: tuple[float, ...] = per_class(
+        "missed_cost", 0.01, 1000.0, "cost of a missed object over that of a false one; 1: said from 1/2 on"
+    )
+    frequency: tuple[float, ...] | None = shares(
+        0.33, "of the classes among proposals, at the start; null: those that the model assumes"
+    )
+    start_proposals: int = number(3000, 1, 100_000_000, "", "that the frequency at the start counts for")
+    memory_proposals: int = number(20_000, 1, 100_000_000, "", "that the frequency of the stream is estimated from")
+    max_change: float = number(5.0, 1.0, 1000.0, "", "of a frequency, over that which the model assumes")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FusionConfig(StageConfig):
     """Independent views and final classes (section V-C, Figs. 10 and 11), found by tools/study/sweep_fusion.py.
 
@@ -59,6 +74,7 @@ class FusionConfig(StageConfig):
     """
 
     prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency among proposals")
+    decision: DecisionConfig = mechanism(DecisionConfig)
     box_update_weight: float = number(0.75, 0.0, 1.0, "", "exponent of the change of the box prior since a view")
     mismatch_probability: float = number(0.1, 0.0, 1.0, "", "that a proposal is not the object of its track")
     first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")

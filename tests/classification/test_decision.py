@@ -1,0 +1,97 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from modt.classes import ObjectClass
+from modt.classification.decision import Decision
+from modt.config import DecisionConfig
+from modt.types import NONE, Tracks
+
+ASSUMED = np.array([0.8, 0.1, 0.06, 0.04])
+ALIKE = {"missed_cost": (1.0, 1.0, 1.0), "max_change": 1.0}
+
+
+def tracks(*posteriors):
+    table = Tracks.blank(len(posteriors))
+    table.posterior[:] = np.reshape(posteriors, (-1, 4))
+    table.proposal[:] = np.arange(len(posteriors))
+    return table
+
+
+def said(config, *posteriors):
+    table = tracks(*posteriors)
+    Decision(config, ASSUMED).decide(table)
+    return table.object_class.tolist()
+
+
+def test_an_object_is_said_where_missing_it_costs_more_than_a_false_one():
+    doubtful = [0.7, 0.0, 0.3, 0.0]
+    assert said(DecisionConfig(**ALIKE), doubtful) == [ObjectClass.BACKGROUND]
+    dear = DecisionConfig(missed_cost=(1.0, 3.0, 1.0), max_change=1.0)
+    assert said(dear, doubtful, [0.7, 0.3, 0.0, 0.0]) == [ObjectClass.PEDESTRIAN, ObjectClass.BACKGROUND]
+
+
+def test_of_two_objects_the_likelier_is_said():
+    config = DecisionConfig(missed_cost=(9.0, 9.0, 9.0), max_change=1.0)
+    assert said(config, [0.4, 0.0, 0.25, 0.35]) == [ObjectClass.CYCLIST]
+
+
+def test_the_settled_posterior_decides():
+    table = tracks([0.9, 0.1, 0.0, 0.0])
+    table.final[:], table.key_points[:], table.key_posterior[:] = True, 30, [0.0, 1.0, 0.0, 0.0]
+    Decision(DecisionConfig(**ALIKE), ASSUMED).decide(table)
+    assert table.object_class.tolist() == [ObjectClass.CAR]
+
+
+def stream(frequency, rng, n):
+    """Posteriors, calibrated under ASSUMED, of proposals whose classes have another frequency."""
+    true = rng.choice(4, n, p=frequency)
+    feature = rng.normal(2.2 * np.eye(4)[true], 1.0)
+    likelihood = np.exp(2.2 * feature) * ASSUMED
+    return likelihood / likelihood.sum(axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("frequency", [(0.5, 0.1, 0.3, 0.1), (0.95, 0.03, 0.01, 0.01), tuple(ASSUMED)])
+def test_the_frequency_of_the_stream_is_learnt(frequency):
+    rng = np.random.default_rng(1)
+    decision = Decision(DecisionConfig(start_proposals=1000), ASSUMED)
+    for _ in range(300):
+        decision.decide(tracks(*stream(frequency, rng, 60)))
+    assert decision.frequency == pytest.approx(frequency, abs=0.05)
+    assert np.abs(decision.frequency - frequency).max() <= max(0.05, np.abs(ASSUMED - frequency).max() / 2)
+
+
+def test_what_is_not_seen_teaches_nothing():
+    decision = Decision(DecisionConfig(start_proposals=1), ASSUMED)
+    lost = tracks([0.0, 0.0, 1.0, 0.0])
+    lost.proposal[:] = NONE
+    decision.decide(lost)
+    assert decision.frequency == pytest.approx(ASSUMED)
+
+
+def test_the_profile_sets_the_frequency_at_the_start():
+    decision = Decision(DecisionConfig(frequency=(0.2, 0.1, 0.1)), ASSUMED)
+    assert decision.frequency == pytest.approx([0.6, 0.2, 0.1, 0.1])
+    table = tracks([0.4, 0.1, 0.45, 0.05])
+    decision.decide(table)
+    assert table.object_class.tolist() == [ObjectClass.PEDESTRIAN]
+
+
+@given(arrays(np.float64, (20, 4), elements=st.floats(1e-4, 1.0)))
+def test_frequencies_stay_a_distribution_within_bounds(weights):
+    config = DecisionConfig(start_proposals=1, max_change=3.0)
+    decision = Decision(config, ASSUMED)
+    posterior = weights / weights.sum(axis=1, keepdims=True)
+    for _ in range(30):
+        table = tracks(*posterior)
+        decision.decide(table)
+    assert decision.frequency.sum() == pytest.approx(1.0)
+    ratio = decision.frequency / ASSUMED
+    assert ratio.max() / ratio.min() <= config.max_change**2 + 1e-9
+    np.testing.assert_allclose(decision.adapted(posterior).sum(axis=1), 1.0)
+
+
+def test_without_tracks_nothing_is_said():
+    assert said(DecisionConfig()) == []
