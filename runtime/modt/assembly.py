@@ -97,6 +97,6 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
         fusion=mode.fusion(fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost),
         classifier=CountingClassifier(classifier, ledger, limits.max_points, limits.batch),
-        decision=Decision(fusion.decision, with_background(fusion.prior)),
+        decision=Decision(profile.decision, with_background(fusion.prior)),
         ledger=ledger,
     )

@@ -92,6 +92,10 @@ class Fusion(Protocol):
 class Decision(Protocol):
     """Posteriors to classes."""
 
+    @property
+    def frequency(self) -> Float64:
+        """(4,) of the classes among the proposals of the stream."""
+
     def decide(self, tracks: Tracks) -> None:
         """Write the class that is said of every track."""
 

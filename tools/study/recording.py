@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from modt.classes import N_CLASSES
 from modt.classification.prior import Prior, object_probability_reaches
 from modt.config import ProfileConfig
 from modt.geometry import transform_boxes
@@ -190,6 +191,11 @@ class Playback:
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) recorded likelihoods."""
         return self._current.likelihood[which]
+
+    @property
+    def frequency(self) -> Float64:
+        """(4,) alike."""
+        return np.full(N_CLASSES, 1 / N_CLASSES)
 
     def decide(self, tracks: Tracks) -> None:
         """Nothing: posteriors are judged."""

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from modt.cli import options
 from modt.errors import MisuseError, ModtError
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from modt.config import ProfileConfig
+    from modt.sensor_fit.finding import Finding, Recording
+
 MOST_FRAMES = 1000
 """Frames of a recording of which the sweeps are taken."""
+MIN_PROPOSALS = 1000
+"""For a frequency of the classes that is sure."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -25,12 +34,29 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.set_defaults(run=run)
 
 
+def class_frequencies(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
+    """The frequency of the classes among the proposals of a recording, as the decision estimates it."""
+    from modt import assembly
+    from modt.energy.ledger import NullLedger
+    from modt.geometry import FieldOfView
+    from modt.sensor_fit.finding import Finding
+    from modt.types import Frame
+
+    pipeline = assembly.pipeline(assembly.MODES["conventional"], config, FieldOfView(), NullLedger())
+    found = 0
+    for number, points in enumerate(recording.sweeps):
+        found += len(pipeline.step(Frame(number, recording.stamps_s[0] + number, points)).proposals)
+    frequency = tuple(round(float(share), 4) for share in pipeline.decision.frequency[1:])
+    evidence = f"cars, pedestrians, cyclists among {found} proposals, by their posteriors"
+    yield Finding("decision", "frequency", frequency, evidence, sure=found >= MIN_PROPOSALS)
+
+
 def run(arguments: argparse.Namespace) -> int:
     """Fit."""
     from itertools import islice
 
     from modt.sensor_fit.finding import Recording
-    from modt.sensor_fit.fit import fit
+    from modt.sensor_fit.fit import FINDERS, fit
     from modt.sensor_fit.profile_text import doubts, profile_text
     from modt.sinks.output import writing
     from modt.sources.recognise import open_stream
@@ -48,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
             sweeps.append(frame.points[(frame.points[:, :2] != 0).any(axis=1)])
     if not sum(map(len, sweeps)):
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
-    _, findings = fit(Recording(sweeps, stamps_s))
+    _, findings = fit(Recording(sweeps, stamps_s), (*FINDERS, class_frequencies))
     title = f"{name}, fitted by `modt profile fit` to {len(sweeps)} of {len(stamps_s)} sweeps of {stream.info.name}."
     text = profile_text(title, findings)
     with writing(out):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from modt import assembly, host, profile
+from modt.classes import CLASS_NAMES
 from modt.cli import assemble, metering
 from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
@@ -141,6 +142,7 @@ class Session:
                 **self.pace.report(),
             },
             "odometry": self.odometry.report(),
+            "class_frequency": dict(zip(CLASS_NAMES, self.pipeline.decision.frequency.tolist(), strict=True)),
             "host": host.usage(self.core),
             "faults": {
                 "count": faults.count,

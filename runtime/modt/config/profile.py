@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from modt.config.base import ValueRangeError
-from modt.config.classification import ClassificationConfig, FusionConfig, SchedulerConfig
+from modt.config.classification import ClassificationConfig, DecisionConfig, FusionConfig, SchedulerConfig
 from modt.config.energy import EnergyConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.segmentation import SegmentationConfig
@@ -23,6 +23,7 @@ class ProfileConfig:
     classification: ClassificationConfig = field(default_factory=ClassificationConfig)
     scheduler: SchedulerConfig = field(default_factory=SchedulerConfig)
     fusion: FusionConfig = field(default_factory=FusionConfig)
+    decision: DecisionConfig = field(default_factory=DecisionConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     energy: EnergyConfig = field(default_factory=EnergyConfig)
 
