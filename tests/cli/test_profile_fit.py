@@ -26,6 +26,9 @@ def test_a_fitted_profile_is_that_of_the_sensor(scans, tmp_path):
     found, own = profile.load(str(tmp_path / "puck.yaml")), profile.load("vlp-16")
     assert found.sensor.elevation_step_deg == pytest.approx(own.sensor.elevation_step_deg, rel=0.02)
     assert found.sensor.height_m == pytest.approx(own.sensor.height_m, abs=0.1)
+    assert found.decision.frequency is not None
+    assert 0 < sum(found.decision.frequency) < 0.8
+    assert "not sure of decision.frequency" in done.stdout  # of few proposals
     assert modt("replay", scans, "--profile", "puck.yaml", "--out", "run", cwd=tmp_path).stderr.count("\n") == 2
 
 
