@@ -48,7 +48,7 @@ CLASSES: dict[ObjectClass, ClassSpec] = {
     ObjectClass.PEDESTRIAN: ClassSpec(
         ("Pedestrian", "Person", "Person_sitting"), (30, 254), 1.1, 1.1, True, 0.02, 3.0, 0.16, "#d9480f"
     ),
-    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 0.02, 2.0, 0.22, "#2b8a3e"),
+    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 0.02, 1.5, 0.22, "#2b8a3e"),
 }
 """The classes in the order of their values."""
 

@@ -168,13 +168,6 @@ class Tracks:
         viewed: Bool = self.key_points > 0
         return viewed
 
-    @property
-    def decisive_posterior(self) -> Float64:
-        """(M, 4) posterior that decides on the class: the one settled, whatever the box of the moment says."""
-        settled = (self.final & self.viewed)[:, None]
-        decisive: Float64 = np.where(settled, self.key_posterior, self.posterior)
-        return decisive
-
     @classmethod
     def blank(cls, m: int = 0) -> Self:
         """M rows: no identity, no proposal, no view yet, all classes alike."""

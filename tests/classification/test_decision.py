@@ -38,13 +38,6 @@ def test_of_two_objects_the_likelier_is_said():
     assert said(config, [0.4, 0.0, 0.25, 0.35]) == [ObjectClass.CYCLIST]
 
 
-def test_the_settled_posterior_decides():
-    table = tracks([0.9, 0.1, 0.0, 0.0])
-    table.final[:], table.key_points[:], table.key_posterior[:] = True, 30, [0.0, 1.0, 0.0, 0.0]
-    Decision(DecisionConfig(**ALIKE), ASSUMED).decide(table)
-    assert table.object_class.tolist() == [ObjectClass.CAR]
-
-
 def stream(frequency, rng, n):
     """Posteriors, calibrated under ASSUMED, of proposals whose classes have another frequency."""
     true = rng.choice(4, n, p=frequency)

@@ -298,9 +298,7 @@ def test_a_final_class_stays_while_its_posterior_follows_the_box(make: type[Firs
     prior.rows = np.array([WALL])
     assert not fusion.asks(tracks, proposals, asking).any()
     assert tracks.posterior[0].argmax() == ObjectClass.BACKGROUND
-    assert tracks.decisive_posterior.argmax(axis=1).tolist() == [ObjectClass.CAR]
-    tracks.final[:] = False
-    assert tracks.decisive_posterior.argmax(axis=1).tolist() == [ObjectClass.BACKGROUND]
+    assert tracks.key_posterior[0].argmax() == ObjectClass.CAR
 
 
 def test_a_further_view_replaces_updates_by_the_box_since_the_last() -> None:

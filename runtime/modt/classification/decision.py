@@ -37,7 +37,7 @@ class Decision:
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
-        adapted = self.adapted(tracks.decisive_posterior)
+        adapted = self.adapted(tracks.posterior)
         likeliest = adapted[:, 1:].argmax(axis=1)
         said = adapted[np.arange(len(adapted)), likeliest + 1] >= self._threshold[likeliest]
         tracks.object_class = np.where(said, likeliest + 1, 0)

@@ -61,7 +61,7 @@ class DecisionConfig(StageConfig):
     frequency: tuple[float, ...] | None = shares(
         0.33, "of the classes among proposals, at the start; null: those that the model assumes"
     )
-    start_proposals: int = number(3000, 1, 100_000_000, "", "that the frequency at the start counts for")
+    start_proposals: int = number(2000, 1, 100_000_000, "", "that the frequency at the start counts for")
     memory_proposals: int = number(20_000, 1, 100_000_000, "", "that the frequency of the stream is estimated from")
     max_change: float = number(5.0, 1.0, 1000.0, "", "of a frequency, over that which the model assumes")
 
