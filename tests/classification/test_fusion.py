@@ -243,7 +243,7 @@ WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.
 )
 def test_posterior_is_the_box_prior_before_the_first_view(fusion: KeyViews | FirstView, asked: list[bool]) -> None:
     proposals, tracks = scene((50, 50, 50))
-    tracks.hits[:] = 1
+    tracks.hits[:] = 9
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
     np.testing.assert_allclose(tracks.posterior, [WALL, UNCERTAIN, CAR])
     assert not tracks.viewed.any()

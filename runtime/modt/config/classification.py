@@ -77,7 +77,7 @@ class FusionConfig(StageConfig):
     box_update_weight: float = number(0.75, 0.0, 1.0, "", "exponent of the change of the box prior since a view")
     mismatch_probability: float = number(0.1, 0.0, 1.0, "", "that a proposal is not the object of its track")
     first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")
-    first_view_min_hits: int = number(1, 1, 1000, "frames", "with a proposal, to be classified")
+    first_view_min_hits: int = number(3, 1, 1000, "frames", "with a proposal, to be classified")
     min_object_probability: float = number(0.01, 0.0, 1.0, "", "by the box prior, for the first of several views")
     start_frame: int = number(5, 1, 1000, "frames", "age of a track from which views are fused")
     object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")
