@@ -70,6 +70,10 @@ class LabelledObjects:
     sensor: Int
     row: Int
 
+    def take(self, rows: Bool) -> LabelledObjects:
+        """Those of a mask (T,)."""
+        return LabelledObjects(*(column[rows] for column in vars(self).values()))
+
 
 @dataclass(frozen=True)
 class Dataset:
