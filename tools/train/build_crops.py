@@ -4,9 +4,8 @@
 
 A proposal takes the class of an object if they share more than half of the points of each. Fragments and merged
 objects are marked partial, proposals outside the annotated regions unknown. Neither is used for training; unknown
-ones are not validated either. Proposals outside KITTI's camera view are stored without labels, for distillation
-(tools.train.distillation). Every scan is segmented by the profile of its sensor; KITTI's are thinned to 32 and to 16
-beams too. The file contains its provenance.
+ones are not validated either. Every scan is segmented by the profile of its sensor; KITTI's are thinned to 32 and to
+16 beams too. The file contains its provenance.
 """
 
 from __future__ import annotations
@@ -26,11 +25,10 @@ import modt
 from modt import profile
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.crops import gather
-from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
 from tools.options import crops_parser
-from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, UNLABELLED, Sensors
+from tools.train.dataset import CLUSTERED, PASTED, SHIPPED, SYNTHETIC, Sensors
 from tools.train.labelled_scans import (
     THINNED,
     Scan,
@@ -127,8 +125,7 @@ class CropWriter:
         proposals = Segmenter(stage, sensor, scan.fov).segment(scan.points)
         labels = label(scan, proposals)
         whole = (labels.kind > 0) & ~labels.partial
-        of_interest = {PASTED: whole, UNLABELLED: labels.unknown & (labels.kind == 0) & ~labels.partial}
-        kept = np.flatnonzero(of_interest.get(variant, np.ones(len(proposals), np.bool_)))
+        kept = np.flatnonzero(whole) if variant == PASTED else np.arange(len(proposals))
         crops = gather(scan.points, proposals, kept, MAX_POINTS)
         n = len(kept)
         row: dict[str, Any] = {"xyz": crops.xyz, "count": crops.count, "label": labels.kind[kept].astype(np.int8)}
@@ -169,7 +166,6 @@ class CropWriter:
             )
         }
         provenance |= {"scans": len(np.unique(table["name"])), "crops": tally, "modt": modt.__version__}
-        provenance |= {"unlabelled": int(np.count_nonzero(table["variant"] == UNLABELLED))}
         provenance |= {"sensors": np.unique(table["sensor"]).tolist()}
         np.savez_compressed(path, provenance=np.array(json.dumps(provenance)), **table)
         return {"sha256": hashlib.sha256(path.read_bytes()).hexdigest(), **tally}
@@ -194,7 +190,6 @@ def add_kitti(writer: CropWriter, root: Path, pastes: int, seed: int) -> None:
     scans = list(kitti(root))
     for scan in scans:
         add_labelled(writer, scan)
-        writer.add(dataclasses.replace(scan, fov=FieldOfView()), UNLABELLED)
         for step in THINNED:
             add_labelled(writer, thinned(scan, step))
     for scan in semantic_scans(root / "odometry"):

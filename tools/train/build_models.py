@@ -6,7 +6,6 @@ Rebuilds models/pointnet-synthetic and, where KITTI's data are given, models/poi
 WORK_DIR/pointnet-scans instead, from your own labelled scans, the simulator and, where given, KITTI's data. The scans
 have the layout of KITTI's object benchmark and are named DRIVE_NUMBER: drives are never split in the validation.
 Without calib/ the labels must cover the full circle, in a camera frame at the sensor (x right, y down, z forward).
-Interrupted training resumes.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ KITTI_DATA = (
     "106 + 2 and 53 more object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR "
     "2013; SemanticKITTI labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 "
     "sweeps of Argoverse 2 (B. Wilson et al., 2021) and 9 scans of PandaSet (Hesai and Scale AI, CC BY 4.0), as our "
-    "segmentation cuts them up, including the part of KITTI's outside the camera view, KITTI's objects pasted into "
+    "segmentation cuts them up, KITTI's objects pasted into "
     "other scans and moved to other ranges, and the synthetic world, part of it with objects placed by KITTI's label "
     "files; nothing of drive 0005"
 )
@@ -43,35 +42,32 @@ def run(name: str, *arguments: str | Path | int) -> None:
     subprocess.run(command, check=True)
 
 
-def build(folder: Path, crops: list[Path], out: Path, schedule: list[str], data: str, licence: str) -> None:
+def build(folder: Path, crops: list[Path], out: Path, options: list[str], data: str, licence: str) -> None:
     """Train and export a model with its card.
 
     Args:
         folder: for the trained weights.
         crops: data sets.
         out: the model.
-        schedule: options of train_pointnet.
+        options: of train_pointnet.
         data: description of the data, for the card.
         licence: for the card.
     """
-    folds = schedule[schedule.index("--folds") :][:2]
-    run("train_pointnet", folder, *crops, *schedule)
-    run("train_box_classifier", folder, *crops, *folds)
-    run("train_reflectance_classifier", folder, *crops, "--sensor", SENSOR, *folds)
+    run("train_pointnet", folder, *crops, *options)
+    run("train_box_classifier", folder, *crops)
+    run("train_reflectance_classifier", folder, *crops, "--sensor", SENSOR)
     run("export_pointnet", folder, out, "--data", data, "--licence", licence)
 
 
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("work", type=Path, help="folder for crops and trained weights")
-    options.add_argument("--steps", type=int, default=4000, help="of the network (default: %(default)s)")
+    options.add_argument("--steps", type=int, default=2400, help="of each network (default: %(default)s)")
     add_sources(options)
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     free, placed, real, own = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti", "scans"))
-    steps = str(args.steps)
-    fewer = str(round(0.4 * args.steps))
-    schedule = ["--steps", steps, "--fold-steps", fewer, "--folds", "3", "--teachers", "2"]
+    steps = ["--steps", str(args.steps)]
     if args.kitti:
         run("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
         labels = args.kitti / "object" / "training_all_labels"
@@ -83,15 +79,12 @@ def main() -> None:
         crops, data = [own, real, placed] if args.kitti else [own, free], f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA
-        build(args.work / "scans", crops, args.work / "pointnet-scans.onnx", schedule, data, licence)
+        build(args.work / "scans", crops, args.work / "pointnet-scans.onnx", steps, data, licence)
         return
-    short = ["--steps", fewer, "--fold-steps", fewer, "--folds", "2"]
     licence = "Apache-2.0: free for any use"
-    build(args.work / "synthetic", [free], MODELS / "pointnet-synthetic.onnx", short, SYNTHETIC_DATA, licence)
+    build(args.work / "synthetic", [free], MODELS / "pointnet-synthetic.onnx", steps, SYNTHETIC_DATA, licence)
     if args.kitti:
-        build(
-            args.work / "kitti", [real, placed], MODELS / "pointnet-kitti.onnx", schedule, KITTI_DATA, KITTI_LICENCE
-        )
+        build(args.work / "kitti", [real, placed], MODELS / "pointnet-kitti.onnx", steps, KITTI_DATA, KITTI_LICENCE)
 
 
 if __name__ == "__main__":

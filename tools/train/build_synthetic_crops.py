@@ -36,7 +36,7 @@ def main() -> None:
     if args.labels:
         scans = chain(scans, scans_from_labels(label_files(args.labels), seeds, sensors))
     for scan, scale in zip(scans, cycle(CELL_SCALES), strict=False):
-        writer.add(scan, SYNTHETIC, scale)
+        writer.add(scan, SYNTHETIC, scale, validation=True)
     provenance: dict[str, object] = {"synthetic": args.worlds, "placed": bool(args.labels), "seed": args.seed}
     print(json.dumps(writer.save(args.out, provenance)))
 

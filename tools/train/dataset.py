@@ -16,9 +16,9 @@ from modt.classification.crops import Crops
 from modt.config import SensorConfig
 from modt.types import NONE, Bool, Float64, Int
 
-SHIPPED, CLUSTERED, PASTED, SYNTHETIC, UNLABELLED = range(5)
+SHIPPED, CLUSTERED, PASTED, SYNTHETIC = range(4)
 """Variants of crops: real scans under the default segmentation; real scans under other cell sizes; real scans with
-pasted objects; synthetic sweeps; unlabelled parts of real scans. All but the first are for training alone."""
+pasted objects; synthetic sweeps. All but the first are for training alone."""
 
 NOT_CONCATENATED = ("offsets", "provenance", "truth_row")
 
@@ -69,6 +69,10 @@ class LabelledObjects:
     drive: Int
     sensor: Int
     row: Int
+
+    def take(self, rows: Bool) -> LabelledObjects:
+        """Those of a mask (T,)."""
+        return LabelledObjects(*(column[rows] for column in vars(self).values()))
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
             for made, digest in zip(report["provenance"], report["crops_sha256"], strict=True)
         ),
         f"- training: tools.train.train_pointnet, seed {report['seed']}, {report['steps']} steps, "
-        f"{report['teachers']} teachers, torch {report['torch']}, {report['cpu_s']} s on one core",
+        f"torch {report['torch']}, {report['cpu_s']} s on one core",
         f"- calibration: temperature {calibration['temperature']}, class offsets {calibration['offset']}; fitted "
         "with every sensor at equal weight",
         f"- class frequency that the posterior assumes: {_shares(frequency)}",
@@ -106,9 +106,8 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
 
 
 def _tally(made: dict[str, Any]) -> str:
-    """Crops by class (background/car/pedestrian/cyclist) and variant, and unlabelled crops."""
-    tally = [f"{'/'.join(map(str, n))} {name}" for name, n in made["crops"].items() if sum(n)]
-    return ", ".join([*tally, f"{made['unlabelled']} unlabelled"] if made["unlabelled"] else tally)
+    """Crops by class (background/car/pedestrian/cyclist) and variant."""
+    return ", ".join(f"{'/'.join(map(str, n))} {name}" for name, n in made["crops"].items() if sum(n))
 
 
 def _shares(values: list[float]) -> str:

@@ -27,7 +27,7 @@ class Validation:
         clear: (R,) clearly one object, or clearly none.
         sensor: (R,) as in the data set.
         sensor_names: of the data set.
-        truth: labelled objects; their rows are among the R.
+        truth: labelled objects of the drives of these crops; their rows are among the R.
     """
 
     rows: Int
@@ -44,6 +44,7 @@ class Validation:
         rows = np.flatnonzero((data.variant == data.variant.min()) & ~data.unknown)
         place = np.full(len(data) + 1, NONE)  # the last one is that of NONE
         place[rows] = np.arange(len(rows))
+        truth = data.truth.take(np.isin(data.truth.drive, data.drive[rows]))
         return cls(
             rows,
             data.label[rows],
@@ -51,7 +52,7 @@ class Validation:
             ~data.partial[rows],
             data.sensor[rows],
             data.sensor_names,
-            replace(data.truth, row=place[data.truth.row]),
+            replace(truth, row=place[truth.row]),
         )
 
     @property

@@ -117,7 +117,7 @@ def _share_below(probability: Float64, label: Int, threshold: float) -> list[flo
 
 
 def main() -> None:
-    parser = training_parser(__doc__, folds=3)
+    parser = training_parser(__doc__)
     parser.add_argument("--steps", type=int, default=STEPS)
     args = parser.parse_args()
     make_torch_deterministic()

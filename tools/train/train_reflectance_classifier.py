@@ -140,7 +140,7 @@ def fit_pool(network: Float64, box: Float64, evidence: Float64, label: Int, weig
 
 
 def main() -> None:
-    parser = training_parser(__doc__, folds=3)
+    parser = training_parser(__doc__)
     parser.add_argument("--sensor", required=True, help="sensor that measured the reflectance, by its profile's name")
     parser.add_argument("--steps", type=int, default=STEPS)
     args = parser.parse_args()

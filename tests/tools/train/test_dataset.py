@@ -7,7 +7,7 @@ import numpy as np
 from modt.classification.crops import Crops
 from modt.types import NONE
 from tests.tools.train.datasets import data_of, truth_of
-from tools.train.dataset import SHIPPED, SYNTHETIC, UNLABELLED, folds
+from tools.train.dataset import SHIPPED, SYNTHETIC, folds
 
 
 def test_folds_split_real_scans_by_drive_and_leave_out_the_rest() -> None:
@@ -23,9 +23,8 @@ def test_folds_split_real_scans_by_drive_and_leave_out_the_rest() -> None:
     assert len(set(fold[:3].tolist())) == 3  # the objects are spread
 
 
-def test_unlabelled_and_partial_crops_are_not_trainable() -> None:
+def test_unknown_and_partial_crops_are_not_trainable() -> None:
     partial, unknown = np.array([False, False, False, True]), np.array([True, False, True, False])
-    variant = np.array([UNLABELLED, SHIPPED, SHIPPED, SHIPPED])
     crops = Crops(np.zeros((4, 3), np.float32), np.arange(5))
-    data = data_of(crops, np.array([0, 0, 1, 0]), partial=partial, unknown=unknown, variant=variant)
+    data = data_of(crops, np.array([0, 0, 1, 0]), partial=partial, unknown=unknown)
     assert data.trainable.tolist() == [False, True, True, False]

@@ -37,12 +37,12 @@ def test_every_sensor_counts_as_much_as_the_others() -> None:
     label, sensor = np.array([0, 0, 0, 1, 0, 1, 2, 0]), np.array([0, 0, 0, 0, 1, 1, 1, 1])
     partial, variant = np.arange(8) == 4, np.where(np.arange(8) == 7, CLUSTERED, SHIPPED)
     crops = Crops(np.zeros((8, 3), np.float32), np.arange(9))
-    truth = truth_of(label[5:], label[5:], row=np.array([5, NONE, 7]))
+    truth = truth_of(label[4:], np.array([0, 0, 0, 9]), row=np.array([5, NONE, 7, 4]))
     columns = {"sensor": sensor, "sensor_names": ("a", "b"), "partial": partial, "variant": variant}
     valid = Validation.of(data_of(crops, label, truth=truth, **columns))
     np.testing.assert_allclose(valid.weight, [1 / 8] * 4 + [0, 1 / 4, 1 / 4])
     np.testing.assert_allclose(valid.class_frequency, [3 / 8, 3 / 8, 1 / 4, 0])
-    assert valid.truth.row.tolist() == [5, NONE, NONE]  # what is not validated is no one's
+    assert valid.truth.row.tolist() == [5, NONE, NONE]  # crop 7 and drive 9 are not validated
     some = valid.weight_of(valid.sensor == 1)
     assert not some[:5].any()
     np.testing.assert_allclose(np.bincount(valid.label, some)[1:] * 5 / 8, [3 / 8, 1 / 4])  # as often as among all
