@@ -46,7 +46,7 @@ def stream(frequency, rng, n):
     return likelihood / likelihood.sum(axis=1, keepdims=True)
 
 
-@pytest.mark.parametrize("frequency", [(0.5, 0.1, 0.3, 0.1), (0.95, 0.03, 0.01, 0.01), tuple(ASSUMED)])
+@pytest.mark.parametrize("frequency", [(0.5, 0.1, 0.3, 0.1), (0.6, 0.28, 0.07, 0.05), tuple(ASSUMED)])
 def test_the_frequency_of_the_stream_is_learnt(frequency):
     rng = np.random.default_rng(1)
     decision = Decision(DecisionConfig(start_proposals=1000), ASSUMED)
@@ -54,6 +54,14 @@ def test_the_frequency_of_the_stream_is_learnt(frequency):
         decision.decide(tracks(*stream(frequency, rng, 60)))
     assert decision.frequency == pytest.approx(frequency, abs=0.05)
     assert np.abs(decision.frequency - frequency).max() <= max(0.05, np.abs(ASSUMED - frequency).max() / 2)
+
+
+def test_no_object_becomes_rarer_than_the_model_assumes():
+    rng = np.random.default_rng(1)
+    decision = Decision(DecisionConfig(start_proposals=1), ASSUMED)
+    for _ in range(100):
+        decision.decide(tracks(*stream((0.97, 0.01, 0.01, 0.01), rng, 60)))
+    assert decision.frequency == pytest.approx(ASSUMED, abs=0.01)
 
 
 def test_what_is_not_seen_teaches_nothing():
@@ -81,8 +89,7 @@ def test_frequencies_stay_a_distribution_within_bounds(weights):
         table = tracks(*posterior)
         decision.decide(table)
     assert decision.frequency.sum() == pytest.approx(1.0)
-    ratio = decision.frequency / ASSUMED
-    assert ratio.max() / ratio.min() <= config.max_change**2 + 1e-9
+    assert (decision.frequency > 0.05 * ASSUMED).all()
     np.testing.assert_allclose(decision.adapted(posterior).sum(axis=1), 1.0)
 
 

@@ -83,8 +83,9 @@ def simulated(scene: str, sensor: str, seconds: float, seed: int, poses: bool = 
 
 
 def labelled(path: Path) -> Drive:
-    """A labelled recording, in the camera's view if it has one."""
-    stream, truth = open_stream(path), open_truth(path)
+    """A labelled recording, its scans in `scans/` if there is such a folder; in the camera's view if it has one."""
+    scans = path / "scans"
+    stream, truth = open_stream(scans if scans.is_dir() else path), open_truth(path)
     fov = FieldOfView() if stream.info.camera is None else FieldOfView.of_camera(stream.info.camera)
     frames = [(frame, truth.frames[frame.index]) for frame in stream if frame.index in truth.frames]
     return Drive(path.name, load(DEFAULT), frames, truth.rules, fov)

@@ -2,8 +2,9 @@
 
 A posterior holds for the class frequencies that the model was trained to assume. Those of the stream are estimated
 from the posteriors themselves (M. Saerens et al., "Adjusting the outputs of a classifier to new a priori
-probabilities", Neural Computation 2002), slowly and within bounds. An object is said where its expected cost, if it
-were missed, exceeds that of a false one.
+probabilities", Neural Computation 2002), slowly and within bounds: no object becomes rarer than the model assumes,
+since the first of its class may still come. An object is said where its expected cost, if it were missed, exceeds
+that of a false one.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ import numpy as np
 from modt.classes import N_CLASSES
 from modt.config import DecisionConfig
 from modt.types import NONE, Float64, Tracks
+
+MIN_BACKGROUND = 0.1
+"""Least frequency of background."""
 
 
 class Decision:
@@ -58,5 +62,6 @@ class Decision:
             self._mass *= config.memory_proposals / total
         frequency = config.start_proposals * self._start + self._mass
         frequency /= frequency.sum()
-        bounded = np.clip(frequency, self._assumed / config.max_change, self._assumed * config.max_change)
-        self.frequency = bounded / bounded.sum()
+        objects = np.clip(frequency[1:], self._assumed[1:], self._assumed[1:] * config.max_change)
+        self.frequency = np.append(max(1.0 - objects.sum(), MIN_BACKGROUND), objects)
+        self.frequency /= self.frequency.sum()

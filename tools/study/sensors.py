@@ -1,0 +1,94 @@
+"""What is found, called and followed, by sensor and mode: simulated drives, or a labelled recording.
+
+    python -m tools.study.sensors [--sensors NAME ...] [--modes MODE ...] [--scene street crossing] [--seeds 450:453]
+                                  [--seconds 6] [--camera] [--recording TRUTH --profile PROFILE]
+
+Of objects of 20 points or more within 60 m [%]: found (point IoU over 1/2); called (found, and said to be what it
+is); precision of what is called; life of the tracks, of the ideal. Calibration error of the class's posterior. The
+default seeds are those of the documents' tables: nothing is settled on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from modt import assembly, profile
+from modt.classes import CLASS_NAMES
+from modt.cli.options import frames as number_range
+from modt.config import ProfileConfig
+from modt.energy.ledger import NullLedger
+from modt.evaluation.evaluation import ALL, DriveRows, Evaluation, collect, evaluation
+from modt.evaluation.frame import JudgedFrame
+from modt.geometry import FieldOfView
+from modt.simulation.sensors import SENSORS
+from modt.sources.synthetic_stream import CAMERA
+from tools.options import parser
+from tools.study.leave_one_out import Drive, labelled, simulated
+
+CLASSES = CLASS_NAMES[1:]
+
+
+def run(drive: Drive, config: ProfileConfig, mode_name: str, fov: FieldOfView, number: int) -> DriveRows:
+    """What became of a drive in a mode of the method."""
+    mode = assembly.MODES[mode_name]
+    pipeline, budget = assembly.pipeline(mode, config, fov, NullLedger()), mode.budget(config)
+
+    def judged() -> Iterator[JudgedFrame]:
+        for frame, truth in drive.frames:
+            yield JudgedFrame.of_result(pipeline.step(frame, budget), truth, fov)
+
+    return collect(judged(), drive.rules, number)
+
+
+def row(name: str, mode: str, found: Evaluation) -> str:
+    """Markdown."""
+    whole = found.ranges[ALL]
+    scores = [whole.classification[c] for c in CLASSES]
+    segmentation = [whole.segmentation[c].recall if c in whole.segmentation else None for c in CLASSES]
+    shares = (
+        segmentation,
+        [s.recall for s in scores],
+        [s.precision for s in scores],
+        [s.average_precision for s in scores],
+    )
+    columns = [[str(s.segmentable) for s in scores], *([_percent(v) for v in values] for values in shares)]
+    columns.append(["-" if s.calibration_error is None else f"{s.calibration_error:.3f}" for s in scores])
+    tracks = found.tracks.get(ALL)
+    life = "-" if tracks is None else f"{_percent(tracks.life.ratio)} | {tracks.discontinuities}"
+    return f"| {name} | {mode} | {' | '.join(' / '.join(c) for c in columns)} | {life} | {_percent(found.beta)} |"
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.0f}"
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--sensors", nargs="*", choices=SENSORS, default=["hdl-64e", "os1-64", "vlp-16"])
+    options.add_argument("--modes", nargs="+", choices=assembly.MODES, default=["accurate", "efficient"])
+    options.add_argument("--scene", nargs="+", default=["street", "crossing"])
+    options.add_argument("--seeds", type=number_range, default=(450, 453), metavar="A:B")
+    options.add_argument("--seconds", type=float, default=6.0)
+    options.add_argument("--camera", action="store_true", help="a camera's view; else the full circle")
+    options.add_argument("--recording", type=Path, metavar="TRUTH", help="in place of simulated drives")
+    options.add_argument("--profile", default=profile.DEFAULT, help="of the recording")
+    args = options.parse_args()
+    print("| sensor | mode | objects | found | called | precision | AP | calibration | life | breaks | beta |")
+    print("|" + "---|" * 11)
+    if args.recording:
+        drive = labelled(args.recording)
+        for mode in args.modes:
+            rows = [run(drive, profile.load(args.profile), mode, drive.fov, 0)]
+            print(row(drive.name, mode, evaluation(rows)), flush=True)
+        return
+    fov = FieldOfView.of_camera(CAMERA) if args.camera else FieldOfView()
+    for sensor in args.sensors:
+        drives = [simulated(scene, sensor, args.seconds, seed) for seed in range(*args.seeds) for scene in args.scene]
+        for mode in args.modes:
+            rows = [run(drive, drive.profile, mode, fov, number) for number, drive in enumerate(drives)]
+            print(row(sensor, mode, evaluation(rows)), flush=True)
+
+
+if __name__ == "__main__":
+    main()
