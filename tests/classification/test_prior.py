@@ -80,7 +80,7 @@ def test_box_priors_of_the_shipped_models(name: str) -> None:
     car = prior.probability(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
     person = prior.probability(standing(120, 12.0, 0.6, 0.5, 1.4))[0]
     wall = prior.probability(standing(600, 15.0, 12.0, 0.5, 2.3))[0]
-    speck = prior.probability(standing(5, 60.0, 0.1, 0.1, 0.3))[0]
+    speck = prior.probability(standing(5, 15.0, 0.1, 0.1, 0.3))[0]
     assert car.argmax() == ObjectClass.CAR
     assert person[ObjectClass.PEDESTRIAN] > 0.1
     assert max(1 - wall[0], 1 - speck[0]) < 0.02

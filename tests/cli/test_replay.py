@@ -40,17 +40,6 @@ def tracks(run):
     return list(read_records(run / "tracks.jsonl", SCHEMA))
 
 
-def test_the_only_view_of_a_track_settles_its_class(runs):
-    root, _ = runs
-    classes = {}
-    for frame in tracks(root / "efficient"):
-        for t in frame["tracks"]:
-            if t["final"] and t["viewed"]:
-                classes.setdefault(t["id"], set()).add(t["class"])
-    assert classes
-    assert all(len(seen) == 1 for seen in classes.values())
-
-
 @pytest.mark.parametrize("mode", MODES)
 def test_run_directory_has_the_documented_files(runs, mode):
     root, _ = runs
@@ -64,8 +53,8 @@ def test_run_directory_has_the_documented_files(runs, mode):
         assert len({t["id"] for t in frame["tracks"]}) == len(frame["tracks"])
         for t in frame["tracks"]:
             assert sum(t["posterior"]) == pytest.approx(1, abs=1e-5)
-            likeliest = CLASS_NAMES[int(np.argmax(t["posterior"]))]
-            assert t["class"] == likeliest or (t["final"] and t["viewed"])
+            objects = CLASS_NAMES[1 + int(np.argmax(t["posterior"][1:]))]
+            assert t["class"] in {"background", objects} or max(t["posterior"][1:]) < 0.5  # by the decision
             assert (t["box"] is None) == (t["proposal"] is None) == (t["missed"] > 0)
 
 

@@ -26,7 +26,7 @@ from modt.types import NONE, FrameResult
 
 FOLDER = Path(__file__).parent
 SCENES = {"street-vlp-16": ("street", "vlp-16", "vlp-16"), "street-hdl-64e": ("street", "hdl-64e", "hdl-64e")}
-SECONDS = 1.2
+SECONDS = 1.0
 _INITIALS = "bcpyBCPY"
 CASES = [(scene, mode) for scene in SCENES for mode in assembly.MODES]
 
