@@ -73,7 +73,7 @@ class FusionConfig(StageConfig):
     first_view_*: mode efficient; start_frame, thresholds, *_change and review_*: mode accurate.
     """
 
-    prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency among proposals")
+    prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency that a model assumes which states none")
     box_update_weight: float = number(0.75, 0.0, 1.0, "", "exponent of the change of the box prior since a view")
     mismatch_probability: float = number(0.1, 0.0, 1.0, "", "that a proposal is not the object of its track")
     first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")

@@ -32,8 +32,9 @@ class RegistrationConfig(StageConfig):
     min_agreement: float = number(0.3, 0.0, 1.0, "", "share of inliers from which the motion counts as known")
     inlier_ratio: float = number(0.75, 0.0, 1.0, "", "share of inliers below which pairs are sought farther away")
     inlier_drop: float = number(0.5, 0.0, 1.0, "", "share of the last frame's inliers below which the same is done")
-    initial_turn_rad: float = number(0.05, 0.0, 1.0, "rad", "step of the turns tried while no motion is known")
-    initial_frames: int = number(10, 1, 1000, "frames", "in which they are tried: three steps to either side")
+    initial_turn_rad: float = number(
+        0.05, 0.0, 1.0, "rad", "of the turns tried while no motion is known, three to either side"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

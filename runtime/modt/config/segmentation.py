@@ -33,7 +33,6 @@ class GroundConfig(StageConfig):
         6.0, 0.0, 45.0, "deg", "tilt of the sensor on the ground beneath it, to the first cell"
     )
     slope_gain: float = number(0.2, 0.01, 1.0, "", "weight of the newest slope in the running slope of a ray")
-    start_m: float = number(0.3, 0.0, 2.0, "m", "deviation of the ground below the sensor from the sensor height")
     max_gap_m: float = number(6.0, 0.1, 100.0, "m", "between ground cells, beyond which tolerance stops growing")
     flat_m: float = number(0.1, 0.0, 1.0, "m", "height range of the returns of a flat cell ...")
     flat_slope: float = number(0.2, 0.0, 2.0, "", "... and what it grows by with the width of the cell")

@@ -54,7 +54,7 @@ class Registration:
     def __init__(self, config: RegistrationConfig) -> None:
         self.config = config
         self._initialised = self._motion_known = False
-        self._inliers = self._attempts = 0
+        self._inliers = 0
 
     def correct(
         self, landmarks: Landmarks, observations: Observations, motion_share: Float64 | float = 1.0
@@ -97,8 +97,7 @@ class Registration:
         self, landmarks: Landmarks, observations: Observations, jacobian: Float64, motion: Float64
     ) -> Fit | None:
         """Best supported motion near another one, or near several turns while none is known."""
-        initial = not self._initialised and self._attempts < self.config.initial_frames
-        self._attempts += initial and len(landmarks) > 0
+        initial = not self._initialised
         step = self.config.initial_turn_rad
         starts = [[0.0, 0.0, k * step] for k in (0, 1, -1, 2, -2, 3, -3)] if initial else [motion]
         reach_m, scales = self.config.reach_m, _SCALES[:_MATCH_ROUNDS]

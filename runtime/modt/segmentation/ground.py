@@ -49,7 +49,7 @@ class GroundEstimator:
         """(rings, SECTORS) lowest return of each cell that can be ground [m], infinite without any."""
         reach = points.sqrt_range * points.sqrt_range
         reach *= np.float32(self.max_slope)
-        reach += np.float32(self.config.start_m)
+        reach += np.float32(self.config.noise_m)
         plausible = np.abs(points.z + np.float32(sensor_height_m)) < reach
         plausible &= points.sqrt_range > self.min_sqrt_range
         z = np.where(plausible, points.z, np.float32(np.inf))

@@ -15,12 +15,14 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
 import yaml
 
 from modt import assembly, profile
+from modt.classification import pointnet
 from modt.cli import assemble
 from modt.config import ProfileConfig
 from modt.energy.conditions import Conditions
@@ -107,6 +109,15 @@ def one_call(config: ProfileConfig, _folder: Path) -> str:
 
 def two_ms(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "scheduler.cpu_ms_per_frame", 2.0))
+
+
+def one_ms(config: ProfileConfig, _folder: Path) -> str:
+    return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 1.0))
+
+
+def model_without_frequency(config: ProfileConfig, _folder: Path) -> str:
+    with mock.patch.object(pointnet, "_class_frequency", return_value=None):
+        return replay(frames(3, 1.0), config)
 
 
 def ten_mJ(config: ProfileConfig, _folder: Path) -> str:
@@ -206,6 +217,7 @@ SCENARIOS: dict[str, Scenario] = {
     "--mode efficient": efficient,
     "--mode accurate, efficient": street,
     "a binding budget": one_call,
+    "a model that states no frequency": model_without_frequency,
     "scheduler.cpu_ms_per_frame or energy_mJ_per_frame": two_ms,
     "--odometry udp://, unix://": pose_socket,
     "frames without a pose": unposed,
@@ -223,6 +235,8 @@ RARE: dict[str, Scenario] = {
     "segmentation.person_splitting.min_gap_columns": long_street,
     "segmentation.car_merging.min_person_top_m": long_street,
     "tracking.split.": long_street,
+    "tracking.merge.": long_street,
+    "scheduler.cost.": one_ms,
     "tracking.background_map.": long_street,
     "odometry.registration.max_turn_rad": turning,
     "energy.windows.": windows,
@@ -239,6 +253,8 @@ def others(key: Key) -> Iterator[Any]:
     value, facts = value_of(BASE, key.path), key.facts
     if "options" in facts:
         yield from (option for option in facts["options"] if option != value)
+    elif "length" in facts and value is None:
+        yield (0.2,) * facts["length"]
     elif "most" in facts:
         yield tuple(np.linspace(-15.0, 15.0, 8).tolist())
     elif key.kind == "str":

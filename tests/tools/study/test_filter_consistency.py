@@ -65,8 +65,10 @@ def test_the_filter_is_nearly_consistent_for_walkers(consistencies):
 
 @pytest.mark.slow
 def test_the_filter_is_nearly_consistent_for_standing_objects(consistencies):
-    """The visible part of partly occluded background moves along the occluder, an error that no filter models."""
-    for kind, tracks, mean in (("pedestrian, standing", 3, 2.0), ("background, standing", 20, 8.0)):
+    """The visible part of partly occluded background moves along the occluder, what a single beam meets of it jumps
+    from sweep to sweep: errors that no filter models.
+    """
+    for kind, tracks, mean in (("pedestrian, standing", 3, 2.0), ("background, standing", 20, 12.0)):
         position = consistencies[kind]["position"]
         assert position.tracks >= tracks
         assert position.mean < mean
