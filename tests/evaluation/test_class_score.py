@@ -5,7 +5,6 @@ from hypothesis import strategies as st
 
 from modt.evaluation.class_score import (
     average_precision,
-    confusion,
     expected_calibration_error,
     top_calibration_error,
 )
@@ -74,8 +73,3 @@ def test_average_precision_agrees_with_the_definition(rows, missed):
         area += (recall - before) * max(p for _, p in points[k:])
         before = recall
     assert average_precision(probability, label, truth)["car"] == pytest.approx(area, abs=1e-3)
-
-
-def test_confusion_counts_true_by_called():
-    probability = np.eye(4)[[0, 1, 1, 3]]
-    assert confusion(probability, np.array([0, 1, 2, 3]))[2] == [0, 1, 0, 0]

@@ -83,13 +83,6 @@ def average_precision(probability: Float64, label: Int, truth: Int) -> dict[str,
     return {name: round(_area(*curve[1:]), 4) for name, curve in zip(CLASS_NAMES[1:], curves, strict=True)}
 
 
-def confusion(probability: Float64, label: Int) -> list[list[int]]:
-    """[true][called] number of proposals."""
-    table = np.zeros((N_CLASSES, N_CLASSES), np.int64)
-    np.add.at(table, (label, probability.argmax(axis=1)), 1)
-    return [[int(n) for n in row] for row in table]
-
-
 def expected_calibration_error(confidence: Float64, correct: Bool) -> float | None:
     """Mean distance of confidence from accuracy, over BINS of confidence weighted by their size (Naeini, 2015)."""
     if not len(confidence):

@@ -34,14 +34,6 @@ def birds_eye_intersection(a: Float64, b: Float64) -> Float64:
     return area
 
 
-def birds_eye_iou(a: Float64, b: Float64) -> Float64:
-    """(n,) intersection over union of the boxes' bird's-eye rectangles, row by row."""
-    shared = birds_eye_intersection(a, b)
-    union = a[:, 3] * a[:, 4] + b[:, 3] * b[:, 4] - shared
-    iou: Float64 = shared / np.maximum(union, TINY)
-    return iou
-
-
 def iou_3d(a: Float64, b: Float64) -> Float64:
     """(n,) intersection over union of the boxes' volumes, row by row."""
     top = np.minimum(a[:, 2] + a[:, 5] / 2, b[:, 2] + b[:, 5] / 2)
