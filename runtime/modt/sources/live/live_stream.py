@@ -1,0 +1,160 @@
+"""The newest sweep of a sensor, received by a thread of its own."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from modt.errors import ScanError
+from modt.sources.live.sweep_reader import Sweep, SweepReader
+from modt.sources.scan_file import sanitised
+from modt.sources.stream import Fault, Faults, StreamInfo
+from modt.types import Frame
+
+log = logging.getLogger(__name__)
+
+SILENT_S = 2.0
+"""Time without a sweep after which a sensor counts as silent."""
+READ_S = 0.2
+"""Time that the receiving thread waits for a message before it looks whether it is to end."""
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A frame, and when its sweep was complete on the clock of the stream [s]."""
+
+    frame: Frame
+    arrived_s: float
+
+
+class LiveStream:
+    """Hands over the newest sweep; an older one that nobody took is dropped and counted.
+
+    Attributes:
+        info: properties of the stream, with n_frames None.
+        faults: unusable sweeps and points.
+        sweeps, incomplete, dropped, silences: counts of sweeps received, of those with missing messages, of those
+            replaced by a newer one before they were taken, and of times that the sensor fell silent.
+    """
+
+    def __init__(
+        self,
+        info: StreamInfo,
+        reader: SweepReader,
+        *,
+        cores: frozenset[int] | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`cores`: where the receiving thread may run; None leaves it where it is started."""
+        self.info, self.reader, self.faults = info, reader, Faults()
+        self.sweeps = self.incomplete = self.dropped = self.silences = 0
+        self._cores, self._clock = cores, clock
+        self._arrived = threading.Condition()
+        self._newest: tuple[Sweep, float] | None = None
+        self._error: Exception | None = None
+        self._ended = self._silent = False
+        self._last_s, self._index, self._stamp_s = clock(), 0, float("-inf")
+        self._thread = threading.Thread(target=self._receive, name="receiver", daemon=True)
+
+    def start(self) -> None:
+        """Begin to receive."""
+        self._last_s = self._clock()
+        self._thread.start()
+
+    def take(self, timeout_s: float) -> Received | None:
+        """The newest sweep not yet taken, waited for at most `timeout_s`; None without one.
+
+        A sensor that is silent for SILENT_S is logged once, and once more when it returns. Sweeps that cannot be used
+        and those older than the last one taken are counted and skipped.
+
+        Raises:
+            Exception: what ended the receiving thread.
+        """
+        with self._arrived:
+            if self._newest is None and self._error is None:
+                self._arrived.wait(timeout_s)
+            if self._error is not None:
+                raise self._error
+            taken, self._newest = self._newest, None
+        if taken is None:
+            self._watch_silence()
+            return None
+        return self._frame(*taken)
+
+    def health(self) -> dict[str, Any]:
+        """Counts for status and summary."""
+        reception = self.reader.reception
+        return {
+            "messages": reception.messages,
+            "lost_messages": reception.lost,
+            "refused_messages": dict(reception.refused),
+            "sweeps": self.sweeps,
+            "incomplete_sweeps": self.incomplete,
+            "dropped_sweeps": self.dropped,
+            "silences": self.silences,
+            "silent": self._silent,
+        }
+
+    def close(self) -> None:
+        """End the receiving thread and release the reader."""
+        self._ended = True
+        self.reader.close()
+        if self._thread.is_alive():
+            self._thread.join(2 * READ_S)
+
+    def _receive(self) -> None:
+        if self._cores:
+            with suppress(OSError):  # a core that is not allowed: stay where the process is
+                os.sched_setaffinity(0, self._cores)
+        while not self._ended:
+            try:
+                sweeps = self.reader.read(READ_S)
+            except Exception as error:
+                with self._arrived:
+                    self._error = None if self._ended else error
+                    self._arrived.notify()
+                return
+            for sweep in sweeps:
+                self._put(sweep)
+
+    def _put(self, sweep: Sweep) -> None:
+        with self._arrived:
+            self.sweeps += 1
+            self.incomplete += not sweep.complete
+            self.dropped += self._newest is not None
+            self._newest = (sweep, self._clock())
+            self._arrived.notify()
+
+    def _frame(self, sweep: Sweep, arrived_s: float) -> Received | None:
+        if self._silent:
+            log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
+        self._silent, self._last_s = False, arrived_s
+        index, self._index = self._index, self._index + 1
+        if sweep.stamp_s < self._stamp_s:
+            self._fault(index, f"stamped {self._stamp_s - sweep.stamp_s:.3f} s before the last sweep", skipped=True)
+            return None
+        try:
+            points, flaws = sanitised(sweep.points, self.info.name)
+        except ScanError as error:
+            self._fault(index, error.cause, skipped=True)
+            return None
+        if flaws:
+            self._fault(index, "; ".join(flaws), skipped=False)
+        self._stamp_s = sweep.stamp_s
+        return Received(Frame(index, sweep.stamp_s, points, turn_s=sweep.turn_s), arrived_s)
+
+    def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
+        if self.faults.add(Fault(index, self.info.name, cause, skipped)):
+            log.warning("%s: %s%s", self.info.name, cause, "; sweep skipped" if skipped else "")
+
+    def _watch_silence(self) -> None:
+        if not self._silent and self._clock() - self._last_s > SILENT_S:
+            self._silent, self.silences = True, self.silences + 1
+            remedy = "check its power, cable, address and port; tracks are kept until it returns"
+            log.warning("%s: no sweep for %.0f s; %s", self.info.name, SILENT_S, remedy)

@@ -1,0 +1,53 @@
+"""Interface of what turns a sensor's messages into sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from modt.types import Float32
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """One turn of a sensor.
+
+    Attributes:
+        stamp_s, points, turn_s: as in modt.types.Frame; points may hold values that are not finite.
+        complete: no message of the turn is known to be missing.
+    """
+
+    stamp_s: float
+    points: Float32
+    turn_s: float = 0.0
+    complete: bool = True
+
+
+@dataclass(slots=True)
+class Reception:
+    """What has been received; each refusal and loss is counted by its reason."""
+
+    messages: int = 0  # taken from the network or file
+    lost: int = 0  # missing by their sequence numbers, stamps or angles
+    refused: dict[str, int] = field(default_factory=dict)  # messages that cannot be used, by reason
+
+    def refuse(self, reason: str) -> bool:
+        """Count a refused message; whether it is the first for this reason."""
+        self.refused[reason] = self.refused.get(reason, 0) + 1
+        return self.refused[reason] == 1
+
+
+class SweepReader(Protocol):
+    """Messages of one sensor to sweeps; used by one thread."""
+
+    reception: Reception
+
+    def read(self, timeout_s: float) -> Sequence[Sweep]:
+        """Sweeps finished by the messages received until the timeout, oldest first; returns as soon as there is one.
+
+        Bytes that are no message of the sensor are counted, never raised.
+        """
+
+    def close(self) -> None:
+        """Release the socket; another thread may be in `read`, which then returns or raises OSError."""

@@ -1,0 +1,126 @@
+"""The newest sweep is handed over; everything else is counted."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from modt.sources.live.live_stream import LiveStream, Received
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.stream import StreamInfo
+
+INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
+
+
+class ScriptedReader:
+    """Hands over batches of sweeps, one a call, when the test says so."""
+
+    def __init__(self) -> None:
+        self.reception = Reception()
+        self._batches: list[Sequence[Sweep] | Exception] = []
+        self._ready = threading.Semaphore(0)
+
+    def give(self, batch: Sequence[Sweep] | Exception) -> None:
+        self._batches.append(batch)
+        self._ready.release()
+
+    def read(self, timeout_s: float) -> Sequence[Sweep]:
+        if not self._ready.acquire(timeout=timeout_s):
+            return []
+        batch = self._batches.pop(0)
+        if isinstance(batch, Exception):
+            raise batch
+        return batch
+
+    def close(self) -> None:
+        pass
+
+
+def sweep(stamp_s: float, *, complete: bool = True, x: float = 5.0) -> Sweep:
+    return Sweep(stamp_s, np.full((10, 4), [x, 0, 0, 0.5], np.float32), complete=complete)
+
+
+@pytest.fixture
+def live():
+    reader = ScriptedReader()
+    stream = LiveStream(INFO, reader)
+    stream.start()
+    yield reader, stream
+    stream.close()
+
+
+def taken(stream: LiveStream) -> Received:
+    received = stream.take(5.0)
+    assert received is not None
+    return received
+
+
+def test_the_newest_of_several_sweeps_is_taken_and_the_others_are_counted(live):
+    reader, stream = live
+    reader.give([sweep(1.0), sweep(1.1, complete=False), sweep(1.2)])
+    deadline = threading.Event()
+    while stream.sweeps < 3:
+        deadline.wait(0.01)
+    assert taken(stream).frame.stamp_s == 1.2
+    assert stream.take(0.0) is None
+    health = stream.health()
+    assert (health["sweeps"], health["dropped_sweeps"], health["incomplete_sweeps"]) == (3, 2, 1)
+
+
+def test_frames_are_numbered_in_the_order_in_which_they_are_taken(live):
+    reader, stream = live
+    frames = []
+    for stamp_s in (1.0, 1.1, 1.2):
+        reader.give([sweep(stamp_s)])
+        frames.append(taken(stream).frame)
+    assert [frame.index for frame in frames] == [0, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("unusable", "cause"),
+    [(sweep(0.5), "0.500 s before the last sweep"), (sweep(1.1, x=5000.0), "its columns are not")],
+)
+def test_an_unusable_sweep_is_a_fault_and_the_next_one_is_taken(live, caplog, unusable, cause):
+    reader, stream = live
+    reader.give([sweep(1.0)])
+    taken(stream)
+    reader.give([unusable])
+    assert stream.take(5.0) is None
+    reader.give([sweep(1.2)])
+    assert taken(stream).frame.stamp_s == 1.2
+    assert stream.faults.skipped == 1
+    assert cause in caplog.text
+
+
+def test_a_failure_of_the_receiving_thread_reaches_the_loop(live):
+    reader, stream = live
+    reader.give(RuntimeError("broken"))
+    with pytest.raises(RuntimeError, match="broken"):
+        while True:
+            stream.take(5.0)
+
+
+def test_a_silent_sensor_is_diagnosed_once_and_its_return_is_logged(caplog):
+    reader, now_s = ScriptedReader(), [0.0]
+    stream = LiveStream(INFO, reader, clock=lambda: now_s[0])
+    stream.start()
+    with caplog.at_level(logging.WARNING):
+        now_s[0] = 1.9
+        assert stream.take(0.0) is None
+        assert stream.silences == 0
+        for now_s[0] in (2.1, 3.0):
+            assert stream.take(0.0) is None
+        assert stream.health()["silent"]
+        now_s[0] = 4.0
+        reader.give([sweep(1.0)])
+        taken(stream)
+    stream.close()
+    assert stream.silences == 1
+    assert [record.message for record in caplog.records] == [
+        "sensor: no sweep for 2 s; check its power, cable, address and port; tracks are kept until it returns",
+        "sensor: sweeps again after 4.0 s",
+    ]
