@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from modt import host
 from modt.classification.decision import Decision
-from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.fusion import EveryFrame, KeyViews, OneView
 from modt.classification.instrumentation import TimedClassifier
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
@@ -48,7 +48,7 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
 
 MODES = {
     "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, FirstView, _profile_budget),
+    "efficient": Mode(EFFICIENT, OneView, _profile_budget),
     "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.classes import ObjectClass
-from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.fusion import EveryFrame, OneView, KeyViews
 from modt.classification.prior import object_probability_reaches
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
@@ -23,10 +23,11 @@ PAPER = FusionConfig(
     start_frame=1,
     review_point_ratio=None,
     extent_change=0.3,
+    memory=1.0,
     box_update_weight=0.0,
     mismatch_probability=0.0,
 )
-ALL = (EveryFrame(), FirstView(FusionConfig()), KeyViews(FusionConfig()), KeyViews(PAPER))
+ALL = (EveryFrame(), OneView(FusionConfig()), KeyViews(FusionConfig()), KeyViews(PAPER))
 
 
 def scene(counts: tuple[int, ...] = (50, 50)) -> tuple[Proposals, Tracks]:
@@ -100,16 +101,39 @@ def test_every_frame_requests_all_tracks_with_a_proposal() -> None:
     assert EveryFrame().asks(tracks, proposals, np.zeros(2, np.bool_)).tolist() == [True, False]
 
 
-def test_efficient_requests_one_view() -> None:
+def test_efficient_requests_one_certain_view() -> None:
     proposals, tracks = scene()
-    fusion = FirstView(FusionConfig(first_view_min_hits=3))
+    fusion = OneView(FusionConfig(first_view_min_hits=3))
     asking, tracks.hits[:] = np.array([True, True]), 3
     assert fusion.asks(tracks, proposals, asking).all()
-    certain = fuse(fusion, tracks, proposals, np.array([0]), np.array([[0.4, 0.3, 0.2, 0.1]]))
-    assert certain.all()
+    assert fuse(fusion, tracks, proposals, np.array([0]), np.array([[0.03, 0.95, 0.01, 0.01]])).all()
     assert fusion.asks(tracks, proposals, asking).tolist() == [False, True]
     tracks.hits[1] = 2  # too few
     assert not fusion.asks(tracks, proposals, asking).any()
+
+
+def test_an_uncertain_view_of_efficient_is_replaced_by_one_with_clearly_more_points() -> None:
+    config = FusionConfig(review_point_ratio=2.0, review_extra_points=5)
+    proposals, tracks = scene((50,))
+    fusion, asking, tracks.hits[:] = OneView(config), np.array([True]), config.first_view_min_hits
+    assert not fuse(fusion, tracks, proposals, np.array([0]), np.array([[0.5, 0.1, 0.3, 0.1]])).any()
+    assert not fusion.asks(tracks, moved(proposals, offsets=np.array([0, 105])), asking).any()
+    nearer = moved(proposals, offsets=np.array([0, 106]))
+    assert fusion.asks(tracks, nearer, asking).all()
+    assert not OneView(dataclasses.replace(config, review_point_ratio=None)).asks(tracks, nearer, asking).any()
+    clear = np.array([[0.03, 0.01, 0.95, 0.01]])
+    assert fuse(fusion, tracks, nearer, np.array([0]), clear).all()
+    np.testing.assert_allclose(tracks.posterior, clear, rtol=1e-6)
+
+
+def test_a_further_view_counts_more_than_the_evidence_before_it() -> None:
+    config = dataclasses.replace(PAPER, memory=0.5)
+    fusion, proposals, tracks = after_a_view(config)
+    first, second = np.array([0.2, 0.6, 0.1, 0.1]), np.array([0.3, 0.3, 0.3, 0.1])
+    tracks.views[:] = 1
+    fusion.fuse(tracks, proposals, np.array([0]), second[None])
+    expected = first**0.5 * second
+    np.testing.assert_allclose(tracks.posterior[0], expected / expected.sum(), rtol=1e-6)
 
 
 def test_a_distinct_first_view_is_certain() -> None:
@@ -137,7 +161,7 @@ def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
 def test_a_final_class_of_few_points_is_reviewed_with_more() -> None:
     _, proposals = blobs([10, 10, 100], np.random.default_rng(0))
     tracks = new_tracks(proposals)
-    config = FusionConfig(review_point_ratio=4.0, review_max_points=60)
+    config = FusionConfig(review_point_ratio=4.0, review_max_points=60, memory=1.0)
     fusion = KeyViews(config)
     sure = np.tile([0.99, 0.005, 0.0025, 0.0025], (3, 1))
     assert fuse(fusion, tracks, proposals, np.arange(3), sure).all()
@@ -238,10 +262,10 @@ WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.
     ("fusion", "asked"),
     [
         (KeyViews(FusionConfig(), FixedPrior(WALL, UNCERTAIN, CAR)), [False, True, True]),
-        (FirstView(FusionConfig(), FixedPrior(WALL, UNCERTAIN, CAR)), [False, False, True]),  # a higher threshold
+        (OneView(FusionConfig(), FixedPrior(WALL, UNCERTAIN, CAR)), [False, False, True]),  # a higher threshold
     ],
 )
-def test_posterior_is_the_box_prior_before_the_first_view(fusion: KeyViews | FirstView, asked: list[bool]) -> None:
+def test_posterior_is_the_box_prior_before_the_first_view(fusion: KeyViews | OneView, asked: list[bool]) -> None:
     proposals, tracks = scene((50, 50, 50))
     tracks.hits[:] = 9
     assert fusion.asks(tracks, proposals, np.ones(3, np.bool_)).tolist() == asked
@@ -288,8 +312,8 @@ def test_posterior_mixes_in_the_box_prior_by_mismatch_probability() -> None:
     np.testing.assert_allclose(tracks.posterior, 0.8 * view + 0.2 * np.array(CAR), rtol=1e-6)
 
 
-@pytest.mark.parametrize("make", [FirstView, KeyViews])
-def test_a_final_class_stays_while_its_posterior_follows_the_box(make: type[FirstView | KeyViews]) -> None:
+@pytest.mark.parametrize("make", [OneView, KeyViews])
+def test_a_final_class_stays_while_its_posterior_follows_the_box(make: type[OneView | KeyViews]) -> None:
     proposals, tracks = scene((50,))
     prior = FixedPrior(CAR)
     fusion, asking = make(FusionConfig(box_update_weight=1.0), prior), np.array([False])
@@ -337,4 +361,4 @@ def test_an_inherited_class_is_reviewed_where_the_box_may_be_an_object() -> None
     asking = np.zeros(2, np.bool_)
     assert KeyViews(FusionConfig(), FixedPrior(WALL, CAR)).asks(tracks, proposals, asking).tolist() == [False, True]
     assert tracks.posterior[:, 0].tolist() == [1.0, 1.0]  # the inherited class holds until then
-    assert not FirstView(FusionConfig(), FixedPrior(WALL, CAR)).asks(tracks, proposals, asking).any()
+    assert not OneView(FusionConfig(), FixedPrior(WALL, CAR)).asks(tracks, proposals, asking).any()

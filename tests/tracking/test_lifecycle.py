@@ -131,8 +131,9 @@ CLASSIFIED_AGAIN = [
 REMEMBERED_ONCE = [*CLASSIFIED_ONCE, (SEEN, "tracked"), (MOVED, "unmatched")]
 REMEMBERED = [*CERTAIN_AT_ONCE, (SEEN, "tracked_classified"), (MOVED, "unmatched")]
 NOT_REMEMBERED = [*CLASSIFIED_ONCE, (SEEN, "unmatched"), (MOVED, "unmatched")]
+UNCERTAIN_ONCE = [(UNCERTAIN, "unmatched"), (SEEN, "unmatched"), (CERTAIN, "tracked")]
 LIVES = {
-    "efficient": (EFFICIENT, [WAITING, CLASSIFIED_ONCE, REMEMBERED_ONCE]),
+    "efficient": (EFFICIENT, [WAITING, UNCERTAIN_ONCE, CLASSIFIED_ONCE, REMEMBERED_ONCE]),
     "conventional": (CONVENTIONAL, [WAITING, CLASSIFIED_ONCE, CLASSIFIED_ALWAYS, NOT_REMEMBERED]),
     "accurate": (
         ACCURATE,

@@ -25,7 +25,10 @@ TABLE_I = {
     ("lost", Event.UNASSOCIATED): ("a8", "lost"),
     ("lost", Event.EXPIRED): ("a9", "deleted"),
 } | WAITING
-WITHDRAWN = {("tracked", Event.WITHDRAWN): ("e12", "unmatched")}
+ONE_VIEW = {
+    ("tracked", Event.WITHDRAWN): ("e12", "unmatched"),
+    ("unmatched", Event.UNDECIDED): ("e13", "unmatched"),
+}
 TABLE_II = {
     ("proposal", Event.ASSOCIATED): ("a1", "matched"),
     ("proposal", Event.UNASSOCIATED): ("a2", "unmatched"),
@@ -50,7 +53,7 @@ TABLE_II = {
     ("tracked_classified", Event.WITHDRAWN): ("e12", "unmatched"),
 } | WAITING
 TABLES = {
-    "efficient": (EFFICIENT, TABLE_I | WITHDRAWN),
+    "efficient": (EFFICIENT, TABLE_I | ONE_VIEW),
     "conventional": (CONVENTIONAL, TABLE_I | {("tracked", Event.CLASSIFIED): ("e7", "tracked")}),
     "accurate": (ACCURATE, TABLE_II),
 }

@@ -33,7 +33,7 @@ import numpy as np
 
 from modt import profile
 from modt.classes import CLASS_NAMES
-from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.fusion import EveryFrame, OneView, KeyViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.config import FusionConfig, ProfileConfig
@@ -61,7 +61,8 @@ SWEEPS: dict[str, tuple[float | None, ...]] = {
     "start_frame": (1, 2, 3, 4, 5, 6, 7, 8),
     "object_threshold": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98),
     "background_threshold": (0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
-    "review_point_ratio": (1.5, 2.0, 3.0, 5.0, 10.0, None),
+    "memory": (0.25, 0.35, 0.5, 0.7, 1.0),
+    "review_point_ratio": (1.25, 1.5, 2.0, 3.0, 5.0, 10.0, None),
     "review_max_points": (30, 50, 100, 200, 400, 800),
     "min_object_probability": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
     FIRST_VIEW_KEY: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
@@ -70,7 +71,7 @@ SWEEPS: dict[str, tuple[float | None, ...]] = {
     "mismatch_probability": (0.0, 0.03, 0.1, 0.2, 0.3),
 }
 NO_BETTER = "No setting is better on both sets at no more calls."
-REVIEWS = tuple(product((1.5, 2.0, 2.5), (30, 50, 100, 200)))
+REVIEWS = tuple(product((1.25, 1.5, 2.0), (30, 50, 100, 200)))
 """(review_point_ratio, review_max_points): a smaller ratio costs calls, fewer points save them."""
 
 
@@ -110,8 +111,8 @@ def variants(config: FusionConfig) -> list[Setting]:
     title = "variant"
     return [
         Setting(title, "conventional", lambda prior: EveryFrame()),
-        Setting(title, "first view (efficient)", lambda prior: FirstView(config, prior)),
-        Setting(title, "first view, no box prior", lambda prior: FirstView(config)),
+        Setting(title, "first view (efficient)", lambda prior: OneView(config, prior)),
+        Setting(title, "first view, no box prior", lambda prior: OneView(config)),
         Setting(title, "no box prior", lambda prior: KeyViews(config)),
         Setting(title, "uniform class prior", lambda prior: KeyViews(uniform, prior)),
         Setting(title, "no review", lambda prior: KeyViews(never, prior)),
@@ -136,7 +137,7 @@ def sweeps(config: FusionConfig) -> Iterator[Setting]:
 
 def _changed(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
     changed = dataclasses.replace(config, **changes)
-    made = FirstView if sweep == FIRST_VIEW_KEY else KeyViews
+    made = OneView if sweep == FIRST_VIEW_KEY else KeyViews
     return Setting(sweep, f"{text} *" if changed == config else text, lambda prior: made(changed, prior))
 
 

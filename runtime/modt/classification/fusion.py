@@ -15,6 +15,25 @@ from modt.config import FusionConfig
 from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
 
+class Certainty:
+    """Whether the posterior of an object, or the evidence for background, reaches its threshold.
+
+    Background is the most frequent class and has a high posterior before any view, so its threshold applies to the
+    posterior under equal class frequencies.
+    """
+
+    def __init__(self, config: FusionConfig) -> None:
+        frequency = np.maximum(with_background(config.prior), MIN_PROBABILITY)
+        self.log_frequency: Float64 = np.log(frequency / frequency.sum())
+        self._object, self._background = config.object_threshold, config.background_threshold
+
+    def __call__(self, posterior: Float64) -> Bool:
+        """(R,) of posteriors (R, 4)."""
+        objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self._object
+        evidence = from_log_weights(np.log(posterior) - self.log_frequency)[:, 0]
+        return objects | (evidence >= self._background)
+
+
 class EveryFrame:
     """Tracking by detection: every proposal is classified, its likelihood is the posterior (Fig. 2a)."""
 
@@ -31,28 +50,37 @@ class EveryFrame:
         return np.ones(len(rows), np.bool_)
 
 
-class FirstView(EveryFrame):
-    """Mode efficient: the first classification is final (Table I).
+class OneView(EveryFrame):
+    """Mode efficient: one classification is final (Table I), the first that is certain.
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
-    minimum number of observations, since spurious proposals do not last.
+    minimum number of observations, since spurious proposals do not last. An uncertain class is replaced by that of
+    the first view with clearly more points.
 
     Args:
-        config: conditions of the first view.
+        config: conditions of a view, and thresholds of certainty.
         prior: of a proposal before its view; the class frequency by default.
     """
 
     def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         self.config = config
         self.prior = prior or FrequencyPrior(config.prior)
+        self._certain = Certainty(config)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
         config = self.config
         update_from_boxes(tracks, proposals, self.prior, config)
-        observed = tracks.proposal != NONE
-        asks: Bool = wants_class & ~tracks.final & observed & (tracks.hits >= config.first_view_min_hits)
-        return asks & self.prior.may_be_object(tracks.prior, config.first_view_min_object_probability)
+        asks = wants_class & ~tracks.final & (tracks.proposal != NONE) & (tracks.hits >= config.first_view_min_hits)
+        asks &= self.prior.may_be_object(tracks.prior, config.first_view_min_object_probability)
+        rows = np.flatnonzero(asks)
+        asks[rows] = ~tracks.viewed[rows] | _has_more_points(tracks, proposals, rows, config)
+        return asks
+
+    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """Replace the posterior; (R,) which rows are certain now."""
+        super().fuse(tracks, proposals, rows, likelihood)
+        return self._certain(tracks.posterior[rows])
 
 
 class KeyViews:
@@ -63,7 +91,8 @@ class KeyViews:
     views are often far and partial (Fig. 11).
 
     The classifier returns a posterior under the class frequency and, by its pool weight, the box prior, so the
-    prior is divided out of every further view. A final class of few points is reviewed when the object shows clearly
+    prior is divided out of the evidence so far. Views of one object are never quite independent: with every further
+    one the evidence so far counts `memory` times. A final class of few points is reviewed when the object shows clearly
     more of them; the previous evidence is then weighted by the ratio of points. Tracks whose box excludes an object
     are neither classified nor reviewed.
 
@@ -76,8 +105,8 @@ class KeyViews:
         self.config = config
         self.prior = prior or FrequencyPrior(config.prior)
         self._point_change = np.array(config.point_change)
-        frequency = np.maximum(with_background(config.prior), MIN_PROBABILITY)
-        self._log_frequency = np.log(frequency / frequency.sum())
+        self._certain = Certainty(config)
+        self._log_frequency = self._certain.log_frequency
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first or an independent view, and final ones to review."""
@@ -93,12 +122,9 @@ class KeyViews:
     def _reviewed(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(M,) tracks of these rows, all final, whose number of points has grown enough for another view."""
         config, review = self.config, np.zeros(len(tracks), np.bool_)
-        if config.review_point_ratio is not None:
-            least = config.review_point_ratio * tracks.key_points[rows] + config.review_extra_points
-            review[rows] = proposals.count[tracks.proposal[rows]] > least
-            review &= tracks.key_points < config.review_max_points
-            review &= self.prior.may_be_object(tracks.prior, config.review_min_object_probability)
-        return review
+        review[rows] = _has_more_points(tracks, proposals, rows, config)
+        review &= tracks.key_points < config.review_max_points
+        return review & self.prior.may_be_object(tracks.prior, config.review_min_object_probability)
 
     def independent(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(R,) whether the view of each track differs enough from its last key view (Equation 4)."""
@@ -111,15 +137,15 @@ class KeyViews:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiply the view into the posterior (Equation 6); (R,) which rows are certain now."""
-        view, prior = np.log(normalise(likelihood)), self._log_pooled_prior(tracks.prior[rows])
+        config, view = self.config, np.log(normalise(likelihood))
         past = np.log(normalise(tracks.key_posterior[rows])) - self._log_pooled_prior(tracks.key_prior[rows])
         ratio = tracks.key_points[rows] / np.maximum(proposals.count[tracks.proposal[rows]], 1)
         past *= np.where(tracks.final[rows], np.minimum(ratio, 1.0), 1.0)[:, None]
         fused = (tracks.views[rows] > 0)[:, None]
-        posterior = from_log_weights(np.where(fused, prior + past + (view - prior), view))
+        posterior = from_log_weights(np.where(fused, config.memory * past + view, view))
         certain = self._certain(posterior)
         tracks.posterior[rows] = posterior
-        tracks.views[rows] += certain | (tracks.age[rows] >= self.config.start_frame)
+        tracks.views[rows] += certain | (tracks.age[rows] >= config.start_frame)
         _record_key_view(tracks, proposals, rows)
         return certain
 
@@ -130,15 +156,14 @@ class KeyViews:
         pooled: Float64 = (1.0 - weight) * self._log_frequency + weight * box
         return pooled
 
-    def _certain(self, posterior: Float64) -> Bool:
-        """(R,) whether the posterior of an object, or the evidence for background, reaches its threshold.
 
-        Background is the most frequent class and has a high posterior before any view, so its threshold applies to
-        the posterior under equal class frequencies.
-        """
-        objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self.config.object_threshold
-        evidence = from_log_weights(np.log(posterior) - self._log_frequency)[:, 0]
-        return objects | (evidence >= self.config.background_threshold)
+def _has_more_points(tracks: Tracks, proposals: Proposals, rows: Int, config: FusionConfig) -> Bool:
+    """(R,) whether the proposal of each track shows clearly more of it than its last key view."""
+    if config.review_point_ratio is None:
+        return np.zeros(len(rows), np.bool_)
+    least = config.review_point_ratio * tracks.key_points[rows] + config.review_extra_points
+    more: Bool = proposals.count[tracks.proposal[rows]] > least
+    return more
 
 
 def _relative_change(now: Float64 | Int, before: Float64 | Int) -> Float64:

@@ -81,13 +81,18 @@ class FusionConfig(StageConfig):
     min_object_probability: float = number(0.01, 0.0, 1.0, "", "by the box prior, for the first of several views")
     start_frame: int = number(5, 1, 1000, "frames", "age of a track from which views are fused")
     object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")
-    background_threshold: float = number(0.6, 0.25, 1.0, "", "posterior under equal frequencies; final background")
+    background_threshold: float = number(0.4, 0.25, 1.0, "", "posterior under equal frequencies; final background")
     point_change: tuple[float, ...] = per_class(
         "point_change", 0.0, 10.0, "relative change of points (Equation 4) of an independent view", tuple(CLASSES)
     )
     extent_change: float = number(0.6, 0.0, 10.0, "", "relative change of extent of an independent view")
+    memory: float = number(0.5, 0.0, 1.0, "", "weight of the evidence so far at a further view; 1: independent views")
     review_point_ratio: float | None = number(
-        1.5, 1.0, 1000.0, "", "points over those of the key view, for a review; none: never"
+        1.25,
+        1.0,
+        1000.0,
+        "",
+        "points over those of the key view, for another view of a class in doubt or final; none: never",
     )
     review_extra_points: int = number(5, 0, 1000, "", "more points than that ratio, beyond random variation")
     review_max_points: int = number(400, 0, 10000, "", "of the last key view; with more, no review (drive 0005)")

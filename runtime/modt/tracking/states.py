@@ -176,6 +176,7 @@ EFFICIENT = StateMachine(
         Transition("proposal", "a1", "matched", _E.ASSOCIATED, "associated with an existing object"),
         Transition("proposal", "a2", "unmatched", _E.UNASSOCIATED, "associated with none"),
         Transition("unmatched", "a3", "tracked", _E.CLASSIFIED, "classified"),
+        Transition("unmatched", "e13", "unmatched", _E.UNDECIDED, "classified, uncertain"),
         Transition("tracked", "a4", "tracked", _E.ASSOCIATED, "its proposal updates its location"),
         Transition("matched", "a5", "tracked", _E.JOINS_FINAL, "given the object's class"),
         Transition("tracked", "a6", "lost", _E.UNASSOCIATED, "no proposal"),
@@ -193,7 +194,7 @@ CONVENTIONAL = replace(
     title="Table I, every frame classified",
     states=tuple(replace(state, final=False) for state in EFFICIENT.states),
     transitions=(
-        *(t for t in EFFICIENT.transitions if t.event != _E.WITHDRAWN),
+        *(t for t in EFFICIENT.transitions if t.event not in {_E.WITHDRAWN, _E.UNDECIDED}),
         Transition("tracked", "e7", "tracked", _E.CLASSIFIED, "classified in every frame"),
     ),
 )

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from modt.classification.fusion import EveryFrame, FirstView, KeyViews
+from modt.classification.fusion import EveryFrame, OneView, KeyViews
 from modt.classification.prior import Prior
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
@@ -53,7 +53,8 @@ def test_conventional_classifies_every_proposal(played: Recording) -> None:
 
 
 def test_efficient_classifies_each_track_once(played: Recording) -> None:
-    outcome = replay([played], lambda prior: FirstView(FusionConfig(), prior), MIN_HITS)
+    once = FusionConfig(review_point_ratio=None)
+    outcome = replay([played], lambda prior: OneView(once, prior), MIN_HITS)
     assert outcome.calls == dict(zip(CALLS, (6, 0, 0, 0), strict=True))
 
 
@@ -93,9 +94,9 @@ def test_replays_are_reproducible_and_leave_the_recording_unchanged(played: Reco
 
 
 def test_unclassified_proposals_count_as_missed(played: Recording) -> None:
-    late = replay([played], lambda prior: FirstView(FusionConfig(), prior), min_hits=6, scored_from=1)
+    late = replay([played], lambda prior: OneView(FusionConfig(), prior), min_hits=6, scored_from=1)
     assert max(late.precision.values()) <= 0.5 + 0.3  # five of ten views come before the first answer
-    assert min(replay([played], lambda prior: FirstView(FusionConfig(), prior), min_hits=6).precision.values()) > max(
+    assert min(replay([played], lambda prior: OneView(FusionConfig(), prior), min_hits=6).precision.values()) > max(
         late.precision.values()
     )
 
