@@ -69,7 +69,7 @@ class Proposals:
     centroid: Float64  # (P, 3) mean of each proposal's points [m, sensor frame]
     box: Float64  # (P, 7) minimum box: x, y, z of its centre, l, w, h [m], yaw [rad], sensor frame, l >= w
     truncated: Bool  # (P,) cut by the edge of the field of view
-    sensor_height_m: float | None = None  # above the ground that they were found on, None where it is not known
+    ground_z_m: Float64 | None = None  # (P,) z of the ground beneath each [m, sensor frame], None where not known
     reflectance: Float64 | None = None  # (P, 5)
 
     def __len__(self) -> int:
@@ -105,7 +105,7 @@ class Proposals:
             centroid=self.centroid.take(source, axis=0),
             box=self.box.take(source, axis=0),
             truncated=self.truncated[source],
-            sensor_height_m=self.sensor_height_m,
+            ground_z_m=None if self.ground_z_m is None else self.ground_z_m.take(source),
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
 

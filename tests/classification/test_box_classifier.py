@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from modt.classification.box_classifier import N_FEATURES, proposal_features
-from modt.classification.crops import Crops, gather
+from modt.classification.crops import Crops, gather, ground_z_m
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
@@ -26,7 +26,9 @@ def test_features_of_crops_and_proposals_agree() -> None:
     crops = gather(frame.points, proposals, np.arange(len(proposals)), 100_000)
     expected = proposal_features(proposals, slice(None), sensor)
     assert len(crops) > 50
-    off = np.abs(crop_features(crops, Sensors.of(sensor, proposals.box)) - expected)
+    off = np.abs(
+        crop_features(crops, Sensors.of(sensor, proposals.box, ground_z_m(proposals, slice(None), sensor))) - expected
+    )
     assert off[:, 4:].max() < 1e-3  # height, foot and top
     assert np.quantile(off[:, :4], 0.9, axis=0).max() < 0.15  # at run time headings are fitted to fewer points
 

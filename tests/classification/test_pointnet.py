@@ -91,13 +91,13 @@ def test_calls_are_deterministic(shipped: PointNet) -> None:
     assert first.tobytes() == shipped.classify(points, proposals, np.arange(3)).tobytes()
 
 
-def test_sensor_height_of_the_proposals_overrides_the_profile(tmp_path: Path) -> None:
+def test_ground_of_the_proposals_overrides_the_profile(tmp_path: Path) -> None:
     model = str(save(tmp_path, random_layers(3)))
     low = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=0.4))
     unknown = PointNet(ClassificationConfig(model=model), SensorConfig(height_m=None))
     points, proposals = blobs([40, 7, 200], np.random.default_rng(5))
     rows = np.arange(3)
-    measured = dataclasses.replace(proposals, sensor_height_m=0.4)
+    measured = dataclasses.replace(proposals, ground_z_m=np.full(3, -0.4))
     expected = low.classify(points, proposals, rows)
     assert np.array_equal(unknown.classify(points, measured, rows), expected)
     assert not np.allclose(unknown.classify(points, proposals, rows), expected, atol=1e-3)

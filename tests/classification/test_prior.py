@@ -59,15 +59,15 @@ def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
 
 def test_features_are_independent_of_the_resolution() -> None:
     near = standing(40, 20.0, 4.0, 1.6, 1.4)
-    fine = box_features(np.array([160]), near.box, 1.73, np.deg2rad(0.1) * np.deg2rad(0.2))
-    coarse = box_features(np.array([40]), near.box, 1.73, np.deg2rad(0.2) * np.deg2rad(0.4))
+    fine = box_features(np.array([160]), near.box, np.array([-1.73]), np.deg2rad(0.1) * np.deg2rad(0.2))
+    coarse = box_features(np.array([40]), near.box, np.array([-1.73]), np.deg2rad(0.2) * np.deg2rad(0.4))
     np.testing.assert_allclose(fine, coarse)
 
 
-def test_sensor_height_of_the_proposals_overrides_the_profile() -> None:
+def test_ground_of_the_proposals_overrides_the_profile() -> None:
     low, high = (BoxPrior(BOXES, NO_REFLECTANCE, SensorConfig(height_m=height_m)) for height_m in (1.0, 2.0))
     unknown = standing(40, 20.0, 4.0, 1.6, 1.4)
-    measured = dataclasses.replace(unknown, sensor_height_m=2.0)
+    measured = dataclasses.replace(unknown, ground_z_m=np.array([-2.0]))
     assert (low.probability(measured) == high.probability(unknown)).all()
     assert (low.probability(measured) != low.probability(unknown)).all()
 

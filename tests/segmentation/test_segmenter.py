@@ -57,9 +57,20 @@ def test_coordinates_of_the_members(fov):
 
 
 @pytest.mark.parametrize("given_m", [0.8, None])
-def test_proposals_carry_the_sensor_height(given_m):
+def test_proposals_carry_the_ground_beneath_them(given_m):
     points, _ = scans.scan([(8.0, 3.0, *CAR)], height_m=0.8)
-    assert segmenter(height_m=given_m).segment(points).sensor_height_m == pytest.approx(0.8, abs=0.03)
+    proposals = segmenter(height_m=given_m).segment(points)
+    assert len(proposals)
+    assert proposals.ground_z_m == pytest.approx(-0.8, abs=0.03)
+
+
+def test_the_ground_beneath_an_object_on_a_slope_is_the_slope():
+    slope, x = 0.06, 20.0
+    points, _ = scans.scan([(x, 0.0, *CAR)])
+    points[:, 2] += slope * points[:, 0]
+    proposals = segmenter().segment(points)
+    car = np.abs(proposals.centroid[:, 0] - x).argmin()
+    assert proposals.ground_z_m[car] == pytest.approx(slope * proposals.centroid[car, 0] - 1.73, abs=0.1)
 
 
 def test_points_without_a_return_belong_to_no_proposal():

@@ -20,7 +20,7 @@ import onnx
 from onnx import numpy_helper
 
 from modt import profile
-from modt.classification.crops import canonical, gather, sensor_height_m
+from modt.classification.crops import canonical, gather, ground_z_m
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
 from modt.geometry import FieldOfView
@@ -43,8 +43,10 @@ def layers_of(model: Path) -> list[Layer]:
 
 def textbook(net: PointNet, points: Float32, proposals: Proposals, batch: int, sensor: SensorConfig) -> Float64:
     """(P, 4) probabilities of proposals resampled to 400 points each, in batches."""
-    crops = gather(points, proposals, np.arange(len(proposals)), TEXTBOOK_POINTS)
-    crops = canonical(crops, sensor_height_m(proposals, sensor))
+    which = np.arange(len(proposals))
+    crops = canonical(
+        gather(points, proposals, which, TEXTBOOK_POINTS), ground_z_m(proposals, which, sensor)
+    )
     step = np.arange(TEXTBOOK_POINTS) % crops.count[:, None]
     full = crops.xyz[crops.offsets[:-1, None] + step]
     parts = [net.infer(full[i : i + batch]) for i in range(0, len(full), batch)]

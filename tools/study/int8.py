@@ -30,7 +30,7 @@ BATCH = 8
 
 def batches(data: Dataset, rows: Int, max_points: int) -> Iterator[tuple[Int, Float32]]:
     """Batches of crops of similar size, as in the classifier."""
-    crops = canonical(subsample_evenly(data.take(rows), max_points), data.sensors.take(rows).height_m)
+    crops = canonical(subsample_evenly(data.take(rows), max_points), data.sensors.take(rows).ground_z_m)
     order = np.argsort(crops.count, kind="stable")
     for first in range(0, len(order), BATCH):
         chosen = order[first : first + BATCH]

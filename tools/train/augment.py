@@ -32,14 +32,14 @@ def augment(crops: Crops, sensors: Sensors, rng: Generator) -> tuple[Crops, Sens
     owner = np.repeat(np.arange(n), count)
     xyz = crops.xyz.astype(np.float64)
     centre = np.stack([np.add.reduceat(xyz[:, k], crops.offsets[:-1]) / count for k in range(3)], axis=1)
-    xyz = _deform(xyz, centre, owner, sensors.height_m, rng)
+    xyz = _deform(xyz, centre, owner, sensors.ground_z_m, rng)
     xyz = _change_range(xyz, centre, owner, rng)
     keep, sensors = _one_return_per_beam(xyz, owner, sensors, rng)
     keep = _keep_enough(keep, _occlude(xyz, owner, keep, n, rng), owner, n)
     keep = _keep_enough(keep, rng.random(len(owner)) < 1 - rng.uniform(0, 0.35, n)[owner] ** 1.5, owner, n)
     xyz += rng.normal(0, 0.012, xyz.shape)
     rho = np.hypot(*centre[:, :2].T)
-    xyz[:, 2] += (rng.normal(0, 1, n) * (0.05 + 0.004 * rho))[owner]
+    xyz[:, 2] += (rng.normal(0, 1, n) * (0.05 + 0.002 * rho))[owner]
     offsets = np.append(0, np.cumsum(np.bincount(owner[keep], minlength=n)))
     return Crops(xyz[keep].astype(np.float32), offsets), sensors
 
@@ -52,7 +52,7 @@ def subsample(crops: Crops, limit: int, rng: Generator) -> Crops:
     return Crops(crops.xyz[kept], np.append(0, np.cumsum(np.minimum(crops.count, limit))))
 
 
-def _deform(xyz: Float64, centre: Float64, owner: Int, height_m: Float64, rng: Generator) -> Float64:
+def _deform(xyz: Float64, centre: Float64, owner: Int, ground_z_m: Float64, rng: Generator) -> Float64:
     """Mirror about the line of sight, rotate slightly, scale."""
     n = len(centre)
     bearing = np.arctan2(centre[:, 1], centre[:, 0])
@@ -61,7 +61,7 @@ def _deform(xyz: Float64, centre: Float64, owner: Int, height_m: Float64, rng: G
     local = _rotate(local, rng.normal(0, np.deg2rad(6), n)[owner])
     size = rng.uniform(0.9, 1.1, n)
     local[:, :2] *= size[owner, None]
-    ground = -height_m[owner]
+    ground = ground_z_m[owner]
     local[:, 2] = ground + (local[:, 2] - ground) * (size * rng.uniform(0.96, 1.04, n))[owner]
     out: Float64 = _rotate(local, bearing[owner]) + np.c_[centre[:, :2], np.zeros(n)][owner]
     return out
@@ -87,7 +87,7 @@ def _one_return_per_beam(xyz: Float64, owner: Int, sensors: Sensors, rng: Genera
 
     A crop keeps all its points or all its beams where too few would be left.
     """
-    n = len(sensors.height_m)
+    n = len(sensors.ground_z_m)
     azimuth = np.rad2deg(np.arctan2(xyz[:, 1], xyz[:, 0])) / sensors.azimuth_deg[owner]
     elevation = np.rad2deg(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1]))) / sensors.elevation_deg[owner]
     cell = np.stack([azimuth, elevation], axis=1) + rng.random((n, 2))[owner]

@@ -22,7 +22,7 @@ def crop_features(crops: Crops, sensors: Sensors) -> Float64:
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
     box = upright_boxes(np.stack([x, y, z]), groups.offsets, fit_headings(x, y, groups, BoxConfig().noise_m))
-    return box_features(crops.count, box, sensors.height_m, sensors.beam_sr)
+    return box_features(crops.count, box, sensors.ground_z_m, sensors.beam_sr)
 
 
 def dataset_features(data: Dataset, rows: Int) -> Float64:

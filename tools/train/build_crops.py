@@ -24,7 +24,7 @@ import numpy as np
 import modt
 from modt import profile
 from modt.classes import N_CLASSES, ObjectClass
-from modt.classification.crops import gather
+from modt.classification.crops import gather, ground_z_m
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, NONE, Bool, Float64, Int, Proposals
 from tools.options import crops_parser
@@ -133,7 +133,7 @@ class CropWriter:
         row |= {"variant": np.full(n, variant, np.int8), "reflectance": reflectance_of(proposals)[kept]}
         row |= {"owner": labels.owner[kept].astype(np.int8)}
         row |= {key: np.full(n, getattr(scan, key)) for key in ("name", "drive", "sensor")}
-        row |= dataclasses.asdict(Sensors.of(sensor, proposals.box[kept]))
+        row |= dataclasses.asdict(Sensors.of(sensor, proposals.box[kept], ground_z_m(proposals, kept, sensor)))
         if validation:
             kinds, points = np.array(scan.kinds, np.int64), points_in_view(scan)
             objects = np.flatnonzero((kinds > ObjectClass.BACKGROUND) & (points >= MIN_DETECTABLE_POINTS))

@@ -20,7 +20,7 @@ from tools.train.build_crops import add_sources
 MODELS = Path(__file__).resolve().parents[2] / "models"
 SENSOR = "hdl-64e"
 """Sensor that measured the reflectance of the crops."""
-WORLDS, PASTES = 120, 120
+WORLDS, PASTES = 240, 120
 KITTI_DATA = (
     "106 + 2 and 53 more object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR "
     "2013; SemanticKITTI labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 "

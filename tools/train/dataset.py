@@ -25,23 +25,22 @@ NOT_CONCATENATED = ("offsets", "provenance", "truth_row")
 
 @dataclass(frozen=True)
 class Sensors:
-    """Mount and resolution of the sensor of each crop.
+    """Ground and resolution at each crop.
 
     Attributes:
-        height_m: (R,) above the ground.
+        ground_z_m: (R,) of the ground beneath, sensor frame.
         azimuth_deg, elevation_deg: (R,) between neighbouring returns of a beam, and between neighbouring beams there.
     """
 
-    height_m: Float64
+    ground_z_m: Float64
     azimuth_deg: Float64
     elevation_deg: Float64
 
     @classmethod
-    def of(cls, config: SensorConfig, box: Float64) -> Sensors:
-        """The same sensor for crops in (R, 7) boxes, sensor frame."""
-        height_m = SensorConfig().height_m if config.height_m is None else config.height_m
+    def of(cls, config: SensorConfig, box: Float64, ground_z_m: Float64) -> Sensors:
+        """The same sensor for crops in (R, 7) boxes on ground (R,), sensor frame."""
         tangent = box[:, 2] / np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
-        columns = height_m, config.azimuth_step_deg, np.rad2deg(config.beams.step_rad(tangent.astype(np.float32)))
+        columns = ground_z_m, config.azimuth_step_deg, np.rad2deg(config.beams.step_rad(tangent.astype(np.float32)))
         return cls(*(np.full(len(box), value, np.float64) for value in columns))
 
     @property
@@ -51,7 +50,7 @@ class Sensors:
 
     def take(self, rows: Int) -> Sensors:
         """Those of rows."""
-        return Sensors(self.height_m[rows], self.azimuth_deg[rows], self.elevation_deg[rows])
+        return Sensors(self.ground_z_m[rows], self.azimuth_deg[rows], self.elevation_deg[rows])
 
 
 @dataclass(frozen=True)
@@ -140,7 +139,7 @@ def load(*paths: Path) -> Dataset:
     row = [np.where(p["truth_row"] == NONE, NONE, p["truth_row"] + n) for p, n in zip(parts, first, strict=False)]
     return Dataset(
         crops=Crops(joined["xyz"], np.append(0, np.cumsum(count))),
-        sensors=Sensors(joined["height_m"], joined["azimuth_deg"], joined["elevation_deg"]),
+        sensors=Sensors(joined["ground_z_m"], joined["azimuth_deg"], joined["elevation_deg"]),
         label=joined["label"].astype(np.int64),
         owner=joined["owner"].astype(np.int64),
         partial=joined["partial"],

@@ -37,7 +37,7 @@ SMOOTHING = 0.02
 
 def tensors(crops: Crops, sensors: Sensors) -> tuple[torch.Tensor, torch.Tensor]:
     """Input of the network: (K, 3) canonical points, crop after crop, and (R,) points of each crop."""
-    local = canonical(crops, sensors.height_m)
+    local = canonical(crops, sensors.ground_z_m)
     return torch.from_numpy(local.xyz), torch.from_numpy(local.count)
 
 

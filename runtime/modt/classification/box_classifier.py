@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.classification.crops import sensor_height_m
+from modt.classification.crops import ground_z_m
 from modt.classification.mlp import Layers, fraction, from_lists, logits, to_lists
 from modt.config import SensorConfig
 from modt.types import Float64, Int, Proposals
@@ -57,7 +57,7 @@ def beam_solid_angle_sr(sensor: SensorConfig, box: Float64) -> Float64:
     return np.asarray(np.deg2rad(sensor.azimuth_step_deg) * elevation_step_rad, np.float64)
 
 
-def box_features(count: Int, box: Float64, sensor_height_m: float | Float64, beam_sr: Float64) -> Float64:
+def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64) -> Float64:
     """(P, 7) logarithms of the area covered by points [m2], distance, length and width [m]; height, foot and top [m].
 
     The area in place of the number of points makes the features independent of the sensor's resolution.
@@ -65,11 +65,11 @@ def box_features(count: Int, box: Float64, sensor_height_m: float | Float64, bea
     Args:
         count: (P,) points.
         box: (P, 7) sensor frame.
-        sensor_height_m: of the sensor above the ground, one for all or (P,).
+        ground_z_m: (P,) of the ground beneath each, sensor frame.
         beam_sr: (P,) or () solid angle of a point [sr].
     """
     distance = np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
-    foot = box[:, 2] - box[:, 5] / 2 + sensor_height_m
+    foot = box[:, 2] - box[:, 5] / 2 - ground_z_m
     return np.stack(
         [
             np.log(np.clip(count, 1, _MAX_COUNT) * distance**2 * beam_sr),
@@ -87,9 +87,8 @@ def box_features(count: Int, box: Float64, sensor_height_m: float | Float64, bea
 def proposal_features(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
     """(R, 7) box features of the given proposals."""
     box = proposals.box[which]
-    return box_features(
-        proposals.count[which], box, sensor_height_m(proposals, sensor), beam_solid_angle_sr(sensor, box)
-    )
+    beam_sr = beam_solid_angle_sr(sensor, box)
+    return box_features(proposals.count[which], box, ground_z_m(proposals, which, sensor), beam_sr)
 
 
 def to_metadata(layers: Layers, pool_weight: float) -> str:

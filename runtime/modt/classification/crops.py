@@ -11,7 +11,7 @@ from modt.types import Float32, Float64, Int, Proposals
 
 # Definition of the canonical frame: fixed when a model is trained.
 _LOWEST_M = 0.3  # height of a standing object's lowest point: what is lower was removed with the ground
-_GROUND_OFFSET_M, _GROUND_SLOPE = 0.1, 0.02  # bound on the ground's height beneath a crop: constant, and per range
+_GROUND_OFFSET_M, _GROUND_SLOPE = 0.1, 0.005  # bound on the ground's height beneath a crop: constant, and per range
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +39,12 @@ class Crops:
         return batch
 
 
-def sensor_height_m(proposals: Proposals, sensor: SensorConfig) -> float:
-    """Height of the sensor above the ground [m]: of the proposals, else of the profile, else the default."""
-    if proposals.sensor_height_m is not None:
-        return proposals.sensor_height_m
-    return sensor.height_m or SensorConfig().height_m or 0.0
+def ground_z_m(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
+    """(R,) z of the ground beneath proposals [m, sensor frame]: as segmented, else by the height of the sensor."""
+    if proposals.ground_z_m is not None:
+        return proposals.ground_z_m[which]
+    height_m = sensor.height_m or SensorConfig().height_m or 0.0
+    return np.full(len(proposals), -height_m)[which]
 
 
 def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -> Crops:
@@ -64,7 +65,7 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
     return Crops(points[members, :3], offsets)
 
 
-def canonical(crops: Crops, sensor_height_m: float | Float64) -> Crops:
+def canonical(crops: Crops, ground_z_m: Float64) -> Crops:
     """Crops in the canonical frame: x along the line of sight, y to its left, z above the ground.
 
     The sensor sees the near side of an object, so in this frame a crop looks the same at every azimuth. The origin is
@@ -74,7 +75,7 @@ def canonical(crops: Crops, sensor_height_m: float | Float64) -> Crops:
 
     Args:
         crops: points in the sensor frame.
-        sensor_height_m: of the sensor above the ground beneath it, one for all or (R,).
+        ground_z_m: (R,) of the ground beneath each.
     """
     if not len(crops):
         return crops
@@ -82,8 +83,8 @@ def canonical(crops: Crops, sensor_height_m: float | Float64) -> Crops:
     starts, count = crops.offsets[:-1], crops.count
     mean_x, mean_y = np.add.reduceat(x, starts) / count, np.add.reduceat(y, starts) / count
     azimuth, bound = np.arctan2(mean_y, mean_x), _GROUND_OFFSET_M + _GROUND_SLOPE * np.hypot(mean_x, mean_y)
-    rise = np.clip(np.minimum.reduceat(z, starts) + sensor_height_m - _LOWEST_M, -bound, bound)
-    ground = np.repeat(rise - sensor_height_m, count)
+    rise = np.clip(np.minimum.reduceat(z, starts) - ground_z_m - _LOWEST_M, -bound, bound)
+    ground = np.repeat(rise + ground_z_m, count)
     c, s = np.repeat(np.cos(azimuth), count), np.repeat(np.sin(azimuth), count)
     along, across = c * x + s * y, c * y - s * x
     xyz = [along - _middle(along, starts, count), across - _middle(across, starts, count), z - ground]

@@ -16,7 +16,7 @@ from scipy.special import softmax
 from modt import assets
 from modt.classes import N_CLASSES
 from modt.classification import box_classifier, reflectance_classifier
-from modt.classification.crops import canonical, gather, sensor_height_m
+from modt.classification.crops import canonical, gather, ground_z_m
 from modt.classification.prior import box_pool_weight
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
@@ -83,7 +83,7 @@ class PointNet:
             which: (R,) proposals to classify.
         """
         crops = gather(points, proposals, which, self.config.max_points)
-        crops = canonical(crops, sensor_height_m(proposals, self._sensor))
+        crops = canonical(crops, ground_z_m(proposals, which, self._sensor))
         out = np.empty((len(crops), N_CLASSES))
         by_size = np.argsort(crops.count, kind="stable")
         for first in range(0, len(crops), self.config.batch):

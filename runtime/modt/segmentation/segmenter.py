@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
@@ -50,8 +48,7 @@ class Segmenter:
         index = rows if region is None else region[rows]
         measured = self.sensor.reflectance != "none" and has_reflectance(points[:, 3])
         reflectance = points[index, 3] if measured else None
-        proposals = self._proposals(sweep.take(rows), height[rows], index, reflectance)
-        return replace(proposals, sensor_height_m=sensor_height_m)
+        return self._proposals(sweep.take(rows), height[rows], index, reflectance)
 
     def sensor_height_m(self, sweep: PointColumns) -> float:
         """Height of the sensor [m]: of the profile, or estimated where the profile has none."""
@@ -78,6 +75,7 @@ class Segmenter:
         yaw = fit_headings(cells.x[few.rows], cells.y[few.rows], few, self.config.boxes.noise_m)
         groups = Groups.from_labels(clusters.of_cell.take(clusters.cell), clusters.n)
         own = np.stack([column.take(groups.rows) for column in (points.x, points.y, points.z)])
+        ground_z = own[2] - height.take(groups.rows)
         truncated, statistics, offsets = np.zeros(clusters.n, np.bool_), None, groups.offsets
         if depth is not None:
             truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m
@@ -90,6 +88,7 @@ class Segmenter:
             centroid=np.stack([groups.mean(v) for v in own], axis=1),
             box=upright_boxes(own, offsets, yaw),
             truncated=truncated,
+            ground_z_m=groups.mean(ground_z),
             reflectance=statistics,
         )
 

@@ -18,7 +18,9 @@ def test_augmentation_keeps_every_crop_and_enough_points(counts: list[int], seed
     rng = np.random.default_rng(seed)
     points, proposals = blobs(counts, rng)
     crops = gather(points, proposals, np.arange(len(counts)), 1000)
-    augmented, _ = augment(crops, Sensors.of(SensorConfig(), np.ones((len(crops), 7))), rng)
+    augmented, _ = augment(
+        crops, Sensors.of(SensorConfig(), np.ones((len(crops), 7)), np.full(len(crops), -1.73)), rng
+    )
     seen = subsample(augmented, 50, rng)
     assert len(seen) == len(counts)
     assert (seen.count >= 6).all()
@@ -29,7 +31,7 @@ def test_augmentation_keeps_every_crop_and_enough_points(counts: list[int], seed
 def test_augmentation_is_reproducible() -> None:
     points, proposals = blobs([40, 200], np.random.default_rng(0))
     crops = gather(points, proposals, np.arange(2), 1000)
-    sensors = Sensors.of(SensorConfig(), np.ones((len(crops), 7)))
+    sensors = Sensors.of(SensorConfig(), np.ones((len(crops), 7)), np.full(len(crops), -1.73))
     once, again = (augment(crops, sensors, np.random.default_rng(5))[0] for _ in range(2))
     assert once.xyz.tobytes() == again.xyz.tobytes()
 
@@ -42,7 +44,7 @@ def test_no_augmented_crop_is_finer_than_its_sensor() -> None:
     n = 200
     crops = Crops(np.tile(wall, (n, 1)), np.arange(n + 1) * len(wall))
     config = SensorConfig(elevation_step_deg=0.5, azimuth_step_deg=0.2)
-    augmented, sensors = augment(crops, Sensors.of(config, np.ones((n, 7))), rng)
+    augmented, sensors = augment(crops, Sensors.of(config, np.ones((n, 7)), np.full(n, -1.73)), rng)
     step = np.round(sensors.elevation_deg / config.elevation_step_deg, 3)
     assert sorted(set(step.tolist())) == [1, 2, 4]
     mean = [augmented.count[step == k].mean() for k in (1, 2, 4)]
