@@ -38,7 +38,7 @@ class Session:
         self.mode = assembly.MODES[request.mode]
         found = PeekedStream(assemble.stream(request))
         self.profile, self.recognition = assemble.recognised(request, found.first)
-        self.profile_name = request.profile or self.recognition.default_name
+        self.asked = profile.resolve(request.profile)
         self.odometry = assemble.odometry(request, found, self.profile.odometry)
         self.stream = PosedStream(found, self.odometry)
         fov = assemble.field_of_view(request, self.stream)
@@ -97,6 +97,9 @@ class Session:
         labels: list[Sink] = [PointLabels(path / "labels")] if self.request.labels else []
         return [self.directory.tracks(), kitti, *labels]
 
+    def _profile_names(self) -> tuple[str, ...]:
+        return self.asked.used(self.recognition.default_name)
+
     def _describe(self, command: list[str]) -> None:
         info = self.stream.info
         facts = {
@@ -118,10 +121,11 @@ class Session:
             "model": self.pipeline.classifier.facts(),
             "host": host.description(),
             "recognition": {
-                "used": self.profile_name,
+                "used": self.asked.sensor or self.recognition.default_name,
                 "differences": list(self.recognition.differences),
                 "nearest": self.recognition.nearest,
             },
+            "profiles": list(self._profile_names()),
             "profile": profile.dump(self.profile),
         }
         self.directory.describe(profile.to_yaml(facts))
@@ -134,7 +138,7 @@ class Session:
                 "stream": self.stream.info.name,
                 "mode": self.request.mode,
                 "fov": self.request.fov,
-                "profile": self.profile_name,
+                "profile": " + ".join(self._profile_names()),
                 "elapsed_s": elapsed_s,
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * self.stream.info.period_s / elapsed_s,
