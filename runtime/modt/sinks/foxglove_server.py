@@ -1,0 +1,47 @@
+"""A WebSocket server that Foxglove connects to."""
+
+from __future__ import annotations
+
+import foxglove
+
+from modt.address import Address
+from modt.errors import MisuseError
+from modt.sinks.background import Background
+from modt.sinks.scene import Scene, points_wanted
+from modt.types import FrameResult
+
+DEPTH = 4
+"""Frames that may wait, each with its points."""
+BACKLOG = 16
+"""Messages that may wait for a client; a slow one misses the oldest."""
+PORT = 8765
+
+
+class FoxgloveServer(Scene):
+    """Publishes to those who are connected."""
+
+    def __init__(self, host: str, port: int, *, points: bool) -> None:
+        self._context = foxglove.Context()  # kept: the server has no hold of it
+        super().__init__(self._context, points=points)
+        self._server = foxglove.start_server(
+            name="modt", host=host, port=port, context=self._context, message_backlog_size=BACKLOG
+        )
+
+    def close(self) -> None:
+        """Disconnect everybody."""
+        self._server.stop()
+
+
+def open_foxglove(address: Address) -> Background[FrameResult]:
+    """A server at 127.0.0.1, which nobody else reaches, if no other host is given.
+
+    Raises:
+        MisuseError: it cannot be bound.
+    """
+    try:
+        port = PORT if address.port is None else address.port
+        server = FoxgloveServer(address.host or "127.0.0.1", port, points=points_wanted(address))
+    except RuntimeError as error:
+        remedy = "give a host of this machine and a free port"
+        raise MisuseError(address.text, f"cannot be bound ({error})", remedy) from None
+    return Background(address.text, server, DEPTH)
