@@ -33,6 +33,7 @@ class Request:
     path: Path | None = None
     mode: str = "accurate"
     profile: Sequence[str] = ()
+    sink: Sequence[str] = ()
     fov: str = "full"
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None

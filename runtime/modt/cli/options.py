@@ -8,6 +8,7 @@ from pathlib import Path
 
 from modt import host
 from modt.profile import DEFAULT
+from modt.sinks.schemes import SCHEMES
 
 Parser = argparse.ArgumentParser
 
@@ -27,6 +28,14 @@ def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, Non
 def add_profile_option(p: Parser, meaning: str) -> None:
     """Profiles."""
     p.add_argument("--profile", action="append", default=[], metavar="NAME|FILE", help=meaning)
+
+
+def add_sink_option(p: Parser) -> None:
+    """Sinks."""
+    forms = ", ".join(scheme.form for scheme in SCHEMES.values())
+    p.add_argument(
+        "--sink", action="append", default=[], metavar="ADDRESS", help=f"send tracks to {forms}; repeatable"
+    )
 
 
 def add_fov_option(p: Parser) -> None:

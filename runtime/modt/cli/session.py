@@ -15,9 +15,10 @@ from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
 from modt.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
 from modt.reporting.summary import Summary
+from modt.sinks.addresses import open_sink
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
-from modt.sinks.output import Sink
+from modt.sinks.output import LedgerLines, Sink
 from modt.sinks.run_directory import RunDirectory
 from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_source import PosedStream
@@ -46,6 +47,7 @@ class Session:
         self.stop = Stop()
         self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
         self._frames_without_reflectance = 0
+        self.sinks = {address: open_sink(address) for address in request.sink}
         stream_name = re.sub(r"[^\w.]+", "-", self.stream.info.name)
         self.directory = RunDirectory(out or Path("runs") / f"{stream_name}-{request.mode}")
         self._describe(command)
@@ -59,8 +61,8 @@ class Session:
     def run(self, tick: Tick, supervisor: Supervisor) -> dict[str, Any]:
         """Process the stream; returns the summary, as written."""
         summary = Summary()
-        ledger_lines = self.directory.ledger()
-        sinks = self._sinks()
+        sinks = [*self._sinks(), *self.sinks.values()]
+        ledger_lines = LedgerLines(self.directory.ledger(), sinks)
         energy = self.profile.energy
         windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
 
@@ -148,6 +150,7 @@ class Session:
             "odometry": self.odometry.report(),
             "class_frequency": dict(zip(CLASS_NAMES, self.pipeline.decision.frequency.tolist(), strict=True)),
             "host": host.usage(self.core),
+            "sinks": {address: sink.health() for address, sink in self.sinks.items()},
             "faults": {
                 "count": faults.count,
                 "skipped": faults.skipped,

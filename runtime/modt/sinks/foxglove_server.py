@@ -18,7 +18,7 @@ PORT = 8765
 
 
 class FoxgloveServer(Scene):
-    """Publishes to those who are connected."""
+    """Publishes to those who are connected, at `port`."""
 
     def __init__(self, host: str, port: int, *, points: bool) -> None:
         self._context = foxglove.Context()  # kept: the server has no hold of it
@@ -26,6 +26,7 @@ class FoxgloveServer(Scene):
         self._server = foxglove.start_server(
             name="modt", host=host, port=port, context=self._context, message_backlog_size=BACKLOG
         )
+        self.port = self._server.port
 
     def close(self) -> None:
         """Disconnect everybody."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Generic, Literal, Protocol, TypeVar, runtime_checkable
@@ -98,3 +98,24 @@ class LineFile(Generic[T]):
         """Close the file."""
         with writing(self.path):
             self._file.close()
+
+
+class LedgerLines:
+    """The ledger of a run, of which some sinks take the lines too."""
+
+    def __init__(self, lines: LineSink, sinks: Iterable[Sink]) -> None:
+        self._lines, self._takers = lines, [sink for sink in sinks if isinstance(sink, LedgerSink)]
+
+    def write(self, record: dict[str, Any], /) -> None:
+        """Write a line, and hand it on.
+
+        Raises:
+            ModtError: it cannot be written.
+        """
+        self._lines.write(record)
+        for taker in self._takers:
+            taker.ledger(record)
+
+    def close(self) -> None:
+        """Close the ledger."""
+        self._lines.close()
