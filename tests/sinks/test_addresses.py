@@ -1,11 +1,12 @@
 """Addresses lead to the sink of their scheme."""
 
 import sys
+import threading
 
 import pytest
 
 from modt.errors import MisuseError
-from modt.sinks.addresses import open_sink
+from modt.sinks.addresses import close_together, open_sink
 from modt.sinks.schemes import SCHEMES, Scheme
 
 
@@ -70,6 +71,38 @@ def test_what_is_no_address_of_a_picture_is_one_line(text, part):
     with pytest.raises(MisuseError) as caught:
         open_sink(text)
     assert part in str(caught.value)
+
+
+def test_a_sink_that_may_wait_is_written_in_the_background(monkeypatch):
+    class Plain:
+        def __init__(self, address):
+            self.frames = []
+
+        def write(self, result):
+            self.frames.append((threading.current_thread().name, result))
+
+        def close(self):
+            pass
+
+    made = []
+    monkeypatch.setitem(globals(), "plain", lambda address: made.append(Plain(address)) or made[0])
+    monkeypatch.setitem(SCHEMES, "plain", Scheme(f"{__name__}:plain", "plain://", depth=2))
+    sink = open_sink("plain://")
+    sink.write("frame")
+    sink.close()
+    assert made[0].frames == [("sink", "frame")]
+    assert sink.health()["written"] == 1
+
+
+def test_sinks_that_hang_are_closed_together():
+    meeting = threading.Barrier(3, timeout=10.0)
+
+    class Hanging:
+        def close(self):
+            meeting.wait()
+
+    close_together([Hanging(), Hanging(), Hanging()])
+    assert not meeting.broken
 
 
 def test_every_opener_exists_or_names_its_extra():

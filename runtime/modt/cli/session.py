@@ -15,7 +15,7 @@ from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
 from modt.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
 from modt.reporting.summary import Summary
-from modt.sinks.addresses import open_sink
+from modt.sinks.addresses import close_together, open_sink
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
 from modt.sinks.output import LedgerLines, Sink
@@ -61,7 +61,8 @@ class Session:
     def run(self, tick: Tick, supervisor: Supervisor) -> dict[str, Any]:
         """Process the stream; returns the summary, as written."""
         summary = Summary()
-        sinks = [*self._sinks(), *self.sinks.values()]
+        recorded = self._sinks()
+        sinks = [*recorded, *self.sinks.values()]
         ledger_lines = LedgerLines(self.directory.ledger(), sinks)
         energy = self.profile.energy
         windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
@@ -79,7 +80,8 @@ class Session:
         budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
         with ExitStack() as stack:
-            for part in (self.odometry, ledger_lines, *sinks, supervisor):
+            stack.callback(close_together, self.sinks.values())
+            for part in (self.odometry, ledger_lines, *recorded, supervisor):
                 stack.callback(part.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)

@@ -6,12 +6,8 @@ import foxglove
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sinks.background import Background
 from modt.sinks.scene import Scene, points_wanted
-from modt.types import FrameResult
 
-DEPTH = 4
-"""Frames that may wait, each with its points."""
 BACKLOG = 16
 """Messages that may wait for a client; a slow one misses the oldest."""
 PORT = 8765
@@ -33,7 +29,7 @@ class FoxgloveServer(Scene):
         self._server.stop()
 
 
-def open_foxglove(address: Address) -> Background[FrameResult]:
+def open_foxglove(address: Address) -> FoxgloveServer:
     """A server at 127.0.0.1, which nobody else reaches, if no other host is given.
 
     Raises:
@@ -41,8 +37,7 @@ def open_foxglove(address: Address) -> Background[FrameResult]:
     """
     try:
         port = PORT if address.port is None else address.port
-        server = FoxgloveServer(address.host or "127.0.0.1", port, points=points_wanted(address))
+        return FoxgloveServer(address.host or "127.0.0.1", port, points=points_wanted(address))
     except RuntimeError as error:
         remedy = "give a host of this machine and a free port"
         raise MisuseError(address.text, f"cannot be bound ({error})", remedy) from None
-    return Background(address.text, server, DEPTH)

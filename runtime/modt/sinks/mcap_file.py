@@ -15,13 +15,10 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sinks.background import Background
 from modt.sinks.output import writing
 from modt.sinks.scene import Scene, points_wanted
 from modt.types import FrameResult
 
-DEPTH = 4
-"""Frames that may wait, each with its points."""
 FLUSH_S = 1.0
 """What a crash loses at most."""
 OPTIONS = MCAPWriteOptions(compression=MCAPCompression.Lz4, compression_threads=0)
@@ -134,7 +131,7 @@ class McapFile:
                     path.unlink()
 
 
-def open_mcap(address: Address) -> Background[FrameResult]:
+def open_mcap(address: Address) -> McapFile:
     """A recording, without the points where `points=none`, of `max_mb` at most.
 
     Raises:
@@ -149,5 +146,4 @@ def open_mcap(address: Address) -> Background[FrameResult]:
         max_bytes = 0.0
     if not max_bytes > 0:
         raise MisuseError(address.text, "max_mb is no size", "write max_mb=MEGABYTES")
-    recording = McapFile(Path(address.path), points=points_wanted(address), max_bytes=max_bytes)
-    return Background(address.text, recording, DEPTH)
+    return McapFile(Path(address.path), points=points_wanted(address), max_bytes=max_bytes)
