@@ -1,5 +1,6 @@
 """Writing in the background."""
 
+import os
 import threading
 
 import pytest
@@ -133,6 +134,23 @@ def test_what_waits_too_long_at_the_end_is_dropped(slow):
     assert slow.closed.wait(LIMIT_S)
     assert slow.items == ["in work", "in time"]
     assert background.health()["dropped"] == 1
+
+
+def test_the_thread_of_a_loop_of_real_time_is_not(slow):
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError:
+        pytest.skip("real-time priority is not permitted")
+    try:
+        policies = []
+        slow.write = lambda item: policies.append(os.sched_getscheduler(0))
+        background = Background("test", slow, 10)
+        background.write("frame")
+        background.close()
+    finally:
+        os.sched_setscheduler(0, *before)
+    assert policies == [os.SCHED_OTHER]
 
 
 @pytest.mark.parametrize(("writer", "expected"), [(Slow(), ["frame"]), (Records(), ["frame", {"frame": 1}])])

@@ -21,7 +21,7 @@ from modt.types import FrameResult
 
 FLUSH_S = 1.0
 """What a crash loses at most."""
-OPTIONS = MCAPWriteOptions(compression=MCAPCompression.Lz4, compression_threads=0)
+OPTIONS = MCAPWriteOptions(compression=MCAPCompression.Lz4, compression_threads=0)  # the cheapest, none included
 PARTS = 8
 """Parts of a recording whose size is limited; the oldest makes room for a new one."""
 
