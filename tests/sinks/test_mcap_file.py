@@ -95,6 +95,14 @@ def test_an_object_in_view_has_a_cube_a_text_and_an_arrow_along_its_motion(tmp_p
     assert arrow["pose"]["orientation"].get("z", 0.0) == pytest.approx(0.0)  # the world's y is straight ahead
 
 
+def test_the_arrow_of_what_goes_backwards_points_there(tmp_path):
+    record(tmp_path / "a.mcap", moving(3, speed_mps=-2.0))
+    ((*_, update),) = read(tmp_path / "a.mcap", "/tracks")
+    (arrow,) = update["entities"][0]["arrows"]
+    assert arrow["shaft_length"] == 2.0
+    assert abs(arrow["pose"]["orientation"]["z"]) == pytest.approx(1.0)
+
+
 def test_what_stands_has_no_arrow(tmp_path):
     record(tmp_path / "a.mcap", moving(3, speed_mps=0.0))
     ((*_, update),) = read(tmp_path / "a.mcap", "/tracks")

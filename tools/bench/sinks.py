@@ -42,12 +42,9 @@ def main() -> None:
                 worst_ns = max(worst_ns, time.perf_counter_ns() - wall0_ns)
             sink.close()
             loop_ms, all_ms = (1e-6 * t / (len(results) - 1) for t in (cpu_ns, time.process_time_ns() - process0_ns))
-            name = text.partition("?")[0].partition("://")[0] + text[text.find("?") :] * ("?" in text)
-            print(
-                f"{name:<20}{loop_ms:8.3f} ms, at most {1e-6 * worst_ns:6.2f} ms; others {all_ms - loop_ms:8.3f} ms",
-                end="  ",
-            )
-            print(sink.health())
+            name = f"{text.partition('://')[0]} {text.partition('?')[2]}"
+            others = f"at most {1e-6 * worst_ns:6.2f} ms; others {all_ms - loop_ms:8.3f} ms"
+            print(f"{name:<20}{loop_ms:8.3f} ms, {others}  {sink.health()}")
 
 
 def frame_result(index: int, n_tracks: int, n_points: int) -> FrameResult:

@@ -47,7 +47,7 @@ class Session:
         self.stop = Stop()
         self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
         self._frames_without_reflectance = 0
-        self.sinks = {address: open_sink(address) for address in request.sink}
+        self.sinks = {address: open_sink(address) for address in dict.fromkeys(request.sink)}
         stream_name = re.sub(r"[^\w.]+", "-", self.stream.info.name)
         self.directory = RunDirectory(out or Path("runs") / f"{stream_name}-{request.mode}")
         self._describe(command)

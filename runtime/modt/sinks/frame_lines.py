@@ -16,6 +16,7 @@ from modt.types import FrameResult
 DEPTH = 100
 """Lines that may wait: 10 s of a disk that stalls."""
 LONGEST_LINE = 1 << 22
+"""Of a file that is continued [bytes]."""
 
 
 class FrameLines:

@@ -102,7 +102,7 @@ class Scene:
             self._energy.log(energy(record), log_time=self._stamp_ns)
         elif record["schema"] == ledger.SCHEMA:
             cpu_ms = {f"{stage}_ms": 1e-6 * row["cpu_ns"] for stage, row in record["stages"].items()}
-            self._stages.log({"cpu_ms": 1e-6 * record["cpu_ns"], **cpu_ms}, log_time=self._stamp_ns)
+            self._stages.log({"cpu_ms": 1e-6 * record.get("cpu_ns", 0), **cpu_ms}, log_time=self._stamp_ns)
 
 
 def entities(result: FrameResult, stamp: Timestamp) -> list[SceneEntity]:
@@ -111,8 +111,9 @@ def entities(result: FrameResult, stamp: Timestamp) -> list[SceneEntity]:
     rows = np.flatnonzero((tracks.proposal != NONE) & (tracks.object_class != ObjectClass.BACKGROUND))
     boxes = result.proposals.box[tracks.proposal[rows]]
     turn = boxes[:, 6] - tracks.box[rows, 6]  # of the world, seen from the sensor
-    heading = tracks.x[rows, 2] + turn
-    columns = (tracks.id[rows], tracks.object_class[rows], tracks.x[rows, 3], heading, boxes)
+    speed = tracks.x[rows, 3]
+    heading = tracks.x[rows, 2] + turn + np.pi * (speed < 0)
+    columns = (tracks.id[rows], tracks.object_class[rows], np.abs(speed), heading, boxes)
     return [_entity(stamp, *row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
 
