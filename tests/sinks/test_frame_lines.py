@@ -15,6 +15,7 @@ from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA, frame_line
 from tests.cli.commands import environment
 from tests.results import CAR, result
+from tests.sinks.full_disk import files_of_at_most
 from tests.sinks.test_background import settled
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -28,6 +29,19 @@ def test_a_file_is_continued(tmp_path):
             sink.write(frame)
         sink.close()
     assert (tmp_path / "lines.jsonl").read_text() == "".join(map(frame_line, FRAMES))
+
+
+def test_a_full_disk_costs_lines_and_what_follows_is_whole(tmp_path, caplog):
+    sink = open_sink(f"file://{tmp_path}/lines.jsonl")
+    with files_of_at_most(len(frame_line(FRAMES[0])) + 10):
+        sink.write(FRAMES[0])
+        sink.write(FRAMES[1])
+        assert settled(sink, written=1, failed=1)
+    sink.write(FRAMES[2])
+    assert settled(sink, written=2, failed=1, state="ok")
+    sink.close()
+    assert [record["frame"] for record in read_records(tmp_path / "lines.jsonl", SCHEMA)] == [0, 2]
+    assert len(caplog.records) == 2
 
 
 @pytest.mark.parametrize("whole", [FRAMES[:1], []])

@@ -1,9 +1,7 @@
 """MCAP recordings, read by the public reader."""
 
 import base64
-import resource
-import signal
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -20,6 +18,7 @@ from modt.sinks.addresses import open_sink
 from modt.sinks.mcap_file import McapFile
 from tests.results import CAR, PEDESTRIAN, result
 from tests.sinks.foxglove_messages import decoded
+from tests.sinks.full_disk import files_of_at_most
 
 
 def moving(index, speed_mps=2.0):
@@ -179,18 +178,6 @@ def test_a_second_old_frame_survives_a_crash(tmp_path):
     sink.close()
     assert n_frames(tmp_path / "crashed.mcap") >= 20 - 4
     assert n_frames(tmp_path / "a.mcap") == 20
-
-
-@contextmanager
-def files_of_at_most(n_bytes):
-    """A disk on which no file grows beyond a size."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    assert signal.getsignal(signal.SIGXFSZ) is signal.SIG_IGN
-    resource.setrlimit(resource.RLIMIT_FSIZE, (n_bytes, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
 def test_a_full_disk_is_an_error_and_the_recording_goes_on_when_there_is_room(tmp_path):

@@ -16,8 +16,8 @@ from modt.sinks.output import Health, LedgerSink, Writer
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
-CLOSE_S = 0.8
-"""Time that a writer has at the end, half of it for what waits; a longer write is abandoned."""
+CLOSE_S = 0.6
+"""Time that a writer has at the end, half of it for what waits; one that takes longer is left alone."""
 RETRY_S = 1.0
 """Pause after a failure."""
 
@@ -86,7 +86,7 @@ class Background(Generic[T]):
             self._dropped += len(self._jobs)
             self._jobs.clear()
         if self._thread.is_alive():
-            log.warning("%s: does not end; abandoned in the middle of a write", self.name)
+            log.warning("%s: does not end within %g s and is left alone", self.name, CLOSE_S)
 
     def _put(self, job: Callable[[], None]) -> None:
         with self._changed:

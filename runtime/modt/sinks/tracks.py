@@ -131,12 +131,14 @@ def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
     whole = frame_line(result)
     if len(whole) <= max_bytes:
         return [whole]
-    n = len(whole) // max_bytes + 1
+    all_rows = np.arange(len(result.tracks))
+    most = max(len(all_rows), 1)
+    n = min(len(whole) // max_bytes + 1, most)
     while True:
-        parts = [_part(result, rows, k, n) for k, rows in enumerate(np.array_split(np.arange(len(result.tracks)), n))]
-        if max(map(len, parts)) <= max_bytes or n >= len(result.tracks):
+        parts = [_part(result, rows, k, n) for k, rows in enumerate(np.array_split(all_rows, n))]
+        if n == most or max(map(len, parts)) <= max_bytes:
             return parts
-        n += 1
+        n = min(n + n // 4 + 1, most)
 
 
 def _part(result: FrameResult, rows: Int, number: int, parts: int) -> str:
