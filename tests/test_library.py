@@ -99,6 +99,14 @@ def test_without_a_profile_the_first_sweep_tells_the_sensor(frames, caplog):
     assert [record.message.count("used instead") for record in caplog.records] == [1]
 
 
+def test_a_board_goes_with_the_sensor_that_the_first_sweep_tells(frames, caplog):
+    library = modt.Pipeline.from_profile(["raspberry-pi-5"])
+    library.step(frames[0].points, 0.0)
+    assert library.config.sensor.elevation_step_deg == pytest.approx(2.0, rel=0.02)
+    assert library.config.energy == load("raspberry-pi-5").energy
+    assert "profile hdl-64e is not of this sensor" in caplog.text
+
+
 def test_a_profile_that_was_asked_for_is_kept_and_warned_of(frames, caplog):
     library = modt.Pipeline.from_profile("os1-64")
     for frame in frames[:3]:

@@ -21,10 +21,10 @@ def folder(kind: str) -> Path:
     raise MisuseError(_PACKAGE, f"no {kind}/ in this installation", "install modt again")
 
 
-def find(kind: str, name: str, suffix: str) -> Path:
-    """A file by its path, or by the name of one of the package; the error where there is none lists the names."""
-    path = Path(name)
-    if path.suffix == suffix or len(path.parts) > 1:
+def find(kind: str, name: str, suffix: str, beside: Path = Path()) -> Path:
+    """A file by its path, from a folder, or by the name of one of the package; an error lists the names."""
+    path = beside / name
+    if path.suffix == suffix or len(Path(name).parts) > 1:
         if path.is_file():
             return path
         raise MisuseError(path, "no such file", f"give a {suffix} file, or a name: {_names(kind, suffix)}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -93,7 +92,8 @@ class Pipeline:
     def __init__(self, config: ProfileConfig, mode: str = "accurate") -> None:
         if mode not in assembly.MODES:
             raise MisuseError(f"mode {mode!r}", "unknown", f"use one of {', '.join(assembly.MODES)}")
-        self.mode, self._name, self._free = mode, "given", False
+        self.mode = mode
+        self._asked: profile.Resolved | None = None  # by name or file
         self._use(config)
         self._index, self._stamp_s = 0, -np.inf
 
@@ -105,21 +105,26 @@ class Pipeline:
 
     def _recognise(self, points: Float32) -> None:
         """Warn of a profile that the first sweep does not fit; replace it if it was not asked for."""
-        found = recognise(points, self.config)
+        found, asked = recognise(points, self.config), self._asked
         if found.differences:
-            log.warning("%s", found.warning(self._name, replaced=self._free))
-            if self._free:
-                self._use(found.fitted)
+            free = asked is not None and asked.sensor is None
+            name = (asked.sensor or profile.DEFAULT) if asked else "given"
+            log.warning("%s", found.warning(name, replaced=free))
+            if asked and free:
+                self._use(asked.over(found.fitted))
 
     @classmethod
-    def from_profile(cls, name: str | Path | None = None, mode: str = "accurate") -> Self:
-        """Pipeline of a profile, by its name or file; without one the default's, or what the first sweep shows.
+    def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:
+        """Pipeline of profiles by name or file, of which later ones win key by key.
+
+        Where none says which sensor it is, that is the default's, or what the first sweep shows.
 
         Raises:
             MisuseError: no such profile or mode, or a profile with an error; it names the line.
         """
-        pipeline = cls(profile.load(str(name) if name else None), mode)
-        pipeline._name, pipeline._free = str(name or profile.DEFAULT), name is None
+        asked = profile.resolve(names)
+        pipeline = cls(asked.config, mode)
+        pipeline._asked = asked
         return pipeline
 
     def step(

@@ -132,6 +132,19 @@ def test_run_yaml_describes_the_run(runs):
     assert profile.parse(profile.to_yaml(facts["profile"])) == profile.load()
 
 
+def test_lines_go_to_every_sink_asked_for(runs, tmp_path):
+    root, _ = runs
+    sinks = ("--sink", "-", "--sink", f"file://{tmp_path}/lines.jsonl", "--sink", f"unix://{tmp_path}/gone.sock")
+    done = modt("replay", "--frames", f"0:{FRAMES}", "--quiet", "--out", "run", *sinks, cwd=tmp_path)
+    lines = (root / "accurate" / "tracks.jsonl").read_text()
+    assert done.returncode == 0
+    assert done.stdout == (tmp_path / "lines.jsonl").read_text() == lines
+    assert done.stderr.count("nobody receives") == 1
+    health = json.loads((tmp_path / "run" / "summary.json").read_text())["sinks"]
+    assert [found["written"] for found in health.values()] == [FRAMES, FRAMES, 0]
+    assert health[sinks[-1]]["failed"] == FRAMES
+
+
 def test_the_summary_is_printed_and_no_bar_in_a_pipe(runs):
     _, done = runs
     out = done["accurate"].stdout
@@ -154,6 +167,8 @@ def test_two_runs_are_the_same_byte_for_byte(runs):
         (["nowhere"], ["nowhere", "no such file"]),
         (["."], ["no stream"]),
         (["--profile", "none"], ["none", "hdl-64e"]),
+        (["--profile", "hdl-64e", "--profile", "vlp-61"], ["vlp-61", "vlp-16"]),
+        (["--sink", "nothing://"], ["nothing", "stdout://"]),
         (["--profile", "bad.yaml"], ["bad.yaml:2", "cell_m", "out of range"]),
         (["--profile", "model.yaml"], ["no-such.onnx", "no such file"]),
         (["--profile", "fake.yaml"], ["fake.onnx"]),

@@ -1,30 +1,52 @@
 """Contract of every sink."""
 
+import socket
+import threading
+
 import pytest
 
 from modt.errors import ModtError
+from modt.sinks.addresses import open_sink
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
-from modt.sinks.output import LineFile
+from modt.sinks.output import LedgerSink, LineFile
+from modt.sinks.schemes import SCHEMES
 from modt.sinks.tracks import frame_line
 from tests.results import CAR, result
 
-SINKS = {
+FILES = {
     "tracks": lambda root: LineFile(root / "tracks.jsonl", frame_line),
     "kitti": lambda root: KittiResults(root / "kitti" / "0000.txt", None),
     "labels": lambda root: PointLabels(root / "labels"),
 }
+"""Sinks of a run directory: what is written is in the file."""
+ADDRESSES = {
+    "file": lambda root: open_sink(f"file://{root}/lines.jsonl"),
+    "mcap": lambda root: open_sink(f"mcap://{root}/run.mcap"),
+    "unix": lambda root: open_sink(f"unix://{root}/lines.sock"),
+    "udp": lambda root: open_sink("udp://127.0.0.1:9"),
+    "foxglove": lambda root: open_sink("foxglove://:0"),
+}
+"""Sinks that are asked for by their address, of those without a reader."""
+EXTRAS = {"mcap": "foxglove", "foxglove": "foxglove"}
 FRAMES = [
     result(0, [], {}),
     result(1, [5, 4], {0: 1, 1: 2}, {1: CAR}),
     result(2, [4], {0: 1}, {1: CAR}, lost=(2,)),
     result(7, [], {}, lost=(1, 2)),
 ]
+LEDGER = {"schema": "modt.ledger/1", "frame": 1, "stages": {"sink": {"cpu_ns": 10}}, "cpu_ns": 10}
 
 
-@pytest.fixture(params=SINKS)
+def opened(kind, root):
+    if kind in EXTRAS:
+        pytest.importorskip(EXTRAS[kind])
+    return {**FILES, **ADDRESSES}[kind](root)
+
+
+@pytest.fixture(params=FILES)
 def make(request):
-    return SINKS[request.param]
+    return FILES[request.param]
 
 
 def content(root):
@@ -41,10 +63,11 @@ def test_a_frame_is_in_the_file_when_write_returns(make, tmp_path):
     assert content(tmp_path) == written
 
 
-def test_the_same_frames_give_the_same_bytes(make, tmp_path):
+@pytest.mark.parametrize("kind", [*FILES, "file", "mcap"])
+def test_the_same_frames_give_the_same_bytes(kind, tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        sink = make(tmp_path / name)
+        sink = opened(kind, tmp_path / name)
         for frame in FRAMES:
             sink.write(frame)
         sink.close()
@@ -52,8 +75,45 @@ def test_the_same_frames_give_the_same_bytes(make, tmp_path):
     assert content(tmp_path / "a")
 
 
-def test_a_path_that_cannot_be_written_is_an_error(make, tmp_path):
-    blocked = tmp_path / "file"
+@pytest.mark.parametrize("kind", [*FILES, "file", "mcap"])
+def test_a_path_that_cannot_be_written_is_an_error(kind, tmp_path):
+    blocked = tmp_path / "blocked"
     blocked.write_text("")
     with pytest.raises(ModtError, match="cannot be written"):
-        make(blocked)
+        opened(kind, blocked)
+
+
+@pytest.mark.parametrize("kind", [*FILES, *ADDRESSES])
+def test_its_health_accounts_for_every_frame(kind, tmp_path):
+    sink = opened(kind, tmp_path)
+    for frame in FRAMES[1:3]:
+        sink.write(frame)
+    sink.close()
+    health = sink.health()
+    assert all(isinstance(value, int | str) for value in health.values())
+    assert health["written"] + health.get("failed", 0) + health.get("dropped", 0) == 2
+    assert health["written"] == (0 if kind == "unix" else 2)
+
+
+@pytest.mark.parametrize("kind", ADDRESSES)
+def test_nobody_who_reads_and_the_lines_of_the_ledger_hold_nothing_up(kind, tmp_path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as stalled:
+        stalled.bind(str(tmp_path / "lines.sock"))
+        sink = opened(kind, tmp_path)
+
+        def use():
+            for frame in FRAMES * 100:
+                sink.write(frame)
+                if isinstance(sink, LedgerSink):
+                    sink.ledger(LEDGER)
+            sink.close()
+
+        user = threading.Thread(target=use, daemon=True)
+        user.start()
+        user.join(20)
+        assert not user.is_alive()
+
+
+def test_every_scheme_has_its_contract_tested():
+    elsewhere = {"stdout", "ros2"}  # test_frame_lines.py, and beside its sink
+    assert ADDRESSES.keys() | elsewhere == SCHEMES.keys()

@@ -1,4 +1,4 @@
-"""Generate docs/profile-keys.md and .yaml from the configuration.
+"""Generate docs/profile-keys.md and .yaml, and profiles/profile.schema.json, from the configuration.
 
 The page has the keys that a robot sets, the YAML file every key: it is a profile of all defaults.
 """
@@ -6,16 +6,17 @@ The page has the keys that a robot sets, the YAML file every key: it is a profil
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
-from modt.config import ProfileConfig, StageConfig
+from modt import assets
+from modt.config.keys import Key, keys
+from modt.profile.schema import FILE, schema_text
+from modt.profile.yaml_text import nested, value_text
 from tools.docs.sections import replace_section
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "profile-keys.md"
 WHOLE = DOCUMENT.with_suffix(".yaml")
+SCHEMA = assets.folder("profiles") / FILE
 MARK = "tools.docs.profile_keys"
 PAGE = ("sensor", "classification", "scheduler", "odometry", "energy")
 """Stages whose own keys are on the page."""
@@ -53,55 +54,11 @@ CONDITIONS = {
 """When keys have an effect, by the longest prefix of their paths; keys without an entry always have."""
 
 
-@dataclass(frozen=True, slots=True)
-class Key:
-    """One key of a profile.
-
-    Attributes:
-        path: of the key, with dots.
-        default: without a profile.
-        kind: type of its values.
-        facts: low, high, unit, options and meaning.
-    """
-
-    path: str
-    default: Any
-    kind: str
-    facts: dict[str, Any]
-
-    @property
-    def condition(self) -> str:
-        """When it has an effect; empty: always."""
-        parts = self.path.split(".")
-        prefixes = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
-        return next((CONDITIONS[prefix] for prefix in prefixes if prefix in CONDITIONS), "")
-
-    @property
-    def bounds(self) -> str:
-        """Bounds and unit, or options."""
-        if "options" in self.facts:
-            return ", ".join(self.facts["options"])
-        if "low" not in self.facts:
-            return "text"
-        bounds = f"{self.facts['low']:g} to {self.facts['high']:g} {self.facts.get('unit', '')}".strip()
-        return f"{bounds}, or null" if "None" in self.kind else bounds
-
-    @property
-    def value(self) -> str:
-        """The default as YAML."""
-        if isinstance(self.default, tuple):
-            return f"[{', '.join(f'{number:g}' for number in self.default)}]"
-        return "null" if self.default is None else f"{self.default}"
-
-
-def keys(config: type[StageConfig] | type[ProfileConfig] = ProfileConfig, prefix: str = "") -> Iterator[Key]:
-    """Every key, in the order of the configuration."""
-    for f in fields(config):
-        kind = f.default_factory
-        if isinstance(kind, type) and issubclass(kind, StageConfig):
-            yield from keys(kind, f"{prefix}{f.name}.")
-        else:
-            yield Key(f"{prefix}{f.name}", f.default, str(f.type), dict(f.metadata))
+def condition(key: Key) -> str:
+    """When a key has an effect; empty: always."""
+    parts = key.path.split(".")
+    prefixes = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
+    return next((CONDITIONS[prefix] for prefix in prefixes if prefix in CONDITIONS), "")
 
 
 def page() -> str:
@@ -114,25 +71,24 @@ def page() -> str:
         lines += ["| key | default | from, to | meaning |", "|---|---|---|---|"]
         for key in own:
             if key.path.startswith(f"{stage}."):
-                when = "" if key.condition == always else f" [{key.condition}]"
+                when = "" if condition(key) == always else f" [{condition(key)}]"
                 name = key.path.partition(".")[2]
-                lines.append(f"| `{name}` | {key.value} | {key.bounds} | {key.facts['meaning']}{when} |")
+                lines.append(
+                    f"| `{name}` | {value_text(key.default)} | {key.bounds} | {key.facts['meaning']}{when} |"
+                )
     return "\n".join(lines[1:])
 
 
 def whole() -> str:
     """A profile of all defaults, each key with a comment."""
-    lines = ["# Every key of a profile with its default. Written by python -m tools.docs.profile_keys."]
-    opened: list[str] = []
-    for key in keys():
-        *groups, name = key.path.split(".")
-        shared = next((n for n, pair in enumerate(zip(groups, opened, strict=False)) if pair[0] != pair[1]), None)
-        for depth in range(min(len(groups), len(opened)) if shared is None else shared, len(groups)):
-            lines.append(f"{'  ' * depth}{groups[depth]}:")
-        opened = groups
-        when = f" [{key.condition}]" if key.condition else ""
-        lines.append(f"{'  ' * len(groups)}{name}: {key.value} # {key.bounds}: {key.facts['meaning']}{when}")
-    return "\n".join(lines) + "\n"
+    head = "# Every key of a profile with its default. Written by python -m tools.docs.profile_keys.\n"
+    return head + nested((key.path, f"{value_text(key.default)} # {meaning(key)}") for key in keys())
+
+
+def meaning(key: Key) -> str:
+    """Bounds, meaning and condition of a key."""
+    when = f" [{condition(key)}]" if condition(key) else ""
+    return f"{key.bounds}: {key.facts['meaning']}{when}"
 
 
 def document() -> str:
@@ -144,6 +100,7 @@ def main() -> None:
     argparse.ArgumentParser(description=__doc__).parse_args()
     DOCUMENT.write_text(document(), encoding="utf-8")
     WHOLE.write_text(whole(), encoding="utf-8")
+    SCHEMA.write_text(schema_text(), encoding="utf-8")
 
 
 if __name__ == "__main__":

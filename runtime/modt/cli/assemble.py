@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -31,7 +32,8 @@ class Request:
 
     path: Path | None = None
     mode: str = "accurate"
-    profile: str | None = None
+    profile: Sequence[str] = ()
+    sink: Sequence[str] = ()
     fov: str = "full"
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
@@ -65,17 +67,17 @@ def stream(request: Request) -> Stream:
 
 
 def recognised(request: Request, first: Frame | None) -> tuple[ProfileConfig, Recognition]:
-    """The profile of a stream by its first frame, and what differs from the one asked for, which is warned of.
+    """The configuration of a stream by its first frame, and what differs from the one asked for, which is warned of.
 
-    What is found takes the place of the default profile, never of one that was asked for.
+    What is found takes the place of the default profile, never of one of a sensor that was asked for.
     """
-    config, free = profile.load(request.profile), request.profile is None
+    asked = profile.resolve(request.profile)
     if first is None:
-        return config, Recognition((), None, config)
-    found = recognise(first.points, config)
+        return asked.config, Recognition((), None, asked.config)
+    found = recognise(first.points, asked.config)
     if found.differences:
-        log.warning("%s", found.warning(request.profile or profile.DEFAULT, replaced=free))
-    return found.fitted if free else config, found
+        log.warning("%s", found.warning(asked.sensor or profile.DEFAULT, replaced=asked.sensor is None))
+    return asked.over(found.fitted) if asked.sensor is None else asked.config, found
 
 
 def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSource:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from modt import host
 from modt.profile import DEFAULT
+from modt.sinks.schemes import SCHEMES
 
 Parser = argparse.ArgumentParser
 
@@ -19,9 +20,22 @@ def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, Non
     stream = "KITTI drive, sequence or folder of .bin scans (default: a synthetic stream)"
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
-    sensor = f"sensor and board (default: {DEFAULT}, or what the first sweep shows)"
-    p.add_argument("--profile", metavar="NAME|FILE", help=sensor)
+    sensor = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
+    add_profile_option(p, sensor)
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
+
+
+def add_profile_option(p: Parser, meaning: str) -> None:
+    """Profiles."""
+    p.add_argument("--profile", action="append", default=[], metavar="NAME|FILE", help=meaning)
+
+
+def add_sink_option(p: Parser) -> None:
+    """Sinks."""
+    forms = ", ".join(scheme.form for scheme in SCHEMES.values())
+    p.add_argument(
+        "--sink", action="append", default=[], metavar="ADDRESS", help=f"send tracks to {forms}; repeatable"
+    )
 
 
 def add_fov_option(p: Parser) -> None:

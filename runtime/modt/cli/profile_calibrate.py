@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     seconds = options.real(0.01, 600, "seconds")
-    p = commands.add_parser("calibrate", help="fit the energy of this board's units of work, and write a profile")
+    p = commands.add_parser("calibrate", help="fit the energy of this board's units of work, and write its profile")
     options.add_stream_options(p, (0, 40))
     options.add_meter_option(p)
     p.add_argument("--board", default="this board", metavar="NAME", help="name of the board in the profile")
@@ -77,7 +77,8 @@ def run(arguments: argparse.Namespace) -> int:
         point_J=found.fit["point_J"].value,
     )
     with writing(arguments.out):
-        arguments.out.write_text(profile.to_yaml(profile.dump(replace(loaded, energy=energy))), encoding="utf-8")
+        board = profile.dump(replace(loaded, energy=energy))["energy"]
+        arguments.out.write_text(profile.to_yaml({"energy": board}), encoding="utf-8")
     print(text(found, meter.name, meter.kind, arguments.out))
     return 0
 
@@ -100,7 +101,7 @@ def text(found: Calibration, meter: str, kind: str, out: Path) -> str:
     ]
     if kind == "estimated":
         lines.append("  the meter is a model: the fit reproduces the model and says nothing of the board")
-    return "\n".join([*lines, f"  written to {out}; use it as --profile {out}"])
+    return "\n".join([*lines, f"  written to {out}; add it to the sensor's: --profile {out}"])
 
 
 def _check(stage: str, by_fit: float, by_burst: float | None) -> str:

@@ -7,7 +7,7 @@ import json
 from typing import Any
 
 from modt import profile
-from modt.cli import metering
+from modt.cli import metering, options
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Kind, Measurand, MeterLostError
 
@@ -17,7 +17,7 @@ SCHEMA = "modt.meters/1"
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("meters", help="list the energy meters of this machine")
-    p.add_argument("--profile", default=profile.DEFAULT, metavar="NAME|FILE", help="board (default: %(default)s)")
+    options.add_profile_option(p, f"board (default: {profile.DEFAULT})")
     p.add_argument("--json", action="store_true", help="print JSON")
     p.set_defaults(run=run)
 

@@ -27,6 +27,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
     source = "poses: recording (the stream's, default), none, or from a socket: udp://HOST:PORT, unix:///PATH"
     motion.add_argument("--odometry", default="recording", metavar="SOURCE", help=source)
+    options.add_sink_option(p)
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
     p.set_defaults(run=run)

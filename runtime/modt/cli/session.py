@@ -15,9 +15,10 @@ from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
 from modt.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
 from modt.reporting.summary import Summary
+from modt.sinks.addresses import close_together, open_sink
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
-from modt.sinks.output import Sink
+from modt.sinks.output import LedgerLines, Sink
 from modt.sinks.run_directory import RunDirectory
 from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_source import PosedStream
@@ -38,7 +39,7 @@ class Session:
         self.mode = assembly.MODES[request.mode]
         found = PeekedStream(assemble.stream(request))
         self.profile, self.recognition = assemble.recognised(request, found.first)
-        self.profile_name = request.profile or self.recognition.default_name
+        self.asked = profile.resolve(request.profile)
         self.odometry = assemble.odometry(request, found, self.profile.odometry)
         self.stream = PosedStream(found, self.odometry)
         fov = assemble.field_of_view(request, self.stream)
@@ -46,6 +47,7 @@ class Session:
         self.stop = Stop()
         self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
         self._frames_without_reflectance = 0
+        self.sinks = {address: open_sink(address) for address in dict.fromkeys(request.sink)}
         stream_name = re.sub(r"[^\w.]+", "-", self.stream.info.name)
         self.directory = RunDirectory(out or Path("runs") / f"{stream_name}-{request.mode}")
         self._describe(command)
@@ -59,8 +61,9 @@ class Session:
     def run(self, tick: Tick, supervisor: Supervisor) -> dict[str, Any]:
         """Process the stream; returns the summary, as written."""
         summary = Summary()
-        ledger_lines = self.directory.ledger()
-        sinks = self._sinks()
+        recorded = self._sinks()
+        sinks = [*recorded, *self.sinks.values()]
+        ledger_lines = LedgerLines(self.directory.ledger(), sinks)
         energy = self.profile.energy
         windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
 
@@ -77,7 +80,8 @@ class Session:
         budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
         with ExitStack() as stack:
-            for part in (self.odometry, ledger_lines, *sinks, supervisor):
+            stack.callback(close_together, self.sinks.values())
+            for part in (self.odometry, ledger_lines, *recorded, supervisor):
                 stack.callback(part.close)
             stack.enter_context(self.stop.on_signals())
             drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
@@ -96,6 +100,9 @@ class Session:
         kitti = KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera)
         labels: list[Sink] = [PointLabels(path / "labels")] if self.request.labels else []
         return [self.directory.tracks(), kitti, *labels]
+
+    def _profile_names(self) -> tuple[str, ...]:
+        return self.asked.used(self.recognition.default_name)
 
     def _describe(self, command: list[str]) -> None:
         info = self.stream.info
@@ -118,10 +125,11 @@ class Session:
             "model": self.pipeline.classifier.facts(),
             "host": host.description(),
             "recognition": {
-                "used": self.profile_name,
+                "used": self.asked.sensor or self.recognition.default_name,
                 "differences": list(self.recognition.differences),
                 "nearest": self.recognition.nearest,
             },
+            "profiles": list(self._profile_names()),
             "profile": profile.dump(self.profile),
         }
         self.directory.describe(profile.to_yaml(facts))
@@ -134,7 +142,7 @@ class Session:
                 "stream": self.stream.info.name,
                 "mode": self.request.mode,
                 "fov": self.request.fov,
-                "profile": self.profile_name,
+                "profile": " + ".join(self._profile_names()),
                 "elapsed_s": elapsed_s,
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * self.stream.info.period_s / elapsed_s,
@@ -144,6 +152,7 @@ class Session:
             "odometry": self.odometry.report(),
             "class_frequency": dict(zip(CLASS_NAMES, self.pipeline.decision.frequency.tolist(), strict=True)),
             "host": host.usage(self.core),
+            "sinks": {address: sink.health() for address, sink in self.sinks.items()},
             "faults": {
                 "count": faults.count,
                 "skipped": faults.skipped,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import Field, dataclass, field, fields
 from typing import Any
 
 from modt.classes import CLASS_NAMES, CLASSES, OBJECTS, ObjectClass
@@ -63,10 +64,16 @@ class StageConfig:
         for f in fields(self):
             if isinstance(f.default_factory, type) and issubclass(f.default_factory, StageConfig):
                 continue  # checked as it was made
-            _check(f.name, getattr(self, f.name), str(f.type), dict(f.metadata))
+            check(f, getattr(self, f.name))
 
 
-def _check(key: str, value: object, kind: str, bounds: dict[str, Any]) -> None:
+def check(declared: Field[Any], value: object) -> None:
+    """Check a value against the bounds that its field declares.
+
+    Raises:
+        ValueRangeError: it is not of its kind or out of range.
+    """
+    key, kind, bounds = declared.name, str(declared.type), declared.metadata
     if value is None and "None" in kind:
         return
     if "options" in bounds:
@@ -79,7 +86,7 @@ def _check(key: str, value: object, kind: str, bounds: dict[str, Any]) -> None:
         _check_numbers(key, value, kind.startswith("int"), bounds)
 
 
-def _check_numbers(key: str, value: object, whole: bool, bounds: dict[str, Any]) -> None:
+def _check_numbers(key: str, value: object, whole: bool, bounds: Mapping[str, Any]) -> None:
     several = "length" in bounds or "most" in bounds
     numbers = value if several and isinstance(value, tuple) else (value,)
     noun = "a whole number" if whole else "a number"

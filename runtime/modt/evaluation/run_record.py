@@ -14,7 +14,7 @@ from modt.errors import MisuseError, ModtError
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.truth import Truth
 from modt.geometry import FieldOfView
-from modt.profile import DEFAULT, from_yaml
+from modt.profile import from_yaml
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
@@ -43,15 +43,12 @@ class RunRecord:
         described = path / RUN
         try:
             facts = from_yaml(described.read_text(encoding="utf-8"), described)
-            stream, fov, command = facts["stream"]["path"], facts["fov"], facts["command"]
+            stream, fov, sensor = facts["stream"]["path"], facts["fov"], facts["recognition"]["used"]
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
         if not (path / LABELS).is_dir():
             raise MisuseError(path, "holds no point labels of its own", "run it again with `modt replay --labels`")
-        words = [word for argument in command for word in argument.split("=", 1)]
-        used = facts.get("recognition", {}).get("used", DEFAULT)
-        sensor = Path(words[words.index("--profile") + 1]).stem if "--profile" in words else used
-        return cls(path, Path(stream) if stream else None, fov, sensor)
+        return cls(path, Path(stream) if stream else None, fov, Path(sensor).stem)
 
     def frames(self, truth: Truth) -> Iterator[JudgedFrame]:
         """Every recorded frame beside its truth.

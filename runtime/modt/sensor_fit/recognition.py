@@ -104,7 +104,10 @@ def _nearest(found: SensorConfig, tangent: Float32) -> str | None:
     """The shipped profile of the same beams, by the height of the mount where several have them."""
     best = None
     for path in sorted(assets.folder("profiles").glob("*.yaml")):
-        sensor = profile.load(path.stem).sensor
+        shipped = profile.resolve(path.stem)
+        if shipped.sensor is None:  # a board
+            continue
+        sensor = shipped.config.sensor
         ratios = _spacing_ratio(sensor, found, tangent), _ratio(sensor.azimuth_step_deg, found.azimuth_step_deg)
         if max(ratios) < MAX_LIKENESS_RATIO:
             away_m = abs((sensor.height_m or 0.0) - (found.height_m or 0.0))

@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
-from modt.sinks.output import LineFile, writing
+from modt.sinks.output import Health, LineFile, writing
 from modt.types import NONE, Float64, FrameResult, Int
 
 KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
@@ -63,6 +63,10 @@ class KittiResults:
             for id_, c, cut, a, i, lwh, at, r, s in zip(*(c.tolist() for c in columns), strict=True)
         )
         self._lines.write(text)
+
+    def health(self) -> Health:
+        """The frames with objects."""
+        return self._lines.health()
 
     def close(self) -> None:
         """Close the file."""

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.sinks.output import writing
+from modt.sinks.output import Health, writing
 from modt.types import NONE, FrameResult
 
 MAX_INSTANCE = 0xFFFF
@@ -19,7 +19,7 @@ class PointLabels:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self._folder, self._written = folder, 0
         with writing(folder):
             folder.mkdir(parents=True, exist_ok=True)
 
@@ -32,6 +32,11 @@ class PointLabels:
         path = self._folder / f"{result.frame.index:06d}.label"
         with writing(path):
             path.write_bytes(encode(result).tobytes())
+        self._written += 1
+
+    def health(self) -> Health:
+        """The files written."""
+        return {"written": self._written}
 
     def close(self) -> None:
         """No file is open."""

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Generic, Protocol, TypeVar
+from typing import Any, BinaryIO, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 from modt.errors import ModtError
 from modt.types import FrameResult
 
 T = TypeVar("T")
 T_contra = TypeVar("T_contra", contravariant=True)
+Health = dict[str, int | str]
+"""Figures of a writer: `written` items, those that are lost by their reasons, and its `state` in words."""
 
 
 class Writer(Protocol[T_contra]):
@@ -24,8 +26,22 @@ class Writer(Protocol[T_contra]):
         """Close the files."""
 
 
-Sink = Writer[FrameResult]
+class Sink(Writer[FrameResult], Protocol):
+    """Takes the results of frames."""
+
+    def health(self) -> Health:
+        """What has become of them so far."""
+
+
 LineSink = Writer[dict[str, Any]]
+
+
+@runtime_checkable
+class LedgerSink(Protocol):
+    """What a sink is besides, if it also takes the lines of the ledger (`modt.ledger/1`, `modt.energy/1`)."""
+
+    def ledger(self, record: dict[str, Any], /) -> None:
+        """Write a line of the ledger."""
 
 
 @contextmanager
@@ -44,12 +60,15 @@ def writing(path: Path) -> Iterator[None]:
 
 
 class LineFile(Generic[T]):
-    """An unbuffered text file of whole lines; `encode` gives the lines of an item."""
+    """An unbuffered text file of whole lines; `encode` gives the lines of an item.
 
-    def __init__(self, path: Path, encode: Callable[[T], str] = str) -> None:
-        self.path, self._encode = path, encode
+    The mode "ab" continues a file, "wb" begins it anew.
+    """
+
+    def __init__(self, path: Path, encode: Callable[[T], str] = str, mode: Literal["wb", "ab"] = "wb") -> None:
+        self.path, self._encode, self._written = path, encode, 0
         with writing(path):
-            self._file: BinaryIO = path.open("wb", buffering=0)
+            self._file: BinaryIO = path.open(mode, buffering=0)
 
     def write(self, item: T, /) -> None:
         """Append the lines of an item; a partial line on a full disk is removed.
@@ -69,8 +88,34 @@ class LineFile(Generic[T]):
                 with suppress(OSError):
                     self._file.truncate(whole)
                 raise
+        self._written += 1
+
+    def health(self) -> Health:
+        """The items written."""
+        return {"written": self._written}
 
     def close(self) -> None:
         """Close the file."""
         with writing(self.path):
             self._file.close()
+
+
+class LedgerLines:
+    """The ledger of a run, of which some sinks take the lines too."""
+
+    def __init__(self, lines: LineSink, sinks: Iterable[Sink]) -> None:
+        self._lines, self._takers = lines, [sink for sink in sinks if isinstance(sink, LedgerSink)]
+
+    def write(self, record: dict[str, Any], /) -> None:
+        """Write a line, and hand it on.
+
+        Raises:
+            ModtError: it cannot be written.
+        """
+        self._lines.write(record)
+        for taker in self._takers:
+            taker.ledger(record)
+
+    def close(self) -> None:
+        """Close the ledger."""
+        self._lines.close()

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from modt.classes import CLASS_NAMES
 from modt.sinks import json_columns as text
 from modt.sinks.records import line
-from modt.types import NONE, FrameResult
+from modt.types import NONE, FrameResult, Int
 
 SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
@@ -65,12 +66,31 @@ BOOLEANS = text.encode_table(["false", "true"])
 NULL = text.encode("null")[0]
 
 
+class _LatestLine:
+    """The line of the latest frame, which several sinks ask for one after the other."""
+
+    result: FrameResult | None = None
+    line = ""
+
+    def of(self, result: FrameResult) -> str:
+        if result is not self.result:
+            self.line, self.result = _encoded(result), result
+        return self.line
+
+
+_latest = _LatestLine()
+
+
 def frame_line(result: FrameResult) -> str:
     """The line of frame_record(result), character by character.
 
     Raises:
         ValueError: a number is not finite.
     """
+    return _latest.of(result)
+
+
+def _encoded(result: FrameResult) -> str:
     if not _in_tables(result):
         return line(frame_record(result))
     tracks = result.tracks
@@ -98,6 +118,32 @@ def frame_line(result: FrameResult) -> str:
     keyed[0] = ',{"id":'
     rows = text.decode(text.join_columns(len(tracks), *keyed, "}"))
     return line(_frame_fields(result) | {"tracks": []}).replace('"tracks":[]', f'"tracks":[{rows[1:]}]')
+
+
+def frame_parts(result: FrameResult, max_bytes: int) -> list[str]:
+    """The line of a frame; where it is longer than that, lines of some of the tracks each.
+
+    Parts have all fields of a frame, and `part`, from 0, and `parts`, their number.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    whole = frame_line(result)
+    if len(whole) <= max_bytes:
+        return [whole]
+    all_rows = np.arange(len(result.tracks))
+    most = max(len(all_rows), 1)
+    n = min(len(whole) // max_bytes + 1, most)
+    while True:
+        parts = [_part(result, rows, k, n) for k, rows in enumerate(np.array_split(all_rows, n))]
+        if n == most or max(map(len, parts)) <= max_bytes:
+            return parts
+        n = min(n + n // 4 + 1, most)
+
+
+def _part(result: FrameResult, rows: Int, number: int, parts: int) -> str:
+    some = _encoded(replace(result, tracks=result.tracks.renewed(rows, 0)))
+    return some.replace(',"tracks":[', f',"part":{number},"parts":{parts},"tracks":[', 1)
 
 
 @lru_cache

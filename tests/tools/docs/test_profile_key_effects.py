@@ -25,6 +25,7 @@ from modt import assembly, profile
 from modt.classification import pointnet
 from modt.cli import assemble
 from modt.config import ProfileConfig
+from modt.config.keys import Key, keys, value_of
 from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.windows import Clocks, Windows
@@ -34,7 +35,7 @@ from modt.sources.pose_socket import PoseSocket
 from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 from modt.types import Frame
 from tests.reporting.test_run_report import write_run
-from tools.docs.profile_keys import Key, keys
+from tools.docs.profile_keys import condition
 
 pytestmark = pytest.mark.slow
 
@@ -176,7 +177,7 @@ def scan_folder(config: ProfileConfig, folder: Path) -> str:
     for frame in frames(3, 1.0)[:2]:
         frame.points.tofile(folder / "scans" / f"{frame.index:06d}.bin")
     (folder / "own.yaml").write_text(profile.to_yaml(profile.dump(config)))
-    request = assemble.Request(path=folder / "scans", profile=str(folder / "own.yaml"))
+    request = assemble.Request(path=folder / "scans", profile=[str(folder / "own.yaml")])
     return str([frame.stamp_s for frame in assemble.stream(request)])
 
 
@@ -245,7 +246,7 @@ RARE: dict[str, Scenario] = {
 
 
 def scenario_of(key: Key) -> Scenario:
-    return next((scenario for path, scenario in RARE.items() if key.path.startswith(path)), SCENARIOS[key.condition])
+    return next((scenario for path, scenario in RARE.items() if key.path.startswith(path)), SCENARIOS[condition(key)])
 
 
 def others(key: Key) -> Iterator[Any]:
@@ -272,13 +273,6 @@ def others(key: Key) -> Iterator[Any]:
             yield tuple(bounded(scale * n) for n in start) if isinstance(start, tuple) else bounded(scale * start)
         if not isinstance(start, tuple):
             yield from (bounded(low), bounded(high))
-
-
-def value_of(config: Any, path: str) -> Any:
-    """Value of a key."""
-    for name in path.split("."):
-        config = getattr(config, name)
-    return config
 
 
 DIGESTS: dict[Scenario, str] = {}

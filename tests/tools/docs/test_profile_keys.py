@@ -2,7 +2,9 @@
 
 from modt import profile
 from modt.config import ProfileConfig
-from tools.docs.profile_keys import CONDITIONS, DOCUMENT, WHOLE, document, keys, whole
+from modt.config.keys import keys
+from modt.profile.schema import schema_text
+from tools.docs.profile_keys import CONDITIONS, DOCUMENT, SCHEMA, WHOLE, document, whole
 
 
 def test_the_page_is_up_to_date():
@@ -13,6 +15,10 @@ def test_the_file_of_all_keys_is_up_to_date_and_the_default_profile():
     text = WHOLE.read_text(encoding="utf-8")
     assert whole() == text
     assert profile.parse(text) == ProfileConfig()
+
+
+def test_the_schema_is_up_to_date():
+    assert schema_text() == SCHEMA.read_text(encoding="utf-8")
 
 
 def test_every_key_has_a_meaning_and_every_condition_a_key():

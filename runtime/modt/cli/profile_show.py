@@ -1,0 +1,21 @@
+"""`modt profile show`: what profiles come to, and who set each key."""
+
+from __future__ import annotations
+
+import argparse
+
+from modt import profile
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("show", help="print the configuration that profiles come to, and who set each key")
+    which = f"name or file; later ones win key by key (default: {profile.DEFAULT})"
+    p.add_argument("names", nargs="*", metavar="NAME|FILE", help=which)
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Show."""
+    print(profile.resolve(arguments.names).shown(), end="")
+    return 0

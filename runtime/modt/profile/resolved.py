@@ -1,0 +1,162 @@
+"""Several profiles, and those that they extend, as one configuration."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modt import assets
+from modt.config import ProfileConfig, StageConfig, ValueRangeError
+from modt.config.keys import keys, value_of
+from modt.errors import MisuseError
+from modt.profile.yaml_text import Written, nested, read, value_text
+
+DEFAULT = "hdl-64e"
+"""Profile of the sensor where none is asked for."""
+Names = str | Path | Sequence[str | Path] | None
+"""Names or files of profiles, of which later ones win key by key."""
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """One profile as written: its name or file, and the values by the paths of their keys."""
+
+    name: str
+    settings: Mapping[str, Any]
+
+    @property
+    def of_sensor(self) -> bool:
+        """Whether it says anything of the sensor."""
+        return any(path.startswith("sensor.") for path in self.settings)
+
+
+@dataclass(frozen=True, slots=True)
+class Resolved:
+    """What profiles come to.
+
+    Attributes:
+        layers: those asked for, each after those that it extends; later ones win.
+        assumed: the DEFAULT, beneath the others, where none of them says anything of the sensor.
+        config: their configuration.
+    """
+
+    layers: tuple[Layer, ...]
+    assumed: tuple[Layer, ...]
+    config: ProfileConfig
+
+    def used(self, default: str) -> tuple[str, ...]:
+        """Names of the profiles, after `default` for the sensor where none of them says which it is."""
+        names = tuple(layer.name for layer in self.layers)
+        return names if self.sensor else (default, *names)
+
+    @property
+    def sensor(self) -> str | None:
+        """The last profile that says anything of the sensor; None where nobody does."""
+        return next((layer.name for layer in reversed(self.layers) if layer.of_sensor), None)
+
+    def over(self, base: ProfileConfig) -> ProfileConfig:
+        """Another configuration with what the layers set.
+
+        Raises:
+            MisuseError: the two do not go together.
+        """
+        return _configured(self.layers, base)
+
+    def shown(self) -> str:
+        """The configuration as YAML, itself a profile, with who set it behind each value."""
+        set_by = {path: layer.name for layer in (*self.assumed, *self.layers) for path in layer.settings}
+        rows = ((key.path, value_of(self.config, key.path)) for key in keys())
+        return nested((path, f"{value_text(value)} # {set_by.get(path, 'default')}") for path, value in rows)
+
+
+def load(names: Names = None) -> ProfileConfig:
+    """Configuration of profiles by name or file, without any of the DEFAULT; raises as resolve does."""
+    return resolve(names).config
+
+
+def resolve(names: Names = None) -> Resolved:
+    """Read profiles by name or file, and those that they extend.
+
+    Raises:
+        MisuseError: no such profile, unreadable, not YAML, an unknown key or a value out of range, with the
+            line and the nearest valid key; profiles that extend one another in a circle.
+    """
+    layers = _layers((names,) if isinstance(names, str | Path) else names or ())
+    assumed = () if any(layer.of_sensor for layer in layers) else _layers([DEFAULT])
+    return Resolved(layers, assumed, _configured((*assumed, *layers), ProfileConfig()))
+
+
+def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
+    """Configuration of a YAML text, and of what it extends; raises as resolve does."""
+    layers = _chain(read(text, origin), Path(origin), ())
+    return _configured(tuple(layers.values()), ProfileConfig())
+
+
+def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
+    """A profile as plain data, with all defaults and tuples as lists."""
+    return dataclasses.asdict(config, dict_factory=_listed)
+
+
+def _listed(items: list[tuple[str, Any]]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in items}
+
+
+def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:
+    """Profiles in their order, each after those that it extends, and each once."""
+    layers: dict[Path, Layer] = {}
+    for name in names:
+        path = assets.find("profiles", str(name), ".yaml")
+        layers.pop(path.resolve(), None)  # named again: it wins over those before
+        for file, layer in _chain(_read(path), path, ()).items():
+            layers.setdefault(file, layer)
+    return tuple(layers.values())
+
+
+def _chain(written: Written, path: Path, within: tuple[Path, ...]) -> dict[Path, Layer]:
+    """A profile by its resolved file, after those that it extends; `within`: the files that lead to it."""
+    chain: dict[Path, Layer] = {}
+    within = (*within, path.resolve())
+    for name in written.extends:
+        try:
+            base = assets.find("profiles", name, ".yaml", path.parent)
+        except MisuseError as error:
+            raise MisuseError(f"{written.place}: extends {name}", error.cause, error.remedy) from None
+        if base.resolve() in within:
+            circle = ", ".join(file.stem for file in within[within.index(base.resolve()) :])
+            raise MisuseError(written.place, f"extends itself, by way of {circle}", "remove one of these `extends`")
+        for file, layer in _chain(_read(base), base, within).items():
+            chain.setdefault(file, layer)
+    name = path.stem if path.parent == assets.folder("profiles") else str(path)
+    return {**chain, path.resolve(): Layer(name, written.settings)}
+
+
+def _read(path: Path) -> Written:
+    try:
+        return read(path.read_text(encoding="utf-8"), path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise MisuseError(path, f"cannot be read ({error})", "make it a readable UTF-8 file") from None
+
+
+def _configured(layers: Sequence[Layer], base: ProfileConfig) -> ProfileConfig:
+    merged = {path: value for layer in layers for path, value in layer.settings.items()}
+    try:
+        config: ProfileConfig = _changed(base, merged, "")
+    except ValueRangeError as error:
+        names = ", ".join(layer.name for layer in layers)
+        raise MisuseError(f"{names}: {error.key}", error.cause, error.remedy) from None
+    return config
+
+
+def _changed(config: Any, settings: Mapping[str, Any], prefix: str) -> Any:
+    """A configuration with the values of some keys changed."""
+    changes = {}
+    for f in dataclasses.fields(config):
+        value, path = getattr(config, f.name), prefix + f.name
+        if isinstance(value, StageConfig):
+            changes[f.name] = _changed(value, settings, f"{path}.")
+        elif path in settings:
+            changes[f.name] = settings[path]
+    return dataclasses.replace(config, **changes)

@@ -1,0 +1,144 @@
+"""YAML of profiles: text to settings with strict keys, and values to text."""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from modt.config import ProfileConfig, StageConfig, ValueRangeError
+from modt.config.base import check
+from modt.errors import MisuseError
+
+EXTENDS = "extends"
+"""The key at a profile's head that names the profiles which it is based on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What a profile says.
+
+    Attributes:
+        extends: the profiles that it names as its base.
+        place: file and line where it does, of the file without.
+        settings: value by the path of its key, "sensor.height_m".
+    """
+
+    extends: tuple[str, ...]
+    place: str
+    settings: Mapping[str, Any]
+
+
+def read(text: str, origin: Path | str) -> Written:
+    """What a YAML text says, in which every key is optional.
+
+    Raises:
+        MisuseError: not YAML, an unknown key or a value out of range, with the line and the nearest valid key.
+    """
+    try:
+        root = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"{origin}:{mark.line + 1}" if mark else str(origin)
+        cause = str(getattr(error, "problem", None) or "unreadable")
+        raise MisuseError(place, f"no YAML ({cause})", "correct this line") from None
+    stages = {f.name: f.default_factory for f in dataclasses.fields(ProfileConfig)}
+    extends, place, settings = tuple[str, ...](), str(origin), dict[str, Any]()
+    for key, node, line in _entries(root, origin, {EXTENDS: None, **stages}, "profile"):
+        stage = stages.get(key)
+        if isinstance(stage, type):
+            settings |= _stage(stage, node, origin, line, f"{key}.")
+        else:
+            place = f"{origin}:{line}"
+            extends = _names(_plain(node, place), place)
+    return Written(extends, place, settings)
+
+
+def to_yaml(data: Mapping[str, Any]) -> str:
+    """YAML text in the order of the keys."""
+    return str(yaml.safe_dump(dict(data), sort_keys=False, allow_unicode=True))
+
+
+def from_yaml(text: str, origin: Path | str) -> Any:
+    """Plain data of a YAML text written by this package."""
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise MisuseError(origin, "no YAML", "give the run directory of a whole run") from None
+
+
+def value_text(value: Any) -> str:
+    """A value on one line."""
+    plain = list(value) if isinstance(value, tuple) else value
+    text: str = yaml.safe_dump(plain, default_flow_style=True, allow_unicode=True, width=float("inf"))
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
+def nested(rows: Iterable[tuple[str, str]]) -> str:
+    """YAML text of keys, by their paths and the texts behind their colons, each mechanism's together."""
+    lines: list[str] = []
+    opened: list[str] = []
+    for path, text in rows:
+        *groups, name = path.split(".")
+        shared = next((n for n, pair in enumerate(zip(groups, opened, strict=False)) if pair[0] != pair[1]), None)
+        for depth in range(min(len(groups), len(opened)) if shared is None else shared, len(groups)):
+            lines.append(f"{'  ' * depth}{groups[depth]}:")
+        opened = groups
+        lines.append(f"{'  ' * len(groups)}{name}: {text}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int, prefix: str) -> dict[str, Any]:
+    """Values of a stage or mechanism by their paths."""
+    known = {f.name: f for f in dataclasses.fields(kind)}
+    settings: dict[str, Any] = {}
+    for key, value, at in _entries(node, origin, known, kind.__name__, line):
+        inner = known[key].default_factory
+        if isinstance(inner, type) and issubclass(inner, StageConfig):
+            settings |= _stage(inner, value, origin, at, f"{prefix}{key}.")
+            continue
+        plain = _plain(value, f"{origin}:{at}")
+        settings[prefix + key] = tuple(plain) if isinstance(plain, list) else plain
+        try:
+            check(known[key], settings[prefix + key])
+        except ValueRangeError as error:
+            raise MisuseError(f"{origin}:{at}: {key}", error.cause, error.remedy) from None
+    return settings
+
+
+def _names(plain: Any, place: str) -> tuple[str, ...]:
+    names = plain if isinstance(plain, list) else [plain]
+    if not all(isinstance(name, str) for name in names):
+        raise MisuseError(place, f"{EXTENDS} is no name", "write the name or file of a profile, or a list of them")
+    return tuple(names)
+
+
+def _plain(node: yaml.Node, place: str) -> Any:
+    try:
+        return yaml.safe_load(yaml.serialize(node))
+    except yaml.YAMLError:
+        raise MisuseError(place, "no plain value", "write a number, a name or a list") from None
+
+
+def _entries(
+    node: yaml.Node | None, origin: Path | str, known: Mapping[str, object], what: str, line: int = 1
+) -> Iterator[tuple[str, yaml.Node, int]]:
+    if node is None or (isinstance(node, yaml.ScalarNode) and node.value == ""):
+        return
+    if not isinstance(node, yaml.MappingNode):
+        raise MisuseError(f"{origin}:{line}", f"{what} is no mapping", "write key: value lines")
+    seen: set[str] = set()
+    for key_node, value in node.value:
+        key, at = str(key_node.value), key_node.start_mark.line + 1
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.0)
+            raise MisuseError(f"{origin}:{at}", f"unknown key '{key}'", f"did you mean '{near[0]}'?")
+        if key in seen:
+            raise MisuseError(f"{origin}:{at}", f"key '{key}' appears twice", "keep one")
+        seen.add(key)
+        yield key, value, at

@@ -1,0 +1,136 @@
+"""A thread that writes what the loop must not wait for."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from typing import Any, Generic, TypeVar
+
+from modt.sinks.output import Health, LedgerSink, Writer
+
+log = logging.getLogger(__name__)
+
+T = TypeVar("T")
+CLOSE_S = 0.6
+"""Time that a writer has at the end, half of it for what waits; one that takes longer is left alone."""
+RETRY_S = 1.0
+"""Pause after a failure."""
+
+
+class Background(Generic[T]):
+    """Writes in a thread of its own, in order; where no room is left, the oldest item that waits gives way.
+
+    A failure of the writer is logged once, until it writes again; the item is lost and counted, and after a pause the
+    next one is tried.
+
+    Args:
+        name: for messages.
+        writer: used by the thread alone from now on.
+        depth: items that may wait.
+        retry_s: pause after a failure.
+        clock: [s].
+    """
+
+    def __init__(
+        self,
+        name: str,
+        writer: Writer[T],
+        depth: int,
+        *,
+        retry_s: float = RETRY_S,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.name, self._writer, self._depth = name, writer, depth
+        self._retry_s, self._clock = retry_s, clock
+        self._jobs: deque[Callable[[], None]] = deque()
+        self._changed = threading.Condition()
+        self._end_s: float | None = None
+        self._written = self._dropped = self._failed = 0
+        self._state = "ok"
+        self._thread = threading.Thread(target=self._work, name="sink", daemon=True)
+        self._thread.start()
+
+    def write(self, item: T, /) -> None:
+        """Hand over one item; never waits."""
+        self._put(lambda: self._writer.write(item))
+
+    def ledger(self, record: dict[str, Any], /) -> None:
+        """Hand over a line of the ledger, if the writer takes them."""
+        writer = self._writer
+        if isinstance(writer, LedgerSink):
+            self._put(lambda: writer.ledger(record))
+
+    def health(self) -> Health:
+        """Items written, dropped for want of room, failed; what is wrong now."""
+        return {
+            "written": self._written,
+            "dropped": self._dropped,
+            "failed": self._failed,
+            "waiting": len(self._jobs),
+            "state": self._state,
+        }
+
+    def close(self) -> None:
+        """Write what waits and close the writer, within CLOSE_S; what is left is dropped."""
+        with self._changed:
+            if self._end_s is None:
+                self._end_s = self._clock() + CLOSE_S / 2
+            self._changed.notify()
+        self._thread.join(CLOSE_S)
+        with self._changed:
+            self._dropped += len(self._jobs)
+            self._jobs.clear()
+        if self._thread.is_alive():
+            log.warning("%s: does not end within %g s and is left alone", self.name, CLOSE_S)
+
+    def _put(self, job: Callable[[], None]) -> None:
+        with self._changed:
+            if self._end_s is not None:
+                self._dropped += 1
+                return
+            if len(self._jobs) == self._depth:
+                self._dropped += 1
+                self._jobs.popleft()
+            self._jobs.append(job)
+            self._changed.notify()
+
+    def _work(self) -> None:
+        with suppress(OSError):
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # the loop may be of real time, this never is
+        while (job := self._next()) is not None:
+            try:
+                job()
+            except Exception as error:
+                self._fail(error)
+            else:
+                self._succeed()
+        with suppress(Exception):
+            self._writer.close()
+
+    def _next(self) -> Callable[[], None] | None:
+        """The oldest job, waited for; None at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._jobs or self._end_s is not None)
+            late = self._end_s is not None and self._clock() > self._end_s
+            return self._jobs.popleft() if self._jobs and not late else None
+
+    def _fail(self, error: Exception) -> None:
+        self._failed += 1
+        if self._state == "ok":
+            log.warning(
+                "%s: %s; tried again every %g s, what cannot be written is counted", self.name, error, self._retry_s
+            )
+        self._state = str(error)
+        with self._changed:
+            self._changed.wait_for(lambda: self._end_s is not None, self._retry_s)
+
+    def _succeed(self) -> None:
+        self._written += 1
+        if self._state != "ok":
+            log.warning("%s: written again; %d failed, %d dropped so far", self.name, self._failed, self._dropped)
+            self._state = "ok"

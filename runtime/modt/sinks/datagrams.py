@@ -1,0 +1,94 @@
+"""The lines of tracks.jsonl as datagrams, sent without waiting."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import socket
+from typing import Any
+
+from modt.address import Address
+from modt.errors import MisuseError
+from modt.sinks.output import Health
+from modt.sinks.tracks import frame_parts
+from modt.types import FrameResult
+
+log = logging.getLogger(__name__)
+
+MAX_BYTES = 65_507
+"""Of a datagram over UDP; longer lines are sent in parts."""
+MAX_PATH_BYTES = 107
+"""Of the path of a Unix socket."""
+SEND_BYTES = 1 << 20
+"""Asked for what a receiver has not read yet; the system may grant less."""
+_FULL = (errno.EAGAIN, errno.ENOBUFS)
+
+
+class Datagrams:
+    """One datagram a frame; a receiver that is not there, or behind, costs nothing but the frames that it misses."""
+
+    def __init__(self, name: str, family: int, target: Any) -> None:
+        self._name, self._target = name, target
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BYTES)
+        self._written = self._dropped = self._failed = 0
+        self._state = "ok"
+
+    def write(self, result: FrameResult, /) -> None:
+        """Send the line of a frame, or its parts, or none where one cannot be sent.
+
+        Raises:
+            ValueError: a number is not finite.
+        """
+        try:
+            for part in frame_parts(result, MAX_BYTES):
+                self._socket.sendto(part.encode(), self._target)
+        except OSError as error:
+            self._miss(error)
+        else:
+            self._written, self._state = self._written + 1, "ok"
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def health(self) -> Health:
+        """Frames sent, dropped by a full queue of the receiver, failed without a receiver; what is wrong now."""
+        return {"written": self._written, "dropped": self._dropped, "failed": self._failed, "state": self._state}
+
+    def _miss(self, error: OSError) -> None:
+        cause = str(error.strerror or error)
+        full = error.errno in _FULL
+        self._dropped, self._failed = self._dropped + full, self._failed + (not full)
+        if self._state == "ok":
+            who = "its receiver is behind" if full else "nobody receives"
+            log.warning("%s: %s (%s); frames are lost and counted until it reads again", self._name, who, cause)
+        self._state = cause
+
+
+def open_udp(address: Address) -> Datagrams:
+    """A UDP receiver.
+
+    Raises:
+        MisuseError: no host or port, or an unknown host.
+    """
+    if not address.host or not address.port or address.path.strip("/"):
+        raise MisuseError(address.text, "names no receiver", "write udp://HOST:PORT")
+    try:
+        family, _, _, _, target = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
+    except OSError as error:
+        raise MisuseError(address.text, f"unknown host ({error.strerror})", "give a host that is reachable") from None
+    return Datagrams(address.text, family, target)
+
+
+def open_unix(address: Address) -> Datagrams:
+    """A receiver that has bound a datagram socket to a path, or will.
+
+    Raises:
+        MisuseError: no path, or one that is too long.
+    """
+    if address.host or not 1 < len(os.fsencode(address.path)) <= MAX_PATH_BYTES:
+        raise MisuseError(address.text, "names no socket", f"write unix:///PATH, of {MAX_PATH_BYTES} bytes at most")
+    return Datagrams(address.text, socket.AF_UNIX, address.path)

@@ -1,0 +1,43 @@
+"""A WebSocket server that Foxglove connects to."""
+
+from __future__ import annotations
+
+import foxglove
+
+from modt.address import Address
+from modt.errors import MisuseError
+from modt.sinks.scene import Scene, points_wanted
+
+BACKLOG = 16
+"""Messages that may wait for a client; a slow one misses the oldest."""
+PORT = 8765
+
+
+class FoxgloveServer(Scene):
+    """Publishes to those who are connected, at `port`."""
+
+    def __init__(self, host: str, port: int, *, points: bool) -> None:
+        self._context = foxglove.Context()  # kept: the server has no hold of it
+        super().__init__(self._context, points=points)
+        self._server = foxglove.start_server(
+            name="modt", host=host, port=port, context=self._context, message_backlog_size=BACKLOG
+        )
+        self.port = self._server.port
+
+    def close(self) -> None:
+        """Disconnect everybody."""
+        self._server.stop()
+
+
+def open_foxglove(address: Address) -> FoxgloveServer:
+    """A server at 127.0.0.1, which nobody else reaches, if no other host is given.
+
+    Raises:
+        MisuseError: it cannot be bound.
+    """
+    try:
+        port = PORT if address.port is None else address.port
+        return FoxgloveServer(address.host or "127.0.0.1", port, points=points_wanted(address))
+    except RuntimeError as error:
+        remedy = "give a host of this machine and a free port"
+        raise MisuseError(address.text, f"cannot be bound ({error})", remedy) from None

@@ -1,0 +1,149 @@
+"""MCAP recordings, in parts of limited size."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import foxglove
+from foxglove.mcap import MCAPCompression, MCAPWriteOptions
+
+from modt.address import Address
+from modt.errors import MisuseError
+from modt.sinks.output import writing
+from modt.sinks.scene import Scene, points_wanted
+from modt.types import FrameResult
+
+FLUSH_S = 1.0
+"""What a crash loses at most."""
+OPTIONS = MCAPWriteOptions(compression=MCAPCompression.Lz4, compression_threads=0)  # the cheapest, none included
+PARTS = 8
+"""Parts of a recording whose size is limited; the oldest makes room for a new one."""
+
+
+class _Output:
+    """The file of a part; keeps the error that the SDK swallows."""
+
+    def __init__(self, path: Path) -> None:
+        with writing(path):
+            self.file: BinaryIO = path.open("xb", buffering=0)
+        self.path, self.size, self.frames = path, 0, 0
+        self.error: OSError | None = None
+
+    def write(self, data: bytes | bytearray) -> int:
+        """Write some of it."""
+        try:
+            written = self.file.write(data)
+        except OSError as error:
+            self.error = error
+            raise
+        self.size += written
+        return written
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Move."""
+        return self.file.seek(offset, whence)
+
+    def flush(self) -> None:
+        """No effect: the file has no buffer."""
+
+
+class McapFile:
+    """Records at PATH, then at PATH with -1, -2 … before its suffix.
+
+    A part that cannot be written any more is left readable up to there, and the next frame begins another.
+
+    Args:
+        path: of the first part.
+        points: whether the points are recorded.
+        max_bytes: of all parts, those of earlier runs too; the oldest make room.
+        clock: [s].
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+
+    def __init__(
+        self, path: Path, *, points: bool, max_bytes: float = math.inf, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._path, self._max_bytes, self._clock = path, max_bytes, clock
+        self._context = foxglove.Context()
+        self._scene = Scene(self._context, points=points)
+        self._output, self._writer, self._flushed_s = self._part()
+
+    def write(self, result: FrameResult, /) -> None:
+        """Record a frame.
+
+        Raises:
+            ModtError: it cannot be written.
+        """
+        if self._output.error is not None or self._output.size > self._max_bytes / PARTS:
+            self.close()
+            self._output, self._writer, self._flushed_s = self._part()
+        self._scene.write(result)
+        if self._clock() - self._flushed_s >= FLUSH_S:
+            self._flushed_s = self._clock()
+            with suppress(RuntimeError):  # the output knows
+                self._writer.flush()
+        with writing(self._output.path):
+            if self._output.error is not None:
+                raise self._output.error
+        self._output.frames += 1
+
+    def ledger(self, record: dict[str, Any], /) -> None:
+        """Record a line of the ledger; whether it could be written the next frame says."""
+        self._scene.ledger(record)
+
+    def close(self) -> None:
+        """Write the index, and close the part; one without a frame, since the disk is full, is removed."""
+        with suppress(RuntimeError):
+            self._writer.close()
+        self._output.file.close()
+        if self._output.error is not None and not self._output.frames:
+            self._output.path.unlink(missing_ok=True)
+
+    def _part(self) -> tuple[_Output, foxglove.MCAPWriter, float]:
+        earlier = self._earlier()
+        self._make_room([path for _, path in earlier])
+        number = earlier[-1][0] + 1 if earlier else 0
+        name = f"{self._path.stem}-{number}{self._path.suffix}" if number else self._path.name
+        output = _Output(self._path.with_name(name))
+        writer = foxglove.open_mcap(output, context=self._context, writer_options=OPTIONS)
+        return output, writer, self._clock()
+
+    def _earlier(self) -> list[tuple[int, Path]]:
+        """Numbers and files of the parts that there are, the oldest first."""
+        form = re.compile(rf"{re.escape(self._path.stem)}(?:-(\d+))?{re.escape(self._path.suffix)}")
+        found = ((form.fullmatch(path.name), path) for path in self._path.parent.glob(f"*{self._path.suffix}"))
+        return sorted((int(match[1] or 0), path) for match, path in found if match)
+
+    def _make_room(self, parts: list[Path]) -> None:
+        with writing(self._path):
+            excess = sum(path.stat().st_size for path in parts) - self._max_bytes * (1 - 1 / PARTS)
+            for path in parts:
+                if excess > 0:
+                    excess -= path.stat().st_size
+                    path.unlink()
+
+
+def open_mcap(address: Address) -> McapFile:
+    """A recording, without the points where `points=none`, of `max_mb` at most.
+
+    Raises:
+        MisuseError: the path is none, or an option is.
+        ModtError: it cannot be written.
+    """
+    if address.host or not Path(address.path).name:
+        raise MisuseError(address.text, "names no file", "write mcap:///PATH")
+    try:
+        max_bytes = 1e6 * float(address.option("max_mb", "inf"))
+    except ValueError:
+        max_bytes = 0.0
+    if not max_bytes > 0:
+        raise MisuseError(address.text, "max_mb is no size", "write max_mb=MEGABYTES")
+    return McapFile(Path(address.path), points=points_wanted(address), max_bytes=max_bytes)

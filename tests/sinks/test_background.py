@@ -1,0 +1,165 @@
+"""Writing in the background."""
+
+import os
+import threading
+
+import pytest
+
+from modt.sinks.background import Background
+from modt.sinks.output import LedgerSink
+
+LIMIT_S = 10.0
+
+
+class Slow:
+    """A writer that a test lets go on, and that fails when told to."""
+
+    def __init__(self):
+        self.items, self.closed, self.failure = [], threading.Event(), None
+        self.entered, self.released = threading.Semaphore(0), threading.Semaphore(0)
+
+    def write(self, item):
+        self.entered.release()
+        assert self.released.acquire(timeout=LIMIT_S)
+        if self.failure is not None:
+            raise self.failure
+        self.items.append(item)
+
+    def close(self):
+        self.closed.set()
+
+
+class Records(Slow):
+    """A writer that takes lines of the ledger too."""
+
+    def ledger(self, record):
+        self.write(record)
+
+
+def settled(background, **expected):
+    """Wait until its health has some values."""
+    tick = threading.Event()
+    for _ in range(int(LIMIT_S / 0.01)):
+        if background.health().items() >= expected.items():
+            return True
+        tick.wait(0.01)
+    return False
+
+
+@pytest.fixture
+def slow():
+    writer = Slow()
+    yield writer
+    for _ in range(100):
+        writer.released.release()
+
+
+def test_items_are_written_in_their_order_and_the_writer_is_closed(slow):
+    background = Background("test", slow, 10)
+    for n in range(5):
+        background.write(n)
+        slow.released.release()
+    background.close()
+    assert slow.items == [0, 1, 2, 3, 4]
+    assert slow.closed.wait(LIMIT_S)
+    assert background.health() == {"written": 5, "dropped": 0, "failed": 0, "waiting": 0, "state": "ok"}
+
+
+def test_a_full_queue_drops_its_oldest(slow):
+    background = Background("test", slow, 3)
+    background.write("in work")
+    assert slow.entered.acquire(timeout=LIMIT_S)
+    for n in range(5):
+        background.write(n)
+    assert background.health()["dropped"] == 2
+    assert background.health()["waiting"] == 3
+    for _ in range(4):
+        slow.released.release()
+    background.close()
+    assert slow.items == ["in work", 2, 3, 4]
+
+
+def test_a_failure_is_logged_once_counted_and_tried_again(slow, caplog):
+    background = Background("test", slow, 10, retry_s=0.0)
+    slow.failure = OSError("No space left on device")
+    for n in range(3):
+        background.write(n)
+        slow.released.release()
+    assert settled(background, failed=3, state="No space left on device")
+    slow.failure = None
+    background.write("again")
+    slow.released.release()
+    assert settled(background, written=1, state="ok")
+    background.close()
+    assert [record.message.partition(";")[0] for record in caplog.records] == [
+        "test: No space left on device",
+        "test: written again",
+    ]
+    assert slow.items == ["again"]
+
+
+def test_the_end_does_not_wait_for_a_writer_that_hangs(slow, caplog):
+    background = Background("test", slow, 10)
+    for n in range(3):
+        background.write(n)
+    assert slow.entered.acquire(timeout=LIMIT_S)
+    closing = threading.Thread(target=background.close, daemon=True)
+    closing.start()
+    closing.join(LIMIT_S)
+    assert not closing.is_alive()
+    assert background.health()["dropped"] == 2
+    assert "left alone" in caplog.text
+    background.write("late")
+    assert background.health()["dropped"] == 3
+
+
+def test_what_waits_too_long_at_the_end_is_dropped(slow):
+    times, asked = iter([0.0, 0.1, 9.0]), threading.Event()
+
+    def clock():
+        asked.set()
+        return next(times)
+
+    background = Background("test", slow, 10, clock=clock)
+    background.write("in work")
+    assert slow.entered.acquire(timeout=LIMIT_S)
+    background.write("in time")
+    background.write("too late")
+    closing = threading.Thread(target=background.close, daemon=True)
+    closing.start()
+    assert asked.wait(LIMIT_S)
+    slow.released.release()
+    slow.released.release()
+    closing.join(LIMIT_S)
+    assert slow.closed.wait(LIMIT_S)
+    assert slow.items == ["in work", "in time"]
+    assert background.health()["dropped"] == 1
+
+
+def test_the_thread_of_a_loop_of_real_time_is_not(slow):
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
+    except PermissionError:
+        pytest.skip("real-time priority is not permitted")
+    try:
+        policies = []
+        slow.write = lambda item: policies.append(os.sched_getscheduler(0))
+        background = Background("test", slow, 10)
+        background.write("frame")
+        background.close()
+    finally:
+        os.sched_setscheduler(0, *before)
+    assert policies == [os.SCHED_OTHER]
+
+
+@pytest.mark.parametrize(("writer", "expected"), [(Slow(), ["frame"]), (Records(), ["frame", {"frame": 1}])])
+def test_lines_of_the_ledger_go_to_a_writer_that_takes_them(writer, expected):
+    background = Background("test", writer, 10)
+    assert isinstance(background, LedgerSink)
+    background.write("frame")
+    background.ledger({"frame": 1})
+    for _ in expected:
+        writer.released.release()
+    background.close()
+    assert writer.items == expected

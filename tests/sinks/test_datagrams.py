@@ -1,0 +1,117 @@
+"""Lines of frames as datagrams."""
+
+import json
+import socket
+
+import numpy as np
+import pytest
+
+from modt.sinks.addresses import open_sink
+from modt.sinks.datagrams import MAX_BYTES
+from modt.sinks.tracks import frame_line, frame_parts, frame_record
+from tests.results import CAR, result
+
+FRAME = result(3, [5, 4], {0: 1, 1: 2}, {1: CAR}, lost=(7,))
+
+
+def many(n):
+    return result(4, [1] * n, {k: k for k in range(n)}, lost=(n,), n_points=n)
+
+
+@pytest.fixture(params=["udp", "unix"])
+def receiver(request, tmp_path):
+    family = socket.AF_INET if request.param == "udp" else socket.AF_UNIX
+    with socket.socket(family, socket.SOCK_DGRAM) as bound:
+        bound.settimeout(10.0)
+        if request.param == "udp":
+            bound.bind(("127.0.0.1", 0))
+            yield bound, f"udp://127.0.0.1:{bound.getsockname()[1]}"
+        else:
+            bound.bind(str(tmp_path / "lines.sock"))
+            yield bound, f"unix://{tmp_path}/lines.sock"
+
+
+def test_a_frame_is_a_datagram(receiver):
+    bound, address = receiver
+    sink = open_sink(address)
+    sink.write(FRAME)
+    sink.close()
+    assert bound.recv(1 << 17).decode() == frame_line(FRAME)
+    assert sink.health() == {"written": 1, "dropped": 0, "failed": 0, "state": "ok"}
+
+
+def test_a_line_longer_than_a_datagram_comes_in_parts(receiver):
+    bound, address = receiver
+    frame = many(300)
+    sink = open_sink(address)
+    sink.write(frame)
+    sink.close()
+    parts = [json.loads(bound.recv(1 << 17))]
+    parts += [json.loads(bound.recv(1 << 17)) for _ in range(parts[0]["parts"] - 1)]
+    assert [part["part"] for part in parts] == list(range(len(parts)))
+    whole = {key: value for key, value in parts[0].items() if key not in ("part", "parts")}
+    whole["tracks"] = [track for part in parts for track in part["tracks"]]
+    assert whole == frame_record(frame)
+    assert sink.health()["written"] == 1
+
+
+@pytest.mark.parametrize(("n", "max_bytes"), [(0, 10), (1, 10), (300, MAX_BYTES), (300, 2000), (300, 600)])
+def test_no_part_is_longer_than_it_may_be_unless_one_track_is(n, max_bytes):
+    frame = many(n)
+    parts = frame_parts(frame, max_bytes)
+    longest = max(len(line) for line in frame_parts(frame, 1))
+    assert max(map(len, parts)) <= max(max_bytes, longest)
+    ids = [track["id"] for line in parts for track in json.loads(line)["tracks"]]
+    assert ids == frame.tracks.id.tolist()
+
+
+def test_a_line_that_fits_is_whole():
+    assert frame_parts(FRAME, len(frame_line(FRAME))) == [frame_line(FRAME)]
+
+
+def test_a_receiver_that_is_behind_costs_frames_and_finds_the_newer_ones_later(tmp_path, caplog):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as bound:
+        bound.bind(str(tmp_path / "lines.sock"))
+        bound.setblocking(False)
+        sink = open_sink(f"unix://{tmp_path}/lines.sock")
+        for _ in range(2000):
+            sink.write(FRAME)
+        health = sink.health()
+        assert health["dropped"] > 0
+        assert health["written"] + health["dropped"] == 2000
+        for _ in range(health["written"]):
+            bound.recv(1 << 17)
+        last = result(9, [5], {0: 1})
+        sink.write(last)
+        assert bound.recv(1 << 17).decode() == frame_line(last)
+        sink.close()
+    assert len(caplog.records) == 1
+    assert "behind" in caplog.text
+
+
+def test_a_receiver_that_comes_leaves_and_comes_back(tmp_path, caplog):
+    path = tmp_path / "lines.sock"
+    sink = open_sink(f"unix://{path}")
+    for there in (False, True, False, False, True):
+        if there:
+            with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as bound:
+                bound.bind(str(path))
+                bound.settimeout(10.0)
+                sink.write(FRAME)
+                assert bound.recv(1 << 17).decode() == frame_line(FRAME)
+            assert sink.health()["state"] == "ok"
+        else:
+            sink.write(FRAME)
+            path.unlink(missing_ok=True)
+    sink.close()
+    assert (sink.health()["written"], sink.health()["failed"]) == (2, 3)
+    assert len(caplog.records) == 2
+
+
+def test_what_cannot_be_encoded_is_refused(tmp_path):
+    sink = open_sink(f"unix://{tmp_path}/lines.sock")
+    bad = result(0, [3], {0: 1})
+    bad.tracks.x[0, 1] = np.nan
+    with pytest.raises(ValueError, match="JSON"):
+        sink.write(bad)
+    sink.close()
