@@ -109,7 +109,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     return Pipeline(
         segmenter=_segmenter(profile, fov),
         odometry=Odometry(profile.odometry),
-        tracker=Tracker(profile.tracking, mode.machine),
+        tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s),
         fusion=mode.fusion(fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost),
         classifier=TimedClassifier(counting, cost, time.thread_time_ns),

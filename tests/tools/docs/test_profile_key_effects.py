@@ -208,7 +208,6 @@ def windows(config: ProfileConfig, _folder: Path) -> str:
 
 SCENARIOS: dict[str, Scenario] = {
     "": street,
-    "a folder of scans": scan_folder,
     "sensor.height_m: null": unknown_height,
     "sensor.blind_sectors_deg": near_blind,
     "sensor.height_m: null, no ground in sight": no_ground,
@@ -233,6 +232,7 @@ SCENARIOS: dict[str, Scenario] = {
 
 
 RARE: dict[str, Scenario] = {
+    "sensor.period_s": scan_folder,
     "sensor.blind_sectors_deg": far_blind,
     "segmentation.ground.start_m": long_street,
     "segmentation.person_splitting.min_gap_columns": long_street,
