@@ -31,12 +31,12 @@ class Stages:
         self.calls.append(("segment", len(points)))
         return proposals([3, 4])
 
-    def static_tracks(self):
-        self.calls.append(("static_tracks",))
+    def static_tracks(self, stamp_s):
+        self.calls.append(("static_tracks", stamp_s))
 
     def locate(self, frame, found, static_tracks):
         self.calls.append(("locate", frame.index, len(found)))
-        static_tracks()
+        static_tracks(frame.stamp_s)
         placement = Placement(np.eye(4))
         return Located(placement, observe(found, placement.T_world_sensor))
 
@@ -86,7 +86,7 @@ def test_the_stages_run_once_and_in_order():
     assert stages.calls == [
         ("segment", 9),
         ("locate", 7, 2),
-        ("static_tracks",),
+        ("static_tracks", 0.7),
         ("follow", 0.7, 2, 2),
         ("asks", [4, 3], [True, False, True]),
         ("select", Budget(calls=5)),

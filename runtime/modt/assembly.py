@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
 
 from modt import host
 from modt.classification.decision import Decision
 from modt.classification.fusion import EveryFrame, KeyViews, OneView
-from modt.classification.instrumentation import TimedClassifier
+from modt.classification.instrumentation import TimedClassifier, warm_up
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, ProfileConfig
-from modt.energy.instrumentation import CountingClassifier
+from modt.energy.instrumentation import CountingClassifier, padded_points
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
 from modt.geometry.blind_sectors import BlindSectors
@@ -25,6 +29,8 @@ from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
 from modt.tracking.tracker import Tracker
 from modt.types import UNLIMITED, Budget, Float32, Proposals
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +81,13 @@ def _segmenter(profile: ProfileConfig, fov: FieldOfView) -> SegmenterStage:
     return SightedSegmenter(segmenter, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
 
 
+def _check_budget(budget: Budget, cost: LinearCost) -> None:
+    least_ms = cost.cost_ms(np.ones(1, np.int64))
+    if budget.cpu_ms is not None and least_ms > budget.cpu_ms:
+        cause = f"{budget.cpu_ms:.2g} ms of CPU a frame pay for no classification on this machine ({least_ms:.2g} ms)"
+        log.warning("scheduler: %s; only one frame in a hundred has one; raise the budget", cause)
+
+
 def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
     """The stages of a mode.
 
@@ -83,20 +96,23 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     """
     host.keep_freed_pages()
     limits = profile.classification
-    cost = LinearCost(limits.max_points, profile.scheduler.cost)
     network = PointNet(limits, profile.sensor)
+    size = partial(padded_points, max_points=limits.max_points, batch=limits.batch)
+    cost = LinearCost(limits.max_points, size, profile.scheduler.cost)
+    warm_up(network, cost, limits.max_points, limits.batch, time.thread_time_ns)
     fusion = profile.fusion
     if network.class_frequency is not None:
         fusion = replace(fusion, prior=network.class_frequency)
     prior = make_prior(network.boxes, network.reflectance, fusion.prior, profile.sensor)
-    classifier = TimedClassifier(network, cost, time.thread_time_ns)
+    _check_budget(mode.budget(profile), cost)
+    counting = CountingClassifier(network, ledger, limits.max_points, limits.batch)
     return Pipeline(
         segmenter=_segmenter(profile, fov),
         odometry=Odometry(profile.odometry),
-        tracker=Tracker(profile.tracking, mode.machine),
+        tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s),
         fusion=mode.fusion(fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost),
-        classifier=CountingClassifier(classifier, ledger, limits.max_points, limits.batch),
+        classifier=TimedClassifier(counting, cost, time.thread_time_ns),
         decision=Decision(profile.decision, with_background(fusion.prior)),
         ledger=ledger,
     )

@@ -48,7 +48,7 @@ class Segmenter(Protocol):
 class Odometry(Protocol):
     """Proposals to the world."""
 
-    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
         """Placement of the frame and observations of its proposals."""
 
 
@@ -59,8 +59,8 @@ class Tracker(Protocol):
     def state_names(self) -> tuple[str, ...]:
         """Name of each value of tracks.state."""
 
-    def static_tracks(self) -> StaticTracks:
-        """What the odometry needs to know of the tracks."""
+    def static_tracks(self, stamp_s: float) -> StaticTracks:
+        """What the odometry needs to know of the tracks that a frame at this time may continue."""
 
     def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """Predict, associate and update; afterwards every proposal belongs to one track."""

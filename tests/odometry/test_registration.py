@@ -307,7 +307,7 @@ def test_the_box_of_a_stationary_track_is_a_landmark_for_the_odometry():
     follower = Follower()
     for i in range(6):
         follower.follow(*frame_of([box(10, 3), box(5 + 1.0 * i, -6)], i, np.eye(4)))
-    found = follower.tracker.static_tracks()
+    found = follower.tracker.static_tracks(0.0)
     assert found.id.tolist() == [0, 1]
     assert found.stationary.tolist() == [True, False]
     assert found.candidate.tolist() == [True, False]

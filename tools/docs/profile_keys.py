@@ -23,7 +23,6 @@ PAGE = ("sensor", "classification", "scheduler", "odometry", "energy")
 
 CONDITIONS = {
     "sensor.blind_range_m": "sensor.blind_sectors_deg",
-    "sensor.period_s": "a folder of scans",
     "segmentation.sensor_height": "sensor.height_m: null",
     "segmentation.sensor_height.default_m": "sensor.height_m: null, no ground in sight",
     "segmentation.view_margin": "--fov camera",

@@ -74,7 +74,7 @@ class PoseRecorder:
         self.odometry = odometry
         self.poses: list[Float64] = []
 
-    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
         """Delegate and store the pose."""
         located = self.odometry.locate(frame, proposals, static_tracks)
         self.poses.append(located.placement.T_world_sensor)

@@ -100,7 +100,7 @@ def replay(
 def _played(recording: Recording, playback: Playback, fusion: Fusion, scored_from: int) -> tuple[Float64, Int]:
     """(R, 4) posteriors of the scored proposals, and (R,) their true classes."""
     config = SchedulerConfig()
-    scheduler = Scheduler(config.worth, LinearCost(128, config.cost))
+    scheduler = Scheduler(config.worth, LinearCost(128, lambda points: int(points.sum()), config.cost))
     pipeline = Pipeline(playback, playback, playback, fusion, scheduler, playback, playback, NullLedger())
     no_points = np.zeros((0, 4), np.float32)
     posterior, true = [np.zeros((0, N_CLASSES))], [np.zeros(0, np.int64)]

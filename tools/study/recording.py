@@ -163,12 +163,12 @@ class Playback:
         self._current = next(self._frames)
         return self._current.proposals
 
-    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
         """Placement at the origin; the recorded boxes are in the world."""
         placement = Placement(np.eye(4))
         return Located(placement, observe(proposals, placement.T_world_sensor))
 
-    def static_tracks(self) -> StaticTracks:
+    def static_tracks(self, stamp_s: float) -> StaticTracks:
         """Never called, since `locate` registers nothing."""
         raise NotImplementedError
 

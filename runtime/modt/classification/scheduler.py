@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,50 +12,86 @@ from modt.classes import N_CLASSES
 from modt.config import CallWorthConfig, CostModelConfig
 from modt.types import NONE, Bool, Budget, Float64, Int, Proposals, Tracks
 
-_POINTS_UNIT = 100.0  # points counted in hundreds, which conditions the fit
+_UNITS = np.array([1.0, 1.0, 100.0])  # a frame, a call, a hundred points, which conditions the fit
+_LEAST_MS = 1e-3  # what takes less was not measured
+_WARM_UP_WEIGHT = 0.2  # of a measurement before the first frame, over that of a frame's
+_UNDERESTIMATES = 0.005  # share accepted: half of the hundredth in which a frame may exceed its budget
+_STARVED_FRAMES = 100  # after which a call that may exceed the budget finds out
 
 
 class LinearCost:
-    """CPU time of a classification, linear in its number of points, estimated on the machine that runs it.
+    """CPU time of the classifications of a frame: linear in their number and points, as measured on this machine.
 
-    Recursive least squares with forgetting estimates time per call and per point. A margin that follows the largest
-    recent underestimate and decays slowly keeps a frame within its budget.
+    Least squares with forgetting, of errors relative to the time measured, so that a spike hardly counts. A margin
+    that grows with each underestimate, by a step, and shrinks slowly otherwise keeps these rare. Without measurements
+    the margin shrinks on, and what was measured before counts less once there is a new one.
 
     Args:
         max_points: limit of the points of a proposal handed to the network.
-        config: initial values and rates.
+        size: points that the network processes, padding included, for proposals of (R,) points.
+        config: of the margin, and the memory.
     """
 
-    def __init__(self, max_points: int, config: CostModelConfig) -> None:
-        self._max_points, self._config = max_points, config
-        self.margin = 1.0
-        self._theta = np.array([config.call_ms, config.point_ms])
-        self._unit = np.array([1.0, _POINTS_UNIT])
-        self._covariance = np.eye(2) * config.initial_variance
+    def __init__(self, max_points: int, size: Callable[[Int], int], config: CostModelConfig) -> None:
+        self._max_points, self._size, self._config = max_points, size, config
+        self._margin, self._starved = config.margin, 0
+        self._equations = np.zeros((3, 4))
+        self._fitted_ms: Float64 | None = None
 
-    def cost_ms(self, points: Int) -> Float64:
-        """(R,) upper estimate of the CPU time of proposals of (R,) points [ms]."""
-        per_call, per_point = np.maximum(self._theta, 1e-6)
-        cost: Float64 = self.margin * (per_call + per_point * np.minimum(points, self._max_points))
-        return cost
+    @property
+    def outdated(self) -> bool:
+        """Whether so many frames went without a call that a measurement is worth exceeding the budget."""
+        return self._starved >= _STARVED_FRAMES
+
+    def cost_ms(self, points: Int) -> float:
+        """Upper estimate of the CPU time of classifying proposals of (R,) points together [ms]."""
+        return float(self._terms(points) @ self._terms_ms())
+
+    def added_ms(self, points: Int) -> Float64:
+        """(R,) what each proposal of (R,) points adds to that at least, without padding [ms]."""
+        _, call_ms, point_ms = self._terms_ms() / _UNITS
+        added: Float64 = call_ms + point_ms * np.minimum(points, self._max_points)
+        return added
+
+    def warmed_up(self, points: Int, cpu_ms: float) -> None:
+        """Add the CPU time that classifying proposals of (R,) points together took before the first frame."""
+        if cpu_ms >= _LEAST_MS:
+            self._learn(points, cpu_ms, _WARM_UP_WEIGHT)
 
     def update(self, points: Int, cpu_ms: float) -> None:
         """Add the measured CPU time of classifying proposals of (R,) points together."""
-        if not len(points) or not np.isfinite(cpu_ms) or cpu_ms <= 0:
-            return
-        config = self._config
-        x = np.array([len(points), np.minimum(points, self._max_points).sum()]) / self._unit
-        scale = 1.0 / len(points)  # per call: equal weight of frames with few and with many calls
-        x, y = x * scale, cpu_ms * scale
-        theta = self._theta * self._unit
-        gain = self._covariance @ x / (config.forgetting + x @ self._covariance @ x)
-        theta = theta + gain * (y - x @ theta)
-        self._covariance = (self._covariance - np.outer(gain, x @ self._covariance)) / config.forgetting
-        # Bounded by its initial trace: without excitation it would grow for ever.
-        self._covariance *= min(1.0, 2 * config.initial_variance / np.trace(self._covariance))
-        self._theta = theta / self._unit
-        expected = float(self.cost_ms(points).sum()) / self.margin
-        self.margin = max(1.0, cpu_ms / expected, 1.0 + (self.margin - 1.0) * config.margin_decay)
+        if len(points) and _LEAST_MS <= cpu_ms < math.inf:
+            self._adapt(cpu_ms > self.cost_ms(points))
+            self._equations *= self._config.forgetting ** (1 + self._starved)
+            self._learn(points, cpu_ms, 1.0)
+            self._starved = 0
+
+    def starve(self) -> None:
+        """Add a frame that allowed none of the calls asked for."""
+        self._adapt(False)
+        self._starved += 1
+
+    def _adapt(self, underestimated: bool) -> None:
+        step = self._config.margin_step * (underestimated - _UNDERESTIMATES)
+        self._margin = max(1.0, self._margin * math.exp(step))
+
+    def _learn(self, points: Int, cpu_ms: float, weight: float) -> None:
+        """Add to the normal equations of terms_ms @ x = 1."""
+        x = self._terms(points) / cpu_ms
+        self._equations += weight * np.outer(x, np.append(x, 1.0))
+        self._fitted_ms = None
+
+    def _terms(self, points: Int) -> Float64:
+        terms: Float64 = np.array([1.0, len(points), self._size(points)]) / _UNITS
+        return terms
+
+    def _terms_ms(self) -> Float64:
+        """(3,) upper estimate of each term's CPU time [ms]."""
+        if self._fitted_ms is None:
+            normal, right = self._equations[:, :3], self._equations[:, 3]
+            little = np.eye(3) * (1e-9 + 1e-6 * np.trace(normal))
+            self._fitted_ms = np.maximum(np.linalg.solve(normal + little, right), 0.0)
+        return self._margin * self._fitted_ms
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,10 +154,15 @@ class Scheduler:
         """(R,) calls, in this order, that the budget pays for; a call that does not fit is skipped."""
         granted = np.ones(len(points), np.bool_)
         if budget.cpu_ms is not None:
-            left_ms = budget.cpu_ms
-            for i, cost_ms in enumerate(self._cost.cost_ms(points)):
-                granted[i] = cost_ms <= left_ms
-                left_ms -= cost_ms * granted[i]
+            left_ms = budget.cpu_ms - self._cost.cost_ms(points[:0])
+            for i, added_ms in enumerate(self._cost.added_ms(points).tolist()):
+                granted[i] = added_ms <= left_ms
+                left_ms -= added_ms * granted[i]
+            while granted.any() and self._cost.cost_ms(points[granted]) > budget.cpu_ms:  # by padding
+                granted[granted.nonzero()[0][-1]] = False
+            if len(points) and not granted.any():
+                self._cost.starve()
+                granted[0] = self._cost.outdated and budget.cpu_ms > 0
         if budget.calls is not None:
             granted &= np.cumsum(granted) <= budget.calls
         return granted

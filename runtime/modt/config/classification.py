@@ -31,13 +31,11 @@ class CallWorthConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CostModelConfig(StageConfig):
-    """Recursive least squares for the CPU time of a classification; set by hand."""
+    """The CPU time of a classification, fitted to the latest frames."""
 
-    call_ms: float = number(0.1, 0.0, 1000.0, "ms", "CPU time per proposal, before any measurement")
-    point_ms: float = number(0.001, 0.0, 1000.0, "ms", "CPU time per point, before any measurement")
     forgetting: float = number(0.98, 0.5, 1.0, "", "weight of the past per frame")
-    initial_variance: float = number(10.0, 0.001, 1000.0, "", "of both parameters, relative to the residual's")
-    margin_decay: float = number(0.95, 0.0, 1.0, "", "per frame, of the margin that the last underestimate left")
+    margin: float = number(1.5, 1.0, 10.0, "", "of the estimate over the fit, at the start")
+    margin_step: float = number(0.05, 0.001, 1.0, "", "by which an underestimate raises the margin's logarithm")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

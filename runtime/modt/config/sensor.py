@@ -27,7 +27,7 @@ class SensorConfig(StageConfig):
         -360.0, 360.0, 64, "deg", "from, to of each, counter-clockwise: onto the robot", pairs=True
     )
     blind_range_m: float = number(3.0, 0.1, 20.0, "m", "of returns left out in these sectors, at most")
-    period_s: float = number(0.1, 0.001, 10.0, "s", "between the scans of a folder, which has no stamps")
+    period_s: float = number(0.1, 0.001, 10.0, "s", "between sweeps, of folders without stamps and of max_missed")
     reflectance: str = choice(
         "none", ("none", "hdl-64e"), "scale; models use only the one they learnt; none: not used"
     )

@@ -92,7 +92,9 @@ class TrackingConfig(StageConfig):
     """Filter, association, regrouping and life of a track."""
 
     association: str = choice("kdop", ("kdop", "paper"), "how proposals find their tracks")
-    max_missed: int = number(8, 0, 100, "frames", "without a proposal before a track is deleted (N of a9 and a14)")
+    max_missed: int = number(
+        8, 0, 100, "frames", "of sensor.period_s, unseen, before a track is deleted (N of a9 and a14)"
+    )
     min_hits: int = number(4, 1, 1000, "frames", "observed, from which a track's velocity and class change proposals")
     envelope_decay: float = number(0.98, 0.0, 1.0, "", "kept a frame of an extent that is not seen again")
     mean_kdop_decay: float = number(0.8, 0.0, 1.0, "", "greatest weight of the past in a mean k-DOP")

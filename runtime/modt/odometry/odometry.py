@@ -34,13 +34,13 @@ class Odometry:
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
 
-    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[], StaticTracks]) -> Located:
+    def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
         """Placement of a frame, and its proposals in the world.
 
         Args:
             frame: its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
             proposals: of the frame.
-            static_tracks: after the frame before; called where there is no pose.
+            static_tracks: by the stamp of a frame, those it may continue; called where there is no pose.
         """
         given, first = frame.T_world_sensor, self._stamp_s is None
         if frame.restarts != self._restarts:
@@ -67,7 +67,7 @@ class Odometry:
             self._landmarks.clear()
             placement = placed(self._T_world_odometry @ given)
         else:
-            landmarks = self._landmarks.update(static_tracks())
+            landmarks = self._landmarks.update(static_tracks(frame.stamp_s))
             share = 1.0 if skew is None else skew.share(dt_s)
 
             def registered(placement: Placement) -> Placement:

@@ -16,6 +16,10 @@ class BackgroundMap:
 
     def __init__(self, config: BackgroundMapConfig) -> None:
         self.config = config
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all places."""
         self._kdop, self._top = np.zeros((8, 0)), np.zeros(0)
 
     def add(self, tracks: TrackTable, rows: Int) -> None:

@@ -46,6 +46,7 @@ class Tracker:
         machine: the table that drives the states.
         association: how proposals find their tracks; by default as the configuration says.
         regroupings: how proposals are corrected; by default as the configuration says.
+        period_s: of the sensor; what the configuration gives in frames of coasting is this many times as long.
     """
 
     def __init__(
@@ -54,12 +55,14 @@ class Tracker:
         machine: StateMachine,
         association: Association | None = None,
         regroupings: tuple[Regrouping, ...] | None = None,
+        period_s: float = 0.1,
     ) -> None:
         self.config, self.machine = config, machine
         self.association = association_of(config) if association is None else association
         self.regroupings = regroupings_of(config) if regroupings is None else regroupings
         none = BackgroundMapConfig(capacity=0)  # the paper classifies every new proposal
         self.background_map = BackgroundMap(none if config.association == "paper" else config.background_map)
+        self._period_s = period_s
         self._reunion = Reunion(config.fragments, config.min_hits)
         position, speed = config.filter.initial_position_sigma_m, config.filter.initial_speed_sigma_mps
         self._P_new = np.diag(np.square([position, position, np.pi, speed]))  # a heading of pi: unknown
@@ -77,8 +80,9 @@ class Tracker:
         """Name of each value of tracks.state."""
         return self.machine.names
 
-    def static_tracks(self) -> StaticTracks:
-        """What the odometry needs to know of the tracks."""
+    def static_tracks(self, stamp_s: float) -> StaticTracks:
+        """What the odometry needs to know of the tracks that a frame at this time may continue."""
+        self._forget(stamp_s)
         t = self._tracks
         return StaticTracks(
             id=t.id,
@@ -100,6 +104,7 @@ class Tracker:
         Returns:
             The live table, into which later stages write their columns; the proposals; and which tracks want a class.
         """
+        self._forget(stamp_s)
         self._predict(stamp_s)
         matches = self.association.match(self._tracks, located.observations)
         matches = self._reunion.reunite(self._tracks, located.observations, matches)
@@ -129,11 +134,30 @@ class Tracker:
             t.final[rows] = self.machine.final[t.state[rows]]
         return t.copy()
 
+    def _lapse_s(self, stamp_s: float) -> float:
+        """Time since the last frame, zero where the clock went back."""
+        return 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
+
+    def _coasting_s(self, frames: float) -> float:
+        """Time that N frames, and some more, take."""
+        return (self.config.max_missed + frames) * self._period_s
+
+    def _forget(self, stamp_s: float) -> None:
+        """Delete the tracks that would have expired in a gap; beyond N frames of it, the scene may be another one."""
+        t, lapse_s, most_s = self._tracks, self._lapse_s(stamp_s), self._coasting_s(1.5)
+        gone = t.unseen_s + lapse_s > most_s
+        if gone.any():
+            self.background_map.add(t, (gone & self._background_at_rest()).nonzero()[0])
+            self._tracks = t.renewed((~gone).nonzero()[0], 0)
+        if lapse_s > most_s:
+            self.background_map.clear()
+
     def _predict(self, stamp_s: float) -> None:
         """Equation 1, over the time since the last frame."""
-        dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
+        dt_s = self._lapse_s(stamp_s)
         self._stamp_s = stamp_s
         t, noise = self._tracks, self.config.filter
+        t.unseen_s += dt_s or self._period_s  # a clock that stands does not keep tracks alive
         t.last_class = t.object_class
         x, P = components_first(t.x, t.P)
         t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, noise.acceleration_sigma_mps2, noise.turn_sigma_radps))
@@ -149,7 +173,7 @@ class Tracker:
         x, P = kalman.update(*kalman.face(x, P, heading), z, R)
         t.x[rows], t.P[rows] = tracks_first(*kalman.turn_about(x, P))
         t.state[rows] = self.machine.joined(self.machine.transition(t.state[rows], Event.ASSOCIATED))
-        t.missed[rows] = 0
+        t.missed[rows], t.unseen_s[rows] = 0, 0.0
         t.hits[rows] += 1
         t.end_variance[rows] = matches.end_variance
         about = self._record(rows, matches.proposals, observations, matches.position)
@@ -219,9 +243,9 @@ class Tracker:
         t.final[rows], t.inherited[rows], t.posterior[rows] = self.machine.final[t.state[rows]], False, 1 / N_CLASSES
 
     def _expire(self) -> Int:
-        """After N frames without a proposal a track is deleted (a9, a14), background into the map; rows (A,) kept."""
+        """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
         t = self._tracks
-        expired = t.missed > self.config.max_missed
+        expired: Bool = (t.proposal == NONE) & (t.unseen_s > self._coasting_s(0.5))
         rows = expired.nonzero()[0]
         t.state[rows] = self.machine.transition(t.state[rows], Event.EXPIRED)
         self.background_map.add(t, (expired & self._background_at_rest()).nonzero()[0])

@@ -1,0 +1,141 @@
+"""Time without sweeps: tracks coast by time, and nothing is inherited over a gap that is longer."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from modt import assembly, profile
+from modt.classes import ObjectClass
+from modt.config import TrackingConfig
+from modt.energy.ledger import NullLedger
+from modt.geometry import FieldOfView
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.tracking.states import ACCURATE, EFFICIENT
+from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
+
+N = TrackingConfig().max_missed
+STREET = [box(10 + 4 * k, side, 2.0, 1.0) for k in range(6) for side in (-8, 8)]
+
+
+def at(stamp_s, boxes, pose=EYE):
+    frame, proposals = frame_of(boxes, 0, pose)
+    return dataclasses.replace(frame, stamp_s=stamp_s), proposals
+
+
+def settled(pose=EYE, **parts):
+    """A follower of a street of classified background, at 0 to 0.5 s."""
+    follower = Follower(**parts)
+    for k in range(6):
+        follower.follow(*at(0.1 * k, STREET, pose))
+        follower.classify(ObjectClass.BACKGROUND)
+    assert follower.tracks.final.all()
+    return follower
+
+
+@pytest.mark.parametrize("gap_s", [1.0, 5.0, 3600.0])
+@pytest.mark.parametrize("pose", [EYE, None], ids=["posed", "unposed"])
+@pytest.mark.parametrize("parts", [{}, {"machine": ACCURATE}, {"config": TrackingConfig(association="paper")}])
+def test_nothing_is_inherited_over_a_long_gap(gap_s, pose, parts):
+    follower = settled(pose, **parts)
+    tracks = follower.follow(*at(0.5 + gap_s, STREET, pose))
+    assert tracks.id.min() >= len(STREET)
+    assert not tracks.final.any()
+    assert (tracks.age == 1).all()
+    assert follower.wants_class.all()
+    assert np.isfinite(tracks.x).all()
+    for k in range(1, 5):  # and what follows is followed
+        tracks = follower.follow(*at(0.5 + gap_s + 0.1 * k, STREET, pose))
+    assert tracks.hits.tolist() == [5] * len(STREET)
+
+
+@pytest.mark.parametrize("pose", [EYE, None], ids=["posed", "unposed"])
+def test_tracks_go_on_over_as_long_a_gap_as_they_coast(pose):
+    follower = settled(pose)
+    tracks = follower.follow(*at(0.5 + 0.1 * (N + 1), STREET, pose))
+    assert tracks.id.tolist() == list(range(len(STREET)))
+    assert tracks.final.all()
+
+
+def test_a_remembered_place_is_forgotten_over_a_gap():
+    follower = settled()
+    for k in range(6, 20):
+        follower.follow(*at(0.1 * k, STREET[1:]))
+    assert follower.follow(*at(2.0, STREET)).final.all()  # recalled
+    for k in range(21, 35):
+        follower.follow(*at(0.1 * k, STREET[1:]))
+    assert not follower.follow(*at(20.0, STREET)).final.any()
+
+
+def test_a_track_whose_time_ran_out_in_a_short_gap_leaves_its_place():
+    follower = settled()
+    for k in range(6, 10):
+        follower.follow(*at(0.1 * k, STREET[1:]))
+    tracks = follower.follow(*at(1.7, STREET))  # unseen for 1.2 s, the others for 0.8
+    assert tracks.id.tolist() == [*range(1, len(STREET)), len(STREET)]
+    assert tracks.inherited.tolist() == [False] * (len(STREET) - 1) + [True]
+
+
+@pytest.mark.parametrize(("period_s", "profile_s"), [(0.1, 0.1), (0.05, 0.1), (0.04, 0.1), (0.2, 0.1), (0.05, 0.05)])
+def test_a_track_coasts_for_the_time_of_its_frames_at_any_rate(period_s, profile_s):
+    follower = Follower(period_s=profile_s)
+    for k in range(3):
+        follower.follow(*at(period_s * k, [box(10, 0)]))
+    coasted = 0
+    while len(follower.follow(*at(period_s * (3 + coasted), []))):
+        coasted += 1
+    assert coasted * period_s == pytest.approx(N * profile_s, abs=profile_s / 2 + 1e-9)
+
+
+@pytest.mark.parametrize("step_s", [0.0, -0.1])
+def test_a_clock_that_stands_or_goes_back_keeps_no_track_alive(step_s):
+    follower = settled()
+    for k in range(N):
+        assert len(follower.follow(*at(0.5 + step_s * (k + 1), []))) == len(STREET)
+    assert len(follower.follow(*at(0.5 + step_s * (N + 1), []))) == 0
+
+
+def test_a_clock_set_back_by_an_hour_goes_on_with_its_tracks():
+    follower = settled()
+    follower.follow(*at(-3600.0, STREET))
+    tracks = follower.follow(*at(-3599.9, STREET))
+    assert tracks.id.tolist() == list(range(len(STREET)))
+    assert tracks.hits.tolist() == [8] * len(STREET)
+
+
+def pipeline():
+    config = profile.load("vlp-16")
+    return assembly.pipeline(assembly.MODES["accurate"], config, FieldOfView(), NullLedger())
+
+
+def sweeps(seed, seconds=1.0, start_s=0.0, posed=True):
+    for frame in SyntheticStream("street", "vlp-16", seconds, seed):
+        pose = frame.T_world_sensor if posed else None
+        yield dataclasses.replace(frame, stamp_s=start_s + frame.stamp_s, T_world_sensor=pose)
+
+
+@pytest.mark.parametrize("posed", [True, False])
+def test_another_scene_after_a_gap_inherits_nothing(posed):
+    pipe = pipeline()
+    before = [pipe.step(frame) for frame in sweeps(3, posed=posed)][-1].tracks
+    after = [pipe.step(frame).tracks for frame in sweeps(3, start_s=6.0, posed=posed)]
+    assert len(before) > 20
+    assert before.final.any()
+    assert after[0].id.min() > before.id.max()
+    assert (after[0].age == 1).all()
+    assert abs(len(after[-1]) - len(before)) < 0.1 * len(before)
+
+
+@pytest.mark.parametrize("posed", [True, False])
+def test_every_other_sweep_missing_keeps_the_tracks(posed):
+    whole, halved = pipeline(), pipeline()
+    reference = [whole.step(frame).tracks for frame in sweeps(5, 2.0, posed=posed)][-1]
+    tracks = [halved.step(frame).tracks for frame in list(sweeps(5, 2.0, posed=posed))[1::2]][-1]
+    assert (tracks.hits >= 8).sum() > 0.6 * (reference.hits >= 16).sum() > 5
+    np.testing.assert_array_less(tracks.missed, N // 2 + 1)
+
+
+def test_the_machines_have_no_say_in_a_gap():
+    """A track matched in the last frame before it would have no row for its end."""
+    for machine in (EFFICIENT, ACCURATE):
+        assert len(settled(machine=machine).follow(*at(99.0, []))) == 0
