@@ -1,0 +1,49 @@
+"""Interface of the decoders of packets, and how an extra is imported."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from importlib import import_module
+from typing import Any, Protocol
+
+from modt.errors import MisuseError
+from modt.sources.live.sweep_reader import Reception, Sweep
+
+log = logging.getLogger(__name__)
+
+
+class PacketDecoder(Protocol):
+    """Packets of one sensor to sweeps.
+
+    Attributes:
+        profile: shipped profile of the sensor; None where there is none, or before its packets have told.
+        elevations_deg: of its beams, where the sensor's metadata have them.
+    """
+
+    profile: str | None
+    elevations_deg: tuple[float, ...] | None
+
+    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+        """Sweeps completed by a packet; what cannot be used or is missing is counted, never raised."""
+
+    def finish(self, reception: Reception) -> Sequence[Sweep]:
+        """Sweeps that only waited for more packets."""
+
+
+def extra(module: str, name: str) -> Any:
+    """A module of an extra.
+
+    Raises:
+        MisuseError: it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MisuseError(f"extra [{name}]", f"not installed ({error})", f"pip install 'modt[{name}]'") from None
+
+
+def refuse(reception: Reception, name: str, reason: str) -> None:
+    """Count a refused packet; the first for its reason is logged."""
+    if reception.refuse(reason):
+        log.warning("%s: packet refused: %s; later ones are only counted", name, reason)
