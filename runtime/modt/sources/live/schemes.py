@@ -26,12 +26,12 @@ class Scheme:
 
 SCHEMES = {
     "velodyne": Scheme(
-        "modt.sources.live.velodyne:open_velodyne",
+        "modt.sources.live.packets:open_velodyne",
         frozenset({"model", "calibration"}),
         "velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE]",
     ),
     "ouster": Scheme(
-        "modt.sources.live.ouster:open_ouster",
+        "modt.sources.live.packets:open_ouster",
         frozenset({"metadata"}),
         "ouster://[HOST][:PORT]?metadata=FILE",
     ),

@@ -48,6 +48,7 @@ class Capture:
     """The datagrams of a file, in its order; what is no UDP over IPv4 is passed over.
 
     Attributes:
+        flow: source and port of the datagrams wanted; None: all.
         flaw: why the last pass ended before the end of the file; None if it did not.
     """
 
@@ -57,8 +58,9 @@ class Capture:
         Raises:
             MisuseError: it cannot be read or is no PCAP file.
         """
-        self.path, self.flaw = path, None
-        self.flaw: str | None
+        self.path = path
+        self.flow: tuple[str, int] | None = None
+        self.flaw: str | None = None
         try:
             with path.open("rb") as file:
                 head = file.read(24)
@@ -83,8 +85,8 @@ class Capture:
                 if packet is None or packet.protocol != UDP or len(packet.payload) < 8:
                     continue
                 port, length = struct.unpack_from(">HH", packet.payload, 2)
-                payload = packet.payload[8 : length or None]
-                yield Datagram(stamp_s, packet.source, port, payload)
+                if self.flow in (None, (packet.source, port)):
+                    yield Datagram(stamp_s, packet.source, port, packet.payload[8 : length or None])
 
     def _records(self, file: BinaryIO) -> Iterator[tuple[float, bytes]]:
         """Stamp [s] and bytes of each record; ends at the first broken one."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
@@ -24,11 +24,17 @@ class PacketDecoder(Protocol):
     profile: str | None
     elevations_deg: tuple[float, ...] | None
 
+    def accepts(self, payload: bytes) -> bool:
+        """Whether a payload is a packet of points of this kind of sensor."""
+
     def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
         """Sweeps completed by a packet; what cannot be used or is missing is counted, never raised."""
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
-        """Sweeps that only waited for more packets."""
+        """The last sweep, if all that it waits for is the packet after it."""
+
+    def again(self) -> Self:
+        """A decoder of the same sensor that has seen no packet yet."""
 
 
 def extra(module: str, name: str) -> Any:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import copy
 import logging
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -63,11 +64,17 @@ class VelodyneDecoder:
         self._signature: Signature | None = None
         self._identity: bytes | None = None
         self._reach, self._dual = 0, False
-        self._clock = DeviceClock(HOUR_S)
-        self._last: Entry | None = None
-        self._turn = self._ending = NO_TURN
-        self._holes: Float64 | None = None
-        self._interval_s, self._longest_s = 0.0, LONGEST_TURN_S
+        self._forget()
+
+    def again(self) -> Self:
+        """A decoder of the same sensor that has seen no packet yet."""
+        other = copy.copy(self)
+        other._forget()
+        return other
+
+    def accepts(self, payload: bytes) -> bool:
+        """Whether a payload is a packet of points of a Velodyne."""
+        return signature_of(payload) is not None
 
     def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
         """Sweeps completed by a packet."""
@@ -88,6 +95,13 @@ class VelodyneDecoder:
                 sweeps += self._sweeps(turn, reception)
         self._turn = self._ending = NO_TURN
         return sweeps
+
+    def _forget(self) -> None:
+        self._clock = DeviceClock(HOUR_S)
+        self._last: Entry | None = None
+        self._turn = self._ending = NO_TURN
+        self._holes: Float64 | None = None
+        self._interval_s, self._longest_s = 0.0, LONGEST_TURN_S
 
     def _read(self, calibration: Path) -> Any:
         try:
