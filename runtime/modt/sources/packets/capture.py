@@ -1,4 +1,4 @@
-"""UDP datagrams of a PCAP file: classic PCAP, either byte order, µs or ns; IPv4 over Ethernet, Linux cooked or raw IP."""
+"""UDP datagrams of a PCAP file: either byte order, µs or ns; IPv4 over Ethernet, Linux cooked or raw IP."""
 
 from __future__ import annotations
 

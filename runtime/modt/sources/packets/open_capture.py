@@ -16,7 +16,7 @@ from modt.sources.packets.velodyne_models import model_named
 from modt.sources.stream import StreamInfo
 
 SUFFIXES = frozenset({".pcap", ".cap"})
-OPTIONS = ("model", "calibration", "metadata")
+"""Of PCAP files."""
 
 
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:

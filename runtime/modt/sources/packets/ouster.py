@@ -39,7 +39,7 @@ class OusterDecoder:
         self._info = info = self._read(metadata)
         self._format, self._project = sdk.PacketFormat(info), sdk.XYZLutFloat(info, False)
         self._width, self._columns = info.format.columns_per_frame, info.format.columns_per_packet
-        self._awaited = _awaited(*info.format.column_window, self._width, self._columns)
+        self._awaited = _awaited(info.format.column_window, self._width, self._columns)
         self.elevations_deg: tuple[float, ...] | None = tuple(map(float, info.beam_altitude_angles))
         self.period_s = 1.0 / (info.format.fps or 10)
         self.profile = _profile(info.prod_line)
@@ -101,7 +101,7 @@ class OusterDecoder:
 
     def _sweeps(self, reception: Reception) -> Sequence[Sweep]:
         frame = self._frame
-        missing = self._awaited & (frame.packet_timestamp == 0)
+        missing: Bool = np.logical_and(self._awaited, frame.packet_timestamp == 0)
         last_id, self._last_id = self._last_id, frame.frame_id
         if last_id is None and missing[self._awaited.argmax()]:
             return []
@@ -139,9 +139,10 @@ class OusterDecoder:
         return points
 
 
-def _awaited(first: int, last: int, width: int, columns: int) -> Bool:
+def _awaited(window: tuple[int, int], width: int, columns: int) -> Bool:
     """(packets of a frame,) those that hold a column of the window, which may reach over the seam."""
-    within: Bool = (np.arange(width) - first) % width <= (last - first) % width
+    first, last = window
+    within: Bool = np.less_equal((np.arange(width) - first) % width, (last - first) % width)
     awaited: Bool = within.reshape(-1, columns).any(axis=1)
     return awaited
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import atexit
+import gc
 import logging
 from collections.abc import Sequence
 from importlib import import_module
@@ -38,11 +40,14 @@ class PacketDecoder(Protocol):
 
 
 def extra(module: str, name: str) -> Any:
-    """A module of an extra.
+    """A module of an extra that is made with nanobind.
+
+    Such a library complains of leaks at exit unless what the loop has frozen is collected.
 
     Raises:
         MisuseError: it is not installed.
     """
+    atexit.register(gc.unfreeze)
     try:
         return import_module(module)
     except ImportError as error:

@@ -86,4 +86,6 @@ class PacketStream:
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
         if self.faults.add(Fault(index, str(self._capture.path), cause, skipped)):
             more = "; later faults are only counted" if self.faults.count == MAX_KEPT_FAULTS else ""
-            log.warning("%s: sweep %d: %s%s%s", self._capture.path, index, cause, "; skipped" if skipped else "", more)
+            log.warning(
+                "%s: sweep %d: %s%s%s", self._capture.path, index, cause, "; skipped" if skipped else "", more
+            )

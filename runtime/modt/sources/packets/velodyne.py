@@ -66,6 +66,14 @@ class VelodyneDecoder:
         self._reach, self._dual = 0, False
         self._forget()
 
+    def _forget(self) -> None:
+        self._clock = DeviceClock(HOUR_S)
+        self._last: Entry | None = None
+        self._turn: Turn = NO_TURN
+        self._ending: Turn = NO_TURN
+        self._holes: Float64 | None = None
+        self._interval_s, self._longest_s = 0.0, LONGEST_TURN_S
+
     def again(self) -> Self:
         """A decoder of the same sensor that has seen no packet yet."""
         other = copy.copy(self)
@@ -91,17 +99,10 @@ class VelodyneDecoder:
         """The last sweep, if all that it waited for is the packet after it."""
         sweeps = [*self._begin(reception)] if self._first else []
         for turn in (self._ending, self._turn):
-            if turn.entries and turn.entries[-1].end + 2 * (turn.entries[-1].end - turn.entries[-1].phase) > TURN:
+            if turn.reaches_seam:
                 sweeps += self._sweeps(turn, reception)
-        self._turn = self._ending = NO_TURN
+        self._forget()
         return sweeps
-
-    def _forget(self) -> None:
-        self._clock = DeviceClock(HOUR_S)
-        self._last: Entry | None = None
-        self._turn = self._ending = NO_TURN
-        self._holes: Float64 | None = None
-        self._interval_s, self._longest_s = 0.0, LONGEST_TURN_S
 
     def _read(self, calibration: Path) -> Any:
         try:

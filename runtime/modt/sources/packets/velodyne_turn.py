@@ -53,6 +53,12 @@ class Turn:
     before: Entry | None
     entries: list[Entry] = field(default_factory=list)
 
+    @property
+    def reaches_seam(self) -> bool:
+        """Whether its last packet is all but the last one that it can have."""
+        last = self.entries[-1] if self.entries else None
+        return last is not None and last.end + 2 * (last.end - last.phase) > TURN
+
     def insert(self, entry: Entry) -> bool:
         """Add a packet that comes late; whether it is of this turn and new."""
         times_s = [e.time_s for e in self.entries]
