@@ -142,7 +142,7 @@ class OusterDecoder:
 def _awaited(window: tuple[int, int], width: int, columns: int) -> Bool:
     """(packets of a frame,) those that hold a column of the window, which may reach over the seam."""
     first, last = window
-    within: Bool = np.less_equal((np.arange(width) - first) % width, (last - first) % width)
+    within = np.asarray((np.arange(width) - first) % width <= (last - first) % width)
     awaited: Bool = within.reshape(-1, columns).any(axis=1)
     return awaited
 

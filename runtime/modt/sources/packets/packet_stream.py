@@ -24,6 +24,7 @@ class PacketStream:
 
     Attributes:
         info, faults: as in Stream.
+        capture: the datagrams of the sensor.
         reception: counts of the last pass.
     """
 
@@ -37,7 +38,7 @@ class PacketStream:
     ) -> None:
         """The frames with first <= index < last; each pass has a decoder of its own, made from this one."""
         self.info, self.faults, self.reception = info, Faults(), Reception()
-        self._capture, self._decoder, self._first, self._last = capture, decoder, first, last
+        self.capture, self._decoder, self._first, self._last = capture, decoder, first, last
 
     def __iter__(self) -> Iterator[Frame]:
         self.reception = reception = Reception()
@@ -67,12 +68,12 @@ class PacketStream:
         first, end = max(first, self._first), min(ends, default=None)
         nothing = end is not None and end <= first
         info = replace(self.info, end=end, n_frames=0 if nothing else None)
-        return type(self)(info, self._capture, self._decoder, first, first if nothing else end)
+        return type(self)(info, self.capture, self._decoder, first, first if nothing else end)
 
     def _sweeps(self, reception: Reception) -> Iterator[Sweep]:
         """All sweeps; after them, what was refused and where the file is broken are faults."""
         decoder, index = self._decoder.again(), 0
-        for datagram in self._capture:
+        for datagram in self.capture:
             reception.messages += 1
             for sweep in decoder.decode(datagram.stamp_s, datagram.payload, reception):
                 yield sweep
@@ -80,12 +81,10 @@ class PacketStream:
         yield from decoder.finish(reception)
         for reason, count in reception.refused.items():
             self._fault(index, f"{count} packets refused: {reason}", skipped=False)
-        if self._capture.flaw is not None:
-            self._fault(index, self._capture.flaw, skipped=False)
+        if self.capture.flaw is not None:
+            self._fault(index, self.capture.flaw, skipped=False)
 
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
-        if self.faults.add(Fault(index, str(self._capture.path), cause, skipped)):
+        if self.faults.add(Fault(index, str(self.capture.path), cause, skipped)):
             more = "; later faults are only counted" if self.faults.count == MAX_KEPT_FAULTS else ""
-            log.warning(
-                "%s: sweep %d: %s%s%s", self._capture.path, index, cause, "; skipped" if skipped else "", more
-            )
+            log.warning("%s: sweep %d: %s%s%s", self.capture.path, index, cause, "; skipped" if skipped else "", more)
