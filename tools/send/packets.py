@@ -5,10 +5,10 @@
     ... --loss P --duplicates P --reordering P --garbage P --seed N
     ... --write FILE.pcap
 
-A capture is repeated as if the sensor had gone on, whole turns of it, until --seconds are over; with --once it is sent
-as it is. Of a STREAM of scans (a KITTI drive; default: the synthetic street), the packets of an ideal sensor are made,
-whose calibration goes to FILE.yaml for the receiver. Faults are shares of the packets, the same for the same seed.
-With --write the packets go to a file instead.
+The whole turns of a capture are repeated as if the sensor had gone on, until --seconds are over; with --once it is
+sent as it is. Of a STREAM of scans (a KITTI drive; default: the synthetic street), the packets of an ideal sensor are
+made, whose calibration goes to FILE.yaml for the receiver. Faults are shares of the packets, the same for the same
+seed. With --write the packets go to a file instead.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from modt import assets
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.device_clock import DeviceClock
-from modt.sources.packets.packet_decoder import extra, refuse
+from modt.sources.packets.packet_decoder import extra, one_line, refuse
 from modt.types import Bool, Float32
 
 MAX_LOST_FRAMES = 20
@@ -86,7 +86,7 @@ class OusterDecoder:
         except OSError as error:
             raise MisuseError(metadata, f"cannot be read ({error.strerror})", remedy) from None
         except Exception as error:  # of the SDK's parser, of no common type
-            raise MisuseError(metadata, f"no metadata of an Ouster ({error})", remedy) from None
+            raise MisuseError(metadata, f"no metadata of an Ouster ({one_line(error)})", remedy) from None
 
     def _flaw(self, payload: bytes) -> str | None:
         """Why a payload is no packet of points that fits the metadata; None if it is one."""
@@ -143,8 +143,7 @@ def _awaited(window: tuple[int, int], width: int, columns: int) -> Bool:
     """(packets of a frame,) those that hold a column of the window, which may reach over the seam."""
     first, last = window
     within = np.asarray((np.arange(width) - first) % width <= (last - first) % width)
-    awaited: Bool = within.reshape(-1, columns).any(axis=1)
-    return awaited
+    return np.asarray(within.reshape(-1, columns).any(axis=1))
 
 
 def _profile(product_line: str) -> str | None:

@@ -12,6 +12,8 @@ from typing import Any, Protocol, Self
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
 
+MAX_QUOTED = 200
+
 log = logging.getLogger(__name__)
 
 
@@ -52,6 +54,11 @@ def extra(module: str, name: str) -> Any:
         return import_module(module)
     except ImportError as error:
         raise MisuseError(f"extra [{name}]", f"not installed ({error})", f"pip install 'modt[{name}]'") from None
+
+
+def one_line(error: Exception) -> str:
+    """What a library says, as part of a line."""
+    return " ".join(str(error).split())[:MAX_QUOTED]
 
 
 def refuse(reception: Reception, name: str, reason: str) -> None:

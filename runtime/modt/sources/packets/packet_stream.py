@@ -75,10 +75,12 @@ class PacketStream:
         decoder, index = self._decoder.again(), 0
         for datagram in self.capture:
             reception.messages += 1
-            for sweep in decoder.decode(datagram.stamp_s, datagram.payload, reception):
-                yield sweep
-                index += 1
-        yield from decoder.finish(reception)
+            sweeps = decoder.decode(datagram.stamp_s, datagram.payload, reception)
+            yield from sweeps
+            index += len(sweeps)
+        last = decoder.finish(reception)
+        yield from last
+        index += len(last)
         for reason, count in reception.refused.items():
             self._fault(index, f"{count} packets refused: {reason}", skipped=False)
         if self.capture.flaw is not None:

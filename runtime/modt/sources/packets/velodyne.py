@@ -13,7 +13,7 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.device_clock import DeviceClock
-from modt.sources.packets.packet_decoder import extra, refuse
+from modt.sources.packets.packet_decoder import extra, one_line, refuse
 from modt.sources.packets.velodyne_models import (
     DUAL,
     IDENTITY_AT,
@@ -109,7 +109,7 @@ class VelodyneDecoder:
             return self._library.Calibration.read(str(calibration))
         except Exception as error:  # of the library's YAML parser, of no common type
             remedy = "give a calibration in the format of ROS's velodyne_pointcloud"
-            raise MisuseError(calibration, f"no calibration ({error})", remedy) from None
+            raise MisuseError(calibration, f"no calibration ({one_line(error)})", remedy) from None
 
     def _begin(self, reception: Reception) -> Sequence[Sweep]:
         """Recognise the model by the packets kept, and decode them."""

@@ -55,9 +55,9 @@ class Turn:
 
     @property
     def reaches_seam(self) -> bool:
-        """Whether its last packet is all but the last one that it can have."""
+        """Whether the packet after its last one would be of the next turn."""
         last = self.entries[-1] if self.entries else None
-        return last is not None and last.end + 2 * (last.end - last.phase) > TURN
+        return last is not None and last.end + (last.end - last.phase) // 4 > TURN
 
     def insert(self, entry: Entry) -> bool:
         """Add a packet that comes late; whether it is of this turn and new."""
