@@ -155,6 +155,28 @@ def test_a_sector_that_the_sensor_is_set_not_to_see_is_not_lost():
     assert np.abs(bearing_deg(sweeps[0].points)).max() < 100
 
 
+def test_a_sweep_of_a_sector_is_handed_over_when_its_sensor_pauses():
+    timed = [(at_s, p) for at_s, p in packets() if not 90 < azimuth_deg(p) < 270]
+    whole, _ = sweeps_of(timed)
+    decoder, reception = VelodyneDecoder("sensor"), Reception()
+    sweeps, paused = [], []
+    for i, (at_s, payload) in enumerate(timed):
+        sweeps += decoder.decode(at_s, payload, reception)
+        if i + 1 < len(timed) and timed[i + 1][0] - at_s > 0.01:
+            paused.append(len(decoder.pause(reception)))
+            sweeps += decoder.pause(reception)  # once only
+    assert paused[:1] == [0]  # the sector is known after a turn
+    assert paused.count(1) == len(whole) - 1
+    assert reception.lost == 0
+
+
+def test_a_pause_within_a_turn_hands_over_nothing():
+    decoder, reception = VelodyneDecoder("sensor"), Reception()
+    for at_s, payload in packets():
+        decoder.decode(at_s, payload, reception)
+        assert not decoder.pause(reception)
+
+
 def restamped(payload, by_s):
     stamp_us = struct.unpack_from("<I", payload, 1200)[0] + round(by_s * 1e6)
     return payload[:1200] + struct.pack("<I", stamp_us % 3_600_000_000) + payload[1204:]

@@ -17,6 +17,8 @@ log = logging.getLogger(__name__)
 MAX_BYTES = 65_535
 BUFFER_BYTES = 4 * 2**20
 """Asked of the kernel for packets received: a second of the fastest sensor."""
+PAUSE_S = 0.01
+"""Time without a packet after which a sensor that does not look all round may have ended its sweep."""
 
 
 class PacketReader:
@@ -41,12 +43,15 @@ class PacketReader:
     def read(self, timeout_s: float) -> Sequence[Sweep]:
         """Sweeps finished by the packets received until the timeout; returns as soon as there is one."""
         until_s = time.monotonic() + timeout_s
-        self._socket.settimeout(timeout_s)
+        self._socket.settimeout(min(timeout_s, PAUSE_S))
         while True:
             try:
                 payload, address = self._socket.recvfrom(MAX_BYTES)
-            except TimeoutError:
-                return []
+            except (TimeoutError, BlockingIOError):
+                sweeps = self.decoder.pause(self.reception)
+                if sweeps or time.monotonic() >= until_s:
+                    return sweeps
+                continue
             self.reception.messages += 1
             if self._source not in (None, address[0]):
                 self.reception.refuse("from another address")

@@ -69,9 +69,11 @@ class OusterDecoder:
             return []
         return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
 
-    def finish(self, reception: Reception) -> Sequence[Sweep]:
-        """None: the SDK completes a frame by its last packet."""
+    def pause(self, reception: Reception) -> Sequence[Sweep]:
+        """None: the SDK completes a frame by the last packet of its window."""
         return []
+
+    finish = pause
 
     def _forget(self) -> None:
         used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]

@@ -34,6 +34,9 @@ class PacketDecoder(Protocol):
     def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
         """Sweeps completed by a packet; what cannot be used or is missing is counted, never raised."""
 
+    def pause(self, reception: Reception) -> Sequence[Sweep]:
+        """The sweep, if the sensor is known not to look any further in this turn; called where it sends nothing."""
+
     def finish(self, reception: Reception) -> Sequence[Sweep]:
         """The last sweep, if all that it waits for is the packet after it."""
 

@@ -95,6 +95,14 @@ class VelodyneDecoder:
         self._first.append((received_s, payload))
         return self._begin(reception) if len(self._first) == RECOGNISED_BY else []
 
+    def pause(self, reception: Reception) -> Sequence[Sweep]:
+        """The sweep, if the turn has reached where it ended in the turn before: what the sensor is set not to see."""
+        turn = self._turn
+        if self._holes is None or not turn.ends_at(self._holes):
+            return []
+        self._turn = Turn(turn.began_s, None, turn.entries)  # handed over
+        return self._sweeps(turn, reception)
+
     def finish(self, reception: Reception) -> Sequence[Sweep]:
         """The last sweep, if all that it waited for is the packet after it."""
         sweeps = [*self._begin(reception)] if self._first else []

@@ -59,6 +59,14 @@ class Turn:
         last = self.entries[-1] if self.entries else None
         return last is not None and last.end + (last.end - last.phase) // 4 > TURN
 
+    def ends_at(self, holes: Float64) -> bool:
+        """Whether a hole of the turn before, of which it was the beginning, is reached."""
+        last = self.entries[-1] if self.entries else None
+        if last is None or self.before is None:
+            return False
+        step = last.phase - self.entries[-2].phase if len(self.entries) > 1 else 0
+        return bool((np.abs(last.phase - TURN - holes) <= step / 2).any())
+
     def insert(self, entry: Entry) -> bool:
         """Add a packet that comes late; whether it is of this turn and new."""
         times_s = [e.time_s for e in self.entries]
