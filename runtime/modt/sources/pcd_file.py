@@ -88,8 +88,9 @@ def _ascii(path: Path, header: Header, body: bytes) -> Mapping[str, NDArray[Any]
         raise ScanError(path, "its text holds what is no number", SKIPPED) from None
     starts = np.cumsum((0, *header.counts))
     integral = [np.issubdtype(kind, np.integer) for kind in header.kinds]
-    rows = zip(header.names, starts, integral, strict=False)
-    return {name: table[:, at].astype(np.int64) if whole else table[:, at] for name, at, whole in rows}
+    columns = zip(header.names, starts, integral, strict=False)
+    with np.errstate(invalid="ignore"):
+        return {name: table[:, at].astype(np.int64) if whole else table[:, at] for name, at, whole in columns}
 
 
 def _binary(path: Path, header: Header, body: bytes) -> Mapping[str, NDArray[Any]]:

@@ -44,8 +44,7 @@ def read_ply(path: Path, raw: bytes) -> Float32:
         encoding, elements = _header(raw[:end].decode("ascii", "replace"))
         before = list(takewhile(lambda element: element.name != "vertex", elements))
         vertex = elements[len(before)]
-        rows = {e.name: np.dtype([(n, BYTE_ORDERS[encoding] + TYPES[t]) for n, t in e.properties]) for e in before}
-        row = np.dtype([(n, BYTE_ORDERS[encoding] + TYPES[t]) for n, t in vertex.properties])
+        skipped, row = [_row(element, encoding) for element in before], _row(vertex, encoding)
     except (KeyError, ValueError, IndexError):
         raise ScanError(path, "its header cannot be read, or has lists before or in its vertices", SKIPPED) from None
     if not 0 <= vertex.n_rows <= MAX_POINTS or any(not 0 <= e.n_rows <= MAX_POINTS for e in before) or not row.names:
@@ -53,7 +52,7 @@ def read_ply(path: Path, raw: bytes) -> Float32:
     if encoding == "ascii":
         table = _text(path, raw[start:], sum(e.n_rows * len(e.properties) for e in before), vertex.n_rows, row)
     else:
-        start += sum(e.n_rows * rows[e.name].itemsize for e in before)
+        start += sum(e.n_rows * kind.itemsize for e, kind in zip(before, skipped, strict=True))
         if len(raw) - start < vertex.n_rows * row.itemsize:
             raise ScanError(path, f"truncated: {len(raw) - start} bytes for {vertex.n_rows} points", SKIPPED)
         table = np.frombuffer(raw, row, vertex.n_rows, start)
@@ -72,6 +71,10 @@ def _header(text: str) -> tuple[str, list[Element]]:
             case ["property", *kind, name]:
                 elements[-1].properties.append((name, " ".join(kind)))
     return encoding, elements
+
+
+def _row(element: Element, encoding: str) -> np.dtype[Any]:
+    return np.dtype([(name, BYTE_ORDERS[encoding] + TYPES[kind]) for name, kind in element.properties])
 
 
 def _text(path: Path, body: bytes, skipped: int, n_rows: int, row: np.dtype[Any]) -> NDArray[Any]:
