@@ -60,7 +60,7 @@ def ideal_calibration(layout: Layout) -> str:
 
 
 def packets_of(frames: Sequence[Frame], layout: Layout, period_s: float) -> Iterator[tuple[float, bytes]]:
-    """Time [s] from the first packet, and payload, of sweeps that follow one another without a gap."""
+    """Time [s] at which each packet is full, and payload, of sweeps that follow one another without a gap."""
     per_turn = round(period_s * 1e6 / layout.firing_us)
     images = (_image(frame.points, layout, per_turn) for frame in frames)
     firings = ((i, *firing) for i, image in enumerate(images) for firing in enumerate(image))
@@ -69,8 +69,9 @@ def packets_of(frames: Sequence[Frame], layout: Layout, period_s: float) -> Iter
     for sweep, column, firing in firings:
         kept.append((sweep * per_turn + column, firing))
         if len(kept) == layout.firings:
-            at_us = next(packet) * layout.firings * layout.firing_us
-            yield at_us * 1e-6, _packet(kept, layout, per_turn, at_us)
+            packet_us = layout.firings * layout.firing_us
+            at_us = next(packet) * packet_us
+            yield (at_us + packet_us) * 1e-6, _packet(kept, layout, per_turn, at_us)
             kept = []
 
 

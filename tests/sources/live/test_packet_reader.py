@@ -40,7 +40,7 @@ def to(port):
 class EchoDecoder:
     """Each packet is a sweep."""
 
-    profile = elevations_deg = None
+    name, profile, elevations_deg = "sensor", None, None
 
     def decode(self, received_s: float, payload: bytes, reception: Reception) -> list[object]:
         return [(received_s, payload)]
@@ -63,7 +63,7 @@ def test_packets_of_another_address_are_refused(port, to):
     to.send(b"packet")
     assert reader.read(0.2) == []
     reader.close()
-    assert reader.reception.refused == {"from another address": 1}
+    assert reader.reception.refused == {"from another address than the sensor's": 1}
 
 
 def test_closing_ends_a_read(port):
@@ -127,7 +127,7 @@ def test_sweeps_over_loopback_are_those_of_the_file(port, to, tmp_path):
     assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in file]
     assert np.diff([f.stamp_s for f in frames]) == pytest.approx(np.diff([f.stamp_s for f in file]), abs=0.02)
     assert abs(frames[-1].stamp_s - time.time()) < 30
-    assert live.reader.decoder.profile == "vlp-16"
+    assert live.reader.profile == "vlp-16"
     health = live.health()
     assert (health["messages"], health["lost_messages"], health["refused_messages"]) == (len(timed), 0, {})
     assert (health["sweeps"], health["incomplete_sweeps"], health["dropped_sweeps"]) == (len(file), 0, 0)

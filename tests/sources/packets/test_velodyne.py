@@ -211,6 +211,19 @@ def test_the_model_is_by_its_pace_or_as_declared_and_a_contradiction_is_one_line
         assert equal(sweeps, sweeps_of(packets())[0])
 
 
+@pytest.mark.parametrize("declared", ["vlp-16", "hdl-64e", "vls-128", "vlp-32c"])
+@pytest.mark.parametrize("sent", ["vlp-16", "hdl-64e"])
+def test_a_wrong_declaration_breaks_nothing(sent, declared):
+    sweeps, _ = sweeps_of(packets(sent, 5 if sent == "vlp-16" else 4), model=model_named(declared))
+    assert all(np.isfinite(s.points).all() for s in sweeps)
+
+
+def test_single_returns_of_any_kind_are_taken():
+    single, _ = sweeps_of(packets())
+    last = [(at_s, payload[:1204] + b"\x38" + payload[1205:]) for at_s, payload in packets()]
+    assert equal(sweeps_of(last)[0], single)
+
+
 def test_an_unknown_model_is_counted():
     timed = with_identity(packets(), 0x77)
     sweeps, reception = sweeps_of(timed)

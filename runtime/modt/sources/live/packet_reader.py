@@ -10,7 +10,7 @@ from contextlib import suppress
 
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.packet_decoder import PacketDecoder, refuse
 
 log = logging.getLogger(__name__)
 
@@ -26,7 +26,7 @@ class PacketReader:
 
     Attributes:
         reception: counts of packets.
-        decoder: of the packets; its `profile` says what the sensor is, once it is known.
+        decoder: of the packets.
     """
 
     def __init__(
@@ -39,6 +39,11 @@ class PacketReader:
         """`source`: address of the sensor, packets of others are refused; None: any. `clock`: s since 1970."""
         self.reception, self.decoder = Reception(), decoder
         self._socket, self._source, self._clock = bound, source, clock
+
+    @property
+    def profile(self) -> str | None:
+        """Shipped profile of the sensor; None where there is none, or before its packets have told."""
+        return self.decoder.profile
 
     def read(self, timeout_s: float) -> Sequence[Sweep]:
         """Sweeps finished by the packets received until the timeout; returns as soon as there is one."""
@@ -54,7 +59,7 @@ class PacketReader:
                 continue
             self.reception.messages += 1
             if self._source not in (None, address[0]):
-                self.reception.refuse("from another address")
+                refuse(self.reception, self.decoder.name, "from another address than the sensor's")
             elif sweeps := self.decoder.decode(self._clock(), payload, self.reception):
                 return sweeps
             if time.monotonic() >= until_s:

@@ -21,10 +21,12 @@ class PacketDecoder(Protocol):
     """Packets of one sensor to sweeps.
 
     Attributes:
+        name: of the source, for messages.
         profile: shipped profile of the sensor; None where there is none, or before its packets have told.
         elevations_deg: of its beams, where the sensor's metadata have them.
     """
 
+    name: str
     profile: str | None
     elevations_deg: tuple[float, ...] | None
 

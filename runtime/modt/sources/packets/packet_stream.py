@@ -24,7 +24,7 @@ class PacketStream:
 
     Attributes:
         info, faults: as in Stream.
-        capture: the datagrams of the sensor.
+        capture, decoder: the datagrams of the sensor, and what decodes them.
         reception: counts of the last pass.
     """
 
@@ -38,7 +38,7 @@ class PacketStream:
     ) -> None:
         """The frames with first <= index < last; each pass has a decoder of its own, made from this one."""
         self.info, self.faults, self.reception = info, Faults(), Reception()
-        self.capture, self._decoder, self._first, self._last = capture, decoder, first, last
+        self.capture, self.decoder, self._first, self._last = capture, decoder, first, last
 
     def __iter__(self) -> Iterator[Frame]:
         self.reception = reception = Reception()
@@ -68,11 +68,11 @@ class PacketStream:
         first, end = max(first, self._first), min(ends, default=None)
         nothing = end is not None and end <= first
         info = replace(self.info, end=end, n_frames=0 if nothing else None)
-        return type(self)(info, self.capture, self._decoder, first, first if nothing else end)
+        return type(self)(info, self.capture, self.decoder, first, first if nothing else end)
 
     def _sweeps(self, reception: Reception) -> Iterator[Sweep]:
         """All sweeps; after them, what was refused and where the file is broken are faults."""
-        decoder, index = self._decoder.again(), 0
+        decoder, index = self.decoder.again(), 0
         for datagram in self.capture:
             reception.messages += 1
             sweeps = decoder.decode(datagram.stamp_s, datagram.payload, reception)

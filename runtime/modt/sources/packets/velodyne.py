@@ -15,9 +15,7 @@ from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.device_clock import DeviceClock
 from modt.sources.packets.packet_decoder import extra, one_line, refuse
 from modt.sources.packets.velodyne_models import (
-    DUAL,
     IDENTITY_AT,
-    RETURN_AT,
     STAMP_AT,
     TURN,
     Model,
@@ -39,6 +37,8 @@ LONGEST_TURN_S = 0.3
 """At the slowest that the heads are set to turn, and half as long again."""
 
 
+RETURN = 7
+"""Column of the library's table: which return of a firing."""
 NO_TURN = Turn(0.0, None)
 
 
@@ -63,7 +63,7 @@ class VelodyneDecoder:
         self._first: list[tuple[float, bytes]] | None = []
         self._signature: Signature | None = None
         self._identity: bytes | None = None
-        self._reach, self._dual = 0, False
+        self._reach, self._packet_s = 0, 0.0
         self._forget()
 
     def _forget(self) -> None:
@@ -77,6 +77,7 @@ class VelodyneDecoder:
     def again(self) -> Self:
         """A decoder of the same sensor that has seen no packet yet."""
         other = copy.copy(self)
+        other._first = None if self._first is None else []
         other._forget()
         return other
 
@@ -129,7 +130,7 @@ class VelodyneDecoder:
             return []
         self._first, self._signature, self.profile = None, signature, model.profile
         self._identity = None if model.signature.identity is None else bytes([model.signature.identity])
-        self._reach, self._dual = model.reach, first[0][1][RETURN_AT] == DUAL and self._identity is not None
+        self._reach, self._packet_s = model.reach, model.interval_us * 1e-6
         calibration = self._calibration
         if calibration is None and model.calibration is not None:
             calibration = self._library.get_bundled_calibration(model.calibration)
@@ -145,7 +146,7 @@ class VelodyneDecoder:
             refuse(reception, self.name, "of another model than the packets before")
             return []
         stamp_s = int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little") * 1e-6
-        time_s = self._clock.unwrapped(stamp_s, received_s)
+        time_s = self._clock.unwrapped(stamp_s, received_s - self._packet_s)  # it is sent when it is full
         first, last = azimuths(payload)
         phase = (first + AHEAD) % TURN
         if self._identity is not None:  # the library checks it, and there are packets that lie
@@ -199,9 +200,8 @@ class VelodyneDecoder:
         table = self._table([e for e in entries if e.phase >= self._reach and e.end <= TURN - self._reach])
         left, right = self._table(heads), self._table(tails)
         table = np.concatenate([left[left[:, 1] >= 0], table, right[right[:, 1] < 0]])
-        if self._dual:
-            table = table[table[:, 7] != self._library.ReturnMode.LAST.value]
-        points: Float32 = table[:, :4].copy()
+        stronger = table[:, RETURN] != self._library.ReturnMode.LAST.value
+        points: Float32 = table[stronger, :4] if stronger.any() else table[:, :4].copy()
         points[:, 3] /= 255.0
         return points
 
