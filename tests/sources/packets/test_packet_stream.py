@@ -90,5 +90,6 @@ def test_an_ouster_is_recognised_by_the_metadata_beside_its_capture(kitti_root):
     folder = kitti_root / "ouster"
     stream = open_stream(folder / "OS-1-32-G_v2.1.1_1024x10.pcap")
     assert (stream.info.layout, stream.info.profile, len(list(stream))) == ("Ouster packets", "os1-32", 1)
+    assert len(stream.info.elevations_deg) == 32
     named = {"metadata": str(folder / "OS-1-128_v2.3.0_1024x10.json")}
     assert len(list(open_stream(folder / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", capture=named))) == 3

@@ -94,10 +94,11 @@ def test_overtaken_and_doubled_packets_change_nothing():
     timed = list(packets())
     whole, _ = sweeps_of(timed)
     timed[120], timed[121] = timed[121], timed[120]
-    timed.insert(130, timed[129])
+    timed[130:130] = timed[127:130]
+    timed.insert(200, timed[100])
     sweeps, reception = sweeps_of(timed)
     assert equal(sweeps, whole)
-    assert (reception.lost, reception.refused) == (0, {"late or twice": 1})
+    assert (reception.lost, reception.refused) == (0, {"late or twice": 4})
 
 
 def test_garbage_and_packets_of_another_model_are_counted(caplog):
@@ -131,6 +132,16 @@ def test_a_silence_begins_anew_at_the_next_seam():
     assert np.diff([s.stamp_s for s in sweeps]) == pytest.approx([5.0, 0.1, 0.1], abs=1e-3)
 
 
+@pytest.mark.parametrize(("first", "lost"), [(160, 60), (160, 140), (160, 200)])
+def test_a_burst_of_losses_is_counted_whole(first, lost):
+    timed = packets(sweeps=8)
+    sweeps, reception = sweeps_of(timed[:first] + timed[first + lost :])
+    assert reception.lost == lost
+    whole = [s.points.tobytes() for s in sweeps_of(timed)[0]]
+    assert 3 <= len(sweeps) <= len(whole)
+    assert all(s.points.tobytes() in whole for s in sweeps if s.complete)
+
+
 def test_a_sensor_switched_on_again_goes_on():
     timed = packets()
     later = [(at_s + 9.0, payload) for at_s, payload in timed]  # its stamps begin again
@@ -142,7 +153,8 @@ def test_a_head_that_stands_still_gives_no_sweep_and_what_is_kept_is_bounded():
     payload = packets()[100][1]
     decoder, reception = VelodyneDecoder("sensor"), Reception()
     for k in range(2000):
-        assert not decoder.decode(BEGAN_S + 1e-3 * k, restamped(payload, 1e-3 * k), reception)
+        still = payload[:2] + struct.pack("<H", 9000 + k % 3) + payload[4:]
+        assert not decoder.decode(BEGAN_S + 1e-3 * k, restamped(still, 1e-3 * k), reception)
     assert len(decoder._turn.entries) < 400
 
 

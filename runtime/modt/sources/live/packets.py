@@ -60,5 +60,6 @@ def _stream(
         camera=None,
         has_poses=False,
         profile=decoder.profile,
+        elevations_deg=decoder.elevations_deg,
     )
     return LiveStream(info, reader, cores=cores)

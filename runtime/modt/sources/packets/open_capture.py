@@ -46,6 +46,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         camera=None,
         has_poses=False,
         profile=decoder.profile,
+        elevations_deg=decoder.elevations_deg,
     )
     return PacketStream(info, capture, decoder)
 

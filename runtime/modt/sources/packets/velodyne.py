@@ -24,7 +24,7 @@ from modt.sources.packets.velodyne_models import (
     recognised,
     signature_of,
 )
-from modt.sources.packets.velodyne_turn import AHEAD, Entry, Turn
+from modt.sources.packets.velodyne_turn import AHEAD, SAME_S, Entry, Turn
 from modt.types import Float32, Float64
 
 log = logging.getLogger(__name__)
@@ -35,6 +35,10 @@ RECOGNISED_BY = 20
 """Packets by which the model is recognised."""
 LONGEST_TURN_S = 0.3
 """At the slowest that the heads are set to turn, and half as long again."""
+LEAST_TURN = 1000
+"""A head that falls back by more has begun another turn [0.01 deg]; by less, it stands still."""
+SILENCE_S = 1.0
+"""Packets missing for longer are those of a sensor that was off."""
 
 
 RETURN = 7
@@ -157,17 +161,17 @@ class VelodyneDecoder:
     def _follow(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
         """Add a packet to its turn; the sweep that ends with it."""
         last = self._last
-        if last is None or abs(entry.time_s - last.time_s) > self._longest_s:
+        gap_s = 0.0 if last is None else entry.time_s - last.time_s
+        if last is None or max(abs(gap_s), entry.time_s - self._turn.began_s) > self._longest_s:
+            if self._interval_s and 0 < gap_s < SILENCE_S:
+                reception.lost += round(gap_s / self._interval_s) - 1
             return self._start(entry)
-        if entry.time_s <= last.time_s:
+        if gap_s < SAME_S:
             if not self._turn.insert(entry):
                 refuse(reception, self.name, "late or twice")
             return []
-        if entry.time_s - self._turn.began_s > self._longest_s:
-            reception.lost += round((entry.time_s - last.time_s) / self._interval_s) if self._interval_s else 0
-            return self._start(entry)
         self._last = entry
-        if entry.phase < last.phase:
+        if entry.phase < last.phase - LEAST_TURN:
             self._ending, self._turn = self._turn, Turn(entry.time_s, last, self._turn.shared(self._reach))
         self._turn.entries.append(entry)
         if not self._ending.entries:

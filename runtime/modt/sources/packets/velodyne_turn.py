@@ -16,6 +16,8 @@ AHEAD = TURN // 2
 """Phase of a head that looks straight ahead; it is 0 behind the sensor."""
 MIN_HOLE = 10
 """Missing packets in a row that may be what the sensor is set not to see."""
+SAME_S = 0.5e-6
+"""Packets whose times differ by less are one packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +71,7 @@ class Turn:
 
     def insert(self, entry: Entry) -> bool:
         """Add a packet that comes late; whether it is of this turn and new."""
-        times_s = [e.time_s for e in self.entries]
-        if not times_s[0] < entry.time_s or entry.time_s in times_s:
+        if entry.time_s < self.began_s or any(abs(entry.time_s - e.time_s) < SAME_S for e in self.entries):
             return False
         insort(self.entries, entry, key=attrgetter("time_s"))
         return True
