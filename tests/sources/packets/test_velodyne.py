@@ -110,13 +110,15 @@ def test_garbage_and_packets_of_another_model_are_counted(caplog):
     for i, (at_s, payload) in enumerate(timed):
         dirty.append((at_s, payload))
         if i > 30 and not i % 50:
-            dirty += [(at_s, rng.bytes(1206)), (at_s, b""), (at_s, payload[:-1]), (at_s, other[i][1])]
+            impossible = payload[:502] + b"\xff\xff" + payload[504:]  # an azimuth
+            junk = (rng.bytes(1206), b"", payload[:-1], impossible, other[i][1])
+            dirty += [(at_s, payload) for payload in junk]
     sweeps, reception = sweeps_of(dirty)
     assert equal(sweeps, whole)
     assert reception.lost == 0
     count = len([i for i in range(31, len(timed)) if not i % 50])
     assert reception.refused == {
-        "no packet of a Velodyne": 3 * count,
+        "no packet of a Velodyne": 4 * count,
         "of another model than the packets before": count,
     }
     assert len([r for r in caplog.records if "only counted" in r.message]) == 2  # one a reason

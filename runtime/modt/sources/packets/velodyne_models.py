@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median
+from struct import Struct
 from typing import NamedTuple
 
 from modt.errors import MisuseError
@@ -15,7 +16,8 @@ from modt.errors import MisuseError
 log = logging.getLogger(__name__)
 
 PACKET_BYTES = 1206
-BANKS, LAST_BLOCK, STAMP_AT, RETURN_AT, IDENTITY_AT = slice(1, 1200, 100), 1100, 1200, 1204, 1205
+BANKS, AZIMUTHS = slice(1, 1200, 100), Struct("<" + 12 * "2xH96x")
+STAMP_AT, RETURN_AT, IDENTITY_AT = 1200, 1204, 1205
 DUAL = 0x39
 """Return mode: two returns of each firing."""
 TURN = 36_000
@@ -94,14 +96,15 @@ def signature_of(payload: bytes) -> Signature | None:
     if len(payload) != PACKET_BYTES or payload[0:1200:100] != b"\xff" * 12:
         return None
     banks = frozenset(payload[BANKS])
-    if banks not in (UPPER, UPPER_LOWER, FOUR_BANKS) or max(azimuths(payload)) > TURN:
+    if banks not in (UPPER, UPPER_LOWER, FOUR_BANKS) or max(AZIMUTHS.unpack_from(payload)) > TURN:
         return None
     return Signature(banks, None if banks == UPPER_LOWER else payload[IDENTITY_AT])
 
 
 def azimuths(payload: bytes) -> tuple[int, int]:
     """Of the first and the last block [0.01 deg]."""
-    return payload[2] | payload[3] << 8, payload[LAST_BLOCK + 2] | payload[LAST_BLOCK + 3] << 8
+    first, *_, last = AZIMUTHS.unpack_from(payload)
+    return first, last
 
 
 def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> tuple[Model | None, Signature | None]:
