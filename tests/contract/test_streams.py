@@ -14,6 +14,9 @@ from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPos
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
 from tests.sources import layouts
+from tests.sources.packets.simulated import packets
+from tests.sources.point_clouds import pcd
+from tools.send.pcap_writer import write_capture
 
 
 def listed(root):
@@ -31,6 +34,19 @@ def sent(root):
     return PosedStream(stream, PoseSocket(here, OdometryConfig(), "sent"))
 
 
+def clouds(root):
+    for frame in range(3):
+        rows = np.rec.fromarrays(layouts.scan(frame).T, names="x,y,z,intensity")
+        (root / f"{frame}.pcd").write_bytes(pcd(rows))
+    return open_stream(root)
+
+
+def capture(root):
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    write_capture(root / "drive.pcap", packets(), 2368)
+    return open_stream(root / "drive.pcap")
+
+
 SOURCES = {
     "raw": lambda root: open_stream(layouts.raw_drive(root)),
     "tracking": lambda root: open_stream(layouts.tracking(root)),
@@ -42,6 +58,8 @@ SOURCES = {
     "listed": listed,
     "sent": sent,
     "peeked": lambda root: PeekedStream(open_stream(layouts.bare(root))),
+    "clouds": clouds,
+    "capture": capture,
     "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
 }
 
@@ -56,7 +74,7 @@ def a_stream(request, tmp_path):
 
 def test_frames_have_valid_points_and_poses(stream):
     frames = list(stream)
-    assert len(frames) == stream.info.n_frames
+    assert stream.info.n_frames in (len(frames), None)
     for frame in frames:
         assert frame.points.dtype == np.float32
         assert frame.points.ndim == 2
@@ -84,13 +102,14 @@ def test_a_stream_can_be_iterated_again(stream):
 def test_a_part_of_a_stream_has_its_frames(stream):
     whole = {f.index: f for f in stream}
     part = stream.between(1, 3)
-    assert part.info.n_frames == 2
+    assert part.info.n_frames in (2, None)
     for frame in part:
         assert frame.points.tobytes() == whole[frame.index].points.tobytes()
     assert [f.index for f in part] == [1, 2]
-    assert stream.info.n_frames == len(whole)  # the whole is not changed by it
-    assert part.between(2, None).info.n_frames == 1
-    assert stream.between(50, None).info.n_frames == 0
+    assert stream.info.n_frames in (len(whole), None)  # the whole is not changed by it
+    assert [f.index for f in part.between(2, None)] == [2]
+    assert list(stream.between(50, None)) == []
+    assert part.between(50, None).info.n_frames == 0
 
 
 def test_a_valid_stream_has_no_faults(stream):

@@ -31,6 +31,7 @@ class Request:
     """What a user asks for; each field is an option of `modt replay`."""
 
     path: Path | None = None
+    capture: Sequence[tuple[str, str]] = ()
     mode: str = "accurate"
     profile: Sequence[str] = ()
     sink: Sequence[str] = ()
@@ -57,7 +58,8 @@ def stream(request: Request) -> Stream:
     if request.path is None:
         whole: Stream = SyntheticStream("street", "hdl-64e", EMBEDDED_SECONDS, seed=0)
     else:
-        whole = open_stream(request.path, profile.load(request.profile).sensor.period_s)
+        period_s = profile.load(request.profile).sensor.period_s
+        whole = open_stream(request.path, period_s, dict(request.capture))
     cut = whole.between(*request.frames)
     if cut.info.n_frames == 0:
         first, last = request.frames

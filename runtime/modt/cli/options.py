@@ -11,14 +11,16 @@ from modt.profile import DEFAULT
 from modt.sinks.schemes import SCHEMES
 
 Parser = argparse.ArgumentParser
+CAPTURE_KEYS = ("model", "calibration", "metadata")
 
 
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
     """Stream, frames, profile and core."""
     a, b = first_frames
     which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
-    stream = "KITTI drive, sequence or folder of .bin scans (default: a synthetic stream)"
+    stream = "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, or PCAP file (default: a synthetic stream)"
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
+    add_capture_option(p)
     p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
     sensor = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
     add_profile_option(p, sensor)
@@ -38,6 +40,14 @@ def add_sink_option(p: Parser) -> None:
     )
 
 
+def add_capture_option(p: Parser) -> None:
+    """What the packets of a PCAP file do not tell."""
+    what = (
+        "of a PCAP file: model=MODEL or calibration=FILE of a Velodyne, metadata=FILE of an Ouster; may be repeated"
+    )
+    p.add_argument("--capture", type=capture, action="append", default=[], metavar="KEY=VALUE", help=what)
+
+
 def add_fov_option(p: Parser) -> None:
     """Field of view."""
     p.add_argument("--fov", choices=("camera", "full"), default="full", help="field of view (default: %(default)s)")
@@ -52,6 +62,14 @@ def add_report_options(p: Parser) -> None:
     """Formats of a report."""
     p.add_argument("--json", action="store_true", help="print JSON")
     p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots")
+
+
+def capture(text: str) -> tuple[str, str]:
+    """KEY=VALUE of a capture."""
+    key, equals, value = text.partition("=")
+    if not equals or key not in CAPTURE_KEYS:
+        raise argparse.ArgumentTypeError(f"{text!r}: write KEY=VALUE, KEY one of {', '.join(CAPTURE_KEYS)}")
+    return key, value
 
 
 def frames(text: str) -> tuple[int, int | None]:

@@ -24,8 +24,9 @@ MIN_PROPOSALS = 1000
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("fit", help="fit a profile to a recording of an unknown sensor")
-    stream = "KITTI drive, sequence or folder of .bin scans; best of a drive that moves"
+    stream = "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, or PCAP file; best of a drive that moves"
     p.add_argument("path", type=Path, metavar="RECORDING", help=stream)
+    options.add_capture_option(p)
     p.add_argument("--name", metavar="NAME", help="of the profile (default: that of the recording)")
     p.add_argument("--out", type=Path, metavar="FILE", help="default: NAME.yaml")
     count = options.integer(1, MOST_FRAMES, "a count")
@@ -61,12 +62,15 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.sinks.output import writing
     from modt.sources.recognise import open_stream
 
-    stream = open_stream(arguments.path)
+    stream = open_stream(arguments.path, capture=dict(arguments.capture))
     name = arguments.name or stream.info.name.replace(" ", "-")
     out: Path = arguments.out or Path(f"{name}.yaml")
     if out.exists():
         raise MisuseError(out, "exists already", "remove it, or give another --out")
-    step = max(1, min(stream.info.n_frames or MOST_FRAMES, MOST_FRAMES) // arguments.sweeps)
+    n_frames = stream.info.n_frames
+    if n_frames is None:
+        n_frames = sum(1 for _ in islice(stream, MOST_FRAMES))
+    step = max(1, min(n_frames, MOST_FRAMES) // arguments.sweeps)
     stamps_s, sweeps = [], []
     for number, frame in enumerate(islice(stream, step * arguments.sweeps)):
         stamps_s.append(frame.stamp_s)

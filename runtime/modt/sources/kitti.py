@@ -25,6 +25,10 @@ from modt.sources.text_file import read_numbers
 from modt.types import Float64
 
 PERIOD_S = 0.1
+MAX_NUMBER_DIGITS = 10
+"""Of names that are numbers of frames, not times."""
+NANOSECOND_DIGITS = 19
+"""Of names that are times since 1970 [ns]."""
 MAX_SWEEP_PERIODS = 2
 """Longer sweeps are taken for wrong time stamps."""
 NO_SWEEP_TIMES = "sweeps are not deskewed"
@@ -103,19 +107,24 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
 
 
-def scan_folder(folder: Path, period_s: float = PERIOD_S) -> ScanStream:
-    """A folder of .bin scans, ordered by name, period_s apart."""
-    notes = Notes([f"folder of scans: no calibration, frames {period_s} s apart"], [f"folder of scans: {NO_POSES}"])
-    stamps = {i: i * period_s for i in _scans(folder)[0]}
-    return _stream(folder.name, "folder of scans", folder, None, {}, stamps, notes, period_s=period_s)
+def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") -> ScanStream:
+    """A folder of scans, ordered by name, period_s apart or at the nanoseconds that are their names."""
+    indices, files = _scans(folder, suffix)
+    if all(f.stem.isdigit() and len(f.stem) == NANOSECOND_DIGITS for f in files):
+        apart, began = "stamped by their names", int(files[0].stem)
+        stamps = {i: (int(f.stem) - began) / 1e9 for i, f in zip(indices, files, strict=True)}
+    else:
+        apart, stamps = f"{period_s} s apart", {i: i * period_s for i in indices}
+    notes = Notes([f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"])
+    return _stream(folder.name, "folder of scans", folder, None, {}, stamps, notes, period_s=period_s, suffix=suffix)
 
 
-def _scans(data: Path) -> tuple[list[int], list[Path]]:
+def _scans(data: Path, suffix: str = ".bin") -> tuple[list[int], list[Path]]:
     """Indices and files of the scans of a folder, ordered by name."""
-    files = sorted(data.glob("*.bin"))
+    files = sorted(data.glob(f"*{suffix}"))
     if not files:
-        raise MisuseError(data, "no .bin scans", "give a folder of scans")
-    numbered = all(f.stem.isdigit() for f in files)
+        raise MisuseError(data, f"no {suffix} scans", "give a folder of scans")
+    numbered = all(f.stem.isdigit() and len(f.stem) <= MAX_NUMBER_DIGITS for f in files)
     return [int(f.stem) for f in files] if numbered else list(range(len(files))), files
 
 
@@ -131,8 +140,9 @@ def _stream(
     sequence: int = 0,
     turns: Mapping[int, float] = MappingProxyType({}),
     period_s: float = PERIOD_S,
+    suffix: str = ".bin",
 ) -> ScanStream:
-    indices, files = _scans(data)
+    indices, files = _scans(data, suffix)
     gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
     if gaps:
         notes.of_stream.append(f"{len(gaps)} frames are missing (the first is {gaps[0]})")

@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 from modt.errors import MisuseError
 from modt.sources import kitti
+from modt.sources.packets.open_capture import SUFFIXES, open_capture
+from modt.sources.scan_file import READERS
 from modt.sources.scan_stream import ScanStream
+from modt.sources.stream import Stream
 
 MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
 
 
-REMEDY = "give a KITTI drive, a sequence or a folder of .bin scans"
+REMEDY = "give a KITTI drive, a sequence, a folder of .bin, .pcd or .ply scans, or a PCAP file of packets"
 
 
-def open_stream(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
-    """The stream at a path; period_s is the time between the scans of a folder, which has no stamps.
+def open_stream(
+    path: Path, period_s: float = kitti.PERIOD_S, capture: Mapping[str, str] = MappingProxyType({})
+) -> Stream:
+    """The stream at a path: a PCAP file, or what `open_scans` opens; `capture` as the options of `open_capture`.
+
+    Raises:
+        MisuseError: the path does not exist or holds no stream.
+    """
+    if path.is_file() and path.suffix in SUFFIXES:
+        return open_capture(path, capture)
+    if capture:
+        raise MisuseError(path, "is no PCAP file, to which --capture applies", "leave --capture out")
+    return open_scans(path, period_s)
+
+
+def open_scans(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
+    """The stream of scan files at a path; period_s is the time between the scans of a folder, which has no stamps.
 
     Raises:
         MisuseError: the path does not exist or holds no stream; the error names streams below it.
@@ -43,15 +63,17 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
     """The stream in a folder or around it, by the most specific layout; None where there is none."""
     data = path.parts[-2:] == ("velodyne_points", "data")
     scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
-    layouts = (
+    layouts: list[tuple[bool, Callable[[Path], ScanStream], Path]] = [
         (_is_raw(path), kitti.raw_drive, path),
         (path.name == "velodyne_points", kitti.raw_drive, path.parent),
         (data, kitti.raw_drive, path.parent.parent),
         (_is_tracking(path), kitti.tracking_sequence, path),
         (_is_odometry(path), kitti.odometry_sequence, path),
         (scans, kitti.odometry_sequence, path.parent),
-        (_has_scans(path), partial(kitti.scan_folder, period_s=period_s), path),
-    )
+    ]
+    for suffix in READERS:
+        folder = partial(kitti.scan_folder, period_s=period_s, suffix=suffix)
+        layouts.append((_has_scans(path, suffix), folder, path))
     return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
 
 
@@ -67,8 +89,8 @@ def _is_odometry(path: Path) -> bool:
     return _has_scans(path / "velodyne")
 
 
-def _has_scans(path: Path) -> bool:
-    return path.is_dir() and next(path.glob("*.bin"), None) is not None
+def _has_scans(path: Path, suffix: str = ".bin") -> bool:
+    return path.is_dir() and next(path.glob(f"*{suffix}"), None) is not None
 
 
 def _nearby(path: Path) -> list[Path]:

@@ -1,4 +1,4 @@
-"""One scan in KITTI's format: float32 rows of x, y, z, reflectance."""
+"""One scan: KITTI's float32 rows of x, y, z, reflectance, or a PCD or PLY file."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import ScanError
+from modt.sources.pcd_file import read_pcd
+from modt.sources.ply_file import read_ply
 from modt.types import UNRECORDED, Float32
 
 ROW_BYTES = 16
@@ -16,7 +18,7 @@ MAX_IMPLAUSIBLE_SHARE = 0.02
 
 
 def read_scan(path: Path) -> tuple[Float32, list[str]]:
-    """Points of a .bin file, and its flaws.
+    """Points of a file by its suffix, a key of READERS, and its flaws.
 
     Points that are not finite are set to the origin, which counts as no return, so that rows keep their indices. A
     reflectance that is not finite or negative counts as not recorded. Reflectances from 0 to 255 are scaled to 0 to
@@ -31,11 +33,17 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
         raise ScanError(path, f"cannot be read ({error.strerror})", "the frame is skipped") from None
     if not raw:
         raise ScanError(path, "empty scan", "the frame is skipped; record it again")
+    return sanitised(READERS.get(path.suffix, _read_rows)(path, raw), path)
+
+
+def _read_rows(path: Path, raw: bytes) -> Float32:
     if len(raw) % ROW_BYTES:
         cause = f"truncated: {len(raw)} bytes are no multiple of {ROW_BYTES}-byte rows"
         raise ScanError(path, cause, "the frame is skipped; copy it again, or convert it to x, y, z, reflectance")
-    points = np.frombuffer(raw, np.float32).reshape(-1, 4).copy()
-    return sanitised(points, path)
+    return np.frombuffer(raw, np.float32).reshape(-1, 4).copy()
+
+
+READERS = {".bin": _read_rows, ".pcd": read_pcd, ".ply": read_ply}
 
 
 def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:

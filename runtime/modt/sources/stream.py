@@ -24,6 +24,8 @@ class StreamInfo:
     notes: tuple[str, ...] = ()  # missing files and their consequences
     pose_notes: tuple[str, ...] = ()  # the same of its poses, irrelevant with another pose source
     end: int | None = None  # index of the last frame plus one, None where unknown
+    profile: str | None = None  # shipped profile of the sensor, where its messages say what it is
+    elevations_deg: tuple[float, ...] | None = None  # of its beams, where its metadata have them
 
 
 @dataclass(frozen=True, slots=True)

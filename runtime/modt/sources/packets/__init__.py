@@ -1,0 +1,1 @@
+"""Sensors' packets, from the network or a capture, to sweeps."""

@@ -1,0 +1,69 @@
+"""A PCAP file as a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from modt.errors import MisuseError
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.packets.capture import Capture
+from modt.sources.packets.ouster import OusterDecoder
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.packet_stream import PacketStream
+from modt.sources.packets.velodyne import VelodyneDecoder
+from modt.sources.packets.velodyne_models import model_named
+from modt.sources.stream import StreamInfo
+
+SUFFIXES = frozenset({".pcap", ".cap"})
+"""Of PCAP files."""
+
+
+def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
+    """The stream of the sensor whose packets come first in a PCAP file.
+
+    `options` may have model and calibration of a Velodyne, or the file with the metadata of an Ouster, which is by
+    default the one with the name of the capture and the suffix .json.
+
+    Raises:
+        MisuseError: no PCAP file, no packets of a sensor, no whole sweep; an invalid option, a missing extra.
+    """
+    capture = Capture(path)
+    decoder, layout = _decoder(path, options)
+    capture.flow = next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
+    if capture.flow is None:
+        remedy = f"for an Ouster, save its metadata as {path.with_suffix('.json')} or give metadata=FILE"
+        raise MisuseError(path, f"no packets of a {layout}", remedy)
+    first = _first_sweep(capture, decoder)
+    if first is None:
+        raise MisuseError(path, f"no whole sweep of a {layout}", "record at least two turns of the sensor")
+    info = StreamInfo(
+        name=path.stem,
+        layout=f"{layout} packets",
+        sequence=0,
+        n_frames=None,
+        period_s=round(first.turn_s, 3),
+        camera=None,
+        has_poses=False,
+        profile=decoder.profile,
+        elevations_deg=decoder.elevations_deg,
+    )
+    return PacketStream(info, capture, decoder)
+
+
+def _decoder(path: Path, options: Mapping[str, str]) -> tuple[PacketDecoder, str]:
+    beside = path.with_suffix(".json")
+    metadata = options.get("metadata", str(beside) if beside.is_file() and "model" not in options else "")
+    if metadata:
+        return OusterDecoder(path.stem, Path(metadata)), "Ouster"
+    model = model_named(options["model"]) if "model" in options else None
+    calibration = Path(options["calibration"]) if "calibration" in options else None
+    return VelodyneDecoder(path.stem, model, calibration), "Velodyne"
+
+
+def _first_sweep(capture: Capture, decoder: PacketDecoder) -> Sweep | None:
+    reception = Reception()
+    for datagram in capture:
+        for sweep in decoder.decode(datagram.stamp_s, datagram.payload, reception):
+            return sweep
+    return next(iter(decoder.finish(reception)), None)

@@ -1,0 +1,155 @@
+"""Ouster's packets to sweeps, by Ouster's SDK."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from modt import assets
+from modt.errors import MisuseError
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.packets.device_clock import DeviceClock
+from modt.sources.packets.packet_decoder import extra, one_line, refuse
+from modt.types import Bool, Float32
+
+MAX_LOST_FRAMES = 20
+"""More frames missing in a row are a sensor that was switched on again."""
+
+
+class OusterDecoder:
+    """Packets to frames of the SDK, which are sweeps: they begin behind the sensor and turn clockwise.
+
+    A sweep that had begun before its first packet was received is no sweep. Of two returns of a firing the first
+    field is taken.
+    """
+
+    def __init__(self, name: str, metadata: Path) -> None:
+        """A decoder for the source of a name.
+
+        Raises:
+            MisuseError: ouster-sdk is missing, or the metadata cannot be read.
+        """
+        self._sdk = sdk = extra("ouster.sdk.core", "ouster")
+        self.name = name
+        self._info = info = self._read(metadata)
+        self._format, self._project = sdk.PacketFormat(info), sdk.XYZLutFloat(info, False)
+        self._width, self._columns = info.format.columns_per_frame, info.format.columns_per_packet
+        self._awaited = _awaited(info.format.column_window, self._width, self._columns)
+        self.elevations_deg: tuple[float, ...] | None = tuple(map(float, info.beam_altitude_angles))
+        self.period_s = 1.0 / (info.format.fps or 10)
+        self.profile = _profile(info.prod_line)
+        self._forget()
+
+    def again(self) -> Self:
+        """A decoder of the same sensor that has seen no packet yet."""
+        other = copy.copy(self)
+        other._forget()
+        return other
+
+    def accepts(self, payload: bytes) -> bool:
+        """Whether a payload is a packet of points that fits the metadata."""
+        return self._flaw(payload) is None
+
+    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+        """Sweeps completed by a packet."""
+        flaw = self._flaw(payload)
+        if flaw is not None:
+            refuse(reception, self.name, flaw)
+            return []
+        packet = self._sdk.LidarPacket(self._format)  # the batcher keeps it
+        packet.buf[:] = np.frombuffer(payload, np.uint8)
+        packet.host_timestamp = round(received_s * 1e9)
+        if packet.validate(self._info, self._format) != self._sdk.PacketValidationFailure.NONE:
+            refuse(reception, self.name, "of another sensor than the metadata")
+            return []
+        return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
+
+    def pause(self, reception: Reception) -> Sequence[Sweep]:
+        """None: the SDK completes a frame by the last packet of its window."""
+        return []
+
+    finish = pause
+
+    def _forget(self) -> None:
+        used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]
+        self._batcher, self._frame = self._sdk.FrameBatcher(self._info), self._sdk.LidarFrame(self._info, used)
+        self._clock = DeviceClock()
+        self._last_id: int | None = None
+
+    def _read(self, metadata: Path) -> Any:
+        remedy = "save what the sensor says at /api/v1/sensor/metadata"
+        try:
+            return self._sdk.SensorInfo(metadata.read_text("utf-8"))
+        except OSError as error:
+            raise MisuseError(metadata, f"cannot be read ({error.strerror})", remedy) from None
+        except Exception as error:  # of the SDK's parser, of no common type
+            raise MisuseError(metadata, f"no metadata of an Ouster ({one_line(error)})", remedy) from None
+
+    def _flaw(self, payload: bytes) -> str | None:
+        """Why a payload is no packet of points that fits the metadata; None if it is one."""
+        if len(payload) != self._format.lidar_packet_size:
+            return f"not the {self._format.lidar_packet_size} bytes of the metadata's format"
+        header = self._sdk.ColHeader.MEASUREMENT_ID
+        columns = self._format.packet_header(header, np.frombuffer(payload, np.uint8)).astype(np.int64)
+        begins = int(columns[0])
+        if begins % self._columns or begins >= self._width or (np.diff(columns) != 1).any():
+            return "no packet of an Ouster"
+        return None
+
+    def _sweeps(self, reception: Reception) -> Sequence[Sweep]:
+        frame = self._frame
+        missing: Bool = np.logical_and(self._awaited, frame.packet_timestamp == 0)
+        last_id, self._last_id = self._last_id, frame.frame_id
+        if last_id is None and missing[self._awaited.argmax()]:
+            return []
+        lost = int(missing.sum())
+        passed = 0 if last_id is None else (frame.frame_id - last_id) % (self._format.max_frame_id + 1) - 1
+        if passed <= MAX_LOST_FRAMES:
+            lost += passed * int(self._awaited.sum())
+        reception.lost += lost
+        stamp_s, turn_s = self._times()
+        return [Sweep(stamp_s, self._points(), turn_s, complete=not missing.any())]
+
+    def _times(self) -> tuple[float, float]:
+        """Stamp and duration of the frame [s]."""
+        frame = self._frame
+        seen = np.flatnonzero(frame.timestamp)
+        time_ns = frame.timestamp.astype(np.int64)[seen]
+        per_column_s = float(time_ns[-1] - time_ns[0]) * 1e-9 / max(int(seen[-1] - seen[0]), 1)
+        near = int(np.abs(seen - self._width // 2).argmin())
+        ahead_s = float(time_ns[near]) * 1e-9 + (self._width / 2 - float(seen[near])) * per_column_s
+        sent_ns = frame.timestamp.astype(np.int64).reshape(-1, self._columns).max(axis=1)
+        received_ns = frame.packet_timestamp.astype(np.int64)
+        known = (sent_ns > 0) & (received_ns > 0)
+        delay_s = float((received_ns - sent_ns)[known].min()) * 1e-9
+        last_s = float(time_ns[-1]) * 1e-9
+        self._clock.unwrapped(last_s, last_s + delay_s)
+        return ahead_s + self._clock.offset_s, per_column_s * self._width
+
+    def _points(self) -> Float32:
+        distance = self._frame.field("RANGE")
+        kept = np.flatnonzero(distance)
+        points = np.empty((len(kept), 4), np.float32)
+        points[:, :3] = self._project(distance).reshape(-1, 3)[kept]
+        points[:, 3] = self._frame.field("REFLECTIVITY").reshape(-1)[kept]
+        points[:, 3] *= np.float32(1 / 255)
+        return points
+
+
+def _awaited(window: tuple[int, int], width: int, columns: int) -> Bool:
+    """(packets of a frame,) those that hold a column of the window, which may reach over the seam."""
+    first, last = window
+    within = np.asarray((np.arange(width) - first) % width <= (last - first) % width)
+    return np.asarray(within.reshape(-1, columns).any(axis=1))
+
+
+def _profile(product_line: str) -> str | None:
+    """Shipped profile of a product line, such as OS-1-64-U13."""
+    line = re.match(r"OS-?(\w+)-(\d+)", product_line)
+    name = f"os{line[1]}-{line[2]}".lower() if line else ""
+    return name if (assets.folder("profiles") / f"{name}.yaml").is_file() else None

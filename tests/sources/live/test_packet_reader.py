@@ -1,0 +1,160 @@
+"""Packets over loopback."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+from modt.errors import MisuseError
+from modt.sources.live.packet_reader import PacketReader, address_of, bound_socket
+from modt.sources.live.schemes import open_live
+from modt.sources.live.sweep_reader import Reception
+from modt.sources.packets.open_capture import open_capture
+from modt.sources.packets.velodyne import VelodyneDecoder
+from tests.sources.packets.simulated import packets
+from tools.send.loops import velodyne_loop
+from tools.send.packets import send
+from tools.send.pcap_writer import write_capture
+
+
+@pytest.fixture
+def port():
+    """A port that is free."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.fixture
+def to(port):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.connect(("127.0.0.1", port))
+        yield sender
+
+
+class EchoDecoder:
+    """Each packet is a sweep."""
+
+    name, profile, elevations_deg = "sensor", None, None
+
+    def decode(self, received_s: float, payload: bytes, reception: Reception) -> list[object]:
+        return [(received_s, payload)]
+
+    def pause(self, reception: Reception) -> list[object]:
+        return []
+
+
+def test_what_is_received_from_the_sensor_is_decoded_at_once(port, to):
+    reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "127.0.0.1", clock=lambda: 7.0)
+    to.send(b"packet")
+    assert reader.read(5.0) == [(7.0, b"packet")]
+    assert reader.read(0.0) == []
+    reader.close()
+    assert (reader.reception.messages, reader.reception.refused) == (1, {})
+
+
+def test_packets_of_another_address_are_refused(port, to):
+    reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "192.0.2.1")
+    to.send(b"packet")
+    assert reader.read(0.2) == []
+    reader.close()
+    assert reader.reception.refused == {"from another address than the sensor's": 1}
+
+
+def test_closing_ends_a_read(port):
+    reader = PacketReader(bound_socket("sensor", port), EchoDecoder())
+    ended = threading.Event()
+
+    def read():
+        with suppress(OSError):
+            reader.read(60.0)
+        ended.set()
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    while not ended.wait(0.05) and reader._socket.fileno() >= 0:
+        reader.close()
+    assert ended.wait(5.0)
+    thread.join()
+
+
+def test_a_small_buffer_is_said(port, monkeypatch, caplog):
+    monkeypatch.setattr("modt.sources.live.packet_reader.BUFFER_BYTES", 2**30)
+    bound_socket("sensor", port).close()
+    (record,) = caplog.records
+    assert "granted, 1073741824 asked; sysctl -w net.core.rmem_max=1073741824" in record.message
+
+
+def test_what_cannot_be_bound_or_found_is_refused(port):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(("", port))
+        with pytest.raises(MisuseError, match=f"port {port} cannot be bound"):
+            bound_socket("sensor", port)
+    with pytest.raises(MisuseError, match=r"host nowhere\.invalid is unknown"):
+        address_of("sensor", "nowhere.invalid")
+
+
+def received(address, timed, to):
+    """Sweeps taken from a live stream while a sensor sends."""
+    live = open_live(address)
+    live.start()
+    sender = threading.Thread(target=send, args=(timed, to))
+    sender.start()
+    frames, until_s = [], time.monotonic() + 30
+    while (sender.is_alive() or live.health()["messages"] < len(timed)) and time.monotonic() < until_s:
+        taken = live.take(0.5)
+        if taken is not None:
+            frames.append(taken.frame)
+    while (taken := live.take(0.3)) is not None:
+        frames.append(taken.frame)
+    sender.join()
+    live.close()
+    return frames, live
+
+
+def test_sweeps_over_loopback_are_those_of_the_file(port, to, tmp_path):
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    timed = packets()
+    write_capture(tmp_path / "drive.pcap", timed, port)
+    began_s = timed[0][0]
+    frames, live = received(f"velodyne://127.0.0.1:{port}", [(at_s - began_s, p) for at_s, p in timed], to)
+    file = list(open_capture(tmp_path / "drive.pcap", {}))
+    assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in file]
+    assert np.diff([f.stamp_s for f in frames]) == pytest.approx(np.diff([f.stamp_s for f in file]), abs=0.02)
+    assert abs(frames[-1].stamp_s - time.time()) < 30
+    assert live.reader.profile == "vlp-16"
+    health = live.health()
+    assert (health["messages"], health["lost_messages"], health["refused_messages"]) == (len(timed), 0, {})
+    assert (health["sweeps"], health["incomplete_sweeps"], health["dropped_sweeps"]) == (len(file), 0, 0)
+
+
+@pytest.mark.kitti
+def test_an_ouster_over_loopback_is_that_of_the_file(port, to, kitti_root):
+    pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
+    metadata = kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10.json"
+    stream = open_capture(kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", {"metadata": str(metadata)})
+    timed = [(0.0016 * k, d.payload) for k, d in enumerate(stream.capture)]
+    frames, live = received(f"ouster://127.0.0.1:{port}?metadata={metadata}", timed, to)
+    assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in stream]
+    assert live.info.profile == "os1-128"
+    assert live.reader.reception.lost == 0
+
+
+def test_an_ouster_needs_its_metadata():
+    with pytest.raises(MisuseError, match=r"metadata; add \?metadata=FILE"):
+        open_live("ouster://127.0.0.1:7502")
+
+
+def test_a_loop_of_a_velodyne_has_no_gap():
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    decoder, reception, sweeps = VelodyneDecoder("loop"), Reception(), []
+    for _, (at_s, payload) in zip(range(900), velodyne_loop([p for _, p in packets()]), strict=False):
+        sweeps += decoder.decode(at_s, payload, reception)
+    assert reception.lost == 0
+    assert len(sweeps) == 10
+    assert all(s.complete for s in sweeps)

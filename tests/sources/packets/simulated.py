@@ -1,0 +1,43 @@
+"""Packets of simulated sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+
+import numpy as np
+
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.types import Float32
+from tools.send.faults import Timed
+from tools.send.velodyne_packets import LAYOUTS, packets_of
+
+BEGAN_S = 1.6e9
+
+
+@cache
+def packets(model: str = "vlp-16", sweeps: int = 5) -> tuple[Timed, ...]:
+    """Of an ideal sensor in the synthetic street: a turn that had begun, whole ones, and one cut short."""
+    frames = list(SyntheticStream("street", model, 0.1 * sweeps, seed=1))
+    return tuple((BEGAN_S + at_s, payload) for at_s, payload in packets_of(frames, LAYOUTS[model], 0.1))
+
+
+def decoded(decoder: PacketDecoder, timed: Iterable[Timed]) -> tuple[list[Sweep], Reception]:
+    reception, sweeps = Reception(), list[Sweep]()
+    for at_s, payload in timed:
+        reception.messages += 1
+        sweeps += decoder.decode(at_s, payload, reception)
+    return [*sweeps, *decoder.finish(reception)], reception
+
+
+def bearing_deg(points: Float32) -> Float32:
+    angle: Float32 = np.rad2deg(np.arctan2(points[:, 1], points[:, 0]))
+    return angle
+
+
+def equal(a: Sequence[Sweep], b: Sequence[Sweep]) -> bool:
+    return len(a) == len(b) and all(
+        x.points.tobytes() == y.points.tobytes() and x.complete == y.complete for x, y in zip(a, b, strict=True)
+    )

@@ -1,0 +1,115 @@
+"""PCAP files: what is read, and what is refused."""
+
+import struct
+
+import pytest
+
+from modt.errors import MisuseError
+from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture
+from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
+
+PAYLOADS = [b"first", b"", bytes(range(256)) * 5]
+DATAGRAM = ipv4(udp(b"payload", 2368))
+
+
+def file_of(path, frames, *, order="<", magic=0xA1B2C3D4, link=ETHERNET):
+    head = struct.pack(order + "IHHiIII", magic, 2, 4, 0, 0, 65_535, link)
+    records = (struct.pack(order + "IIII", 7, 250_000, len(f), len(f)) + f for f in frames)
+    path.write_bytes(head + b"".join(records))
+    return path
+
+
+def payloads(path):
+    return [d.payload for d in Capture(path)]
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize(("magic", "stamp_s"), [(0xA1B2C3D4, 7.25), (0xA1B23C4D, 7.00025)])
+def test_either_byte_order_and_unit(tmp_path, order, magic, stamp_s):
+    frames = [ethernet(ipv4(udp(p, 2368))) for p in PAYLOADS]
+    read = list(Capture(file_of(tmp_path / "a.pcap", frames, order=order, magic=magic)))
+    assert [d.payload for d in read] == PAYLOADS
+    assert [d.stamp_s for d in read] == pytest.approx([stamp_s] * 3, abs=1e-9)
+    assert {(d.source, d.port) for d in read} == {("192.0.2.1", 2368)}
+
+
+@pytest.mark.parametrize(
+    ("link", "frame"),
+    [
+        (ETHERNET, ethernet(DATAGRAM) + b"padding"),
+        (ETHERNET, bytes(12) + b"\x81\x00\x00\x05" + b"\x08\x00" + DATAGRAM),
+        (ETHERNET, bytes(12) + b"\x88\xa8\x00\x05\x81\x00\x00\x06\x08\x00" + DATAGRAM),
+        (RAW_IP, DATAGRAM),
+        (COOKED, bytes(14) + b"\x08\x00" + DATAGRAM),
+        (COOKED_2, b"\x08\x00" + bytes(18) + DATAGRAM),
+    ],
+    ids=["Ethernet", "VLAN", "two VLAN tags", "raw IP", "cooked", "cooked 2"],
+)
+def test_link_layers(tmp_path, link, frame):
+    assert payloads(file_of(tmp_path / "a.pcap", [frame], link=link)) == [b"payload"]
+
+
+def test_fragments_are_put_together_in_any_order(tmp_path):
+    whole = udp(bytes(i % 251 for i in range(4000)), 7502)
+    parts = [
+        ipv4(whole[i : i + 1480], identity=9, offset=i, more=i + 1480 < len(whole)) for i in range(0, 4008, 1480)
+    ]
+    other = ipv4(udp(b"between", 7502))
+    frames = [ethernet(p) for p in (parts[2], parts[0], other, parts[1], parts[0])]
+    assert payloads(file_of(tmp_path / "a.pcap", frames)) == [b"between", whole[8:]]
+
+
+def test_what_is_no_datagram_is_passed_over(tmp_path):
+    tcp = bytearray(DATAGRAM)
+    tcp[9] = 6
+    frames = [b"", b"short", bytes(12) + b"\x86\xdd" + bytes(60), ethernet(bytes(tcp)), ethernet(DATAGRAM[:24])]
+    assert payloads(file_of(tmp_path / "a.pcap", [*frames, ethernet(DATAGRAM)])) == [b"payload"]
+
+
+def test_only_the_flow_wanted_is_read(tmp_path):
+    frames = [ethernet(ipv4(udp(b"a", 2368))), ethernet(ipv4(udp(b"b", 8308)))]
+    capture = Capture(file_of(tmp_path / "a.pcap", frames))
+    capture.flow = ("192.0.2.1", 8308)
+    assert [d.payload for d in capture] == [b"b"]
+
+
+@pytest.mark.parametrize("missing", [1, 40, len(ethernet(DATAGRAM)) + 3])
+def test_a_truncated_file_is_read_up_to_there(tmp_path, missing):
+    path = file_of(tmp_path / "a.pcap", [ethernet(DATAGRAM)] * 2)
+    path.write_bytes(path.read_bytes()[:-missing])
+    capture = Capture(path)
+    assert len(list(capture)) == 1
+    assert "truncated" in capture.flaw
+
+
+def test_an_absurd_length_is_not_believed(tmp_path):
+    path = file_of(tmp_path / "a.pcap", [ethernet(DATAGRAM)])
+    with path.open("ab") as file:
+        file.write(struct.pack("<IIII", 8, 0, MAX_RECORD_BYTES + 1, 10) + bytes(10))
+    capture = Capture(path)
+    assert len(list(capture)) == 1
+    assert "promises 262145 bytes" in capture.flaw
+
+
+@pytest.mark.parametrize(
+    ("raw", "cause"),
+    [
+        (b"", "no PCAP"),
+        (b"\xd4\xc3\xb2\xa1", "no PCAP"),
+        (b"garbage" * 10, "no PCAP"),
+        (b"\x0a\x0d\x0d\x0a" + bytes(30), "editcap"),
+        (struct.pack("<IHHiIII", 0xA1B2C3D4, 2, 4, 0, 0, 65_535, 105), "link type 105"),
+    ],
+)
+def test_another_file_is_refused(tmp_path, raw, cause):
+    path = tmp_path / "a.pcap"
+    path.write_bytes(raw)
+    with pytest.raises(MisuseError, match=cause):
+        Capture(path)
+
+
+def test_what_is_written_is_read(tmp_path):
+    path = tmp_path / "a.pcap"
+    timed = [(0.25 * k, payload) for k, payload in enumerate(PAYLOADS)]
+    write_capture(path, timed, 2368)
+    assert [(d.stamp_s, d.payload) for d in Capture(path)] == timed

@@ -1,0 +1,130 @@
+"""Ouster's packets: the SDK's frames, everything else counted."""
+
+import numpy as np
+import pytest
+
+from modt.errors import MisuseError
+from modt.sources.packets.capture import Capture
+from modt.sources.packets.ouster import OusterDecoder
+from tests.sources.packets.simulated import bearing_deg, decoded, equal
+
+sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
+pytestmark = pytest.mark.kitti
+CAPTURE, METADATA = "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", "OS-1-128_v2.3.0_1024x10.json"
+
+
+@pytest.fixture
+def metadata(kitti_root):
+    return kitti_root / "ouster" / METADATA
+
+
+@pytest.fixture
+def timed(kitti_root):
+    """Three sweeps of 64 packets."""
+    datagrams = Capture(kitti_root / "ouster" / CAPTURE)
+    return [(d.stamp_s, d.payload) for d in datagrams if d.port == 7502]
+
+
+def test_sweeps_are_the_frames_of_the_sdk(timed, metadata):
+    decoder = OusterDecoder("sensor", metadata)
+    sweeps, reception = decoded(decoder, timed)
+    assert (decoder.profile, decoder.period_s, len(decoder.elevations_deg)) == ("os1-128", 0.1, 128)
+    assert decoder.elevations_deg[0] > 20 > -20 > decoder.elevations_deg[-1]
+    assert (reception.lost, reception.refused) == (0, {})
+    assert [s.complete for s in sweeps] == [True] * 3
+    assert np.diff([s.stamp_s for s in sweeps]) == pytest.approx([0.1, 0.1], abs=1e-3)
+    assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * 3, abs=1e-3)
+    info = sdk.SensorInfo(metadata.read_text())
+    batcher, frame, project = sdk.FrameBatcher(info), sdk.LidarFrame(info), sdk.XYZLut(info)
+    for _, payload in timed[:64]:
+        packet = sdk.LidarPacket(sdk.PacketFormat(info))
+        packet.buf[:] = np.frombuffer(payload, np.uint8)
+        packet.host_timestamp = 1
+        batcher.batch(packet, frame)
+    seen = frame.field("RANGE") > 0
+    np.testing.assert_allclose(sweeps[0].points[:, :3], project(frame)[seen], atol=1e-4)
+    np.testing.assert_allclose(sweeps[0].points[:, 3] * 255, frame.field("REFLECTIVITY")[seen], atol=1e-3)
+
+
+def test_it_looks_straight_ahead_at_the_stamp(timed, metadata):
+    (sweep, *_), _ = decoded(OusterDecoder("sensor", metadata), timed)
+    info = sdk.SensorInfo(metadata.read_text())
+    stamps_ns = [
+        sdk.PacketFormat(info).packet_header(sdk.ColHeader.TIMESTAMP, np.frombuffer(p, np.uint8)) for _, p in timed
+    ]
+    middle_s = float(np.concatenate(stamps_ns)[512] - stamps_ns[0][0]) * 1e-9
+    assert sweep.stamp_s - timed[0][0] == pytest.approx(middle_s, abs=2e-3)
+    beam = sweep.points[:600]  # rows of the image are beams: along one the head turns from behind to the right
+    assert np.all(np.diff(np.unwrap(np.deg2rad(bearing_deg(beam)))) < 0.01)
+
+
+def test_lost_packets_are_counted_and_their_sweep_is_incomplete(timed, metadata):
+    whole, _ = decoded(OusterDecoder("sensor", metadata), timed)
+    kept = [p for i, p in enumerate(timed) if i not in (70, 90, 91)]
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), kept)
+    assert reception.lost == 3
+    assert [s.complete for s in sweeps] == [True, False, True]
+    assert equal(sweeps[::2], whole[::2])
+
+
+def test_a_sweep_that_had_begun_is_none(timed, metadata):
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[10:])
+    assert [s.complete for s in sweeps] == [True, True]
+    assert reception.lost == 0
+
+
+def test_a_whole_lost_sweep_is_counted(timed, metadata):
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), timed[:64] + timed[128:])
+    assert len(sweeps) == 2
+    assert reception.lost == 64
+
+
+def test_overtaken_doubled_and_foreign_packets_change_nothing(timed, metadata):
+    whole, _ = decoded(OusterDecoder("sensor", metadata), timed)
+    rng, size = np.random.default_rng(0), len(timed[0][1])
+    dirty = [*timed]
+    dirty[20], dirty[21] = dirty[21], dirty[20]
+    dirty.insert(30, dirty[29])
+    for i in range(40, 180, 20):
+        foreign = bytearray(timed[i][1])
+        foreign[4:12] = b"\x01" * 8  # serial numbers
+        dirty[i:i] = [(dirty[i][0], junk) for junk in (rng.bytes(size), b"", rng.bytes(48), bytes(foreign))]
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), dirty)
+    assert equal(sweeps, whole)
+    assert reception.lost == 0
+    assert reception.refused == {
+        "not the 8448 bytes of the metadata's format": 14,
+        "no packet of an Ouster": 7,
+        "of another sensor than the metadata": 7,
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "beams", "turn_s", "profile"),
+    [
+        ("OS-0-32-U1_v2.2.0_1024x10", 32, 0.1, None),
+        ("OS-0-128-U1_v2.3.0_1024x10", 128, 0.1, None),
+        ("OS-1-32-G_v2.1.1_1024x10", 32, 0.1, "os1-32"),
+        ("OS-2-32-U0_v2.0.0_1024x10", 32, 0.05, None),
+        ("OS-2-128-U1_v2.3.0_1024x10", 128, 0.1, None),
+    ],
+)
+def test_each_packet_format(kitti_root, name, beams, turn_s, profile):
+    path = kitti_root / "ouster" / f"{name}.pcap"
+    decoder = OusterDecoder(name, path.with_suffix(".json"))
+    (sweep,), _ = decoded(decoder, ((d.stamp_s, d.payload) for d in Capture(path)))
+    assert sweep.complete
+    assert sweep.turn_s == pytest.approx(turn_s, rel=0.01)
+    assert (len(decoder.elevations_deg), decoder.profile) == (beams, profile)
+    assert np.isfinite(sweep.points).all()
+    assert 0 <= sweep.points[:, 3].min() <= sweep.points[:, 3].max() <= 1
+
+
+@pytest.mark.parametrize("text", ["", "{}", "[1, 2]", "no JSON"])
+def test_what_is_no_metadata_is_refused(tmp_path, text):
+    path = tmp_path / "metadata.json"
+    path.write_text(text)
+    with pytest.raises(MisuseError, match=r"no metadata of an Ouster.*api/v1/sensor/metadata"):
+        OusterDecoder("sensor", path)
+    with pytest.raises(MisuseError, match="cannot be read"):
+        OusterDecoder("sensor", tmp_path / "nowhere.json")

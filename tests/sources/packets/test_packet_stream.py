@@ -1,0 +1,95 @@
+"""Captures as streams."""
+
+import pytest
+
+from modt.errors import MisuseError
+from modt.sources.packets.open_capture import open_capture
+from modt.sources.recognise import open_stream
+from tests.sources.packets.simulated import packets
+from tools.send.pcap_writer import write_capture
+
+pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = tmp_path / "drive.pcap"
+    write_capture(file, packets(), 2368)
+    return file
+
+
+def test_a_capture_is_recognised(path):
+    info = open_stream(path).info
+    assert (info.name, info.layout, info.profile, info.period_s) == ("drive", "Velodyne packets", "vlp-16", 0.1)
+
+
+def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):
+    whole = list(open_stream(path))
+    path.write_bytes(path.read_bytes()[:-50])
+    stream = open_stream(path)
+    assert [f.points.tobytes() for f in stream] == [f.points.tobytes() for f in whole]
+    assert [(f.frame, f.skipped) for f in stream.faults.first] == [(3, False)]
+    assert "sweep 3: truncated within a record" in caplog.text
+
+
+def test_missing_packets_and_refused_ones_are_faults(path):
+    timed = [*packets()]
+    del timed[110:113]
+    timed.insert(50, (timed[50][0], bytes(1206)))
+    write_capture(path, timed, 2368)
+    stream = open_stream(path)
+    assert [f.index for f in stream] == [0, 1, 2]
+    assert [(f.frame, f.cause, f.skipped) for f in stream.faults.first] == [
+        (0, "3 packets are missing", False),
+        (3, "1 packets refused: no packet of a Velodyne", False),
+    ]
+
+
+def test_a_file_whose_clock_was_set_back_skips_what_is_older(path):
+    timed = [*packets()]
+    write_capture(path, [*timed, *((at_s - 60.0, payload) for at_s, payload in timed)], 2368)
+    stream = open_stream(path)
+    stamps_s = [f.stamp_s for f in stream]
+    assert stamps_s == sorted(stamps_s)
+    assert stream.faults.skipped == 3
+    assert "before the last sweep" in stream.faults.first[0].cause
+
+
+@pytest.mark.parametrize(
+    ("options", "cause"),
+    [
+        ({"model": "vlp-17"}, "model=vlp-17.*use one of"),
+        ({"calibration": "nowhere.yaml"}, "nowhere.yaml: no calibration"),
+    ],
+)
+def test_invalid_options_are_refused(path, options, cause):
+    with pytest.raises(MisuseError, match=cause):
+        open_stream(path, capture=options)
+
+
+def test_options_of_a_capture_are_refused_elsewhere(tmp_path):
+    with pytest.raises(MisuseError, match="is no PCAP file, to which --capture applies"):
+        open_stream(tmp_path, capture={"model": "vlp-16"})
+
+
+@pytest.mark.parametrize(
+    ("timed", "cause"),
+    [([], "no packets of a Velodyne"), ([(0.0, b"x")], "give metadata=FILE"), (packets()[:50], "no whole sweep")],
+    ids=["empty", "others", "short"],
+)
+def test_a_capture_without_a_sweep_is_refused(tmp_path, timed, cause):
+    path = tmp_path / "a.pcap"
+    write_capture(path, timed, 2368)
+    with pytest.raises(MisuseError, match=cause):
+        open_capture(path, {})
+
+
+@pytest.mark.kitti
+def test_an_ouster_is_recognised_by_the_metadata_beside_its_capture(kitti_root):
+    pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
+    folder = kitti_root / "ouster"
+    stream = open_stream(folder / "OS-1-32-G_v2.1.1_1024x10.pcap")
+    assert (stream.info.layout, stream.info.profile, len(list(stream))) == ("Ouster packets", "os1-32", 1)
+    assert len(stream.info.elevations_deg) == 32
+    named = {"metadata": str(folder / "OS-1-128_v2.3.0_1024x10.json")}
+    assert len(list(open_stream(folder / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", capture=named))) == 3

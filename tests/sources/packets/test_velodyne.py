@@ -1,0 +1,311 @@
+"""Velodyne's packets: sweeps cut behind the sensor, everything else counted."""
+
+import logging
+import sqlite3
+import struct
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from modt.errors import MisuseError
+from modt.sources.live.sweep_reader import Reception
+from modt.sources.packets.capture import Capture
+from modt.sources.packets.velodyne import VelodyneDecoder
+from modt.sources.packets.velodyne_models import model_named
+from modt.sources.pcd_file import read_pcd
+from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets
+from tools.send.velodyne_packets import LAYOUTS, ideal_calibration
+
+pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+
+
+def sweeps_of(timed, **options):
+    return decoded(VelodyneDecoder("sensor", **options), timed)
+
+
+@pytest.fixture
+def calibration(tmp_path):
+    path = tmp_path / "ideal.yaml"
+    path.write_text(ideal_calibration(LAYOUTS["hdl-64e"]))
+    return path
+
+
+def test_sweeps_of_a_vlp_16():
+    timed = packets()
+    sweeps, reception = sweeps_of(timed)
+    assert len(sweeps) == 3  # the first turn began before it was heard
+    assert all(s.complete for s in sweeps)
+    assert (reception.lost, reception.refused) == (0, {})
+    for k, sweep in enumerate(sweeps, 1):
+        assert sweep.turn_s == pytest.approx(0.1, abs=1e-4)
+        assert sweep.stamp_s == pytest.approx(BEGAN_S + 0.1 * k + 0.05, abs=1e-3)  # straight ahead
+        assert sweep.points.dtype == np.float32
+        assert 0 < sweep.points[:, 3].max() <= 1
+        assert 20_000 < len(sweep.points) < 30_000
+
+
+def test_points_are_those_of_the_scene_in_the_frame_of_the_sensor():
+    from modt.sources.synthetic_stream import SyntheticStream
+
+    scene = list(SyntheticStream("street", "vlp-16", 0.5, seed=1))
+    for sweep, frame in zip(sweeps_of(packets())[0], scene[1:4], strict=True):
+        distance, _ = cKDTree(frame.points[:, :3]).query(sweep.points[:, :3])
+        assert np.quantile(distance, 0.95) < 0.05  # m; a packet's azimuths are those of its blocks
+
+
+def test_a_sweep_turns_clockwise_once_from_the_seam():
+    for sweep in sweeps_of(packets())[0]:
+        bearing = np.unwrap(np.deg2rad(bearing_deg(sweep.points)))
+        assert bearing[0] == pytest.approx(np.pi, abs=0.05)
+        assert bearing[-1] == pytest.approx(-np.pi, abs=0.05)
+        assert np.diff(bearing).max() < 0.05
+
+
+def test_an_hdl_64e_is_told_by_its_blocks_and_has_the_calibration_given(calibration, caplog):
+    sweeps, _ = sweeps_of(packets("hdl-64e", 4), calibration=calibration)
+    assert [s.complete for s in sweeps] == [True, True]
+    elevation = np.rad2deg(np.arcsin(sweeps[0].points[:, 2] / np.linalg.norm(sweeps[0].points[:, :3], axis=1)))
+    off = np.abs(elevation[:, None] - LAYOUTS["hdl-64e"].elevations_deg).min(axis=1)
+    assert off.max() < 0.01
+    assert not caplog.records
+
+
+def test_an_hdl_64e_without_its_calibration_is_warned_of(caplog):
+    decoder = VelodyneDecoder("sensor")
+    sweeps, _ = decoded(decoder, packets("hdl-64e", 4))
+    assert decoder.profile == "hdl-64e"
+    assert len(sweeps) == 2
+    assert "give the unit's own by calibration=" in caplog.text
+
+
+def test_lost_packets_are_counted_and_their_sweep_is_incomplete():
+    timed = packets()
+    whole, _ = sweeps_of(timed)
+    seam = next(i for i, (at_s, _) in enumerate(timed) if at_s > BEGAN_S + 0.2)
+    gone = {seam + 10, seam + 11, seam + 40}
+    sweeps, reception = sweeps_of([p for i, p in enumerate(timed) if i not in gone])
+    assert reception.lost == 3
+    assert [s.complete for s in sweeps] == [True, False, True]
+    assert equal([sweeps[0], sweeps[2]], [whole[0], whole[2]])
+
+
+def test_overtaken_and_doubled_packets_change_nothing():
+    timed = list(packets())
+    whole, _ = sweeps_of(timed)
+    timed[120], timed[121] = timed[121], timed[120]
+    timed[130:130] = timed[127:130]
+    timed.insert(200, timed[100])
+    sweeps, reception = sweeps_of(timed)
+    assert equal(sweeps, whole)
+    assert (reception.lost, reception.refused) == (0, {"late or twice": 4})
+
+
+def test_garbage_and_packets_of_another_model_are_counted(caplog):
+    timed = packets()
+    whole, _ = sweeps_of(timed)
+    rng = np.random.default_rng(0)
+    other = packets("hdl-64e", 4)
+    dirty = []
+    for i, (at_s, payload) in enumerate(timed):
+        dirty.append((at_s, payload))
+        if i > 30 and not i % 50:
+            impossible = payload[:502] + b"\xff\xff" + payload[504:]  # an azimuth
+            junk = (rng.bytes(1206), b"", payload[:-1], impossible, other[i][1])
+            dirty += [(at_s, payload) for payload in junk]
+    sweeps, reception = sweeps_of(dirty)
+    assert equal(sweeps, whole)
+    assert reception.lost == 0
+    count = len([i for i in range(31, len(timed)) if not i % 50])
+    assert reception.refused == {
+        "no packet of a Velodyne": 4 * count,
+        "of another model than the packets before": count,
+    }
+    assert len([r for r in caplog.records if "only counted" in r.message]) == 2  # one a reason
+
+
+def test_a_silence_begins_anew_at_the_next_seam():
+    timed = packets()
+    later = [(at_s + 5.0, restamped(payload, 5.0)) for at_s, payload in timed]
+    sweeps, reception = sweeps_of([*timed[:200], *later])
+    assert len(sweeps) == 1 + 3
+    assert all(s.complete for s in sweeps)
+    assert reception.lost == 0
+    assert np.diff([s.stamp_s for s in sweeps]) == pytest.approx([5.0, 0.1, 0.1], abs=1e-3)
+
+
+@pytest.mark.parametrize(("first", "lost"), [(160, 60), (160, 140), (160, 200)])
+def test_a_burst_of_losses_is_counted_whole(first, lost):
+    timed = packets(sweeps=8)
+    sweeps, reception = sweeps_of(timed[:first] + timed[first + lost :])
+    assert reception.lost == lost
+    whole = [s.points.tobytes() for s in sweeps_of(timed)[0]]
+    assert 3 <= len(sweeps) <= len(whole)
+    assert all(s.points.tobytes() in whole for s in sweeps if s.complete)
+
+
+def test_a_sensor_switched_on_again_goes_on():
+    timed = packets()
+    later = [(at_s + 9.0, payload) for at_s, payload in timed]  # its stamps begin again
+    sweeps, _ = sweeps_of([*timed, *later])
+    assert np.diff([s.stamp_s for s in sweeps]) == pytest.approx([0.1, 0.1, 8.8, 0.1, 0.1], abs=2e-3)
+
+
+def test_a_head_that_stands_still_gives_no_sweep_and_what_is_kept_is_bounded():
+    payload = packets()[100][1]
+    decoder, reception = VelodyneDecoder("sensor"), Reception()
+    for k in range(2000):
+        still = payload[:2] + struct.pack("<H", 9000 + k % 3) + payload[4:]
+        assert not decoder.decode(BEGAN_S + 1e-3 * k, restamped(still, 1e-3 * k), reception)
+    assert len(decoder._turn.entries) < 400
+
+
+def test_a_sector_that_the_sensor_is_set_not_to_see_is_not_lost():
+    timed = [(at_s, p) for at_s, p in packets() if not 90 < azimuth_deg(p) < 270]
+    sweeps, reception = sweeps_of(timed)
+    assert [s.complete for s in sweeps] == [True] * len(sweeps)
+    assert len(sweeps) >= 2
+    assert reception.lost == 0
+    assert np.abs(bearing_deg(sweeps[0].points)).max() < 100
+
+
+def test_a_sweep_of_a_sector_is_handed_over_when_its_sensor_pauses():
+    timed = [(at_s, p) for at_s, p in packets() if not 90 < azimuth_deg(p) < 270]
+    whole, _ = sweeps_of(timed)
+    decoder, reception = VelodyneDecoder("sensor"), Reception()
+    sweeps, paused = [], []
+    for i, (at_s, payload) in enumerate(timed):
+        sweeps += decoder.decode(at_s, payload, reception)
+        if i + 1 < len(timed) and timed[i + 1][0] - at_s > 0.01:
+            paused.append(len(decoder.pause(reception)))
+            sweeps += decoder.pause(reception)  # once only
+    assert paused[:1] == [0]  # the sector is known after a turn
+    assert paused.count(1) == len(whole) - 1
+    assert reception.lost == 0
+
+
+def test_a_pause_within_a_turn_hands_over_nothing():
+    decoder, reception = VelodyneDecoder("sensor"), Reception()
+    for at_s, payload in packets():
+        decoder.decode(at_s, payload, reception)
+        assert not decoder.pause(reception)
+
+
+def restamped(payload, by_s):
+    stamp_us = struct.unpack_from("<I", payload, 1200)[0] + round(by_s * 1e6)
+    return payload[:1200] + struct.pack("<I", stamp_us % 3_600_000_000) + payload[1204:]
+
+
+def azimuth_deg(payload):
+    return struct.unpack_from("<H", payload, 2)[0] / 100
+
+
+def with_identity(timed, identity):
+    return [(at_s, payload[:1205] + bytes([identity])) for at_s, payload in timed]
+
+
+@pytest.mark.parametrize(
+    ("identity", "declared", "warning"),
+    [
+        (0x22, None, None),
+        (0x22, "vlp-16", None),
+        (0x21, None, "say hdl-32e at the pace of vlp-16; decoded as vlp-16; give model= to overrule"),
+        (0x21, "vlp-16", "say hdl-32e at the pace of vlp-16; decoded as vlp-16; give the right model="),
+        (0x22, "vlp-32c", "say vlp-16; decoded as vlp-32c; give the right model="),
+    ],
+)
+def test_the_model_is_by_its_pace_or_as_declared_and_a_contradiction_is_one_line(identity, declared, warning, caplog):
+    timed = with_identity(packets(), identity)
+    decoder = VelodyneDecoder("sensor", model_named(declared) if declared else None)
+    with caplog.at_level(logging.WARNING):
+        sweeps, _ = decoded(decoder, timed)
+    assert decoder.profile == (declared or "vlp-16")
+    assert [r.message for r in caplog.records] == ([f"sensor: its packets {warning}"] if warning else [])
+    if declared != "vlp-32c":
+        assert equal(sweeps, sweeps_of(packets())[0])
+
+
+@pytest.mark.parametrize("declared", ["vlp-16", "hdl-64e", "vls-128", "vlp-32c"])
+@pytest.mark.parametrize("sent", ["vlp-16", "hdl-64e"])
+def test_a_wrong_declaration_breaks_nothing(sent, declared):
+    sweeps, _ = sweeps_of(packets(sent, 5 if sent == "vlp-16" else 4), model=model_named(declared))
+    assert all(np.isfinite(s.points).all() for s in sweeps)
+
+
+def test_single_returns_of_any_kind_are_taken():
+    single, _ = sweeps_of(packets())
+    last = [(at_s, payload[:1204] + b"\x38" + payload[1205:]) for at_s, payload in packets()]
+    assert equal(sweeps_of(last)[0], single)
+
+
+def test_an_unknown_model_is_counted():
+    timed = with_identity(packets(), 0x77)
+    sweeps, reception = sweeps_of(timed)
+    assert sweeps == []
+    assert reception.refused == {"of a model of Velodyne that is unknown; give model=": len(timed)}
+
+
+def test_an_unknown_name_and_a_broken_calibration_are_refused(tmp_path):
+    with pytest.raises(MisuseError, match="use one of vlp-16"):
+        model_named("vlp-17")
+    broken = tmp_path / "broken.yaml"
+    broken.write_text("lasers: 5")
+    with pytest.raises(MisuseError, match="no calibration"):
+        VelodyneDecoder("sensor", None, broken)
+
+
+@pytest.mark.kitti
+@pytest.mark.parametrize(
+    ("name", "profile", "n_sweeps", "turn_s"),
+    [
+        ("sample_velodyne_vlp16_gps", "vlp-16", 3, 0.1001),
+        ("sample_velodyne_hdl32", "hdl-32e", 1, 0.1106),
+        ("monterey-first-100-packets", "hdl-32e", 17, 0.0849),
+        ("vlp-16-test-90deg-1-50-frames", "vlp-16", 49, 0.0500),
+    ],
+)
+def test_real_captures(kitti_root, name, profile, n_sweeps, turn_s):
+    capture = Capture(kitti_root / "velodyne" / f"{name}.pcap")
+    decoder = VelodyneDecoder(name)
+    sweeps, reception = decoded(decoder, ((d.stamp_s, d.payload) for d in capture if len(d.payload) == 1206))
+    assert decoder.profile == profile
+    assert len(sweeps) == n_sweeps
+    assert all(s.complete for s in sweeps)
+    assert (reception.lost, reception.refused) == (0, {})
+    assert [s.turn_s for s in sweeps] == pytest.approx([turn_s] * n_sweeps, abs=2e-4)
+
+
+def packets_of_bag(folder):
+    """Velodyne's packets in the messages of a rosbag2 file."""
+    (path,) = folder.glob("*.db3")
+    bag = sqlite3.connect(f"file:{path}?mode=ro&immutable=1", uri=True)
+    messages = [data for (data,) in bag.execute("select data from messages order by timestamp")]
+    bag.close()
+    for data in messages:
+        at = 16 + struct.unpack_from("<I", data, 12)[0]
+        at += -at % 4
+        for k in range(struct.unpack_from("<I", data, at)[0]):
+            start = at + 4 + 1216 * k
+            second, fraction = struct.unpack_from("<II", data, start)
+            yield second + 1e-9 * fraction, data[start + 8 : start + 8 + 1206]
+
+
+@pytest.mark.kitti
+@pytest.mark.parametrize(
+    ("name", "median_m", "n_sweeps"),
+    [
+        ("vlp16-1673400471837873222", 0.01, 3),  # two returns a firing
+        ("vlp32-1713492677464078412", 0.01, 4),  # set to see the front half only
+        ("vls128-1614315746471294674", 0.03, 3),
+    ],
+)
+def test_points_are_those_of_another_decoder(kitti_root, name, median_m, n_sweeps):
+    folder = kitti_root / "packets" / name
+    sweeps, reception = sweeps_of(packets_of_bag(folder))
+    assert (len(sweeps), reception.lost) == (n_sweeps, 0)
+    assert all(s.complete for s in sweeps)
+    (cloud,) = folder.glob("*.pcd")
+    theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # cut elsewhere, without the lasers' offsets of height
+    distance, _ = cKDTree(np.concatenate([s.points[:, :3] for s in sweeps])).query(theirs)
+    assert np.median(distance) < median_m
+    assert np.quantile(distance, 0.9) < 5 * median_m

@@ -1,0 +1,184 @@
+"""PCD and PLY files."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.errors import ScanError
+from modt.sources.lzf import decompress
+from modt.sources.recognise import open_stream
+from modt.sources.scan_file import read_scan
+from modt.types import UNRECORDED
+from tests.sources.point_clouds import literal, pcd, ply, table
+
+WRITERS = {
+    f"{write.__name__} {data}": (write, data)
+    for write, kinds in (
+        (pcd, ("ascii", "binary", "binary_compressed")),
+        (ply, ("ascii", "binary_little_endian", "binary_big_endian")),
+    )
+    for data in kinds
+}
+
+
+def read(path, raw):
+    path.write_bytes(raw)
+    return read_scan(path)
+
+
+@pytest.fixture(params=WRITERS)
+def form(request, tmp_path):
+    """A function that writes rows and reads them again."""
+    write, data = WRITERS[request.param]
+    return lambda rows: read(tmp_path / f"scan.{write.__name__}", write(rows, data))
+
+
+def test_points_of_every_form(form):
+    rows = table(x="f4", y="f4", z="f4", intensity="u1")
+    points, flaws = form(rows)
+    np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
+    np.testing.assert_allclose(points[:, 3], rows["intensity"] / 255, atol=1e-7)
+    assert points.dtype == np.float32
+    assert not flaws
+
+
+def test_columns_of_any_order_and_type(form):
+    points, _ = form(table(ring="u2", z="f8", time="f4", reflectivity="u2", x="f8", intensity="f4", y="f4"))
+    np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [4, 6, 1])
+    np.testing.assert_allclose(points[:, 3], (50 * np.arange(5) + 3) / 255, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "reflectance"),
+    [
+        ("u1", [0, 1, 0, 1, 0], [0, 1 / 255, 0, 1 / 255, 0]),
+        ("u2", [0, 255, 65_535, 0, 0], [0, 255 / 65_535, 1, 0, 0]),
+        ("f4", [0, 0.5, 1, 0, 0], [0, 0.5, 1, 0, 0]),
+        ("f4", [0, 51, 255, 102, 51], [0, 0.2, 1, 0.4, 0.2]),
+        ("f4", [0, 51, 4000, 102, 51], [UNRECORDED] * 5),
+    ],
+)
+def test_reflectance_is_scaled(form, kind, values, reflectance):
+    rows = table(x="f4", y="f4", z="f4", i=kind)
+    rows["i"] = values
+    np.testing.assert_allclose(form(rows)[0][:, 3], reflectance, atol=1e-6)
+
+
+def test_without_reflectance_none_is_recorded(form):
+    assert (form(table(x="f4", y="f4", z="f4"))[0][:, 3] == UNRECORDED).all()
+
+
+def test_points_that_are_not_finite_are_no_returns(form):
+    rows = table(x="f4", y="f4", z="f4", i="u1")
+    rows["x"][2] = np.nan
+    points, flaws = form(rows)
+    assert not points[2, :3].any()
+    assert flaws == ["1 points are not finite and count as no return"]
+
+
+def test_repeated_names_and_several_numbers_a_field(tmp_path):
+    rows = table(x="f4", y="f4", z="f4", a="u1", b="u1")
+    points, _ = read(tmp_path / "scan.pcd", pcd(rows, FIELDS="x y z _ _"))
+    np.testing.assert_allclose(points[:, 2], np.arange(5) + 2)
+    rows = np.zeros(3, [("normal", "f4", 3), ("x", "f4"), ("y", "f4"), ("z", "f4")])
+    rows["z"] = [1, 2, 3]
+    flat = table(x="f4", y="f4", z="f4")
+    head = pcd(flat, FIELDS="normal x y z", SIZE="4 4 4 4", TYPE="F F F F", COUNT="3 1 1 1", WIDTH=3, POINTS=3)
+    points, _ = read(tmp_path / "scan.pcd", head[: head.index(b"binary\n") + 7] + rows.tobytes())
+    assert points[:, 2].tolist() == [1, 2, 3]
+
+
+def test_elements_before_the_vertices_are_passed_over(tmp_path):
+    rows = table(x="f4", y="f4", z="f4")
+    raw = ply(rows, before="element camera 2\nproperty float a\nproperty uchar b\n")
+    at = raw.index(b"end_header\n") + 11
+    points, _ = read(tmp_path / "scan.ply", raw[:at] + bytes(10) + raw[at:])
+    np.testing.assert_allclose(points[:, 0], np.arange(5))
+
+
+ROWS = table(x="f4", y="f4", z="f4", i="u1")
+
+
+@pytest.mark.parametrize(
+    ("name", "raw", "cause"),
+    [
+        ("a.pcd", b"nothing", "no header"),
+        ("a.pcd", pcd(ROWS, POINTS=10**18), "promises"),
+        ("a.pcd", pcd(ROWS, POINTS=-1), "promises"),
+        ("a.pcd", pcd(ROWS, COUNT="1 1 1 1000000000"), "promises"),
+        ("a.pcd", pcd(ROWS, COUNT="0 1 1 1"), "promises"),
+        ("a.pcd", pcd(ROWS, COUNT="1 1 1"), "promises"),
+        ("a.pcd", pcd(ROWS, SIZE="4 4 4 3"), "lacks a line, or one is broken"),
+        ("a.pcd", pcd(ROWS, TYPE="F F F X"), "lacks a line, or one is broken"),
+        ("a.pcd", pcd(ROWS, FIELDS=None), "lacks a line, or one is broken"),
+        ("a.pcd", pcd(ROWS, POINTS="many"), "lacks a line, or one is broken"),
+        ("a.pcd", pcd(ROWS, "zipped"), "DATA 'zipped' is unknown"),
+        ("a.pcd", pcd(ROWS, FIELDS="a b c d"), "no column x, y, z"),
+        ("a.pcd", pcd(ROWS)[:-1], "truncated: 64 bytes for 5 points"),
+        ("a.pcd", pcd(ROWS, "ascii")[:-6], "truncated: 19 numbers"),
+        ("a.pcd", pcd(ROWS, "ascii").replace(b"4.0", b"4.o"), "no number"),
+        ("a.pcd", pcd(ROWS, "binary_compressed")[:-1], "truncated"),
+        ("a.pcd", pcd(ROWS, "binary_compressed", POINTS=4_000_000), "of another size"),
+        ("a.ply", b"nothing", "no header"),
+        ("a.ply", ply(ROWS, n=10**15), "promises"),
+        ("a.ply", ply(ROWS, n=-1), "promises"),
+        ("a.ply", ply(ROWS, "binary"), "cannot be read"),
+        ("a.ply", ply(ROWS, before="element face 1\nproperty list uchar int n\n"), "lists"),
+        ("a.ply", ply(ROWS, before="element many 10000000000\nproperty uchar n\n"), "promises"),
+        ("a.ply", ply(ROWS).replace(b"element vertex", b"element point"), "cannot be read"),
+        ("a.ply", ply(ROWS)[:-1], "truncated"),
+        ("a.ply", ply(ROWS, "ascii")[:-6], "truncated"),
+    ],
+)
+def test_a_hostile_or_broken_file_is_one_clear_error(tmp_path, name, raw, cause):
+    with pytest.raises(ScanError, match=cause):
+        read(tmp_path / name, raw)
+
+
+@given(st.binary(max_size=300))
+def test_lzf_of_literals(data):
+    assert decompress(literal(data), len(data)) == data
+
+
+def test_lzf_repeats():
+    # "abc", then 7 bytes from 3 before, then 262 + 2 bytes from 1 before
+    packed = b"\x02abc" + bytes([5 << 5, 2]) + bytes([7 << 5, 255, 0])
+    assert decompress(packed, 274) == b"abc" + b"abcabca" + b"a" * 264
+
+
+@given(st.binary(max_size=60), st.integers(0, 4000))
+def test_broken_lzf_is_refused_without_growing(data, length):
+    out = decompress(data, length)
+    assert out is None or len(out) == length
+
+
+@pytest.mark.parametrize("write", [pcd, ply])
+def test_a_folder_of_them_is_a_stream(tmp_path, write):
+    rows = table(x="f4", y="f4", z="f4", i="u1")
+    for name in ("a", "b", "c"):
+        (tmp_path / f"{name}.{write.__name__}").write_bytes(write(rows))
+    (tmp_path / f"b.{write.__name__}").write_bytes(write(rows)[:-3])
+    stream = open_stream(tmp_path, period_s=0.05)
+    assert [(f.index, f.stamp_s) for f in stream] == [(0, 0.0), (2, 0.1)]
+    assert (stream.info.n_frames, stream.faults.count, stream.faults.skipped) == (3, 1, 1)
+    assert "truncated" in stream.faults.first[0].cause
+
+
+def test_names_in_nanoseconds_are_stamps(tmp_path):
+    for k in (0, 1, 3):
+        (tmp_path / f"{1_673_400_472_138_016_708 + k * 100_000_000}.pcd").write_bytes(pcd(ROWS))
+    stream = open_stream(tmp_path)
+    assert [f.index for f in stream] == [0, 1, 2]
+    assert [f.stamp_s for f in stream] == pytest.approx([0.0, 0.1, 0.3])
+    assert any("stamped by their names" in note for note in stream.info.notes)
+
+
+@pytest.mark.kitti
+def test_real_clouds(kitti_root):
+    clouds = sorted((kitti_root / "packets").glob("*/*.pcd"))
+    assert len(clouds) == 10
+    for cloud in clouds:
+        points, flaws = read_scan(cloud)
+        assert len(points) > 10_000
+        assert not flaws

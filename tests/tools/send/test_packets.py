@@ -1,0 +1,86 @@
+"""The sender of packets."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from modt.errors import MisuseError
+from modt.sources.packets.capture import Capture
+from modt.sources.packets.open_capture import open_capture
+from modt.sources.recognise import open_stream
+from tests.sources import layouts
+from tests.sources.packets.simulated import packets
+from tools.send import packets as sender
+from tools.send.loops import ouster_loop, velodyne_loop
+from tools.send.pcap_writer import write_capture
+
+
+class RecordingSocket:
+    def __init__(self):
+        self.sent = []
+
+    def send(self, payload):
+        self.sent.append(payload)
+
+
+def test_each_packet_is_sent_when_it_is_due():
+    now_s, slept = [10.0], []
+
+    def sleep(time_s):
+        slept.append(time_s)
+        now_s[0] += time_s
+
+    to = RecordingSocket()
+    timed = [(0.0, b"a"), (0.5, b"b"), (0.5, b"c"), (2.0, b"d")]
+    assert sender.send(timed, to, clock=lambda: now_s[0], sleep=sleep) == 4
+    assert to.sent == [b"a", b"b", b"c", b"d"]
+    assert slept == pytest.approx([0.5, 1.5])
+
+
+def test_a_loop_needs_a_whole_turn():
+    with pytest.raises(MisuseError, match="no whole turn"):
+        next(velodyne_loop([p for _, p in packets()][:60]))
+
+
+def written(tmp_path, monkeypatch, *arguments):
+    out = tmp_path / "out.pcap"
+    monkeypatch.setattr(sys, "argv", ["packets", "127.0.0.1:2368", *map(str, arguments), "--write", str(out)])
+    sender.main()
+    return out
+
+
+def test_a_capture_is_repeated_without_a_gap_or_sent_as_it_is(tmp_path, monkeypatch):
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    path = tmp_path / "in.pcap"
+    write_capture(path, packets(), 2368)
+    stream = open_capture(written(tmp_path, monkeypatch, path, "--seconds", "1"), {})
+    stamps_s = [f.stamp_s for f in stream]
+    assert len(stamps_s) == 9
+    assert np.diff(stamps_s) == pytest.approx([0.1] * 8, abs=1e-3)
+    assert stream.faults.count == 0
+    once = Capture(written(tmp_path, monkeypatch, path, "--once"))
+    assert [d.payload for d in once] == [p for _, p in packets()]
+
+
+def test_a_stream_of_scans_is_sent_as_an_hdl_64e(tmp_path, monkeypatch):
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    scans, calibration = layouts.bare(tmp_path), tmp_path / "ideal.yaml"
+    out = written(tmp_path, monkeypatch, scans, "--as", "hdl-64e", "--calibration", calibration, "--seconds", "0.35")
+    stream = open_stream(out, capture={"calibration": str(calibration)})
+    assert stream.info.profile == "hdl-64e"
+    assert len(list(stream)) == 2
+
+
+@pytest.mark.kitti
+def test_an_ouster_is_repeated_without_a_gap(kitti_root, tmp_path):
+    pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
+    metadata = kitti_root / "ouster" / "OS-1-32-G_v2.1.1_1024x10.json"
+    payloads = [d.payload for d in Capture(metadata.with_suffix(".pcap"))]
+    path = tmp_path / "loop.pcap"
+    write_capture(path, (timed for timed, _ in zip(ouster_loop(payloads, metadata), range(256), strict=False)), 7502)
+    stream = open_capture(path, {"metadata": str(metadata)})
+    frames = list(stream)
+    assert stream.reception.lost == 0
+    assert np.diff([f.stamp_s for f in frames]) == pytest.approx([0.1] * 3, abs=1e-3)
+    assert len({f.points.tobytes() for f in frames}) == 1

@@ -1,0 +1,1 @@
+"""Senders of recorded and simulated sensors, at their pace."""

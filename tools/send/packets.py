@@ -1,0 +1,121 @@
+"""Send a sensor's packets to a UDP address at the sensor's pace.
+
+    python -m tools.send.packets 127.0.0.1:2368 CAPTURE.pcap [--metadata FILE.json] [--once] [--seconds S]
+    python -m tools.send.packets 127.0.0.1:2368 [STREAM] --as hdl-64e --calibration FILE.yaml [--frames A:B]
+    ... --loss P --duplicates P --reordering P --garbage P --seed N
+    ... --write FILE.pcap
+
+The whole turns of a capture are repeated as if the sensor had gone on, until --seconds are over; with --once it is
+sent as it is. Of a STREAM of scans (a KITTI drive; default: the synthetic street), the packets of an ideal sensor are
+made, whose calibration goes to FILE.yaml for the receiver. Faults are shares of the packets, the same for the same
+seed. With --write the packets go to a file instead.
+"""
+
+from __future__ import annotations
+
+import argparse
+import socket
+import time
+from collections.abc import Callable, Iterable, Iterator
+from itertools import takewhile
+from pathlib import Path
+
+from modt.cli.options import frames, real
+from modt.errors import ModtError
+from modt.sources.packets.open_capture import SUFFIXES, open_capture
+from modt.sources.recognise import open_stream
+from modt.sources.synthetic_stream import SyntheticStream
+from tools.options import parser
+from tools.send.faults import PacketFaults, Timed
+from tools.send.loops import ouster_loop, velodyne_loop
+from tools.send.pcap_writer import write_capture
+from tools.send.velodyne_packets import LAYOUTS, ideal_calibration, packets_of
+
+SYNTHETIC_S = 5.0
+
+
+def send(
+    packets: Iterable[Timed],
+    to: socket.socket,
+    clock: Callable[[], float] = time.monotonic,
+    sleep: Callable[[float], None] = time.sleep,
+) -> int:
+    """Send payloads over a connected socket, each at its time from now on; returns their number."""
+    began_s, sent = clock(), 0
+    for at_s, payload in packets:
+        early_s = began_s + at_s - clock()
+        if early_s > 0:
+            sleep(early_s)
+        try:
+            to.send(payload)
+        except ConnectionRefusedError:  # nobody listens yet, as of a sensor
+            continue
+        sent += 1
+    return sent
+
+
+def captured(path: Path, metadata: Path | None, *, once: bool) -> Iterator[Timed]:
+    """Packets of a capture, as they are or endlessly."""
+    stream = open_capture(path, {"metadata": str(metadata)} if metadata else {})
+    datagrams = list(stream.capture)
+    if once:
+        return ((d.stamp_s - datagrams[0].stamp_s, d.payload) for d in datagrams)
+    payloads = [d.payload for d in datagrams]
+    if stream.info.layout.startswith("Velodyne"):
+        return velodyne_loop(payloads)
+    return ouster_loop(payloads, metadata or path.with_suffix(".json"))
+
+
+def made(path: Path | None, model: str, calibration: Path | None, part: tuple[int, int | None]) -> list[Timed]:
+    """Packets of an ideal sensor that saw the sweeps of a stream, followed by those of the stream again."""
+    layout = LAYOUTS[model]
+    if calibration is not None:
+        calibration.write_text(ideal_calibration(layout), encoding="utf-8")
+    stream = SyntheticStream("street", model, SYNTHETIC_S) if path is None else open_stream(path)
+    return [*packets_of([*stream.between(*part)], layout, stream.info.period_s)]
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("address", metavar="HOST:PORT")
+    options.add_argument("path", type=Path, nargs="?", help="capture or stream")
+    options.add_argument("--metadata", type=Path, help="of an Ouster (default: the capture's name with .json)")
+    options.add_argument("--as", dest="model", choices=LAYOUTS, default="vlp-16", help="default: %(default)s")
+    options.add_argument("--calibration", type=Path, help="file to write, of the ideal sensor")
+    options.add_argument("--frames", type=frames, default=(0, None), metavar="A:B", help="of a stream")
+    options.add_argument("--once", action="store_true", help="do not repeat")
+    options.add_argument("--seconds", type=float, default=float("inf"), help="default: until it is ended")
+    options.add_argument("--write", type=Path, metavar="FILE", help="PCAP file to write instead of sending")
+    share = real(0.0, 1.0, "a share")
+    for name in ("loss", "duplicates", "reordering", "garbage"):
+        options.add_argument(f"--{name}", type=share, default=0.0, metavar="SHARE")
+    options.add_argument("--seed", type=int, default=0)
+    try:
+        run(options.parse_args())
+    except ModtError as error:
+        raise SystemExit(f"send: {error}") from None
+
+
+def run(arguments: argparse.Namespace) -> None:
+    host, _, port = arguments.address.rpartition(":")
+    packets: Iterable[Timed]
+    if arguments.path is not None and arguments.path.suffix in SUFFIXES:
+        packets = captured(arguments.path, arguments.metadata, once=arguments.once)
+    else:
+        packets = made(arguments.path, arguments.model, arguments.calibration, arguments.frames)
+        if not arguments.once:
+            packets = velodyne_loop([payload for _, payload in packets])
+    faults = PacketFaults(
+        arguments.loss, arguments.duplicates, arguments.reordering, arguments.garbage, arguments.seed
+    )
+    packets = faults.applied(takewhile(lambda timed: timed[0] < arguments.seconds, packets))
+    if arguments.write is not None:
+        write_capture(arguments.write, packets, int(port))
+        return
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as to:
+        to.connect((host, int(port)))
+        print(f"{send(packets, to)} packets sent")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,105 @@
+"""Sweeps as the packets of an ideal Velodyne: a VLP-16, or an HDL-64E without errors of its lasers."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import count
+
+import numpy as np
+import yaml
+
+from modt.types import Float32, Float64, Frame
+
+UNIT_M = 0.002
+PACKET_BLOCKS, BLOCK_LASERS, TURN = 12, 32, 36_000
+HOUR_US = 3_600_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How a model's packets hold its firings.
+
+    Attributes:
+        elevations_deg: of the lasers, in the order of a firing.
+        firing_us: time from one firing to the next.
+        headers: of the blocks of a packet, repeated as often as they fit.
+        tail: the last two bytes of a packet.
+    """
+
+    elevations_deg: tuple[float, ...]
+    firing_us: float
+    headers: tuple[bytes, ...]
+    tail: bytes
+
+    @property
+    def firings(self) -> int:
+        """In a packet."""
+        return PACKET_BLOCKS * BLOCK_LASERS // len(self.elevations_deg)
+
+
+HDL_64E_DEG = (*(2.0 - i / 3 for i in range(32)), *(-8.83 - i / 2 for i in range(32)))
+VLP_16_DEG = tuple(float(v) for i in range(8) for v in (-15 + 2 * i, 1 + 2 * i))
+LAYOUTS = {
+    "hdl-64e": Layout(HDL_64E_DEG, 48.0, (b"\xff\xee", b"\xff\xdd"), b"V\x00"),
+    "vlp-16": Layout(VLP_16_DEG, 55.296, (b"\xff\xee",), b"\x37\x22"),
+}
+
+
+def ideal_calibration(layout: Layout) -> str:
+    """The calibration of the ideal sensor, in the format of ROS's velodyne_pointcloud."""
+    none = ("rot", "dist", "dist_x", "dist_y", "vert_offset", "horiz_offset")
+    names = ["rot_correction", *(f"{name}_correction" for name in none[4:]), "dist_correction"]
+    names += ["dist_correction_x", "dist_correction_y", "focal_distance", "focal_slope"]
+    lasers = [
+        {"laser_id": i, "vert_correction": float(np.deg2rad(elevation))} | dict.fromkeys(names, 0.0)
+        for i, elevation in enumerate(layout.elevations_deg)
+    ]
+    return yaml.safe_dump({"num_lasers": len(lasers), "distance_resolution": UNIT_M, "lasers": lasers})
+
+
+def packets_of(frames: Sequence[Frame], layout: Layout, period_s: float) -> Iterator[tuple[float, bytes]]:
+    """Time [s] at which each packet is full, and payload, of sweeps that follow one another without a gap."""
+    per_turn = round(period_s * 1e6 / layout.firing_us)
+    images = (_image(frame.points, layout, per_turn) for frame in frames)
+    firings = ((i, *firing) for i, image in enumerate(images) for firing in enumerate(image))
+    kept: list[tuple[int, Float64]] = []
+    packet = count()
+    for sweep, column, firing in firings:
+        kept.append((sweep * per_turn + column, firing))
+        if len(kept) == layout.firings:
+            packet_us = layout.firings * layout.firing_us
+            at_us = next(packet) * packet_us
+            yield (at_us + packet_us) * 1e-6, _packet(kept, layout, per_turn, at_us)
+            kept = []
+
+
+def _image(points: Float32, layout: Layout, per_turn: int) -> Float64:
+    """(per_turn, lasers, 2) distance in units and reflectance in bytes of the nearest point of each firing."""
+    x, y, z, reflectance = points.T.astype(np.float64)
+    distance = np.sqrt(x * x + y * y + z * z)
+    seen = np.flatnonzero((distance > 0) & (distance < UNIT_M * 65_535))
+    seen = seen[np.argsort(-distance[seen], kind="stable")]  # the nearest is written last
+    elevation = np.rad2deg(np.arcsin(z[seen] / distance[seen]))
+    order = np.argsort(layout.elevations_deg)
+    sorted_deg = np.array(layout.elevations_deg)[order]
+    laser = order[np.searchsorted((sorted_deg[1:] + sorted_deg[:-1]) / 2, elevation)]
+    turned = (np.pi - np.arctan2(y[seen], x[seen])) / (2 * np.pi)  # 0 behind the sensor, clockwise
+    column = (turned * per_turn).astype(np.int64) % per_turn
+    image = np.zeros((per_turn, len(layout.elevations_deg), 2))
+    image[column, laser, 0] = np.rint(distance[seen] / UNIT_M)
+    image[column, laser, 1] = np.rint(255 * reflectance[seen].clip(0, 1))
+    return image
+
+
+def _packet(firings: Sequence[tuple[int, Float64]], layout: Layout, per_turn: int, at_us: float) -> bytes:
+    lasers = np.concatenate([values for _, values in firings]).reshape(PACKET_BLOCKS, BLOCK_LASERS, 2)
+    cells = np.zeros((PACKET_BLOCKS, BLOCK_LASERS), np.dtype([("distance", "<u2"), ("reflectance", "u1")]))
+    cells["distance"], cells["reflectance"] = lasers[..., 0], lasers[..., 1]
+    body = b""
+    for i in range(PACKET_BLOCKS):
+        firing = firings[i * BLOCK_LASERS // len(layout.elevations_deg)][0]
+        azimuth = (round((firing + 0.5) * TURN / per_turn) + TURN // 2) % TURN
+        body += layout.headers[i % len(layout.headers)] + struct.pack("<H", azimuth) + cells[i].tobytes()
+    return body + struct.pack("<I", round(at_us) % HOUR_US) + layout.tail
