@@ -24,6 +24,7 @@ class StreamInfo:
     notes: tuple[str, ...] = ()  # missing files and their consequences
     pose_notes: tuple[str, ...] = ()  # the same of its poses, irrelevant with another pose source
     end: int | None = None  # index of the last frame plus one, None where unknown
+    profile: str | None = None  # shipped profile of the sensor, where its messages say what it is
 
 
 @dataclass(frozen=True, slots=True)
