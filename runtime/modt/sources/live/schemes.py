@@ -35,6 +35,11 @@ SCHEMES = {
         frozenset({"metadata"}),
         "ouster://[HOST][:PORT]?metadata=FILE",
     ),
+    "ros2": Scheme(
+        "modt.sources.live.ros2:open_ros2",
+        frozenset({"domain", "reliability"}),
+        "ros2:///TOPIC[?domain=N&reliability=best_effort|reliable]",
+    ),
 }
 
 

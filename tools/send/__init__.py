@@ -1,0 +1,1 @@
+"""Tools that send recordings as a live sensor does."""
