@@ -35,6 +35,7 @@ class Request:
     fov: str = "full"
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
+    topic: str | None = None
     labels: bool = False
     odometry: str = RECORDED
     poses: Path | None = None
@@ -55,7 +56,7 @@ def stream(request: Request) -> Stream:
     if request.path is None:
         whole: Stream = SyntheticStream("street", "hdl-64e", EMBEDDED_SECONDS, seed=0)
     else:
-        whole = open_stream(request.path, profile.load(request.profile).sensor.period_s)
+        whole = open_stream(request.path, profile.load(request.profile).sensor.period_s, request.topic)
     cut = whole.between(*request.frames)
     if cut.info.n_frames == 0:
         first, last = request.frames
@@ -90,6 +91,10 @@ def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSo
         return RecordedPoses()
     if request.odometry == NONE:
         return NoPoses()
+    if request.odometry.startswith("ros2:"):
+        from modt.sources.pose_topic import open_topic
+
+        return open_topic(request.odometry, config)
     return PoseSocket(open_socket(request.odometry), config, request.odometry)
 
 

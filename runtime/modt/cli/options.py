@@ -16,9 +16,10 @@ def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, Non
     """Stream, frames, profile and core."""
     a, b = first_frames
     which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
-    stream = "KITTI drive, sequence or folder of .bin scans (default: a synthetic stream)"
+    stream = "KITTI drive, sequence, folder of .bin scans or ROS 2 recording (default: a synthetic stream)"
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
+    p.add_argument("--topic", metavar="NAME", help="point clouds to read of a ROS 2 recording that holds several")
     sensor = f"sensor and board (default: {DEFAULT}, or what the first sweep shows)"
     p.add_argument("--profile", metavar="NAME|FILE", help=sensor)
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")

@@ -78,9 +78,11 @@ def _scans(beside: Path, run_path: Path | None) -> ScanStream | None:
     for path in (beside, run_path):
         if path is not None and path.is_dir():
             try:
-                return open_stream(path)
+                stream = open_stream(path)
             except MisuseError:
                 continue
+            if isinstance(stream, ScanStream):
+                return stream
     return None
 
 

@@ -32,7 +32,6 @@ except ImportError:
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 
-MAX_DOMAIN = 232
 BUFFER_BYTES = 16 << 20
 """Asked for the socket: a sweep arrives as a burst of up to 2 MB, and the kernel grants what it is configured to."""
 CONFIGURATION = (
@@ -163,29 +162,6 @@ class Publication:
     def receivers(self) -> int:
         """Matched subscribers."""
         return len(self._writer.get_matched_subscriptions())
-
-
-def domain_of(text: str, subject: str) -> int:
-    """The domain of an option, ROS_DOMAIN_ID or 0 where it is empty.
-
-    Raises:
-        MisuseError: no number of a domain.
-    """
-    text = text or os.environ.get("ROS_DOMAIN_ID", "") or "0"
-    if not text.isdecimal() or int(text) > MAX_DOMAIN:
-        raise MisuseError(subject, f"domain {text!r} is none", f"give a number from 0 to {MAX_DOMAIN}")
-    return int(text)
-
-
-def topic_of(host: str, path: str, subject: str) -> str:
-    """The topic that an address names.
-
-    Raises:
-        MisuseError: none.
-    """
-    if host or not path.strip("/"):
-        raise MisuseError(subject, "names no topic", "write ros2:///TOPIC, with three slashes")
-    return path.strip("/")
 
 
 def _qos(depth: int, reliable: bool) -> Any:

@@ -7,17 +7,21 @@ from pathlib import Path
 
 from modt.errors import MisuseError
 from modt.sources import kitti
-from modt.sources.scan_stream import ScanStream
+from modt.sources.bag import open_bag
+from modt.sources.bag_files import is_bag
+from modt.sources.stream import Stream
 
 MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
 
 
-REMEDY = "give a KITTI drive, a sequence or a folder of .bin scans"
+REMEDY = "give a KITTI drive, a sequence, a folder of .bin scans or a recording of ROS 2 (.db3, .mcap)"
 
 
-def open_stream(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
+def open_stream(path: Path, period_s: float = kitti.PERIOD_S, topic: str | None = None) -> Stream:
     """The stream at a path; period_s is the time between the scans of a folder, which has no stamps.
+
+    `topic` is that of the point clouds in a recording of ROS 2 that holds several.
 
     Raises:
         MisuseError: the path does not exist or holds no stream; the error names streams below it.
@@ -25,7 +29,7 @@ def open_stream(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
     if not path.exists():
         raise MisuseError(path, "no such file or directory", REMEDY)
     path = path.resolve()
-    stream = _stream(path, period_s)
+    stream = _stream(path, period_s, topic)
     if stream is not None:
         return stream
     if (path / "oxts").is_dir():
@@ -39,8 +43,10 @@ def open_stream(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
     raise MisuseError(path, "no stream of scans", REMEDY)
 
 
-def _stream(path: Path, period_s: float) -> ScanStream | None:
-    """The stream in a folder or around it, by the most specific layout; None where there is none."""
+def _stream(path: Path, period_s: float, topic: str | None) -> Stream | None:
+    """The stream in a file or folder, or around it, by the most specific layout; None where there is none."""
+    if is_bag(path):
+        return open_bag(path, period_s, topic)
     data = path.parts[-2:] == ("velodyne_points", "data")
     scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
     layouts = (

@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 
 from modt.errors import MisuseError
+from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
-from modt.ros2.dds import Message, Subscription, domain_of, participant, topic_of
+from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.point_cloud2 import TYPE, read_cloud
 from modt.sources.live.address import Address
 from modt.sources.live.live_stream import LiveStream
@@ -67,12 +68,12 @@ def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
         MisuseError: Cyclone DDS is not installed, or the address names no topic, domain or reliability.
         ModtError: the domain cannot be joined.
     """
-    topic = topic_of(address.host, address.path, address.text)
+    topic = topic_of(address)
     reliability = address.option("reliability", "best_effort")
     if reliability not in RELIABILITIES:
         remedy = f"use one of {', '.join(RELIABILITIES)}"
         raise MisuseError(address.text, f"reliability {reliability!r} is unknown", remedy)
-    joined = participant(domain_of(address.option("domain"), address.text), cores)
+    joined = participant(domain_of(address), cores)
     reliable = RELIABILITIES[reliability]
     subscription = Subscription(joined, topic, TYPE, depth=DEPTH, reliable=reliable)
     info = StreamInfo(f"/{topic}", "ros2", 0, None, PERIOD_S, None, has_poses=False)

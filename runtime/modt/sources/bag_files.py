@@ -1,0 +1,169 @@
+"""Files of ROS 2 recordings: rosbag2's SQLite databases, and MCAP."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+from urllib.parse import quote
+
+from modt.errors import MisuseError, ModtError
+
+REMEDY = "give a recording by rosbag2 (.db3 or .mcap) that was closed, and not compressed as a whole"
+
+
+class BagMessage(NamedTuple):
+    """A recorded message."""
+
+    topic: str
+    recorded_s: float
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class BagTopic:
+    """A topic of a recording: the type of its messages as PACKAGE/NAME, and their number."""
+
+    type: str
+    count: int
+
+
+class BagFile(Protocol):
+    """One file of a recording."""
+
+    path: Path
+
+    def topics(self) -> dict[str, BagTopic]:
+        """Topics by name, of messages in CDR.
+
+        Raises:
+            ModtError: the file cannot be read.
+        """
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Messages of these topics in the order of their recording.
+
+        Raises:
+            ModtError: the file cannot be read, or not beyond the messages before.
+        """
+
+
+class DatabaseFile:
+    """A .db3 file."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def topics(self) -> dict[str, BagTopic]:
+        """Topics by name, of messages in CDR."""
+        query = (
+            "SELECT name, type, (SELECT count(*) FROM messages WHERE topic_id = topics.id) FROM topics "
+            "WHERE serialization_format = 'cdr'"
+        )
+        with self._open() as database:
+            return {name: BagTopic(_type(kind), count) for name, kind, count in database.execute(query)}
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Messages of these topics in the order of their recording."""
+        query = (
+            "SELECT name, timestamp, data FROM messages JOIN topics ON topic_id = topics.id "
+            f"WHERE name IN ({', '.join('?' * len(topics))}) ORDER BY timestamp"
+        )
+        with self._open() as database:
+            for name, recorded_ns, data in database.execute(query, tuple(topics)):
+                yield BagMessage(name, 1e-9 * recorded_ns, data)
+
+    @contextmanager
+    def _open(self) -> Iterator[sqlite3.Connection]:
+        try:
+            address = f"file:{quote(str(self.path))}?immutable=1"
+            with closing(sqlite3.connect(address, uri=True)) as database:
+                yield database
+        except sqlite3.Error as error:
+            raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
+
+
+class McapFile:
+    """An .mcap file.
+
+    Raises:
+        MisuseError: the library `mcap` is not installed.
+    """
+
+    def __init__(self, path: Path) -> None:
+        try:
+            from mcap.exceptions import McapError
+            from mcap.reader import make_reader
+        except ImportError:
+            raise MisuseError(path, "needs the library mcap", "pip install 'modt[ros2]'") from None
+        self.path, self._reader_of, self._error = path, make_reader, McapError
+
+    def topics(self) -> dict[str, BagTopic]:
+        """Topics by name, of messages in CDR."""
+        with self._open() as reader:
+            summary = reader.get_summary()
+            if summary is not None and summary.statistics is not None:
+                counts = Counter(summary.statistics.channel_message_counts)
+                pairs = [(summary.schemas.get(channel.schema_id), channel) for channel in summary.channels.values()]
+                return _topics(pairs, counts)
+        with self._open() as reader:
+            found: dict[int, Any] = {}
+            counts = Counter()
+            try:
+                for schema, channel, _ in reader.iter_messages(log_time_order=False):
+                    found[channel.id] = schema, channel
+                    counts[channel.id] += 1
+            except self._error:  # of a recording that was cut off, what is whole is used
+                if not found:
+                    raise
+            return _topics(found.values(), counts)
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Messages of these topics in the order of their recording."""
+        with self._open() as reader:
+            for _, channel, message in reader.iter_messages(topics=list(topics)):
+                yield BagMessage(channel.topic, 1e-9 * message.log_time, message.data)
+
+    @contextmanager
+    def _open(self) -> Iterator[Any]:
+        try:
+            with self.path.open("rb") as file:
+                yield self._reader_of(file)
+        except (OSError, self._error) as error:
+            raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
+
+
+KINDS: dict[str, type[DatabaseFile] | type[McapFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
+
+
+def bag_files(path: Path) -> list[BagFile]:
+    """The files of a recording, a file or a folder, in their order; none where there are none."""
+    paths = sorted(path.iterdir(), key=lambda p: (len(p.name), p.name)) if path.is_dir() else [path]
+    return [KINDS[file.suffix](file) for file in paths if file.suffix in KINDS and file.is_file()]
+
+
+def is_bag(path: Path) -> bool:
+    """Whether there is a recording at a path."""
+    return path.suffix in KINDS or (path.is_dir() and any(p.suffix in KINDS for p in path.iterdir()))
+
+
+def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:
+    """Messages of these topics, file by file."""
+    return (message for file in files for message in file.messages(topics))
+
+
+def _type(name: str) -> str:
+    """PACKAGE/NAME of PACKAGE/msg/NAME."""
+    return name.replace("/msg/", "/")
+
+
+def _topics(pairs: Any, counts: Counter[int]) -> dict[str, BagTopic]:
+    return {
+        channel.topic: BagTopic(_type(schema.name), counts[channel.id])
+        for schema, channel in pairs
+        if schema is not None and channel.message_encoding == "cdr"
+    }
