@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sqlite3
+import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, BinaryIO, NamedTuple, Protocol
 from urllib.parse import quote
 
 from modt.errors import MisuseError, ModtError
@@ -88,7 +89,7 @@ class DatabaseFile:
 
 
 class McapFile:
-    """An .mcap file.
+    """An .mcap file; one that was cut off is read up to there.
 
     Raises:
         MisuseError: the library `mcap` is not installed.
@@ -97,43 +98,55 @@ class McapFile:
     def __init__(self, path: Path) -> None:
         try:
             from mcap.exceptions import McapError
-            from mcap.reader import make_reader
+            from mcap.reader import NonSeekingReader, SeekingReader
+            from zstandard import ZstdError
         except ImportError:
             raise MisuseError(path, "needs the library mcap", "pip install 'modt[ros2]'") from None
-        self.path, self._reader_of, self._error = path, make_reader, McapError
+        # What the library and its decompressors raise where the bytes are no recording, or not all of one.
+        self.path, self._errors = path, (McapError, ZstdError, struct.error, ValueError, RuntimeError)
+        self._indexed, self._sequential = SeekingReader, NonSeekingReader
 
     def topics(self) -> dict[str, BagTopic]:
         """Topics by name, of messages in CDR."""
-        with self._open() as reader:
-            summary = reader.get_summary()
-            if summary is not None and summary.statistics is not None:
-                counts = Counter(summary.statistics.channel_message_counts)
-                pairs = [(summary.schemas.get(channel.schema_id), channel) for channel in summary.channels.values()]
-                return _topics(pairs, counts)
-        with self._open() as reader:
+        counts: Counter[int] = Counter()
+        with self._open() as file:
+            summary = self._summary(file)
+            if summary is not None:
+                counts.update(summary.statistics.channel_message_counts)
+                schemas, channels = summary.schemas, summary.channels
+                return _topics([(schemas.get(channel.schema_id), channel) for channel in channels.values()], counts)
+        with self._open() as file:
             found: dict[int, Any] = {}
-            counts = Counter()
-            try:
-                for schema, channel, _ in reader.iter_messages(log_time_order=False):
+            with suppress(*self._errors):  # at its end
+                for schema, channel, _ in self._sequential(file).iter_messages(log_time_order=False):
                     found[channel.id] = schema, channel
                     counts[channel.id] += 1
-            except self._error:  # of a recording that was cut off, what is whole is used
-                if not found:
-                    raise
-            return _topics(found.values(), counts)
+        if not found:
+            raise ModtError(self.path, "holds no message", REMEDY)
+        return _topics(found.values(), counts)
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Messages of these topics in the order of their recording."""
-        with self._open() as reader:
-            for _, channel, message in reader.iter_messages(topics=list(topics)):
+        with self._open() as file:
+            indexed = self._summary(file) is not None
+            file.seek(0)
+            reader = (self._indexed if indexed else self._sequential)(file)
+            for _, channel, message in reader.iter_messages(topics=list(topics), log_time_order=indexed):
                 yield BagMessage(channel.topic, 1e-9 * message.log_time, message.data)
 
+    def _summary(self, file: BinaryIO) -> Any:
+        """Index and counts, None where the recording was not closed."""
+        with suppress(*self._errors, OSError):
+            summary = self._indexed(file).get_summary()
+            return summary if summary is not None and summary.statistics is not None else None
+        return None
+
     @contextmanager
-    def _open(self) -> Iterator[Any]:
+    def _open(self) -> Iterator[BinaryIO]:
         try:
             with self.path.open("rb") as file:
-                yield self._reader_of(file)
-        except (OSError, self._error) as error:
+                yield file
+        except (OSError, *self._errors) as error:
             raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
 
 
