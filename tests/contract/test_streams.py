@@ -13,7 +13,7 @@ from modt.sources.pose_socket import PoseSocket
 from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
-from tests.sources import layouts
+from tests.sources import bags, layouts
 
 
 def listed(root):
@@ -41,6 +41,7 @@ SOURCES = {
     "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoPoses()),
     "listed": listed,
     "sent": sent,
+    "bag": lambda root: open_stream(bags.write_rosbag2(root / "bag", bags.by_time(bags.clouds(), bags.poses()))),
     "peeked": lambda root: PeekedStream(open_stream(layouts.bare(root))),
     "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),
 }

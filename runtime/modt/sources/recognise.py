@@ -45,8 +45,6 @@ def open_stream(path: Path, period_s: float = kitti.PERIOD_S, topic: str | None 
 
 def _stream(path: Path, period_s: float, topic: str | None) -> Stream | None:
     """The stream in a file or folder, or around it, by the most specific layout; None where there is none."""
-    if is_bag(path):
-        return open_bag(path, period_s, topic)
     data = path.parts[-2:] == ("velodyne_points", "data")
     scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
     layouts = (
@@ -58,7 +56,8 @@ def _stream(path: Path, period_s: float, topic: str | None) -> Stream | None:
         (scans, kitti.odometry_sequence, path.parent),
         (_has_scans(path), partial(kitti.scan_folder, period_s=period_s), path),
     )
-    return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
+    found = next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
+    return open_bag(path, period_s, topic) if found is None and is_bag(path) else found
 
 
 def _is_raw(path: Path) -> bool:
