@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from modt.types import Float64
 
 HEADER_BYTES = 4
 """Encapsulation header: the byte order; alignment counts from behind it."""
+MAX_ALIGNMENT = 8
 MAX_TEXT_BYTES = 4096
 """Longest string that is read."""
 
@@ -75,40 +76,62 @@ class CdrReader:
 
 
 class CdrWriter:
-    """Writes a message field by field, in little-endian byte order."""
+    """Writes a message in little-endian byte order, record by record.
+
+    A record is described by its fields, format characters of `struct` with a count before them (`7d`), which are
+    aligned as in CDR. A string takes two, `I` and `{n}s`: its length, and its bytes with a zero.
+    """
 
     def __init__(self) -> None:
         self._message = bytearray(b"\0\1\0\0")
 
-    def numbers(self, code: str, *values: float) -> None:
-        """Numbers of the type that a format character of `struct` names."""
-        self._align(struct.calcsize(code))
-        self._message += struct.pack(f"<{len(values)}{code}", *values)
-
-    def doubles(self, values: Sequence[float]) -> None:
-        """64-bit numbers."""
-        self.numbers("d", *values)
+    def record(self, fields: tuple[str, ...], *values: float | bytes) -> None:
+        """Append a record."""
+        phase = (len(self._message) - HEADER_BYTES) % MAX_ALIGNMENT
+        self._message += _layout(fields, phase).pack(*values)
 
     def text(self, text: str) -> None:
-        """A string."""
-        self.octets(text.encode() + b"\0")
+        """Append a string."""
+        fields, values = text_fields(text)
+        self.record(fields, *values)
 
     def octets(self, octets: bytes) -> None:
-        """A sequence of octets."""
-        self.numbers("I", len(octets))
+        """Append a sequence of octets."""
+        self.record(("I",), len(octets))
         self._message += octets
 
     def header(self, stamp_s: float, frame_id: str) -> None:
-        """A std_msgs/Header."""
-        seconds, nanoseconds = divmod(round(stamp_s * 1e9), 10**9)
-        self.numbers("i", seconds)
-        self.numbers("I", nanoseconds)
-        self.text(frame_id)
+        """Append a std_msgs/Header."""
+        fields, values = header_fields(stamp_s, frame_id)
+        self.record(fields, *values)
 
     def message(self) -> bytes:
         """The whole message, padded to a multiple of four bytes as DDS requires it."""
-        self._align(4)
-        return bytes(self._message)
+        return bytes(self._message) + bytes(-len(self._message) % 4)
 
-    def _align(self, size: int) -> None:
-        self._message += bytes(-(len(self._message) - HEADER_BYTES) % size)
+
+Fields = tuple[tuple[str, ...], tuple[float | bytes, ...]]
+"""Fields of a part of a record, and their values."""
+
+
+def text_fields(text: str) -> Fields:
+    """A string."""
+    octets = text.encode() + b"\0"
+    return ("I", f"{len(octets)}s"), (len(octets), octets)
+
+
+def header_fields(stamp_s: float, frame_id: str) -> Fields:
+    """A std_msgs/Header."""
+    fields, values = text_fields(frame_id)
+    return ("i", "I", *fields), (*divmod(round(stamp_s * 1e9), 10**9), *values)
+
+
+@lru_cache(maxsize=1024)
+def _layout(fields: tuple[str, ...], phase: int) -> struct.Struct:
+    """The fields of a record that begins at an offset of so many bytes, by the greatest alignment."""
+    at, text = phase, "<"
+    for field in fields:
+        gap = -at % struct.calcsize("<" + field[-1])
+        text += f"{gap}x{field}"
+        at += gap + struct.calcsize("<" + field)
+    return struct.Struct(text)

@@ -12,6 +12,8 @@ from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
 from modt.types import Float64
 
 TYPE = "nav_msgs/Odometry"
+UNKNOWN = f"{8 * (36 + 6 + 36)}x"
+"""Covariance of the pose, and twist with its covariance: zeros."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +61,6 @@ def write_odometry(stamp_s: float, frame_id: str, child_frame_id: str, T_odom_ch
     cdr = CdrWriter()
     cdr.header(stamp_s, frame_id)
     cdr.text(child_frame_id)
-    write_pose(cdr, T_odom_child)
-    cdr.doubles([0.0] * (36 + 6 + 36))
+    quaternion = Rotation.from_matrix(T_odom_child[:3, :3]).as_quat()
+    cdr.record(("7d", UNKNOWN), *T_odom_child[:3, 3].tolist(), *quaternion.tolist())
     return cdr.message()
-
-
-def write_pose(cdr: CdrWriter, T: Float64) -> None:
-    """Append a geometry_msgs/Pose or Transform of a (4, 4) pose."""
-    cdr.doubles([*T[:3, 3].tolist(), *Rotation.from_matrix(T[:3, :3]).as_quat().tolist()])

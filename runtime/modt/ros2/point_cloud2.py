@@ -121,16 +121,13 @@ def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
     """A message of (N, 4) points: x, y, z and intensity in float32."""
     cdr = CdrWriter()
     cdr.header(stamp_s, frame_id)
-    cdr.numbers("I", 1, len(points), 4)
+    cdr.record(("3I",), 1, len(points), 4)
     for k, name in enumerate(("x", "y", "z", "intensity")):
         cdr.text(name)
-        cdr.numbers("I", 4 * k)
-        cdr.numbers("B", FLOAT32)
-        cdr.numbers("I", 1)
-    cdr.numbers("B", 0)
-    cdr.numbers("I", 16, 16 * len(points))
+        cdr.record(("I", "B", "I"), 4 * k, FLOAT32, 1)
+    cdr.record(("B", "2I"), 0, 16, 16 * len(points))
     cdr.octets(points.astype("<f4").tobytes())
-    cdr.numbers("B", 1)
+    cdr.record(("B",), 1)
     return cdr.message()
 
 
