@@ -132,12 +132,6 @@ class Subscription:
         ]
 
     @property
-    def lost(self) -> int:
-        """Messages lost on the way."""
-        status: Any = self._reader.get_sample_lost_status()  # type: ignore[no-untyped-call]
-        return int(status.total_count)
-
-    @property
     def senders(self) -> int:
         """Matched publishers."""
         return len(self._reader.get_matched_publications())

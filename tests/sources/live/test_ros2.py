@@ -25,7 +25,7 @@ class Scripted:
     """A subscription that holds what the test says."""
 
     def __init__(self, *batches):
-        self.batches, self.lost = list(batches), 0
+        self.batches = list(batches)
 
     def take(self, timeout_s):
         return [dds.Message(data, sent_s=77.0) for data in self.batches.pop(0)]
@@ -57,6 +57,15 @@ def test_messages_that_cannot_be_used_are_counted_by_their_reason_and_logged_onc
     assert reader.reception.messages == 5
     assert reader.reception.refused == {"malformed": 3, "empty": 1}
     assert caplog.text.count("message refused (malformed)") == 1
+
+
+def test_sweeps_that_are_missing_by_their_stamps_are_counted_and_warned_of_once(caplog):
+    arrived = [k for k in range(60) if k not in (20, 31, 32, 50)]
+    reader = PointCloudReader(Scripted(*([cloud(10.0 + k / 10)] for k in arrived)), "/points")
+    for _ in arrived:
+        reader.read(0.0)
+    assert reader.reception.lost == 4
+    assert caplog.text.count("sweeps are missing by their stamps; raise net.core.rmem_max") == 1
 
 
 def test_after_it_is_closed_nothing_is_read():

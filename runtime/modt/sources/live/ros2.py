@@ -11,6 +11,7 @@ from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.point_cloud2 import TYPE, read_cloud
 from modt.sources.live.address import Address
 from modt.sources.live.live_stream import LiveStream
+from modt.sources.live.missing import MissingSweeps
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.stream import StreamInfo
 
@@ -30,7 +31,7 @@ class PointCloudReader:
         self.reception = Reception()
         self.frame_id = ""
         self._subscription: Subscription | None = subscription
-        self._name = name
+        self._name, self._missing = name, MissingSweeps()
 
     def read(self, timeout_s: float) -> list[Sweep]:
         """Sweeps received until the timeout, oldest first."""
@@ -39,13 +40,20 @@ class PointCloudReader:
             return []
         messages = subscription.take(timeout_s)
         self.reception.messages += len(messages)
-        self.reception.lost = subscription.lost
-        sweeps = [self._sweep(message) for message in messages]
-        return [sweep for sweep in sweeps if sweep is not None]
+        sweeps = [sweep for message in messages if (sweep := self._sweep(message)) is not None]
+        for sweep in sweeps:
+            self._lose(self._missing.before(sweep.stamp_s))
+        return sweeps
 
     def close(self) -> None:
         """Leave the topic, once `read` has returned."""
         self._subscription = None
+
+    def _lose(self, count: int) -> None:
+        if count and not self.reception.lost:
+            remedy = "raise net.core.rmem_max here, or check the network and the sender; later ones are only counted"
+            log.warning("%s: sweeps are missing by their stamps; %s", self._name, remedy)
+        self.reception.lost += count
 
     def _sweep(self, message: Message) -> Sweep | None:
         try:
