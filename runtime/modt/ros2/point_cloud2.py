@@ -113,7 +113,8 @@ def read_cloud(message: bytes) -> PointCloud:
     table = _Table(data, order, (height, width), strides, fields)
     points = _points(table)
     time = table.first(TIMES)
-    turn = None if time is None else turn_of(points, table.column(time).reshape(-1))
+    with np.errstate(all="ignore"):  # of times that are none
+        turn = None if time is None else turn_of(points, table.column(time).reshape(-1))
     return PointCloud(stamp_s, frame_id, points, turn)
 
 

@@ -48,6 +48,6 @@ def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | None:
     slope, ahead_s = np.polyfit(bearing, t, 1)
     turn_s = -2 * np.pi * slope
     off = np.quantile(np.abs(t - slope * bearing - ahead_s), 0.9)
-    if off > MAX_RESIDUAL * abs(turn_s):
+    if not off <= MAX_RESIDUAL * abs(turn_s):
         return None
     return Turn(float(turn_s), float(begin * unit_s + ahead_s))

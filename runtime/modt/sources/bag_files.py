@@ -101,7 +101,7 @@ class McapFile:
             from mcap.reader import NonSeekingReader, SeekingReader
             from zstandard import ZstdError
         except ImportError:
-            raise MisuseError(path, "needs the library mcap", "pip install 'modt[ros2]'") from None
+            raise MisuseError(path, "needs the library mcap", "pip install mcap, or 'modt[ros2]'") from None
         # What the library and its decompressors raise where the bytes are no recording, or not all of one.
         self.path, self._errors = path, (McapError, ZstdError, struct.error, ValueError, RuntimeError)
         self._indexed, self._sequential = SeekingReader, NonSeekingReader
