@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -101,6 +103,25 @@ def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
     recorded = [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)]
     stream = open_stream(write(tmp_path / "drive", recorded))
     assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
+
+
+def test_a_recording_in_several_files_is_read_in_their_order(tmp_path):
+    recorded = clouds(12)
+    for k, message in enumerate(recorded):
+        write_mcap(tmp_path / f"drive_{k}", [message])
+    with pytest.raises(MisuseError, match="no stream of scans"):  # nothing says that they belong together
+        open_stream(tmp_path)
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
+    assert [len(frame.points) for frame in open_stream(tmp_path)] == list(range(20, 32))
+
+
+def test_a_recording_may_be_read_by_another_thread_than_began(write, tmp_path):
+    frames = iter(open_stream(write(tmp_path / "drive", by_time(clouds(), poses()))))
+    rest = [next(frames)]
+    reader = threading.Thread(target=lambda: rest.extend(frames))
+    reader.start()
+    reader.join(20.0)
+    assert [frame.index for frame in rest] == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("chunked", [True, False])

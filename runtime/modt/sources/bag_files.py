@@ -82,7 +82,7 @@ class DatabaseFile:
     def _open(self) -> Iterator[sqlite3.Connection]:
         try:
             address = f"file:{quote(str(self.path))}?immutable=1"
-            with closing(sqlite3.connect(address, uri=True)) as database:
+            with closing(sqlite3.connect(address, uri=True, check_same_thread=False)) as database:
                 yield database
         except sqlite3.Error as error:
             raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
@@ -160,8 +160,11 @@ def bag_files(path: Path) -> list[BagFile]:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether there is a recording at a path."""
-    return path.suffix in KINDS or (path.is_dir() and any(p.suffix in KINDS for p in path.iterdir()))
+    """Whether a path is a recording: a file, or a folder of one file or of those that `metadata.yaml` joins."""
+    if not path.is_dir():
+        return path.suffix in KINDS
+    count = sum(p.suffix in KINDS for p in path.iterdir())
+    return count == 1 or (count > 1 and (path / "metadata.yaml").is_file())
 
 
 def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:
