@@ -2,9 +2,9 @@
 
 import pytest
 
+from modt.address import parse_address
 from modt.errors import MisuseError
 from modt.ros2.address import domain_of, name_of, topic_of
-from modt.sources.live.address import parse_address
 
 OPTIONS = {"ros2": frozenset({"domain"})}
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from modt.address import parse_address
 from modt.errors import MisuseError
 from modt.sinks import ros2_detections, ros2_markers
-from modt.sources.live.address import parse_address
 from tests.results import CAR, PEDESTRIAN, result
 from tests.ros2 import messages
 from tests.ros2.network import FAR, NEAR, until

@@ -11,6 +11,7 @@ from modt.errors import MisuseError, ModtError
 from modt.sources import kitti
 from modt.sources.recognise import open_stream
 from tests.ros2 import messages
+from tests.sources import layouts
 from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, TF, by_time, clouds, poses, write_mcap, write_rosbag2
 
 
@@ -137,6 +138,17 @@ def test_a_recording_that_was_cut_off_is_read_up_to_there(tmp_path, chunked):
         stream = open_stream(path)
         assert len(list(stream)) == stream.info.n_frames == 3
         assert stream.faults.skipped == 1
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(MisuseError, match="no such file or directory"):
+        open_stream(tmp_path / "drive.mcap")
+
+
+def test_scans_go_before_a_recording_beside_them(tmp_path):
+    scans = layouts.bare(tmp_path)
+    write_mcap(scans / "drive", clouds())
+    assert open_stream(scans).info.layout != "rosbag2"
 
 
 @pytest.mark.parametrize("name", ["drive.db3", "drive.mcap"])

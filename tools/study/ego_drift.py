@@ -26,8 +26,8 @@ from modt.observations import Located, StaticTracks
 from modt.pipeline import Odometry
 from modt.profile import load
 from modt.sources import kitti_calibration, oxts
-from modt.sources.kitti import raw_drive
 from modt.sources.pose_source import NoPoses, PosedStream
+from modt.sources.recognise import open_scans
 from modt.sources.stream import Stream
 from modt.types import Float64, Frame, Proposals
 from tools.options import parser
@@ -139,7 +139,7 @@ def has_kiss_icp() -> bool:
 
 def study(drive: Path, span: tuple[int, int | None], *, kiss: bool) -> dict[str, dict[str, float]]:
     """Drift of each estimate against each reference, by name."""
-    stream = raw_drive(drive).between(*span)
+    stream = open_scans(drive).between(*span)
     poses = [(s.index, s.T_world_sensor) for s in stream.scans if s.T_world_sensor is not None]
     references = {
         "positions": np.array([T for _, T in poses]),

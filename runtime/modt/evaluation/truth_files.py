@@ -26,7 +26,7 @@ from modt.geometry import Camera
 from modt.sources.kitti_calibration import camera_of_sequence
 from modt.sources.kitti_labels import DONT_CARE, Label, read_labels, read_tracklets
 from modt.sources.pose_file import read_poses
-from modt.sources.recognise import open_stream
+from modt.sources.recognise import open_scans
 from modt.sources.scan_stream import ScanStream
 from modt.types import NONE
 
@@ -78,11 +78,9 @@ def _scans(beside: Path, run_path: Path | None) -> ScanStream | None:
     for path in (beside, run_path):
         if path is not None and path.is_dir():
             try:
-                stream = open_stream(path)
+                return open_scans(path)
             except MisuseError:
                 continue
-            if isinstance(stream, ScanStream):
-                return stream
     return None
 
 

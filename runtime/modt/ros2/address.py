@@ -3,30 +3,19 @@
 from __future__ import annotations
 
 import os
-from typing import Protocol
 
+from modt.address import Address
 from modt.errors import MisuseError
 
 MAX_DOMAIN = 232
 
 
-class TopicAddress(Protocol):
-    """What is read of a parsed address."""
-
-    @property
-    def text(self) -> str:
-        """The address as given."""
-
-    def option(self, name: str, default: str = "") -> str:
-        """Value of an option."""
-
-
-def name_of(address: TopicAddress) -> str:
+def name_of(address: Address) -> str:
     """The name between ros2:// and the options, without slashes at its ends; with two slashes or three."""
     return address.text.partition("://")[2].partition("?")[0].strip("/")
 
 
-def topic_of(address: TopicAddress) -> str:
+def topic_of(address: Address) -> str:
     """The name of a topic.
 
     Raises:
@@ -38,7 +27,7 @@ def topic_of(address: TopicAddress) -> str:
     return name
 
 
-def domain_of(address: TopicAddress) -> int:
+def domain_of(address: Address) -> int:
     """The domain, ROS_DOMAIN_ID or else 0 where none is stated.
 
     Raises:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from modt.ros2.address import TopicAddress, domain_of, name_of
+from modt.address import Address
+from modt.ros2.address import domain_of, name_of
 from modt.ros2.dds import Publication, participant
 from modt.sinks import ros2_detections, ros2_markers
 from modt.types import FrameResult
@@ -34,7 +35,7 @@ class Ros2Sink:
         self._topics = []
 
 
-def open_sink(address: TopicAddress, cores: frozenset[int] | None = None) -> Ros2Sink:
+def open_sink(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink:
     """The sink of ros2:///PREFIX?domain=N&frame_id=NAME; `cores` for Cyclone's threads, None: where the caller runs.
 
     Raises:

@@ -117,6 +117,7 @@ def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream
         MisuseError: no topic of point clouds, or several and none is chosen; or no library to read the file.
         ModtError: the file cannot be read.
     """
+    path = path.resolve()
     files = bag_files(path)
     topics: dict[str, BagTopic] = {}
     for file in files:
@@ -129,7 +130,7 @@ def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream
     stamps = [_stamp_s(cloud, message) for cloud, message in began]
     poses, notes = find_poses(files, topics, began[0][0].frame_id)
     info = StreamInfo(
-        name=path.stem,
+        name=path.stem if path.is_file() else path.name,
         layout="rosbag2",
         sequence=0,
         n_frames=topics[chosen].count,

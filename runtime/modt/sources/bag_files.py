@@ -162,7 +162,7 @@ def bag_files(path: Path) -> list[BagFile]:
 def is_bag(path: Path) -> bool:
     """Whether a path is a recording: a file, or a folder of one file or of those that `metadata.yaml` joins."""
     if not path.is_dir():
-        return path.suffix in KINDS
+        return path.is_file() and path.suffix in KINDS
     count = sum(p.suffix in KINDS for p in path.iterdir())
     return count == 1 or (count > 1 and (path / "metadata.yaml").is_file())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.address import parse_address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
@@ -11,7 +12,6 @@ from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
-from modt.sources.live.address import parse_address
 from modt.sources.pose_datagram import DatagramError
 from modt.sources.pose_file import pose_defect
 from modt.sources.pose_socket import ReceivedPoses

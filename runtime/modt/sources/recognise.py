@@ -9,6 +9,7 @@ from modt.errors import MisuseError
 from modt.sources import kitti
 from modt.sources.bag import open_bag
 from modt.sources.bag_files import is_bag
+from modt.sources.scan_stream import ScanStream
 from modt.sources.stream import Stream
 
 MAX_LISTED = 5
@@ -19,9 +20,21 @@ REMEDY = "give a KITTI drive, a sequence, a folder of .bin scans or a recording 
 
 
 def open_stream(path: Path, period_s: float = kitti.PERIOD_S, topic: str | None = None) -> Stream:
-    """The stream at a path; period_s is the time between the scans of a folder, which has no stamps.
+    """The stream at a path: a recording of ROS 2, or what `open_scans` opens.
 
-    `topic` is that of the point clouds in a recording of ROS 2 that holds several.
+    `topic` is that of the point clouds in a recording that holds several.
+
+    Raises:
+        MisuseError: the path does not exist or holds no stream.
+        ModtError: a recording that cannot be read.
+    """
+    if is_bag(path) and _stream(path, period_s) is None:
+        return open_bag(path, period_s, topic)
+    return open_scans(path, period_s)
+
+
+def open_scans(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
+    """The stream of scan files at a path; period_s is the time between the scans of a folder, which has no stamps.
 
     Raises:
         MisuseError: the path does not exist or holds no stream; the error names streams below it.
@@ -29,7 +42,7 @@ def open_stream(path: Path, period_s: float = kitti.PERIOD_S, topic: str | None 
     if not path.exists():
         raise MisuseError(path, "no such file or directory", REMEDY)
     path = path.resolve()
-    stream = _stream(path, period_s, topic)
+    stream = _stream(path, period_s)
     if stream is not None:
         return stream
     if (path / "oxts").is_dir():
@@ -43,8 +56,8 @@ def open_stream(path: Path, period_s: float = kitti.PERIOD_S, topic: str | None 
     raise MisuseError(path, "no stream of scans", REMEDY)
 
 
-def _stream(path: Path, period_s: float, topic: str | None) -> Stream | None:
-    """The stream in a file or folder, or around it, by the most specific layout; None where there is none."""
+def _stream(path: Path, period_s: float) -> ScanStream | None:
+    """The stream in a folder or around it, by the most specific layout; None where there is none."""
     data = path.parts[-2:] == ("velodyne_points", "data")
     scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
     layouts = (
@@ -56,8 +69,7 @@ def _stream(path: Path, period_s: float, topic: str | None) -> Stream | None:
         (scans, kitti.odometry_sequence, path.parent),
         (_has_scans(path), partial(kitti.scan_folder, period_s=period_s), path),
     )
-    found = next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
-    return open_bag(path, period_s, topic) if found is None and is_bag(path) else found
+    return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
 
 
 def _is_raw(path: Path) -> bool:

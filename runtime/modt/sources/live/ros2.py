@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import logging
 
+from modt.address import Address
 from modt.errors import MisuseError
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.point_cloud2 import TYPE, read_cloud
-from modt.sources.live.address import Address
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.missing import MissingSweeps
 from modt.sources.live.sweep_reader import Reception, Sweep

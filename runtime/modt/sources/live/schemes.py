@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import import_module
 
-from modt.sources.live.address import parse_address
+from modt.address import parse_address
 from modt.sources.live.live_stream import LiveStream
 
 
