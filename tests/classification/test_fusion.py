@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from modt.classes import ObjectClass
-from modt.classification.fusion import EveryFrame, OneView, KeyViews
+from modt.classification.fusion import EveryFrame, KeyViews, OneView
 from modt.classification.prior import object_probability_reaches
 from modt.config import FusionConfig
 from modt.pipeline import Fusion

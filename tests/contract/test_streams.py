@@ -13,7 +13,7 @@ from modt.sources.pose_socket import PoseSocket
 from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.synthetic_stream import SyntheticStream
-from tests.sources import layouts
+from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets
 from tests.sources.point_clouds import pcd
 from tools.send.pcap_writer import write_capture
@@ -57,6 +57,7 @@ SOURCES = {
     "blind": lambda root: PosedStream(open_stream(layouts.raw_drive(root)), NoPoses()),
     "listed": listed,
     "sent": sent,
+    "bag": lambda root: open_stream(bags.write_rosbag2(root / "bag", bags.by_time(bags.clouds(), bags.poses()))),
     "peeked": lambda root: PeekedStream(open_stream(layouts.bare(root))),
     "clouds": clouds,
     "capture": capture,

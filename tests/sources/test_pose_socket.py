@@ -279,7 +279,9 @@ def test_interpolation_is_rigid_and_exact_at_both_ends(begin, end):
     ],
 )
 def test_an_invalid_address_is_refused(url):
-    with pytest.raises(MisuseError, match=r"write recording, none, udp://HOST:PORT or unix:///PATH|cannot be bound"):
+    with pytest.raises(
+        MisuseError, match=r"write recording, none, udp://HOST:PORT, unix:///PATH or ros2:///TOPIC|cannot be bound"
+    ):
         open_socket(url)
 
 

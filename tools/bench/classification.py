@@ -44,9 +44,7 @@ def layers_of(model: Path) -> list[Layer]:
 def textbook(net: PointNet, points: Float32, proposals: Proposals, batch: int, sensor: SensorConfig) -> Float64:
     """(P, 4) probabilities of proposals resampled to 400 points each, in batches."""
     which = np.arange(len(proposals))
-    crops = canonical(
-        gather(points, proposals, which, TEXTBOOK_POINTS), ground_z_m(proposals, which, sensor)
-    )
+    crops = canonical(gather(points, proposals, which, TEXTBOOK_POINTS), ground_z_m(proposals, which, sensor))
     step = np.arange(TEXTBOOK_POINTS) % crops.count[:, None]
     full = crops.xyz[crops.offsets[:-1, None] + step]
     parts = [net.infer(full[i : i + batch]) for i in range(0, len(full), batch)]

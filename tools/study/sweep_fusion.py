@@ -33,7 +33,7 @@ import numpy as np
 
 from modt import profile
 from modt.classes import CLASS_NAMES
-from modt.classification.fusion import EveryFrame, OneView, KeyViews
+from modt.classification.fusion import EveryFrame, KeyViews, OneView
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.config import FusionConfig, ProfileConfig

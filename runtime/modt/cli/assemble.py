@@ -94,6 +94,10 @@ def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSo
         return RecordedPoses()
     if request.odometry == NONE:
         return NoPoses()
+    if request.odometry.startswith("ros2:"):
+        from modt.sources.pose_topic import open_topic
+
+        return open_topic(request.odometry, config)
     return PoseSocket(open_socket(request.odometry), config, request.odometry)
 
 

@@ -11,14 +11,16 @@ from modt.profile import DEFAULT
 from modt.sinks.schemes import SCHEMES
 
 Parser = argparse.ArgumentParser
-CAPTURE_KEYS = ("model", "calibration", "metadata")
+CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
 
 
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
     """Stream, frames, profile and core."""
     a, b = first_frames
     which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
-    stream = "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, or PCAP file (default: a synthetic stream)"
+    stream = (
+        "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, PCAP file or ROS 2 recording (default: synthetic)"
+    )
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     add_capture_option(p)
     p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
@@ -41,9 +43,10 @@ def add_sink_option(p: Parser) -> None:
 
 
 def add_capture_option(p: Parser) -> None:
-    """What the packets of a PCAP file do not tell."""
+    """What a recording does not tell."""
     what = (
-        "of a PCAP file: model=MODEL or calibration=FILE of a Velodyne, metadata=FILE of an Ouster; may be repeated"
+        "of a PCAP file: model=MODEL or calibration=FILE of a Velodyne, metadata=FILE of an Ouster; of a ROS 2 recording"
+        " with several topics of point clouds: topic=NAME; repeatable"
     )
     p.add_argument("--capture", type=capture, action="append", default=[], metavar="KEY=VALUE", help=what)
 

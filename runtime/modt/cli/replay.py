@@ -25,7 +25,9 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     motion = p.add_mutually_exclusive_group()
     file = "poses in KITTI odometry's format, instead of the recorded ones"
     motion.add_argument("--poses", type=Path, metavar="FILE", help=file)
-    source = "poses: recording (the stream's, default), none, or from a socket: udp://HOST:PORT, unix:///PATH"
+    source = (
+        "poses: recording (the stream's, default), none, or received: udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
+    )
     motion.add_argument("--odometry", default="recording", metavar="SOURCE", help=source)
     options.add_sink_option(p)
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")

@@ -25,11 +25,11 @@ from modt.types import Float64, Frame
 
 log = logging.getLogger(__name__)
 
-FORM = "write recording, none, udp://HOST:PORT or unix:///PATH"
+FORM = "write recording, none, udp://HOST:PORT, unix:///PATH or ros2:///TOPIC"
 
 
-class PoseSocket(PoseSource):
-    """Reads the socket once a frame without blocking; refused poses are counted, and logged once of each kind.
+class ReceivedPoses(PoseSource):
+    """Poses that another process sends; refused ones are counted, and logged once of each kind.
 
     A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
     are removed and the restart is passed on in `Frame.restarts`.
@@ -39,9 +39,8 @@ class PoseSocket(PoseSource):
     REASONS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")
     """Reasons of a refusal; each has a counter."""
 
-    def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
-        bound.setblocking(False)
-        self.name, self.config, self._socket = name, config, bound
+    def __init__(self, config: OdometryConfig, name: str) -> None:
+        self.name, self.config = name, config
         self._buffer = PoseBuffer(config)
         self.received = self.used = self.restarts = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
@@ -54,7 +53,7 @@ class PoseSocket(PoseSource):
         return replace(frame, T_world_sensor=T, restarts=self.restarts)
 
     def report(self) -> dict[str, Any]:
-        """Counts of datagrams received, used and refused, of restarts, and of frames with and without a pose."""
+        """Counts of poses received, used and refused, of restarts, and of frames with and without a pose."""
         return {
             "source": self.name,
             "received": self.received,
@@ -65,25 +64,9 @@ class PoseSocket(PoseSource):
             "frames_unposed": self.unposed,
         }
 
-    def close(self) -> None:
-        """Close the socket and remove its file."""
-        address = self._socket.getsockname()
-        self._socket.close()
-        if isinstance(address, str) and address:
-            Path(address).unlink(missing_ok=True)
-
     def _drain(self, now_s: float) -> None:
-        """Read what has arrived, at most `capacity` datagrams: a flood must not delay the frame."""
-        for _ in range(self.config.capacity):
-            try:
-                raw = self._socket.recv(MAX_BYTES + 1)
-            except OSError:  # nothing to read, or an error caused by the last sender
-                return
-            self.received += 1
-            try:
-                self._keep(*read_datagram(raw), now_s)
-            except DatagramError as error:
-                self._refuse(error)
+        """Keep what has arrived."""
+        raise NotImplementedError
 
     def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
         if stamp_s < now_s - self.config.max_age_s:
@@ -111,6 +94,35 @@ class PoseSocket(PoseSource):
         self.refused[error.reason] += 1
         if self.refused[error.reason] == 1:
             log.warning("%s: pose refused (%s): %s; later ones are only counted", self.name, error.reason, error)
+
+
+class PoseSocket(ReceivedPoses):
+    """Reads the socket once a frame without blocking."""
+
+    def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
+        super().__init__(config, name)
+        bound.setblocking(False)
+        self._socket = bound
+
+    def close(self) -> None:
+        """Close the socket and remove its file."""
+        address = self._socket.getsockname()
+        self._socket.close()
+        if isinstance(address, str) and address:
+            Path(address).unlink(missing_ok=True)
+
+    def _drain(self, now_s: float) -> None:
+        """Read what has arrived, at most `capacity` datagrams: a flood must not delay the frame."""
+        for _ in range(self.config.capacity):
+            try:
+                raw = self._socket.recv(MAX_BYTES + 1)
+            except OSError:  # nothing to read, or an error caused by the last sender
+                return
+            self.received += 1
+            try:
+                self._keep(*read_datagram(raw), now_s)
+            except DatagramError as error:
+                self._refuse(error)
 
 
 def open_socket(url: str) -> socket.socket:

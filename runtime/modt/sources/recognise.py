@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
 from modt.errors import MisuseError
 from modt.sources import kitti
-from modt.sources.packets.open_capture import SUFFIXES, open_capture
+from modt.sources.bag import open_bag
+from modt.sources.bag_files import is_bag
+from modt.sources.packets.open_capture import CAPTURE_OPTIONS, SUFFIXES, open_capture
 from modt.sources.scan_file import READERS
 from modt.sources.scan_stream import ScanStream
 from modt.sources.stream import Stream
@@ -18,22 +20,35 @@ MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
 
 
-REMEDY = "give a KITTI drive, a sequence, a folder of .bin, .pcd or .ply scans, or a PCAP file of packets"
+REMEDY = "give a KITTI drive, a sequence, a folder of .bin, .pcd or .ply scans, a PCAP file or a recording of ROS 2"
 
 
 def open_stream(
     path: Path, period_s: float = kitti.PERIOD_S, capture: Mapping[str, str] = MappingProxyType({})
 ) -> Stream:
-    """The stream at a path: a PCAP file, or what `open_scans` opens; `capture` as the options of `open_capture`.
+    """The stream at a path: packets, a recording of ROS 2, or what `open_scans` opens.
+
+    `capture` is what the recording does not tell: options of `open_capture`, or the topic for `open_bag`.
 
     Raises:
-        MisuseError: the path does not exist or holds no stream.
+        MisuseError: the path does not exist or holds no stream, or an option that does not apply.
+        ModtError: a recording that cannot be read.
     """
     if path.is_file() and path.suffix in SUFFIXES:
+        _only(path, capture, CAPTURE_OPTIONS)
         return open_capture(path, capture)
-    if capture:
-        raise MisuseError(path, "is no PCAP file, to which --capture applies", "leave --capture out")
+    if is_bag(path) and _stream(path, period_s) is None:
+        _only(path, capture, frozenset({"topic"}))
+        return open_bag(path, period_s, capture.get("topic"))
+    _only(path, capture, frozenset())
     return open_scans(path, period_s)
+
+
+def _only(path: Path, capture: Mapping[str, str], known: Collection[str]) -> None:
+    unknown = sorted(set(capture) - set(known))
+    if unknown:
+        remedy = f"--capture takes {', '.join(sorted(known))} here" if known else "leave --capture out"
+        raise MisuseError(path, f"{unknown[0]} does not apply", remedy)
 
 
 def open_scans(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:

@@ -68,7 +68,7 @@ def test_invalid_options_are_refused(path, options, cause):
 
 
 def test_options_of_a_capture_are_refused_elsewhere(tmp_path):
-    with pytest.raises(MisuseError, match="is no PCAP file, to which --capture applies"):
+    with pytest.raises(MisuseError, match="model does not apply"):
         open_stream(tmp_path, capture={"model": "vlp-16"})
 
 

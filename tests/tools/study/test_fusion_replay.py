@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from modt.classification.fusion import EveryFrame, OneView, KeyViews
+from modt.classification.fusion import EveryFrame, KeyViews, OneView
 from modt.classification.prior import Prior
 from modt.config import FusionConfig
 from modt.pipeline import Fusion

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from modt.address import Address
 from modt.errors import MisuseError
-from modt.sources.live.address import Address
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packet_reader import PacketReader, address_of, bound_socket
 from modt.sources.packets.ouster import OusterDecoder

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import import_module
 
-from modt.sources.live.address import parse_address
+from modt.address import parse_address
 from modt.sources.live.live_stream import LiveStream
 
 
@@ -34,6 +34,11 @@ SCHEMES = {
         "modt.sources.live.packets:open_ouster",
         frozenset({"metadata"}),
         "ouster://[HOST][:PORT]?metadata=FILE",
+    ),
+    "ros2": Scheme(
+        "modt.sources.live.ros2:open_ros2",
+        frozenset({"domain", "reliability"}),
+        "ros2:///TOPIC[?domain=N&reliability=best_effort|reliable]",
     ),
 }
 

@@ -17,6 +17,7 @@ from modt.sources.stream import StreamInfo
 
 SUFFIXES = frozenset({".pcap", ".cap"})
 """Of PCAP files."""
+CAPTURE_OPTIONS = frozenset({"model", "calibration", "metadata"})
 
 
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:

@@ -1,0 +1,1 @@
+"""ROS 2 messages and topics without a ROS installation."""

@@ -1,0 +1,178 @@
+"""Topics of ROS 2 over Cyclone DDS."""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+from weakref import WeakValueDictionary
+
+from modt.errors import MisuseError, ModtError
+
+try:
+    from cyclonedds.core import DDSException, ReadCondition, WaitSet
+    from cyclonedds.core import InstanceState as Instance
+    from cyclonedds.core import SampleState as Sample
+    from cyclonedds.core import ViewState as View
+    from cyclonedds.domain import Domain, DomainParticipant
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.qos import Policy, Qos
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+
+    from modt.ros2.message_types import message_type
+except ImportError:
+    raise MisuseError("ROS 2", "needs Cyclone DDS", "pip install 'modt[ros2]'") from None
+
+log = logging.getLogger(__name__)
+T = TypeVar("T")
+
+BUFFER_BYTES = 16 << 20
+"""Asked for the socket: a sweep arrives as a burst of up to 2 MB, and the kernel grants what it is configured to."""
+CONFIGURATION = (
+    '<CycloneDDS><Domain Id="any"><Internal>'
+    f'<SocketReceiveBufferSize min="default" max="{BUFFER_BYTES}B"/>'
+    "</Internal></Domain></CycloneDDS>"
+)
+RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
+ENOUGH_BYTES = 4 << 20
+"""Of rmem_max, for a sweep of 120,000 points in fragments of an Ethernet frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A message as received, and when it was sent on the clock of its sender [s]."""
+
+    data: bytes
+    sent_s: float
+
+
+class Participant:
+    """The process in a DDS domain; one for all its topics, so that they share Cyclone's threads."""
+
+    def __init__(self, domain_id: int) -> None:
+        given = os.environ.get("CYCLONEDDS_URI")  # comes last and wins
+        with suppress(DDSException):  # the program that uses this library has set up the domain
+            self._domain = Domain(domain_id, f"{CONFIGURATION},{given}" if given else CONFIGURATION)
+        try:
+            self.entity = DomainParticipant(domain_id)
+        except DDSException as error:
+            remedy = "check the network interfaces and CYCLONEDDS_URI"
+            raise ModtError(f"ROS 2 domain {domain_id}", f"cannot be joined ({error})", remedy) from None
+
+    def topic(self, name: str, kind: str) -> Any:
+        """The DDS topic of a ROS 2 topic and the type of its messages."""
+        return Topic(self.entity, "rt/" + name.strip("/"), message_type(kind))
+
+
+_participants: WeakValueDictionary[int, Participant] = WeakValueDictionary()
+_lock = threading.Lock()
+
+
+def participant(domain_id: int, cores: frozenset[int] | None = None) -> Participant:
+    """The participant of a domain, joined at first; its threads run on these cores, None: where the caller runs.
+
+    Raises:
+        ModtError: the domain cannot be joined.
+    """
+    with _lock:
+        found = _participants.get(domain_id)
+        if found is None:
+            _warn_of_buffer()
+            found = _participants[domain_id] = on_cores(cores, lambda: Participant(domain_id))
+        return found
+
+
+def on_cores(cores: frozenset[int] | None, make: Callable[[], T]) -> T:
+    """What `make` returns, called by a thread on these cores: the threads that it starts inherit them."""
+    made: list[T] = []
+    errors: list[Exception] = []
+
+    def work() -> None:
+        try:
+            if cores:
+                os.sched_setaffinity(0, cores)
+            made.append(make())
+        except Exception as error:
+            errors.append(error)
+
+    thread = threading.Thread(target=work, name="joiner")
+    thread.start()
+    thread.join()
+    if errors:
+        raise errors[0]
+    return made[0]
+
+
+class Subscription:
+    """The messages of a topic, the last `depth` of them; used by one thread."""
+
+    def __init__(self, joined: Participant, name: str, kind: str, *, depth: int, reliable: bool = False) -> None:
+        self._depth = depth
+        self._reader = DataReader(joined.entity, joined.topic(name, kind), qos=_qos(depth, reliable))
+        self._unread = ReadCondition(self._reader, View.Any | Instance.Any | Sample.NotRead)
+        self._arrival = WaitSet(joined.entity)
+        self._arrival.attach(self._unread)
+        self._joined = joined
+
+    def take(self, timeout_s: float = 0.0) -> list[Message]:
+        """What has arrived, oldest first, waited for at most `timeout_s`."""
+        if timeout_s > 0:
+            self._arrival.wait(int(timeout_s * 1e9))
+        samples = self._reader.take(self._depth)
+        return [
+            Message(sample.message, 1e-9 * sample.sample_info.source_timestamp)
+            for sample in samples
+            if hasattr(sample, "message")  # not the notice that a sender has left
+        ]
+
+    @property
+    def senders(self) -> int:
+        """Matched publishers."""
+        return len(self._reader.get_matched_publications())
+
+
+class Publication:
+    """Sends to a topic; never waits for a slow receiver."""
+
+    def __init__(self, joined: Participant, name: str, kind: str, *, depth: int = 5) -> None:
+        self._kind, self._joined = message_type(kind), joined
+        self._writer = DataWriter(joined.entity, joined.topic(name, kind), qos=_qos(depth, reliable=True))
+
+    def write(self, message: bytes) -> bool:
+        """Send a message; False where it was not taken."""
+        try:
+            self._writer.write(self._kind(message))
+        except DDSException:
+            return False
+        return True
+
+    @property
+    def receivers(self) -> int:
+        """Matched subscribers."""
+        return len(self._writer.get_matched_subscriptions())
+
+
+def _qos(depth: int, reliable: bool) -> Any:
+    reliability = Policy.Reliability.Reliable(0) if reliable else Policy.Reliability.BestEffort
+    return Qos(
+        reliability,
+        Policy.History.KeepLast(depth),
+        Policy.Durability.Volatile,
+        Policy.DataRepresentation(use_cdrv0_representation=True),
+    )
+
+
+def _warn_of_buffer() -> None:
+    try:
+        granted = int(RMEM_MAX.read_text())
+    except (OSError, ValueError):
+        return
+    if granted < ENOUGH_BYTES:
+        cause = f"{granted} bytes are too few for a sweep that arrives at once"
+        log.warning("net.core.rmem_max: %s; sysctl -w net.core.rmem_max=%d", cause, ENOUGH_BYTES)

@@ -1,0 +1,186 @@
+"""sensor_msgs/PointCloud2: a view of its bytes becomes a sweep by one copy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
+from modt.ros2.point_times import Turn, turn_of
+from modt.types import UNRECORDED, Float32
+
+TYPE = "sensor_msgs/PointCloud2"
+NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
+"""NumPy's name of each sensor_msgs/PointField datatype."""
+FLOAT32 = 7
+REFLECTANCES = ("reflectivity", "reflectance", "intensity", "i")
+"""Names of the field, by preference: a calibrated reflectance goes before a raw intensity."""
+TIMES = ("time", "t", "timestamp", "offset_time", "time_stamp")
+MAX_FIELDS = 64
+MAX_DELAY_S = 1.0
+"""Time of a point against the header's, by which it is on the same clock; else it counts from the header's."""
+FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))
+"""Full scale of the reflectances where more than MAX_SHARE_ABOVE of them lie above a limit."""
+MAX_SHARE_ABOVE = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class PointCloud:
+    """A sweep as received.
+
+    Attributes:
+        stamp_s: of the header [s]; 0 where the driver states none.
+        frame_id: of its coordinates.
+        points: (N, 4) float32 x, y, z [m], reflectance or UNRECORDED; finite, a point that is not lies at the origin.
+        turn: the motion of the head by the time of each point, None where it is not known.
+    """
+
+    stamp_s: float
+    frame_id: str
+    points: Float32
+    turn: Turn | None
+
+    @property
+    def ahead_s(self) -> float:
+        """Time of straight ahead [s]: the stamp of a sweep that is not skewed; 0 where the driver states none."""
+        if self.turn is None or not self.stamp_s:
+            return self.stamp_s
+        absolute = abs(self.turn.ahead_s - self.stamp_s) < MAX_DELAY_S
+        return self.turn.ahead_s if absolute else self.stamp_s + self.turn.ahead_s
+
+    @property
+    def turn_s(self) -> float:
+        """As Frame.turn_s; 0 where the turn is not known."""
+        return 0.0 if self.turn is None else self.turn.turn_s
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    offset: int
+    datatype: int
+
+    @property
+    def end(self) -> int:
+        return self.offset + np.dtype(NUMBERS[self.datatype]).itemsize
+
+
+@dataclass(frozen=True, slots=True)
+class _Table:
+    """The points in the message, `fields` by name in lower case."""
+
+    data: memoryview
+    order: str
+    shape: tuple[int, int]
+    strides: tuple[int, int]
+    fields: dict[str, _Field]
+
+    def first(self, names: tuple[str, ...]) -> _Field | None:
+        """The first field that is there."""
+        return next((self.fields[name] for name in names if name in self.fields), None)
+
+    def columns(self, field: _Field, n: int = 1) -> NDArray[np.generic]:
+        """(height, width, n) view of a field and those of its type that follow it."""
+        kind = np.dtype(self.order + NUMBERS[field.datatype])
+        strides = (*self.strides, kind.itemsize)
+        return np.ndarray((*self.shape, n), kind, self.data, field.offset, strides)
+
+    def column(self, field: _Field) -> NDArray[np.generic]:
+        """(height, width) view of a field."""
+        return self.columns(field)[..., 0]
+
+
+def read_cloud(message: bytes) -> PointCloud:
+    """The sweep in a message, of either byte order.
+
+    Raises:
+        MessageError: `malformed`, `empty`, or `fields`: without x, y and z as floating-point numbers.
+    """
+    cdr = CdrReader(message)
+    stamp_s, frame_id = cdr.stamp_s(), cdr.text()
+    height, width = cdr.count(), cdr.count()
+    fields = _fields(cdr)
+    order = ">" if cdr.number("B") else "<"
+    point_step, row_step = cdr.count(), cdr.count()
+    data = cdr.octets()
+    if not height * width:
+        raise MessageError("empty", "no points")
+    strides = (row_step if height > 1 else point_step * width, point_step)  # of one row, many drivers leave it 0
+    if strides[0] < width * point_step or (height - 1) * strides[0] + width * point_step > len(data):
+        raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
+    fields = {name: field for name, field in fields.items() if field.end <= point_step}
+    table = _Table(data, order, (height, width), strides, fields)
+    points = _points(table)
+    time = table.first(TIMES)
+    with np.errstate(all="ignore"):  # of times that are none
+        turn = None if time is None else turn_of(points, table.column(time).reshape(-1))
+    return PointCloud(stamp_s, frame_id, points, turn)
+
+
+def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
+    """A message of (N, 4) points: x, y, z and intensity in float32."""
+    cdr = CdrWriter()
+    cdr.header(stamp_s, frame_id)
+    cdr.record(("3I",), 1, len(points), 4)
+    for k, name in enumerate(("x", "y", "z", "intensity")):
+        cdr.text(name)
+        cdr.record(("I", "B", "I"), 4 * k, FLOAT32, 1)
+    cdr.record(("B", "2I"), 0, 16, 16 * len(points))
+    cdr.octets(points.astype("<f4").tobytes())
+    cdr.record(("B",), 1)
+    return cdr.message()
+
+
+def _fields(cdr: CdrReader) -> dict[str, _Field]:
+    n = cdr.count()
+    if n > MAX_FIELDS:
+        raise MessageError("malformed", f"{n} fields")
+    fields = {}
+    for _ in range(n):
+        name, offset, datatype, _count = cdr.text(), cdr.count(), int(cdr.number("B")), cdr.count()
+        if datatype in NUMBERS:
+            fields[name.lower()] = _Field(offset, datatype)
+    return fields
+
+
+def _points(table: _Table) -> Float32:
+    xyz = [table.fields[name] for name in "xyz" if name in table.fields]
+    if len(xyz) < 3 or any(NUMBERS[field.datatype][0] != "f" for field in xyz):
+        raise MessageError("fields", f"no x, y, z of floating point among {', '.join(table.fields) or 'none'}")
+    reflectance = table.first(REFLECTANCES)
+    points = np.empty((table.shape[0] * table.shape[1], 4), np.float32)
+    rows = points.reshape(*table.shape, 4)
+    in_row = [_Field(xyz[0].offset + 4 * k, FLOAT32) for k in range(4)]
+    with np.errstate(all="ignore"):  # of float64 beyond float32, and of NaN
+        if [*xyz, reflectance] == in_row:
+            rows[...] = table.columns(xyz[0], 4)
+        elif xyz == in_row[:3]:
+            rows[..., :3] = table.columns(xyz[0], 3)
+        else:
+            for k, field in enumerate(xyz):
+                rows[..., k] = table.column(field)
+        if reflectance is None:
+            rows[..., 3] = UNRECORDED
+        elif [*xyz, reflectance] != in_row:
+            rows[..., 3] = table.column(reflectance)
+        _scale(points[:, 3])
+        if not np.isfinite(np.dot(points.ravel(), points.ravel())):
+            _finite(points)
+    return points
+
+
+def _scale(reflectance: Float32) -> None:
+    """Brought to [0, 1] in place, from numbers of 8 or 16 bits where more than a few are above 1 or 255."""
+    if reflectance.max() <= 1.0:
+        return
+    values = reflectance.copy()  # contiguous
+    above = [(full, np.count_nonzero(values > limit)) for limit, full in FULL_SCALES]
+    full = next((full for full, count in above if count > MAX_SHARE_ABOVE * len(values)), 1.0)
+    reflectance[:] = np.minimum(values / np.float32(full), np.float32(1.0))
+
+
+def _finite(points: Float32) -> None:
+    """Points without a return, not finite in most drivers, go to the origin, in place."""
+    points[~np.isfinite(points[:, :3]).all(axis=1), :3] = 0.0
+    points[~np.isfinite(points[:, 3]), 3] = UNRECORDED

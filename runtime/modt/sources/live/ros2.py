@@ -1,0 +1,88 @@
+"""sensor_msgs/PointCloud2 topics of ROS 2."""
+
+from __future__ import annotations
+
+import logging
+
+from modt.address import Address
+from modt.errors import MisuseError
+from modt.ros2.address import domain_of, topic_of
+from modt.ros2.cdr import MessageError
+from modt.ros2.dds import Message, Subscription, participant
+from modt.ros2.point_cloud2 import TYPE, read_cloud
+from modt.sources.live.live_stream import LiveStream
+from modt.sources.live.missing import MissingSweeps
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.stream import StreamInfo
+
+log = logging.getLogger(__name__)
+
+PERIOD_S = 0.1
+"""Nominal, until the profile of the sensor says better."""
+DEPTH = 5
+"""Sweeps kept until they are read, as of ROS 2's QoS for sensors."""
+RELIABILITIES = {"best_effort": False, "reliable": True}
+
+
+class PointCloudReader:
+    """Messages of a topic to sweeps; `frame_id` names the frame of their points, which is taken for the sensor's."""
+
+    def __init__(self, subscription: Subscription, name: str) -> None:
+        self.reception = Reception()
+        self.frame_id = ""
+        self._subscription: Subscription | None = subscription
+        self._name, self._missing = name, MissingSweeps()
+
+    def read(self, timeout_s: float) -> list[Sweep]:
+        """Sweeps received until the timeout, oldest first."""
+        subscription = self._subscription
+        if subscription is None:
+            return []
+        messages = subscription.take(timeout_s)
+        self.reception.messages += len(messages)
+        sweeps = [sweep for message in messages if (sweep := self._sweep(message)) is not None]
+        for sweep in sweeps:
+            self._lose(self._missing.before(sweep.stamp_s))
+        return sweeps
+
+    def close(self) -> None:
+        """Leave the topic, once `read` has returned."""
+        self._subscription = None
+
+    def _lose(self, count: int) -> None:
+        if count and not self.reception.lost:
+            remedy = "raise net.core.rmem_max here, or check the network and the sender; later ones are only counted"
+            log.warning("%s: sweeps are missing by their stamps; %s", self._name, remedy)
+        self.reception.lost += count
+
+    def _sweep(self, message: Message) -> Sweep | None:
+        try:
+            cloud = read_cloud(message.data)
+        except MessageError as error:
+            if self.reception.refuse(error.reason):
+                what = f"message refused ({error.reason}): {error}"
+                log.warning("%s: %s; later ones are only counted", self._name, what)
+            return None
+        if cloud.frame_id != self.frame_id:
+            self.frame_id = cloud.frame_id
+            log.info("%s: points are in the frame %r", self._name, cloud.frame_id)
+        return Sweep(cloud.ahead_s or message.sent_s, cloud.points, cloud.turn_s)
+
+
+def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
+    """The sweeps of ros2:///TOPIC; Cyclone's threads and the receiving one run on `cores`.
+
+    Raises:
+        MisuseError: Cyclone DDS is not installed, or the address names no topic, domain or reliability.
+        ModtError: the domain cannot be joined.
+    """
+    topic = topic_of(address)
+    reliability = address.option("reliability", "best_effort")
+    if reliability not in RELIABILITIES:
+        remedy = f"use one of {', '.join(RELIABILITIES)}"
+        raise MisuseError(address.text, f"reliability {reliability!r} is unknown", remedy)
+    joined = participant(domain_of(address), cores)
+    reliable = RELIABILITIES[reliability]
+    subscription = Subscription(joined, topic, TYPE, depth=DEPTH, reliable=reliable)
+    info = StreamInfo(f"/{topic}", "ros2", 0, None, PERIOD_S, None, has_poses=False)
+    return LiveStream(info, PointCloudReader(subscription, info.name), cores=cores)

@@ -1,0 +1,75 @@
+"""Poses received from a nav_msgs/Odometry topic of ROS 2."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.address import parse_address
+from modt.config import OdometryConfig
+from modt.errors import MisuseError
+from modt.geometry import rotation_zyx, se3
+from modt.ros2.address import domain_of, topic_of
+from modt.ros2.cdr import MessageError
+from modt.ros2.dds import Subscription, participant
+from modt.ros2.odometry import TYPE, read_odometry
+from modt.sources.pose_datagram import DatagramError
+from modt.sources.pose_file import pose_defect
+from modt.sources.pose_socket import ReceivedPoses
+from modt.types import Float64
+
+OPTIONS = {"ros2": frozenset({"domain", "base_to_sensor"})}
+MOUNT = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+class PoseTopic(ReceivedPoses):
+    """Reads the topic once a frame without blocking; T_base_sensor is where the sensor sits on the robot."""
+
+    def __init__(self, subscription: Subscription, config: OdometryConfig, name: str, T_base_sensor: Float64) -> None:
+        super().__init__(config, name)
+        self._subscription, self._T_base_sensor = subscription, T_base_sensor
+
+    def _drain(self, now_s: float) -> None:
+        for message in self._subscription.take():
+            self.received += 1
+            try:
+                self._keep(*self._pose(message.data), now_s)
+            except DatagramError as error:
+                self._refuse(error)
+
+    def _pose(self, message: bytes) -> tuple[float, Float64]:
+        """Stamp [s] and (4, 4) T_world_sensor."""
+        try:
+            odometry = read_odometry(message)
+        except MessageError as error:
+            raise DatagramError(error.reason, str(error)) from None
+        T = odometry.T_odom_child @ self._T_base_sensor
+        defect = pose_defect(T)
+        if defect:
+            raise DatagramError("malformed", f"pose is {defect}")
+        return odometry.stamp_s, T
+
+
+def open_topic(text: str, config: OdometryConfig, cores: frozenset[int] | None = None) -> PoseTopic:
+    """The poses of ros2:///TOPIC?domain=N&base_to_sensor=x,y,z,roll,pitch,yaw [m, rad].
+
+    `cores`: where Cyclone's threads run, None: where the caller does.
+
+    Raises:
+        MisuseError: Cyclone DDS is not installed, or the address names no topic, domain or mount.
+        ModtError: the domain cannot be joined.
+    """
+    address = parse_address(text, OPTIONS)
+    topic = topic_of(address)
+    T_base_sensor = _mount(address.option("base_to_sensor", "0,0,0,0,0,0"), text)
+    joined = participant(domain_of(address), cores)
+    return PoseTopic(Subscription(joined, topic, TYPE, depth=config.capacity), config, text, T_base_sensor)
+
+
+def _mount(text: str, subject: str) -> Float64:
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        numbers = np.array([np.nan])
+    if len(numbers) != len(MOUNT) or not np.isfinite(numbers).all():
+        raise MisuseError(subject, f"base_to_sensor {text!r} is no pose", f"give {','.join(MOUNT)} [m, rad]")
+    return se3(rotation_zyx(*numbers[3:]), numbers[:3])

@@ -1,0 +1,79 @@
+"""`modt replay` of a recording of ROS 2, and with the poses of a topic."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from modt.cli.assemble import Request
+from modt.cli.session import Session
+from modt.ros2 import odometry
+from modt.ros2.odometry import write_odometry
+from modt.ros2.point_cloud2 import write_cloud
+from modt.sinks.records import read_records
+from modt.sinks.tracks import SCHEMA
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.supervisor import NoSupervisor
+from tests.ros2.network import FAR, NEAR, until
+from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
+
+from .commands import modt
+
+FRAMES = 5
+
+
+@pytest.fixture(scope="module", name="street")
+def the_embedded_street():
+    return list(SyntheticStream("street", "hdl-64e", 10.0, seed=0).between(0, FRAMES))
+
+
+def session(out, **options):
+    return Session(Request(mode="efficient", frames=(0, FRAMES), **options), out, None, ["modt"])
+
+
+def run(out, **options):
+    made = session(out, **options)
+    return made, made.run(lambda result: None, NoSupervisor())
+
+
+def tracks(out):
+    """Id and box of each track of each frame."""
+    frames = read_records(out / "tracks.jsonl", SCHEMA)
+    return [[(t["id"], *(t["box"] or {}).values()) for t in frame["tracks"]] for frame in frames]
+
+
+def test_a_recording_gives_the_tracks_of_what_was_recorded(street, tmp_path):
+    recorded = []
+    for frame in street:
+        s = BEGAN_S + frame.stamp_s
+        recorded.append(("/odom", ODOMETRY, s, write_odometry(s, "odom", "lidar", frame.T_world_sensor)))
+        recorded.append(("/points", CLOUD, s, write_cloud(s, "lidar", frame.points)))
+    made, _ = run(tmp_path / "bag", path=write_mcap(tmp_path / "drive", recorded), profile="hdl-64e")
+    assert made.stream.info.layout == "rosbag2"
+    run(tmp_path / "street", profile="hdl-64e")
+    for a, b in zip(tracks(tmp_path / "bag"), tracks(tmp_path / "street"), strict=True):
+        assert [row[0] for row in a] == [row[0] for row in b]
+        np.testing.assert_allclose(sum((row[1:] for row in a), ()), sum((row[1:] for row in b), ()), atol=0.002)
+
+
+def test_the_poses_of_a_topic_place_the_sweeps(street, tmp_path, loopback):
+    from modt.ros2 import dds
+
+    made = session(tmp_path / "run", odometry=f"ros2:///odom?domain={NEAR}")
+    sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
+    until(lambda: sent.receivers)
+    for frame in street:
+        sent.write(write_odometry(frame.stamp_s, "odom", "lidar", frame.T_world_sensor))
+    until(lambda: made.odometry.place(street[0]).T_world_sensor is not None)
+    summary = made.run(lambda result: None, NoSupervisor())
+    assert summary["odometry"]["frames_unposed"] <= FRAMES
+    assert summary["odometry"]["frames_posed"] >= FRAMES
+    assert summary["odometry"]["used"] == FRAMES
+
+
+def test_topics_are_named_on_the_command_line(tmp_path):
+    recorded = [(f"/{k}", CLOUD, BEGAN_S, write_cloud(BEGAN_S, "lidar", np.ones((9, 4), np.float32))) for k in "ab"]
+    path = write_mcap(tmp_path / "drive", recorded)
+    refused = modt("replay", path, "--quiet", cwd=tmp_path)
+    assert (refused.returncode, "choose by --capture topic=NAME: /a, /b" in refused.stderr) == (2, True)
+    assert modt("replay", path, "--capture", "topic=/b", "--quiet", "--out", "run", cwd=tmp_path).returncode == 0

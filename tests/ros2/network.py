@@ -1,0 +1,43 @@
+"""Two domains of this process that meet over the loopback interface as two processes do."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from modt.errors import ModtError
+
+NEAR, FAR = 201, 202
+LOOPBACK = (
+    '<CycloneDDS><Domain Id="any"><General><AllowMulticast>false</AllowMulticast>'
+    '<Interfaces><NetworkInterface name="lo"/></Interfaces></General>'
+    "<Discovery><ExternalDomainId>203</ExternalDomainId><ParticipantIndex>auto</ParticipantIndex>"
+    '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
+)
+DEADLINE_S = 20.0
+
+
+@pytest.fixture
+def loopback(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """NEAR and FAR are domains that meet; what was opened on them is closed with the test."""
+    pytest.importorskip("cyclonedds")
+    from modt.ros2.dds import participant
+
+    monkeypatch.setenv("CYCLONEDDS_URI", LOOPBACK)
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    try:
+        joined = [participant(NEAR), participant(FAR)]
+    except ModtError as error:
+        pytest.skip(f"no loopback interface for DDS here: {error}")
+    yield
+    del joined
+
+
+def until(condition: Callable[[], object]) -> None:
+    """Wait for a condition, at most DEADLINE_S."""
+    end_s = time.monotonic() + DEADLINE_S
+    while not condition():
+        assert time.monotonic() < end_s, "not within the deadline"
+        time.sleep(0.01)

@@ -1,0 +1,191 @@
+"""PointCloud2 messages of any layout, by comparison with an obvious reader; and hostile ones."""
+
+from __future__ import annotations
+
+import dataclasses
+import tracemalloc
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from modt.ros2.cdr import MessageError
+from modt.ros2.point_cloud2 import read_cloud, write_cloud
+from modt.types import UNRECORDED
+from tests.ros2 import messages
+
+KINDS = ["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"]
+
+
+@st.composite
+def tables(draw):
+    """Structured points: the fields in any order, of any type, with gaps, in either byte order."""
+    order = draw(st.sampled_from("<>"))
+    others = st.dictionaries(st.sampled_from(["ring", "intensity", "rgb", "range"]), st.sampled_from(KINDS))
+    kinds = {name: draw(st.sampled_from(["f4", "f8"])) for name in "xyz"} | draw(others)
+    names = draw(st.permutations(sorted(kinds)))
+    offsets, end = [], 0
+    for name in names:
+        offsets.append(end + draw(st.integers(0, 5)))
+        end = offsets[-1] + np.dtype(kinds[name]).itemsize
+    formats = [order + kinds[name] for name in names]
+    layout = np.dtype(
+        {"names": names, "formats": formats, "offsets": offsets, "itemsize": end + draw(st.integers(0, 5))}
+    )
+    shape = draw(st.integers(1, 3)), draw(st.integers(1, 40))
+    points = np.zeros(shape, layout)
+    rng = np.random.default_rng(draw(st.integers(0, 1000)))
+    for name in names:
+        points[name] = rng.uniform(0, 1 if kinds[name][0] == "f" else 100, shape)
+    return points
+
+
+@given(points=tables(), padding=st.integers(0, 7), little=st.booleans())
+def test_any_layout_is_read_as_point_by_point(points, padding, little):
+    raw = messages.encode(messages.cloud(points, padding=padding), little=little)
+    cloud = read_cloud(raw)
+    expected = [[point[name] for name in "xyz"] for point in points.reshape(-1)]
+    np.testing.assert_array_equal(cloud.points[:, :3], np.array(expected, np.float32))
+    assert (cloud.stamp_s, cloud.frame_id) == (1.0, "lidar")
+    assert cloud.points.dtype == np.float32
+    assert cloud.points.flags.writeable
+    if "intensity" not in points.dtype.names:
+        assert (cloud.points[:, 3] == UNRECORDED).all()
+    else:
+        assert cloud.points[:, 3].min() >= 0
+        assert cloud.points[:, 3].max() <= 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "expected"),
+    [
+        ("f4", np.linspace(0, 1, 100), np.linspace(0, 1, 100)),
+        ("f4", np.linspace(0, 255, 100), np.linspace(0, 1, 100)),
+        ("u1", np.arange(0, 250, 2.5).astype(int), np.arange(0, 250, 2.5).astype(int) / 255),
+        ("u2", np.arange(100), np.arange(100) / 255),
+        ("u2", np.arange(100) * 600, np.arange(100) * 600 / 65535),
+        ("f4", np.where(np.arange(100) == 7, 3.0, 0.5), np.where(np.arange(100) == 7, 1.0, 0.5)),
+    ],
+)
+def test_reflectances_are_scaled_by_what_they_span(kind, values, expected):
+    layout = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", kind)]
+    points = messages.xyzi(100, layout)
+    points["intensity"] = values
+    np.testing.assert_allclose(read_cloud(messages.encode(messages.cloud(points))).points[:, 3], expected, atol=1e-6)
+
+
+def test_a_calibrated_reflectivity_goes_before_the_raw_intensity():
+    points = messages.xyzi(50, [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), ("Reflectivity", "u1")])
+    points["Reflectivity"] = 51
+    assert read_cloud(messages.encode(messages.cloud(points))).points[:, 3] == pytest.approx(np.full(50, 0.2))
+
+
+def test_points_that_are_not_finite_count_as_no_return():
+    points = messages.xyzi(10)
+    points["y"][0, 3], points["z"][0, 5], points["intensity"][0, 8] = np.nan, np.inf, np.nan
+    cloud = read_cloud(messages.encode(messages.cloud(points)))
+    assert np.flatnonzero((cloud.points[:, :3] == 0).all(axis=1)).tolist() == [3, 5]
+    assert np.flatnonzero(cloud.points[:, 3] == UNRECORDED).tolist() == [8]
+    assert np.isfinite(cloud.points).all()
+
+
+@pytest.mark.parametrize("row_step", [0, 1])
+def test_the_length_of_a_single_row_does_not_matter(row_step):
+    message = messages.cloud(messages.xyzi(20))
+    message.row_step = row_step
+    assert len(read_cloud(messages.encode(message)).points) == 20
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"height": 2**32 - 1, "width": 2**32 - 1}, "malformed"),
+        ({"width": 21}, "malformed"),
+        ({"point_step": 2**31}, "malformed"),
+        ({"point_step": 0}, "fields"),
+        ({"height": 2, "width": 10, "row_step": 3}, "malformed"),
+        ({"width": 0}, "empty"),
+        ({"fields": []}, "fields"),
+    ],
+)
+def test_sizes_that_do_not_fit_are_refused(changes, reason):
+    message = dataclasses.replace(messages.cloud(messages.xyzi(20)), **changes)
+    with pytest.raises(MessageError) as caught:
+        read_cloud(messages.encode(message))
+    assert caught.value.reason == reason
+
+
+def test_a_field_beyond_the_point_is_not_there():
+    message = messages.cloud(messages.xyzi(20))
+    message.fields[2].offset = 13
+    with pytest.raises(MessageError, match="no x, y, z of floating point among x, y, intensity"):
+        read_cloud(messages.encode(message))
+
+
+@pytest.mark.parametrize("datatype", [4, 9, 255])
+def test_coordinates_of_another_type_are_refused(datatype):
+    with pytest.raises(MessageError, match="no x, y, z"):
+        read_cloud(messages.encode(messages.cloud(messages.xyzi(20), datatypes={"x": datatype})))
+
+
+VALID = write_cloud(1.0, "lidar", np.ones((20, 4), np.float32))
+
+
+@given(length=st.integers(0, len(VALID)), changes=st.dictionaries(st.integers(0, 140), st.integers(0, 255)))
+@example(length=len(VALID), changes=dict.fromkeys(range(12, 20), 255))
+def test_no_bytes_do_more_than_be_refused(length, changes):
+    raw = bytearray(VALID[:length])
+    for at, value in changes.items():
+        if at < length:
+            raw[at] = value
+    tracemalloc.start()
+    try:
+        points = read_cloud(bytes(raw)).points
+        assert np.isfinite(points).all()
+    except MessageError:
+        pass
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 1e6
+
+
+def test_a_written_cloud_is_read_by_another_implementation():
+    points = np.random.default_rng(0).uniform(0, 1, (30, 4)).astype(np.float32)
+    message = messages.decode(write_cloud(12.5, "lidar", points), "sensor_msgs/msg/PointCloud2")
+    assert (message.header.stamp.sec, message.header.stamp.nanosec) == (12, 500_000_000)
+    assert [field.name for field in message.fields] == ["x", "y", "z", "intensity"]
+    assert (message.height, message.width, message.point_step, message.row_step) == (1, 30, 16, 480)
+    np.testing.assert_array_equal(message.data.view(np.float32).reshape(-1, 4), points)
+    np.testing.assert_array_equal(read_cloud(write_cloud(12.5, "lidar", points)).points, points)
+
+
+class TestTimes:
+    """Times of the points, of a head that turns clockwise once in 0.1 s, its seam behind."""
+
+    def cloud(self, *, turn_s=0.1, seam=np.pi, field="time", kind="f4", unit=1e-9, begin=0.0):
+        """Points all round, seen `turn_s / 2` before to after straight ahead."""
+        bearing = np.linspace(-np.pi, np.pi, 2000, endpoint=False)
+        points = np.zeros((1, 2000), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "f4"), (field, kind)])
+        points["x"], points["y"] = 10 * np.cos(bearing), 10 * np.sin(bearing)
+        since_seam = np.mod(seam - bearing, 2 * np.pi) if turn_s > 0 else np.mod(bearing - seam, 2 * np.pi)
+        points[field] = (begin + abs(turn_s) * since_seam / (2 * np.pi)) / unit
+        return read_cloud(messages.encode(messages.cloud(points, stamp_s=1000.0)))
+
+    @pytest.mark.parametrize("turn_s", [0.1, -0.1, 0.05])
+    @pytest.mark.parametrize(("kind", "unit"), [("f4", 1.0), ("u4", 1e-9), ("u4", 1e-6)])
+    def test_a_turn_is_known_by_them(self, turn_s, kind, unit):
+        cloud = self.cloud(turn_s=turn_s, kind=kind, unit=unit)
+        assert cloud.turn_s == pytest.approx(turn_s, rel=1e-2)
+        assert cloud.ahead_s == pytest.approx(1000.0 + abs(turn_s) / 2, abs=1e-3)
+
+    def test_times_on_the_clock_of_the_header_are_not_added_to_it(self):
+        cloud = self.cloud(field="timestamp", kind="f8", unit=1.0, begin=1000.0)
+        assert cloud.ahead_s == pytest.approx(1000.05, abs=1e-3)
+        assert self.cloud(field="timestamp", kind="f8", begin=1000.0).ahead_s == pytest.approx(1000.05, abs=1e-3)
+
+    @pytest.mark.parametrize("odd", [{"seam": 0.0}, {"turn_s": 3.0, "unit": 1.0}, {"turn_s": 0.0}])
+    def test_a_seam_elsewhere_and_times_of_no_head_are_not_used(self, odd):
+        cloud = self.cloud(**odd)
+        assert cloud.turn is None
+        assert (cloud.turn_s, cloud.ahead_s) == (0.0, 1000.0)

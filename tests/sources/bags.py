@@ -1,0 +1,61 @@
+"""Small recordings of ROS 2, for tests."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import pytest
+
+from tests.ros2 import messages
+
+CLOUD, ODOMETRY, TF = "sensor_msgs/msg/PointCloud2", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
+BEGAN_S = 1_700_000_000.0
+UP = [0.0, 0.0, 0.0, 1.0]
+Recorded = list[tuple[str, str, float, bytes]]
+"""Topic, type, time of the recording, message."""
+
+
+def write_rosbag2(path: Path, recorded: Recorded) -> Path:
+    writer = pytest.importorskip("rosbags.rosbag2").Writer(path)
+    with writer as bag:
+        connections = {}
+        for topic, kind, recorded_s, data in recorded:
+            if topic not in connections:
+                connections[topic] = bag.add_connection(topic, kind, typestore=messages.store())
+            bag.write(connections[topic], round(recorded_s * 1e9), data)
+    return path
+
+
+def write_mcap(path: Path, recorded: Recorded, **options: object) -> Path:
+    writing = pytest.importorskip("mcap.writer")
+    path = path.with_suffix(".mcap")
+    with path.open("wb") as file:
+        writer = writing.Writer(file, **options)
+        writer.start("ros2")
+        channels = {}
+        for topic, kind, recorded_s, data in recorded:
+            if topic not in channels:
+                schema = writer.register_schema(kind, "ros2msg", b"")
+                channels[topic] = writer.register_channel(topic, "cdr", schema)
+            writer.add_message(channels[topic], round(recorded_s * 1e9), data, round(recorded_s * 1e9))
+        writer.finish()
+    return path
+
+
+def clouds(n: int = 4, topic: str = "/points") -> Recorded:
+    """Sweeps 0.1 s apart, recorded 30 ms after their stamps."""
+    stamps = [BEGAN_S + k / 10 for k in range(n)]
+    data = [messages.encode(messages.cloud(messages.xyzi(20 + k), stamp_s=s)) for k, s in enumerate(stamps)]
+    return [(topic, CLOUD, s + 0.03, raw) for s, raw in zip(stamps, data, strict=True)]
+
+
+def poses(child: str = "lidar", topic: str = "/odom") -> Recorded:
+    """A metre a second along x, fifty poses a second, from 0.2 s before the first sweep on."""
+    stamps = [BEGAN_S + k / 50 - 0.21 for k in range(40)]
+    made = [messages.odometry(s, [10.0 + s - BEGAN_S, 0.0, 0.0], UP, child) for s in stamps]
+    return [(topic, ODOMETRY, s + 0.001, messages.encode(m)) for s, m in zip(stamps, made, strict=True)]
+
+
+def by_time(*recorded: Recorded) -> Recorded:
+    return sorted(itertools.chain(*recorded), key=lambda message: message[2])

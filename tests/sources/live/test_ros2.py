@@ -1,0 +1,134 @@
+"""PointCloud2 topics as a live source."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from modt.errors import MisuseError
+from modt.sources.live.schemes import open_live
+from tests.ros2 import messages
+from tests.ros2.network import FAR, NEAR, until
+
+pytest.importorskip("cyclonedds")
+from modt.ros2 import dds, point_cloud2
+from modt.ros2.point_cloud2 import write_cloud
+from modt.sources.live.ros2 import PointCloudReader
+from tools.send.ros2 import Sender, looped, pace
+
+ADDRESS = f"ros2:///points?domain={NEAR}&reliability=reliable"
+
+
+class Scripted:
+    """A subscription that holds what the test says."""
+
+    def __init__(self, *batches):
+        self.batches = list(batches)
+
+    def take(self, timeout_s):
+        return [dds.Message(data, sent_s=77.0) for data in self.batches.pop(0)]
+
+
+def cloud(stamp_s=5.0, frame_id="lidar", n=10):
+    return write_cloud(stamp_s, frame_id, np.full((n, 4), 0.5, np.float32))
+
+
+def test_messages_become_sweeps_and_the_frame_is_reported(caplog):
+    caplog.set_level("INFO")
+    reader = PointCloudReader(Scripted([cloud(5.0), cloud(5.1)], [cloud(5.2)]), "/points")
+    assert [sweep.stamp_s for sweep in reader.read(0.0)] == [5.0, 5.1]
+    assert [len(sweep.points) for sweep in reader.read(0.0)] == [10]
+    assert reader.frame_id == "lidar"
+    assert caplog.text.count("points are in the frame 'lidar'") == 1
+
+
+def test_a_driver_without_stamps_is_stamped_by_its_sending():
+    (sweep,) = PointCloudReader(Scripted([cloud(0.0)]), "/points").read(0.0)
+    assert sweep.stamp_s == 77.0
+
+
+def test_messages_that_cannot_be_used_are_counted_by_their_reason_and_logged_once(caplog):
+    huge = dataclasses.replace(messages.cloud(messages.xyzi(20)), width=2**32 - 1)
+    bad = [b"", cloud(n=0), messages.encode(huge), messages.encode(huge)]
+    reader = PointCloudReader(Scripted([*bad, cloud()]), "/points")
+    assert len(reader.read(0.0)) == 1
+    assert reader.reception.messages == 5
+    assert reader.reception.refused == {"malformed": 3, "empty": 1}
+    assert caplog.text.count("message refused (malformed)") == 1
+
+
+def test_sweeps_that_are_missing_by_their_stamps_are_counted_and_warned_of_once(caplog):
+    arrived = [k for k in range(60) if k not in (20, 31, 32, 50)]
+    reader = PointCloudReader(Scripted(*([cloud(10.0 + k / 10)] for k in arrived)), "/points")
+    for _ in arrived:
+        reader.read(0.0)
+    assert reader.reception.lost == 4
+    assert caplog.text.count("sweeps are missing by their stamps; raise net.core.rmem_max") == 1
+
+
+def test_after_it_is_closed_nothing_is_read():
+    reader = PointCloudReader(Scripted([cloud()]), "/points")
+    reader.close()
+    assert reader.read(0.0) == []
+
+
+@pytest.mark.parametrize(
+    ("address", "cause"),
+    [
+        ("ros2:///points?reliability=perfect", "reliability 'perfect' is unknown"),
+        ("ros2://?domain=3", "names no topic"),
+        ("ros2:///points?domain=300", "domain '300' is none"),
+        ("ros2:///points?colour=red", "option 'colour' is unknown"),
+    ],
+)
+def test_an_address_that_cannot_be_is_refused(address, cause):
+    with pytest.raises(MisuseError, match=cause):
+        open_live(address)
+
+
+@pytest.fixture
+def live(loopback):
+    stream = open_live(ADDRESS)
+    stream.start()
+    yield stream
+    stream.close()
+
+
+def test_sweeps_over_loopback_are_frames(live):
+    sent = dds.Publication(dds.participant(FAR), "points", point_cloud2.TYPE)
+    until(lambda: sent.receivers)
+    points = np.random.default_rng(0).uniform(0, 1, (100_000, 4)).astype(np.float32)
+    sent.write(write_cloud(1000.5, "lidar", points))
+    received = live.take(20.0)
+    np.testing.assert_array_equal(received.frame.points, points)
+    assert received.frame.stamp_s == 1000.5
+    assert live.health()["lost_messages"] == 0
+
+
+@pytest.mark.kitti
+def test_a_drive_that_is_sent_is_received_as_it_is_on_disk(live, drive_0005):
+    from modt.sources.kitti import raw_drive
+
+    drive = raw_drive(drive_0005).between(0, 3)
+    sender = Sender(dds.participant(FAR))
+    assert sender.wait_for_receiver(20.0)
+    stamps = []
+    for after_s, frame in looped(drive, 2):
+        sender.send(frame, 1000.0 + after_s)
+        received = live.take(20.0).frame
+        np.testing.assert_array_equal(received.points, frame.points)
+        stamps.append(received.stamp_s)
+    period_s = drive.info.period_s
+    np.testing.assert_allclose(np.diff(stamps), period_s, atol=0.01)
+    assert live.health()["dropped_sweeps"] == 0
+
+
+def test_a_sender_keeps_the_pace_of_the_stream():
+    from modt.sources.synthetic_stream import SyntheticStream
+
+    stream, sent = SyntheticStream("street", "vlp-16", 0.3, seed=0), []
+    frames, octets = pace(looped(stream, 2), lambda frame, stamp_s: sent.append(stamp_s) or 10, rate=50.0)
+    assert (frames, octets) == (6, 60)
+    np.testing.assert_allclose(np.diff(sent), 0.1, atol=1e-6)

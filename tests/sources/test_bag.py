@@ -1,0 +1,184 @@
+"""Recordings of ROS 2, in both kinds of files."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from modt.errors import MisuseError, ModtError
+from modt.sources import kitti
+from modt.sources.recognise import open_stream
+from tests.ros2 import messages
+from tests.sources import layouts
+from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, TF, by_time, clouds, poses, write_mcap, write_rosbag2
+
+
+@pytest.fixture(params=[write_rosbag2, write_mcap])
+def write(request):
+    return request.param
+
+
+def test_sweeps_are_frames_and_stamps_count_from_the_first(write, tmp_path):
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), poses())))
+    assert (stream.info.name, stream.info.layout, stream.info.n_frames) == ("drive", "rosbag2", 4)
+    assert stream.info.period_s == pytest.approx(0.1, abs=1e-6)
+    frames = list(stream)
+    assert [frame.index for frame in frames] == [0, 1, 2, 3]
+    assert [frame.stamp_s for frame in frames] == pytest.approx([0.0, 0.1, 0.2, 0.3], abs=1e-6)
+    for k, frame in enumerate(frames):
+        expected = messages.xyzi(20 + k).view(np.float32).reshape(-1, 4)
+        np.testing.assert_array_equal(frame.points, expected)
+    assert stream.faults.count == 0
+
+
+def test_poses_are_interpolated_at_the_stamp_of_the_sweep(write, tmp_path):
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), poses())))
+    assert stream.info.has_poses
+    assert [frame.T_world_sensor[0, 3] for frame in stream] == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-6)
+
+
+def test_the_sensor_s_place_on_the_robot_is_taken_from_the_static_transforms(write, tmp_path):
+    turned = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    mount = messages.encode(messages.transforms(("base_link", "lidar", [1.0, 0.0, 2.0], turned)))
+    recorded = by_time(clouds(), poses("base_link"), [("/tf_static", TF, BEGAN_S - 1, mount)])
+    first = next(iter(open_stream(write(tmp_path / "drive", recorded))))
+    np.testing.assert_allclose(first.T_world_sensor[:3, 3], [11.0, 0.0, 2.0], atol=1e-6)
+    np.testing.assert_allclose(first.T_world_sensor[:3, 0], [0.0, 1.0, 0.0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("others", "note"),
+    [
+        ([], "no nav_msgs/Odometry: no poses"),
+        (poses("base_link"), "/tf_static does not lead from base_link, of which they are, to lidar"),
+        (by_time(poses(), poses(topic="/wheels")), "several topics of odometry (/odom, /wheels)"),
+    ],
+)
+def test_poses_that_cannot_be_used_are_left_out_and_named(write, tmp_path, others, note):
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), others)))
+    assert not stream.info.has_poses
+    assert note in " ".join(stream.info.pose_notes)
+    assert [frame.T_world_sensor for frame in stream] == [None] * 4
+
+
+def test_a_part_has_the_frames_and_the_stamps_of_the_whole(write, tmp_path):
+    stream = open_stream(write(tmp_path / "drive", by_time(clouds(), poses())))
+    part = stream.between(1, 3)
+    assert (part.info.n_frames, part.info.end) == (2, 3)
+    assert [(frame.index, round(frame.stamp_s, 3)) for frame in part] == [(1, 0.1), (2, 0.2)]
+    assert [frame.T_world_sensor[0, 3] for frame in part] == pytest.approx([10.1, 10.2], abs=1e-6)
+    assert part.between(2, None).info.n_frames == 1
+    assert len(list(stream)) == 4
+
+
+def test_of_several_topics_one_is_to_be_chosen(write, tmp_path):
+    path = write(tmp_path / "drive", by_time(clouds(), clouds(2, "/rear/points")))
+    with pytest.raises(
+        MisuseError, match=r"2 topics of point clouds; choose by --capture topic=NAME: /points, /rear/points"
+    ):
+        open_stream(path)
+    assert open_stream(path, capture={"topic": "rear/points"}).info.n_frames == 2
+    with pytest.raises(MisuseError, match=r"no point clouds in /front"):
+        open_stream(path, capture={"topic": "/front"})
+
+
+def test_a_recording_without_point_clouds_says_what_it_holds(write, tmp_path):
+    with pytest.raises(MisuseError, match=r"no sensor_msgs/PointCloud2; .* it holds nav_msgs/Odometry"):
+        open_stream(write(tmp_path / "drive", poses()))
+
+
+def test_a_message_that_cannot_be_used_is_counted_and_skipped(write, tmp_path, caplog):
+    recorded = clouds()
+    recorded[1] = (*recorded[1][:3], b"\0\1\0\0\1\2")
+    recorded[2] = (*recorded[2][:3], recorded[0][3])  # stamped as the first one
+    recorded[3] = (*recorded[3][:3], messages.encode(messages.cloud(messages.xyzi(9), stamp_s=BEGAN_S - 5)))
+    stream = open_stream(write(tmp_path / "drive", recorded))
+    assert [frame.index for frame in stream] == [0, 2]
+    assert stream.faults.skipped == 2
+    assert "/points 1: 6 bytes end within a field; frame skipped" in caplog.text
+    assert "/points 3: stamped 5.000 s before the last sweep; frame skipped" in caplog.text
+
+
+def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
+    raw = messages.encode(messages.cloud(messages.xyzi(20), stamp_s=0.0))
+    recorded = [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)]
+    stream = open_stream(write(tmp_path / "drive", recorded))
+    assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
+
+
+def test_a_recording_in_several_files_is_read_in_their_order(tmp_path):
+    recorded = clouds(12)
+    for k, message in enumerate(recorded):
+        write_mcap(tmp_path / f"drive_{k}", [message])
+    with pytest.raises(MisuseError, match="no stream of scans"):  # nothing says that they belong together
+        open_stream(tmp_path)
+    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
+    assert [len(frame.points) for frame in open_stream(tmp_path)] == list(range(20, 32))
+
+
+def test_a_recording_may_be_read_by_another_thread_than_began(write, tmp_path):
+    frames = iter(open_stream(write(tmp_path / "drive", by_time(clouds(), poses()))))
+    rest = [next(frames)]
+    reader = threading.Thread(target=lambda: rest.extend(frames))
+    reader.start()
+    reader.join(20.0)
+    assert [frame.index for frame in rest] == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("chunked", [True, False])
+def test_a_recording_that_was_cut_off_is_read_up_to_there(tmp_path, chunked):
+    options = {} if chunked else {"use_chunking": False}
+    path = write_mcap(tmp_path / "drive", clouds(), **options)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2 if chunked else 1700])
+    if chunked:  # the only chunk is not whole
+        with pytest.raises(ModtError, match="holds no message"):
+            open_stream(path)
+    else:
+        stream = open_stream(path)
+        assert len(list(stream)) == stream.info.n_frames == 3
+        assert stream.faults.skipped == 1
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(MisuseError, match="no such file or directory"):
+        open_stream(tmp_path / "drive.mcap")
+
+
+def test_scans_go_before_a_recording_beside_them(tmp_path):
+    scans = layouts.bare(tmp_path)
+    write_mcap(scans / "drive", clouds())
+    assert open_stream(scans).info.layout != "rosbag2"
+
+
+@pytest.mark.parametrize("name", ["drive.db3", "drive.mcap"])
+def test_a_file_of_other_bytes_is_refused(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(b"no recording at all" * 10)
+    with pytest.raises(ModtError, match=r"cannot be read|holds no message"):
+        open_stream(path)
+
+
+@pytest.mark.kitti
+def test_a_recording_of_packets_is_refused_by_the_type_of_its_messages(kitti_root):
+    with pytest.raises(MisuseError, match=r"no sensor_msgs/PointCloud2; .* velodyne_msgs/VelodyneScan"):
+        open_stream(kitti_root / "packets" / "vlp16-1673400471837873222")
+
+
+@pytest.mark.kitti
+def test_a_recorded_drive_is_the_drive(drive_0005, tmp_path):
+    from modt.ros2.odometry import write_odometry
+    from modt.ros2.point_cloud2 import write_cloud
+
+    drive = kitti.raw_drive(drive_0005).between(0, 5)
+    recorded = []
+    for frame in drive:
+        s = BEGAN_S + frame.stamp_s
+        recorded.append(("/odom", ODOMETRY, s, write_odometry(s, "odom", "velodyne", frame.T_world_sensor)))
+        recorded.append(("/points", CLOUD, s, write_cloud(s, "velodyne", frame.points)))
+    for a, b in zip(drive, open_stream(write_mcap(tmp_path / "drive", recorded)), strict=True):
+        np.testing.assert_array_equal(a.points, b.points)
+        np.testing.assert_allclose(a.T_world_sensor, b.T_world_sensor, atol=1e-9)
+        assert b.stamp_s == pytest.approx(a.stamp_s - next(iter(drive)).stamp_s, abs=1e-6)
