@@ -71,7 +71,9 @@ class OneView(EveryFrame):
         """(M,) tracks without a final class that meet the conditions."""
         config = self.config
         update_from_boxes(tracks, proposals, self.prior, config)
-        asks = wants_class & ~tracks.final & (tracks.proposal != NONE) & (tracks.hits >= config.first_view_min_hits)
+        asks: Bool = (
+            wants_class & ~tracks.final & (tracks.proposal != NONE) & (tracks.hits >= config.first_view_min_hits)
+        )
         asks &= self.prior.may_be_object(tracks.prior, config.first_view_min_object_probability)
         rows = np.flatnonzero(asks)
         asks[rows] = ~tracks.viewed[rows] | _has_more_points(tracks, proposals, rows, config)
@@ -92,9 +94,9 @@ class KeyViews:
 
     The classifier returns a posterior under the class frequency and, by its pool weight, the box prior, so the
     prior is divided out of the evidence so far. Views of one object are never quite independent: with every further
-    one the evidence so far counts `memory` times. A final class of few points is reviewed when the object shows clearly
-    more of them; the previous evidence is then weighted by the ratio of points. Tracks whose box excludes an object
-    are neither classified nor reviewed.
+    one the evidence so far counts `memory` times. A final class of few points is reviewed when the object shows
+    clearly more of them; the previous evidence is then weighted by the ratio of points. Tracks whose box excludes an
+    object are neither classified nor reviewed.
 
     Args:
         config: thresholds of independence and certainty.

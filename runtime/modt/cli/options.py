@@ -19,7 +19,7 @@ def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, Non
     a, b = first_frames
     which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
     stream = (
-        "KITTI drive, sequence, folder of .bin, .pcd or .ply scans, PCAP file or ROS 2 recording (default: synthetic)"
+        "KITTI drive, folder of .bin, .pcd or .ply scans, PCAP file, ROS 2 recording (default: a synthetic stream)"
     )
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     add_capture_option(p)
@@ -45,8 +45,8 @@ def add_sink_option(p: Parser) -> None:
 def add_capture_option(p: Parser) -> None:
     """What a recording does not tell."""
     what = (
-        "of a PCAP file: model=MODEL or calibration=FILE of a Velodyne, metadata=FILE of an Ouster; of a ROS 2 recording"
-        " with several topics of point clouds: topic=NAME; repeatable"
+        "of a PCAP file: model=MODEL or calibration=FILE of a Velodyne, metadata=FILE of an Ouster; of a ROS 2 "
+        "recording with several topics of point clouds: topic=NAME; repeatable"
     )
     p.add_argument("--capture", type=capture, action="append", default=[], metavar="KEY=VALUE", help=what)
 
