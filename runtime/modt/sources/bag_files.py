@@ -160,11 +160,13 @@ def bag_files(path: Path) -> list[BagFile]:
 
 
 def is_bag(path: Path) -> bool:
-    """Whether a path is a recording: a file, or a folder of one file or of those that `metadata.yaml` joins."""
+    """Whether a path is a recording: a file, or a folder that `metadata.yaml` joins, or of one file alone."""
     if not path.is_dir():
         return path.is_file() and path.suffix in KINDS
-    count = sum(p.suffix in KINDS for p in path.iterdir())
-    return count == 1 or (count > 1 and (path / "metadata.yaml").is_file())
+    if (path / "metadata.yaml").is_file():
+        return any(p.suffix in KINDS for p in path.iterdir())
+    files = [p for p in path.iterdir() if p.is_file()]
+    return len(files) == 1 and files[0].suffix in KINDS
 
 
 def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:

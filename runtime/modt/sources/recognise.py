@@ -37,7 +37,7 @@ def open_stream(
     if path.is_file() and path.suffix in SUFFIXES:
         _only(path, capture, CAPTURE_OPTIONS)
         return open_capture(path, capture)
-    if is_bag(path) and _stream(path, period_s) is None:
+    if is_bag(path):
         _only(path, capture, frozenset({"topic"}))
         return open_bag(path, period_s, capture.get("topic"))
     _only(path, capture, frozenset())
