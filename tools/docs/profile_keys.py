@@ -1,6 +1,7 @@
-"""Generate docs/profile-keys.md and .yaml, and profiles/profile.schema.json, from the configuration.
+"""Generate the keys of a profile in docs/ and profiles/ from the configuration.
 
-The page has the keys that a robot sets, the YAML file every key: it is a profile of all defaults.
+docs/profile-keys.md has the keys that a robot sets, profile-keys.yaml every key: it is a profile of all defaults;
+profiles/profile.schema.json is their JSON Schema.
 """
 
 from __future__ import annotations
