@@ -24,6 +24,7 @@ MAX_DELAY_S = 1.0
 FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))
 """Full scale of the reflectances where more than MAX_SHARE_ABOVE of them lie above a limit."""
 MAX_SHARE_ABOVE = 0.02
+SAMPLES = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,13 +172,13 @@ def _points(table: _Table) -> Float32:
 
 
 def _scale(reflectance: Float32) -> None:
-    """Brought to [0, 1] in place, from numbers of 8 or 16 bits where more than a few are above 1 or 255."""
-    if reflectance.max() <= 1.0:
+    """Brought to [0, 1] in place, from 8 or 16 bits where more than a few of a sample are above 1 or 255."""
+    sample = reflectance[:: max(1, len(reflectance) // SAMPLES)]
+    if sample.max() <= 1.0:
         return
-    values = reflectance.copy()  # contiguous
-    above = [(full, np.count_nonzero(values > limit)) for limit, full in FULL_SCALES]
-    full = next((full for full, count in above if count > MAX_SHARE_ABOVE * len(values)), 1.0)
-    reflectance[:] = np.minimum(values / np.float32(full), np.float32(1.0))
+    above = [(full, np.count_nonzero(sample > limit)) for limit, full in FULL_SCALES]
+    full = next((full for full, count in above if count > MAX_SHARE_ABOVE * len(sample)), 1.0)
+    reflectance[:] = np.minimum(reflectance / np.float32(full), np.float32(1.0))
 
 
 def _finite(points: Float32) -> None:

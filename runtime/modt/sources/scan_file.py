@@ -83,5 +83,6 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
 def _flawless(points: Float32) -> bool:
     """Whether nothing is to be corrected, by four reductions; those that meet a NaN are NaN."""
     reflectance = points[:, 3].copy()  # contiguous, which is reduced faster
-    coordinates = points.min(initial=0.0) >= -MAX_COORDINATE_M and points.max(initial=0.0) <= MAX_COORDINATE_M
-    return bool(coordinates and reflectance.min(initial=0.0) >= 0.0 and reflectance.max(initial=0.0) <= 1.0)
+    with np.errstate(invalid="ignore"):
+        coordinates = points.min(initial=0.0) >= -MAX_COORDINATE_M and points.max(initial=0.0) <= MAX_COORDINATE_M
+        return bool(coordinates and reflectance.min(initial=0.0) >= 0.0 and reflectance.max(initial=0.0) <= 1.0)

@@ -44,6 +44,12 @@ def test_messages_become_sweeps_and_the_frame_is_reported(caplog):
     assert caplog.text.count("points are in the frame 'lidar'") == 1
 
 
+@pytest.mark.parametrize(("frame_id", "warned"), [("velodyne", False), ("base_link", True), ("/map", True)])
+def test_points_in_a_frame_that_is_no_sensor_s_are_warned_of(caplog, frame_id, warned):
+    PointCloudReader(Scripted([cloud(frame_id=frame_id)]), "/points").read(0.0)
+    assert ("not in the sensor's: subscribe to what its driver publishes" in caplog.text) is warned
+
+
 def test_a_driver_without_stamps_is_stamped_by_its_sending():
     (sweep,) = PointCloudReader(Scripted([cloud(0.0)]), "/points").read(0.0)
     assert sweep.stamp_s == 77.0

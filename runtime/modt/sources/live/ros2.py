@@ -21,6 +21,8 @@ PERIOD_S = 0.1
 """Nominal, until the profile of the sensor says better."""
 DEPTH = 5
 """Sweeps kept until they are read, as of ROS 2's QoS for sensors."""
+FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint"})
+"""Conventional names of frames that are no sensor's (REP 105)."""
 RELIABILITIES = {"best_effort": False, "reliable": True}
 
 
@@ -65,7 +67,10 @@ class PointCloudReader:
             return None
         if cloud.frame_id != self.frame_id:
             self.frame_id = cloud.frame_id
-            log.info("%s: points are in the frame %r", self._name, cloud.frame_id)
+            foreign = cloud.frame_id.lstrip("/") in FOREIGN_FRAMES
+            remedy = ", not in the sensor's: subscribe to what its driver publishes" if foreign else ""
+            level = logging.WARNING if foreign else logging.INFO
+            log.log(level, "%s: points are in the frame %r%s", self._name, cloud.frame_id, remedy)
         return Sweep(cloud.ahead_s or message.sent_s, cloud.points, cloud.turn_s)
 
 
