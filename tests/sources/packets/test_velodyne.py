@@ -210,8 +210,12 @@ def with_identity(timed, identity):
         (0x22, None, None),
         (0x22, "vlp-16", None),
         (0x21, None, "say hdl-32e at the pace of vlp-16; decoded as vlp-16; give model= to overrule"),
-        (0x21, "vlp-16", "say hdl-32e at the pace of vlp-16; decoded as vlp-16; give the right model="),
-        (0x22, "vlp-32c", "say vlp-16; decoded as vlp-32c; give the right model="),
+        (
+            0x21,
+            "vlp-16",
+            "say hdl-32e at the pace of vlp-16; decoded as vlp-16; leave model= out to have it recognised",
+        ),
+        (0x22, "vlp-32c", "say vlp-16; decoded as vlp-32c; leave model= out to have it recognised"),
     ],
 )
 def test_the_model_is_by_its_pace_or_as_declared_and_a_contradiction_is_one_line(identity, declared, warning, caplog):

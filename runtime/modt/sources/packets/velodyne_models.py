@@ -121,7 +121,7 @@ def recognised(payloads: Sequence[bytes], name: str, declared: Model | None) -> 
     if used is not None and not (used.signature == signature and (paced is said or said is None)):
         facts = f"its packets say {said.name if said else 'nothing known'}"
         pace = f" at the pace of {paced.name}" if paced is not said and paced is not None else ""
-        remedy = "give the right model=" if declared else "give model= to overrule"
+        remedy = "leave model= out to have it recognised" if declared else "give model= to overrule"
         log.warning("%s: %s%s; decoded as %s; %s", name, facts, pace, used.name, remedy)
     return used, signature
 
