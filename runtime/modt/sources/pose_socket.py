@@ -18,8 +18,9 @@ from urllib.parse import urlsplit
 
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.sources.pose_buffer import PoseBuffer
+from modt.sources.datagram_queue import DatagramQueue
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
+from modt.sources.pose_sequence import PoseSequence
 from modt.sources.pose_source import PoseSource
 from modt.types import Float64, Frame
 
@@ -31,33 +32,47 @@ FORM = "write recording, none, udp://HOST:PORT or unix:///PATH"
 class PoseSocket(PoseSource):
     """Reads the socket once a frame without blocking; refused poses are counted, and logged once of each kind.
 
-    A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
-    are removed and the restart is passed on in `Frame.restarts`.
+    Poses are believed as `PoseSequence` says. A restarted sender with another world frame is passed on in
+    `Frame.restarts`.
     """
 
     has_poses = True  # though frames may lack one
-    REASONS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")
+    REASONS = (
+        *("malformed", "non_finite", "crowded_out", "stale", "ahead"),
+        *("repeated", "out_of_order", "early", "leap"),  # doubts of PoseBuffer
+    )
     """Reasons of a refusal; each has a counter."""
 
     def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
-        bound.setblocking(False)
-        self.name, self.config, self._socket = name, config, bound
-        self._buffer = PoseBuffer(config)
-        self.received = self.used = self.restarts = self.posed = self.unposed = 0
+        self.name, self.config = name, config
+        self._queue = DatagramQueue(bound, config.capacity, MAX_BYTES + 1)
+        self._poses = PoseSequence(config)
+        self.used = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
+
+    @property
+    def received(self) -> int:
+        """Datagrams received."""
+        return self._queue.received
+
+    @property
+    def restarts(self) -> int:
+        """Times that the sender went on in another world."""
+        return self._poses.restarts
 
     def place(self, frame: Frame) -> Frame:
         """The frame with T_world_sensor at its stamp, None where the poses received are too old."""
         self._drain(frame.stamp_s)
-        T = self._buffer.at(frame.stamp_s)
+        T = self._poses.believed.at(frame.stamp_s)
         self.posed, self.unposed = self.posed + (T is not None), self.unposed + (T is None)
         return replace(frame, T_world_sensor=T, restarts=self.restarts)
 
     def report(self) -> dict[str, Any]:
-        """Counts of datagrams received, used and refused, of restarts, and of frames with and without a pose."""
+        """Counts of datagrams, of those that the kernel dropped, of restarts, of frames with and without a pose."""
         return {
             "source": self.name,
             "received": self.received,
+            "overflowed": self._queue.overflowed,
             "used": self.used,
             "refused": {reason: self.refused[reason] for reason in self.REASONS},
             "restarts": self.restarts,
@@ -67,41 +82,35 @@ class PoseSocket(PoseSource):
 
     def close(self) -> None:
         """Close the socket and remove its file."""
-        address = self._socket.getsockname()
-        self._socket.close()
-        if isinstance(address, str) and address:
-            Path(address).unlink(missing_ok=True)
+        self._queue.close()
 
     def _drain(self, now_s: float) -> None:
-        """Read what has arrived, at most `capacity` datagrams: a flood must not delay the frame."""
-        for _ in range(self.config.capacity):
-            try:
-                raw = self._socket.recv(MAX_BYTES + 1)
-            except OSError:  # nothing to read, or an error caused by the last sender
-                return
-            self.received += 1
+        """Read what has arrived, the newest `capacity` datagrams: a flood must not delay the frame."""
+        for raw in self._queue.take():
             try:
                 self._keep(*read_datagram(raw), now_s)
             except DatagramError as error:
                 self._refuse(error)
+        if self._queue.crowded_out > self.refused["crowded_out"]:
+            more = self._queue.crowded_out - self.refused["crowded_out"] - 1
+            self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"))
+            self.refused["crowded_out"] += more
 
     def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
-        if stamp_s < now_s - self.config.max_age_s:
-            raise DatagramError("stale", f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s")
+        cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s"
         if stamp_s > now_s + self.config.max_ahead_s:
-            cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s: is it the stream's clock?"
-            raise DatagramError("ahead", cause)
-        newest_s = self._buffer.newest_s
-        speed_mps = self._buffer.speed_to(stamp_s, T)
-        if speed_mps > self.config.max_speed_mps:
-            self._restart(f"{speed_mps:.0f} m/s from the pose before, at stamp {stamp_s:.3f} s")
-        if not self._buffer.add(stamp_s, T):
-            raise DatagramError("out_of_order", f"stamp {stamp_s:.3f} s after {newest_s:.3f} s")
+            raise DatagramError("ahead", f"{cause}: is it the stream's clock?")
+        newest_s, restarts = self._poses.believed.newest_s, self.restarts
+        doubt = self._poses.add(stamp_s, T, now_s)
+        if self.restarts > restarts:
+            self._warn_of_restart(f"another place than the sensor can have reached, at stamp {stamp_s:.3f} s")
+        if stamp_s < now_s - self.config.max_age_s:
+            raise DatagramError("stale", cause)
+        if doubt is not None:
+            raise DatagramError(doubt, f"stamp {stamp_s:.3f} s after {newest_s:.3f} s")
         self.used += 1
 
-    def _restart(self, cause: str) -> None:
-        self._buffer.clear()
-        self.restarts += 1
+    def _warn_of_restart(self, cause: str) -> None:
         if self.restarts == 1:
             meaning = "the sender seems to have restarted, tracks keep their positions"
             remedy = "let it keep its origin, or raise odometry.max_speed_mps for a faster robot"
