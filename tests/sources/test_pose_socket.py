@@ -181,8 +181,10 @@ def test_each_reason_is_counted_and_logged_once(pair, caplog):
     assert odometry.report() == {
         "source": "test",
         "received": 11,
+        "overflowed": 0,
         "used": 1,
-        "refused": {"malformed": 2, "non_finite": 2, "stale": 2, "out_of_order": 2, "ahead": 2},
+        "refused": dict.fromkeys(PoseSocket.REASONS, 0)
+        | {"malformed": 2, "non_finite": 2, "stale": 2, "repeated": 2, "ahead": 2},
         "restarts": 0,
         "frames_posed": 1,
         "frames_unposed": 0,
@@ -191,22 +193,25 @@ def test_each_reason_is_counted_and_logged_once(pair, caplog):
     assert "is it the stream's clock?" in caplog.text
 
 
-def test_a_restarted_sender_is_detected_by_its_jump(pair, caplog):
+def test_a_restarted_sender_is_detected_by_poses_that_go_on_after_a_leap(pair, caplog):
     there, odometry = pair
-    for k in range(8):
-        x = 20 + 0.1 * k if k < 5 else 0.1 * (k - 5)  # 20 m back in 0.05 s
-        there.send(planar(0.05 * k, x))
+
+    def placed(numbers):
+        for k in numbers:
+            there.send(planar(0.05 * k, (20 if k < 5 else 500 if k > 12 else 0) + 0.1 * k))  # 20 m back in 0.05 s
+        return odometry.place(frame(0.05 * numbers[-1] + 0.02))
+
     with caplog.at_level(logging.WARNING):
-        placed = [odometry.place(frame(s)) for s in (0.225, 0.35)]
-    assert placed[0].T_world_sensor is None  # between both worlds, there is no place
-    np.testing.assert_allclose(placed[1].T_world_sensor[0, 3], 0.2)
-    assert [p.restarts for p in placed] == [1, 1]
-    assert odometry.report()["restarts"] == 1
-    assert odometry.report()["used"] == 8
+        first, doubted, second = (placed(range(*r)) for r in ((5,), (5, 9), (9, 11)))
+    assert [p.restarts for p in (first, doubted, second)] == [0, 0, 1]
+    x = [p.T_world_sensor[0, 3] for p in (first, doubted, second)]
+    np.testing.assert_allclose(x, [20.44, 20.84, 1.04])  # the world before, until the new one is believed
+    report = odometry.report()
+    assert (report["restarts"], report["used"], report["refused"]["leap"]) == (1, 7, 4)
     assert "odometry.max_speed_mps" in caplog.text
-    there.send(planar(0.4, 500.0))
-    assert odometry.place(frame(0.4)).restarts == 2
-    assert len(caplog.records) == 1
+    warnings = len(caplog.records)
+    assert placed(range(13, 18)).restarts == 2
+    assert len(caplog.records) == warnings
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 2), st.floats(-1, 1), st.floats(-1, 1)), max_size=40))
@@ -216,25 +221,53 @@ def test_no_motion_below_the_speed_limit_is_a_restart(steps):
     there.send(planar(0.0))
     for dt_s, ahead, left in steps:  # up to the speed allowed, and noise
         stamp_s += dt_s
-        x += (ahead * CONFIG.max_speed_mps * dt_s + 0.3 * left) / 2
-        y += (left * CONFIG.max_speed_mps * dt_s + 0.3 * ahead) / 2
-        there.send(planar(stamp_s, x, y))
+        x += ahead * CONFIG.max_speed_mps * dt_s / 2
+        y += left * CONFIG.max_speed_mps * dt_s / 2
+        there.send(planar(stamp_s, x + 0.15 * left, y + 0.15 * ahead))
         assert odometry.place(frame(stamp_s)).restarts == 0
     there.close()
     odometry.close()
 
 
-def test_a_frame_reads_a_flood_up_to_the_capacity():
+def test_of_a_flood_the_newest_are_kept():
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     there.setblocking(False)
     odometry = PoseSocket(here, OdometryConfig(capacity=4), "test")
     for k in range(6):
-        there.send(planar(0.1 * k))
-    pose_of(odometry, frame(0.0))
-    assert odometry.received == 4
-    pose_of(odometry, frame(0.1))
-    assert odometry.received == 6
+        there.send(planar(0.1 * k, 1.0 * k))
+    assert pose_of(odometry, frame(0.5))[0, 3] == 5.0
+    report = odometry.report()
+    assert (report["received"], report["used"], report["refused"]["crowded_out"]) == (6, 4, 2)
     there.close()
+    odometry.close()
+
+
+def test_a_unix_socket_is_emptied_between_two_frames(tmp_path):
+    """The kernel holds ten datagrams: a sender that waits for room gets through a hundred without a frame."""
+    path = tmp_path / "odometry.sock"
+    odometry = PoseSocket(open_socket(f"unix://{path}"), CONFIG, "test")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sender:
+        sender.settimeout(60)
+        for k in range(100):
+            sender.sendto(planar(0.0025 * k, 0.02 * k), str(path))
+    assert pose_of(odometry, frame(0.2475))[0, 3] == pytest.approx(1.98)
+    assert odometry.report()["used"] == 100
+    odometry.close()
+
+
+def test_what_the_kernel_drops_is_counted(free_port):
+    url = f"udp://127.0.0.1:{free_port}"
+    odometry = PoseSocket(open_socket(url), CONFIG, url)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for k in range(4000):
+            sender.sendto(planar(0.001 * k) + b" " * 2000, ("127.0.0.1", free_port))
+        pose_of(odometry, frame(4.0))
+        sender.sendto(planar(4.1), ("127.0.0.1", free_port))  # datagrams report what was dropped before them
+    pose_of(odometry, frame(4.1))
+    report = odometry.report()
+    assert 200 < report["received"] < 4001
+    assert report["received"] + report["overflowed"] == 4001
+    assert report["received"] == report["used"] + sum(report["refused"].values())
     odometry.close()
 
 

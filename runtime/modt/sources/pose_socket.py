@@ -1,99 +1,21 @@
-"""Poses received from another process, one per datagram.
-
-Stamps of poses and frames are on the clock of the stream, `stamp_s` of `tracks.jsonl`. No other clock is read: a
-replay is reproducible if it receives the same poses before the same frames.
-"""
+"""Poses received in datagrams, one each."""
 
 from __future__ import annotations
 
 import errno
-import logging
 import socket
 import stat
-from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.sources.pose_buffer import PoseBuffer
+from modt.sources.datagram_queue import DatagramQueue
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
-from modt.sources.pose_source import PoseSource
-from modt.types import Float64, Frame
-
-log = logging.getLogger(__name__)
+from modt.sources.received_poses import ReceivedPoses
 
 FORM = "write recording, none, udp://HOST:PORT, unix:///PATH or ros2:///TOPIC"
-
-
-class ReceivedPoses(PoseSource):
-    """Poses that another process sends; refused ones are counted, and logged once of each kind.
-
-    A pose beyond the speed of the sensor is the first of a restarted sender with another world frame: earlier poses
-    are removed and the restart is passed on in `Frame.restarts`.
-    """
-
-    has_poses = True  # though frames may lack one
-    REASONS = ("malformed", "non_finite", "stale", "out_of_order", "ahead")
-    """Reasons of a refusal; each has a counter."""
-
-    def __init__(self, config: OdometryConfig, name: str) -> None:
-        self.name, self.config = name, config
-        self._buffer = PoseBuffer(config)
-        self.received = self.used = self.restarts = self.posed = self.unposed = 0
-        self.refused: Counter[str] = Counter()
-
-    def place(self, frame: Frame) -> Frame:
-        """The frame with T_world_sensor at its stamp, None where the poses received are too old."""
-        self._drain(frame.stamp_s)
-        T = self._buffer.at(frame.stamp_s)
-        self.posed, self.unposed = self.posed + (T is not None), self.unposed + (T is None)
-        return replace(frame, T_world_sensor=T, restarts=self.restarts)
-
-    def report(self) -> dict[str, Any]:
-        """Counts of poses received, used and refused, of restarts, and of frames with and without a pose."""
-        return {
-            "source": self.name,
-            "received": self.received,
-            "used": self.used,
-            "refused": {reason: self.refused[reason] for reason in self.REASONS},
-            "restarts": self.restarts,
-            "frames_posed": self.posed,
-            "frames_unposed": self.unposed,
-        }
-
-    def _drain(self, now_s: float) -> None:
-        """Keep what has arrived."""
-        raise NotImplementedError
-
-    def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
-        if stamp_s < now_s - self.config.max_age_s:
-            raise DatagramError("stale", f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s")
-        if stamp_s > now_s + self.config.max_ahead_s:
-            cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s: is it the stream's clock?"
-            raise DatagramError("ahead", cause)
-        newest_s = self._buffer.newest_s
-        speed_mps = self._buffer.speed_to(stamp_s, T)
-        if speed_mps > self.config.max_speed_mps:
-            self._restart(f"{speed_mps:.0f} m/s from the pose before, at stamp {stamp_s:.3f} s")
-        if not self._buffer.add(stamp_s, T):
-            raise DatagramError("out_of_order", f"stamp {stamp_s:.3f} s after {newest_s:.3f} s")
-        self.used += 1
-
-    def _restart(self, cause: str) -> None:
-        self._buffer.clear()
-        self.restarts += 1
-        if self.restarts == 1:
-            meaning = "the sender seems to have restarted, tracks keep their positions"
-            remedy = "let it keep its origin, or raise odometry.max_speed_mps for a faster robot"
-            log.warning("%s: %s: %s; %s; later ones are only counted", self.name, cause, meaning, remedy)
-
-    def _refuse(self, error: DatagramError) -> None:
-        self.refused[error.reason] += 1
-        if self.refused[error.reason] == 1:
-            log.warning("%s: pose refused (%s): %s; later ones are only counted", self.name, error.reason, error)
 
 
 class PoseSocket(ReceivedPoses):
@@ -101,28 +23,25 @@ class PoseSocket(ReceivedPoses):
 
     def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
         super().__init__(config, name)
-        bound.setblocking(False)
-        self._socket = bound
+        self._queue = DatagramQueue(bound, config.capacity, MAX_BYTES + 1)
 
     def close(self) -> None:
         """Close the socket and remove its file."""
-        address = self._socket.getsockname()
-        self._socket.close()
-        if isinstance(address, str) and address:
-            Path(address).unlink(missing_ok=True)
+        self._queue.close()
 
     def _drain(self, now_s: float) -> None:
-        """Read what has arrived, at most `capacity` datagrams: a flood must not delay the frame."""
-        for _ in range(self.config.capacity):
-            try:
-                raw = self._socket.recv(MAX_BYTES + 1)
-            except OSError:  # nothing to read, or an error caused by the last sender
-                return
-            self.received += 1
+        """Read what has arrived, the newest `capacity` datagrams: a flood must not delay the frame."""
+        datagrams = self._queue.take()
+        self.received, self.overflowed = self._queue.received, self._queue.overflowed
+        for raw in datagrams:
             try:
                 self._keep(*read_datagram(raw), now_s)
             except DatagramError as error:
                 self._refuse(error)
+        if self._queue.crowded_out > self.refused["crowded_out"]:
+            more = self._queue.crowded_out - self.refused["crowded_out"] - 1
+            self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"))
+            self.refused["crowded_out"] += more
 
 
 def open_socket(url: str) -> socket.socket:

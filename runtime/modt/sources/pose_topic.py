@@ -14,7 +14,7 @@ from modt.ros2.dds import Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
 from modt.sources.pose_datagram import DatagramError
 from modt.sources.pose_file import pose_defect
-from modt.sources.pose_socket import ReceivedPoses
+from modt.sources.received_poses import ReceivedPoses
 from modt.types import Float64
 
 OPTIONS = {"ros2": frozenset({"domain", "base_to_sensor"})}

@@ -1,0 +1,95 @@
+"""Poses received from another process.
+
+Stamps of poses and frames are on the clock of the stream, `stamp_s` of `tracks.jsonl`. No other clock is read: a
+replay is reproducible if it receives the same poses before the same frames.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from dataclasses import replace
+from typing import Any
+
+from modt.config import OdometryConfig
+from modt.sources.pose_datagram import DatagramError
+from modt.sources.pose_sequence import PoseSequence
+from modt.sources.pose_source import PoseSource
+from modt.types import Float64, Frame
+
+log = logging.getLogger(__name__)
+
+
+class ReceivedPoses(PoseSource):
+    """Poses that another process sends; refused ones are counted, and logged once of each kind.
+
+    Poses are believed as `PoseSequence` says. A restarted sender with another world frame is passed on in
+    `Frame.restarts`.
+    """
+
+    has_poses = True  # though frames may lack one
+    REASONS = (
+        *("malformed", "non_finite", "crowded_out", "stale", "ahead"),
+        *("repeated", "out_of_order", "early", "leap"),  # doubts of PoseBuffer
+    )
+    """Reasons of a refusal; each has a counter."""
+
+    def __init__(self, config: OdometryConfig, name: str) -> None:
+        self.name, self.config = name, config
+        self._poses = PoseSequence(config)
+        self.received = self.overflowed = self.used = self.posed = self.unposed = 0
+        self.refused: Counter[str] = Counter()
+
+    @property
+    def restarts(self) -> int:
+        """Times that the sender went on in another world."""
+        return self._poses.restarts
+
+    def place(self, frame: Frame) -> Frame:
+        """The frame with T_world_sensor at its stamp, None where the poses received are too old."""
+        self._drain(frame.stamp_s)
+        T = self._poses.believed.at(frame.stamp_s)
+        self.posed, self.unposed = self.posed + (T is not None), self.unposed + (T is None)
+        return replace(frame, T_world_sensor=T, restarts=self.restarts)
+
+    def report(self) -> dict[str, Any]:
+        """Counts of messages, of those that the system dropped, of restarts, of frames with and without a pose."""
+        return {
+            "source": self.name,
+            "received": self.received,
+            "overflowed": self.overflowed,
+            "used": self.used,
+            "refused": {reason: self.refused[reason] for reason in self.REASONS},
+            "restarts": self.restarts,
+            "frames_posed": self.posed,
+            "frames_unposed": self.unposed,
+        }
+
+    def _drain(self, now_s: float) -> None:
+        """Keep what has arrived."""
+        raise NotImplementedError
+
+    def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
+        cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s"
+        if stamp_s > now_s + self.config.max_ahead_s:
+            raise DatagramError("ahead", f"{cause}: is it the stream's clock?")
+        newest_s, restarts = self._poses.believed.newest_s, self.restarts
+        doubt = self._poses.add(stamp_s, T, now_s)
+        if self.restarts > restarts:
+            self._warn_of_restart(f"another place than the sensor can have reached, at stamp {stamp_s:.3f} s")
+        if stamp_s < now_s - self.config.max_age_s:
+            raise DatagramError("stale", cause)
+        if doubt is not None:
+            raise DatagramError(doubt, f"stamp {stamp_s:.3f} s after {newest_s:.3f} s")
+        self.used += 1
+
+    def _warn_of_restart(self, cause: str) -> None:
+        if self.restarts == 1:
+            meaning = "the sender seems to have restarted, tracks keep their positions"
+            remedy = "let it keep its origin, or raise odometry.max_speed_mps for a faster robot"
+            log.warning("%s: %s: %s; %s; later ones are only counted", self.name, cause, meaning, remedy)
+
+    def _refuse(self, error: DatagramError) -> None:
+        self.refused[error.reason] += 1
+        if self.refused[error.reason] == 1:
+            log.warning("%s: pose refused (%s): %s; later ones are only counted", self.name, error.reason, error)

@@ -1,0 +1,170 @@
+"""Odometry that lies: single datagrams cost nothing that lasts, a sequence that goes on is followed."""
+
+import json
+import socket
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modt.config import OdometryConfig
+from modt.sources.pose_socket import PoseSocket
+from modt.types import Frame
+
+CONFIG = OdometryConfig()
+EMPTY = np.zeros((0, 4), np.float32)
+PERIOD_S = 0.1
+SPEED_MPS = 12.0
+KINDS = {  # of lies, by a scale, and the reason that they are refused for
+    "far ahead": (lambda t, x, k=1.0: (t + 59.0 * k, x, 0.0), "early"),
+    "beyond any lead": (lambda t, x, k=1.0: (t + 1e6 * k, x, 0.0), "ahead"),
+    "ahead": (lambda t, x, k=1.0: (t + 1.5 * k, x, 0.0), "early"),
+    "a little ahead": (lambda t, x, k=1.0: (t + 0.2 * k, x, 0.0), "leap"),
+    "behind": (lambda t, x, k=1.0: (t - 0.15 * k, x, 0.0), "out_of_order"),
+    "far behind": (lambda t, x, k=1.0: (t - 100.0 * k, x, 0.0), "stale"),
+    "teleported": (lambda t, x, k=1.0: (t, x + 80.0 * k, 0.0), "leap"),
+    "teleported a little": (lambda t, x, k=1.0: (t, x - 2.0 * k, 0.0), "leap"),
+    "turned": (lambda t, x, k=1.0: (t, x, 2.0 * k), "leap"),
+}
+
+
+class Robot:
+    """A robot on a straight way, whose sender and sensor stamp by clocks of their own; time is the test's."""
+
+    def __init__(self, rate_hz=50.0):
+        self.there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.there.setblocking(False)
+        self.odometry = PoseSocket(here, CONFIG, "test")
+        self.interval_s, self.time_s, self.sent = 1.0 / rate_hz, 0.0, 0
+        self.sender_s = self.sensor_s = self.world_m = 0.0  # what they are off
+
+    def close(self):
+        self.there.close()
+        self.odometry.close()
+
+    def send(self, lie=None):
+        """The next pose, or a lie in its place."""
+        self.sent += 1
+        self.time_s = self.sent * self.interval_s
+        told = (self.time_s + self.sender_s, SPEED_MPS * self.time_s + self.world_m, 0.0)
+        stamp_s, x, yaw = lie(*told[:2]) if lie else told
+        self.there.send(json.dumps({"stamp": stamp_s, "x": x, "y": 0.0, "yaw": yaw}).encode())
+        self.odometry._queue._read()  # the kernel's queue of a pair of sockets is short
+
+    def frame_error_m(self):
+        """Of the pose at a frame now; None without one."""
+        placed = self.odometry.place(Frame(0, self.time_s + 0.003 + self.sensor_s, EMPTY))
+        if placed.T_world_sensor is None:
+            return None
+        off = placed.T_world_sensor[:3, 3] - [SPEED_MPS * (self.time_s + 0.003) + self.world_m, 0.0, 0.0]
+        turn = np.arctan2(placed.T_world_sensor[1, 0], placed.T_world_sensor[0, 0])
+        return float(np.linalg.norm(off)) + abs(float(turn)) * 5
+
+    def drive(self, seconds, lies=lambda: None):
+        """Errors of the frames, of NaN without a pose."""
+        errors, frames = [], round(seconds / PERIOD_S)
+        for _ in range(frames):
+            until = self.time_s + PERIOD_S - 1e-9
+            while self.time_s < until:
+                self.send(lies())
+            errors.append(self.frame_error_m())
+        return np.array([np.nan if e is None else e for e in errors])
+
+
+@pytest.fixture(name="robot", params=[20.0, 50.0, 400.0], ids="{:.0f} Hz".format)
+def a_robot(request):
+    made = Robot(request.param)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_lie_costs_no_frame_its_pose(robot, kind):
+    lie, reason = KINDS[kind]
+    assert robot.drive(1.0)[2:].max() < 0.01
+    before = robot.odometry.report()
+    assert before["used"] == robot.sent
+    robot.send(lie)
+    assert robot.drive(2.0).max() < 0.01
+    report = robot.odometry.report()
+    assert report["refused"] == before["refused"] | {reason: 1}
+    assert report["used"] == robot.sent - 1
+    assert report["restarts"] == 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_sender_that_begins_with_a_lie_is_believed_within_a_second(robot, kind):
+    robot.send(KINDS[kind][0])
+    errors = robot.drive(2.0)
+    assert errors[3:].max() < 0.01
+
+
+def test_repeated_datagrams_are_counted(robot):
+    robot.drive(0.5)
+    used = robot.odometry.used
+    for _ in range(3):
+        robot.send(lambda t, x: (0.5, SPEED_MPS * 0.5, 0.0))
+    assert np.nanmax(robot.drive(1.0)) < 0.01
+    assert robot.odometry.refused["repeated"] >= 1
+    assert robot.odometry.used == used + robot.sent - round(0.5 / robot.interval_s) - 3
+
+
+@pytest.mark.parametrize("step_s", [-30.0, -0.5, -0.15, 0.15, 0.5, 30.0])
+def test_a_step_of_the_clock_of_both_is_followed(robot, step_s):
+    robot.drive(1.0)
+    robot.sender_s = robot.sensor_s = step_s
+    errors = robot.drive(2.0)
+    assert errors[5:].max() < 0.01
+    assert robot.odometry.restarts == 0
+
+
+def test_a_step_of_the_senders_clock_is_followed_but_gives_no_pose_where_it_is_not_the_streams(robot):
+    robot.drive(1.0)
+    robot.sender_s = 5.0
+    assert np.isnan(robot.drive(2.0)[5:]).all()
+    used = robot.odometry.used
+    robot.drive(1.0)
+    assert robot.odometry.used - used == round(1.0 / robot.interval_s)
+    robot.sender_s = 0.0  # set right again
+    assert robot.drive(2.0)[5:].max() < 0.01
+    assert robot.odometry.restarts == 0
+
+
+def test_a_new_world_is_followed_and_told_once(robot):
+    robot.drive(1.0)
+    robot.world_m = -300.0
+    errors = robot.drive(2.0)
+    assert errors[3:].max() < 0.01
+    assert robot.odometry.restarts == 1
+
+
+def test_silence_of_the_sender_is_no_lie(robot):
+    robot.drive(1.0)
+    robot.sent += round(5.0 / robot.interval_s)
+    assert np.nanmax(robot.drive(1.0)) < 0.01
+    assert sum(robot.odometry.refused.values()) == 0
+
+
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    share=st.floats(0.0, 0.3),
+    rate_hz=st.sampled_from([20.0, 50.0, 100.0, 400.0]),
+    kinds=st.sets(st.sampled_from(sorted(KINDS)), min_size=1),
+)
+def test_while_most_datagrams_are_honest_no_pose_is_far_off(seed, share, rate_hz, kinds):
+    rng, robot = np.random.default_rng(seed), Robot(rate_hz)
+    chosen = [KINDS[kind][0] for kind in sorted(kinds)]
+
+    def lies():
+        lie, scale = chosen[rng.integers(len(chosen))], rng.uniform(-1.5, 1.5)
+        return (lambda t, x: lie(t, x, scale)) if rng.random() < share else None
+
+    robot.drive(0.5)  # of the first poses nobody can say which one lies
+    errors = robot.drive(5.0, lies)
+    after = robot.drive(1.5)
+    robot.close()
+    assert np.nanmax(np.append(errors, 0.0)) < 3.0
+    assert after[9:].max() < 0.01
+    assert np.isnan(errors).mean() < 0.3
