@@ -24,6 +24,7 @@ from modt.sources.packets.velodyne_models import (
     recognised,
     signature_of,
 )
+from modt.sources.packets.velodyne_status import CalibrationBytes
 from modt.sources.packets.velodyne_turn import AHEAD, SAME_S, Entry, Turn
 from modt.types import Float32, Float64
 
@@ -68,6 +69,7 @@ class VelodyneDecoder:
         self._signature: Signature | None = None
         self._identity: bytes | None = None
         self._reach, self._packet_s = 0, 0.0
+        self._own: CalibrationBytes | None = None
         self._forget()
 
     def _forget(self) -> None:
@@ -82,6 +84,7 @@ class VelodyneDecoder:
         """A decoder of the same sensor that has seen no packet yet."""
         other = copy.copy(self)
         other._first = None if self._first is None else []
+        other._own = None if self._own is None else CalibrationBytes(self._library)
         other._forget()
         return other
 
@@ -138,10 +141,25 @@ class VelodyneDecoder:
         calibration = self._calibration
         if calibration is None and model.calibration is not None:
             calibration = self._library.get_bundled_calibration(model.calibration)
-            log.warning("%s: beams as of another %s; give the unit's own by calibration=", self.name, model.name)
-        config = self._library.Config(model=getattr(self._library.Model, model.member), calibration=calibration)
-        self._decoder = self._library.ScanDecoder(config)
+            self._own = CalibrationBytes(self._library)
+            log.warning(
+                "%s: beams as of another %s until it has sent its own; better give them by calibration=",
+                self.name,
+                model.name,
+            )
+        self._decoder = self._scan_decoder(model.member, calibration)
         return [s for r, p in first for s in self._packet(r, p, signature_of(p), reception)]
+
+    def _scan_decoder(self, member: str, calibration: Any) -> Any:
+        config = self._library.Config(model=getattr(self._library.Model, member), calibration=calibration)
+        return self._library.ScanDecoder(config)
+
+    def _calibrate(self, own: CalibrationBytes, payload: bytes) -> None:
+        """Use the unit's own calibration from the packet on that completes it."""
+        found = own.add(payload)
+        if found is not None:
+            self._decoder, self._own = self._scan_decoder(*found), None
+            log.warning("%s: it has sent the calibration of its beams, which is used from now on", self.name)
 
     def _packet(
         self, received_s: float, payload: bytes, signature: Signature | None, reception: Reception
@@ -151,6 +169,8 @@ class VelodyneDecoder:
             return []
         stamp_s = int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little") * 1e-6
         time_s = self._clock.unwrapped(stamp_s, received_s - self._packet_s)  # it is sent when it is full
+        if self._own is not None:
+            self._calibrate(self._own, payload)
         first, last = azimuths(payload)
         phase = (first + AHEAD) % TURN
         if self._identity is not None:  # the library checks it, and there are packets that lie
