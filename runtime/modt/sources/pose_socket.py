@@ -47,13 +47,8 @@ class PoseSocket(PoseSource):
         self.name, self.config = name, config
         self._queue = DatagramQueue(bound, config.capacity, MAX_BYTES + 1)
         self._poses = PoseSequence(config)
-        self.used = self.posed = self.unposed = 0
+        self.received = self.used = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
-
-    @property
-    def received(self) -> int:
-        """Datagrams received."""
-        return self._queue.received
 
     @property
     def restarts(self) -> int:
@@ -86,15 +81,15 @@ class PoseSocket(PoseSource):
 
     def _drain(self, now_s: float) -> None:
         """Read what has arrived, the newest `capacity` datagrams: a flood must not delay the frame."""
-        for raw in self._queue.take():
+        taken, crowded_out = self._queue.take()
+        self.received += len(taken) + crowded_out
+        if crowded_out:
+            self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"), crowded_out)
+        for raw in taken:
             try:
                 self._keep(*read_datagram(raw), now_s)
             except DatagramError as error:
                 self._refuse(error)
-        if self._queue.crowded_out > self.refused["crowded_out"]:
-            more = self._queue.crowded_out - self.refused["crowded_out"] - 1
-            self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"))
-            self.refused["crowded_out"] += more
 
     def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
         cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s"
@@ -116,9 +111,9 @@ class PoseSocket(PoseSource):
             remedy = "let it keep its origin, or raise odometry.max_speed_mps for a faster robot"
             log.warning("%s: %s: %s; %s; later ones are only counted", self.name, cause, meaning, remedy)
 
-    def _refuse(self, error: DatagramError) -> None:
-        self.refused[error.reason] += 1
-        if self.refused[error.reason] == 1:
+    def _refuse(self, error: DatagramError, number: int = 1) -> None:
+        self.refused[error.reason] += number
+        if self.refused[error.reason] == number:
             log.warning("%s: pose refused (%s): %s; later ones are only counted", self.name, error.reason, error)
 
 
