@@ -28,8 +28,6 @@ class DatagramQueue:
         max_bytes: of a datagram, beyond which it is cut.
 
     Attributes:
-        received: datagrams read.
-        crowded_out: older ones of these, of which there were more than the capacity.
         overflowed: datagrams that the kernel dropped, where it says so.
     """
 
@@ -37,7 +35,7 @@ class DatagramQueue:
         bound.setblocking(False)
         self._socket, self._max_bytes = bound, max_bytes
         self._kept: deque[bytes] = deque(maxlen=capacity)
-        self.received = self.crowded_out = self.overflowed = 0
+        self._crowded_out = self.overflowed = 0
         with suppress(OSError):
             bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
         with suppress(OSError):
@@ -48,13 +46,14 @@ class DatagramQueue:
         if bound.family == socket.AF_UNIX and self._address:
             self._thread.start()
 
-    def take(self) -> list[bytes]:
-        """All that has arrived, without waiting."""
+    def take(self) -> tuple[list[bytes], int]:
+        """The newest of what has arrived, and the number of older ones that they crowded out; without waiting."""
         with self._lock:
             self._read()
-            taken = list(self._kept)
+            taken, crowded_out = list(self._kept), self._crowded_out
             self._kept.clear()
-        return taken
+            self._crowded_out = 0
+        return taken, crowded_out
 
     def close(self) -> None:
         """Close the socket and remove its file."""
@@ -76,8 +75,7 @@ class DatagramQueue:
                 raw, facts, _, _ = self._socket.recvmsg(self._max_bytes, socket.CMSG_SPACE(_COUNT.size))
             except OSError:  # nothing to read, or an error caused by the last sender
                 return
-            self.received += 1
-            self.crowded_out += len(self._kept) == self._kept.maxlen
+            self._crowded_out += len(self._kept) == self._kept.maxlen
             self._kept.append(raw)
             for level, kind, value in facts:
                 if (level, kind) == (socket.SOL_SOCKET, _OVERFLOW):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -58,16 +59,17 @@ class PoseBuffer:
             return "early"
         if self.leaps(stamp_s, T):
             return "leap"
-        expected = self._line(stamp_s)
         slack_m = self.config.position_noise_m + self.config.max_acceleration_mps2 * dt_s**2
-        return "leap" if expected is not None and _apart_m(expected[0], T) > slack_m else None
+        return "leap" if self._off_m(stamp_s, T) > slack_m else None
 
     def leaps(self, stamp_s: float, T: Float64) -> bool:
         """Whether a (4, 4) pose is farther from the latest than its sensor can have moved: it is of another world."""
         if not self._poses:
             return False
         dt_s = stamp_s - self.newest_s if stamp_s > self.newest_s else self.config.max_age_s
-        return _apart_m(self._poses[-1], T) > self.config.position_noise_m + self.config.max_speed_mps * dt_s
+        last = self._poses[-1]
+        apart_m = float(np.linalg.norm(T[:3, 3] - last[:3, 3])) + _LEVER_M * _turn_rad(last, T)
+        return apart_m > self.config.position_noise_m + self.config.max_speed_mps * dt_s
 
     def clear(self) -> None:
         """Remove all poses."""
@@ -76,32 +78,42 @@ class PoseBuffer:
 
     def at(self, stamp_s: float) -> Float64 | None:
         """(4, 4) pose at a time, interpolated or extrapolated from the latest poses; None where they are too old."""
-        line = self._line(stamp_s)
-        return line[0] if line is not None and line[1] <= self.config.max_age_s else None
+        ends = self._ends(stamp_s)
+        if ends is None:
+            return None
+        (t0, a), (t1, b) = ((self._stamps[k], self._poses[k]) for k in ends)
+        if stamp_s == t1:
+            return b.copy()
+        if max(abs(stamp_s - t1), min(stamp_s, t1) - t0) > self.config.max_age_s:
+            return None
+        return interpolate(a, b, (stamp_s - t0) / (t1 - t0))
 
-    def _line(self, stamp_s: float) -> tuple[Float64, float] | None:
-        """(4, 4) pose at a time on the line through two poses, and the distance in time that they bridge [s]."""
+    def _ends(self, stamp_s: float) -> tuple[int, int] | None:
+        """The poses around a time or, after the latest, it and the one as long before; twice the one at the time."""
         stamps = np.array(self._stamps)
         after = int(np.searchsorted(stamps, stamp_s))
-        if after < len(self) and stamps[after] == stamp_s:
-            return self._poses[after].copy(), 0.0
-        before = after - 1
-        if after == len(self):  # extrapolation over no more than the span of the two poses
-            after -= 1
-            before = int(np.searchsorted(stamps, 2 * self.newest_s - stamp_s, "right")) - 1
-            before = max(before, int(np.searchsorted(stamps, self.newest_s - self.config.max_age_s)))
-            before = min(before, after - 1)
-        if before < 0 or before >= after:
-            return None
-        t0, t1 = stamps[before], stamps[after]
-        T = interpolate(self._poses[before], self._poses[after], float((stamp_s - t0) / (t1 - t0)))
-        return T, float(max(abs(stamp_s - t1), min(stamp_s, t1) - t0))
+        if after < len(self):
+            first = after if stamps[after] == stamp_s else after - 1
+            return (first, after) if first >= 0 else None
+        before = int(np.searchsorted(stamps, 2 * self.newest_s - stamp_s, "right")) - 1
+        before = max(before, int(np.searchsorted(stamps, self.newest_s - self.config.max_age_s)))
+        before = min(before, len(self) - 2)
+        return (before, len(self) - 1) if before >= 0 else None
+
+    def _off_m(self, stamp_s: float, T: Float64) -> float:
+        """Distance of a (4, 4) pose, later than the latest, from where they lead; zero where they lead nowhere."""
+        ends = self._ends(stamp_s)
+        if ends is None:
+            return 0.0
+        (t0, a), (t1, b) = ((self._stamps[k], self._poses[k]) for k in ends)
+        share = (stamp_s - t1) / (t1 - t0)
+        off_m = float(np.linalg.norm(T[:3, 3] - b[:3, 3] - share * (b[:3, 3] - a[:3, 3])))
+        return off_m + _LEVER_M * max(0.0, _turn_rad(b, T) - share * _turn_rad(a, b))
 
 
-def _apart_m(a: Float64, b: Float64) -> float:
-    """Distance between two (4, 4) poses, turns included [m]."""
-    cosine = (np.trace(a[:3, :3].T @ b[:3, :3]) - 1) / 2
-    return float(np.linalg.norm(a[:3, 3] - b[:3, 3]) + _LEVER_M * np.arccos(np.clip(cosine, -1.0, 1.0)))
+def _turn_rad(a: Float64, b: Float64) -> float:
+    """Angle between two (4, 4) poses."""
+    return math.acos(min(max((float(np.sum(a[:3, :3] * b[:3, :3])) - 1) / 2, -1.0), 1.0))
 
 
 def interpolate(a: Float64, b: Float64, share: float) -> Float64:

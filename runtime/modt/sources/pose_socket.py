@@ -31,17 +31,15 @@ class PoseSocket(ReceivedPoses):
 
     def _drain(self, now_s: float) -> None:
         """Read what has arrived, the newest `capacity` datagrams: a flood must not delay the frame."""
-        datagrams = self._queue.take()
-        self.received, self.overflowed = self._queue.received, self._queue.overflowed
-        for raw in datagrams:
+        taken, crowded_out = self._queue.take()
+        self.received, self.overflowed = self.received + len(taken) + crowded_out, self._queue.overflowed
+        if crowded_out:
+            self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"), crowded_out)
+        for raw in taken:
             try:
                 self._keep(*read_datagram(raw), now_s)
             except DatagramError as error:
                 self._refuse(error)
-        if self._queue.crowded_out > self.refused["crowded_out"]:
-            more = self._queue.crowded_out - self.refused["crowded_out"] - 1
-            self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"))
-            self.refused["crowded_out"] += more
 
 
 def open_socket(url: str) -> socket.socket:

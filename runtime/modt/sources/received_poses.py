@@ -89,7 +89,7 @@ class ReceivedPoses(PoseSource):
             remedy = "let it keep its origin, or raise odometry.max_speed_mps for a faster robot"
             log.warning("%s: %s: %s; %s; later ones are only counted", self.name, cause, meaning, remedy)
 
-    def _refuse(self, error: DatagramError) -> None:
-        self.refused[error.reason] += 1
-        if self.refused[error.reason] == 1:
+    def _refuse(self, error: DatagramError, number: int = 1) -> None:
+        self.refused[error.reason] += number
+        if self.refused[error.reason] == number:
             log.warning("%s: pose refused (%s): %s; later ones are only counted", self.name, error.reason, error)
