@@ -44,7 +44,7 @@ class Session:
         fov = assemble.field_of_view(request, self.stream)
         self.pipeline = assembly.pipeline(self.mode, self.profile, fov, Ledger())
         self.stop = Stop()
-        self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
+        self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz, sleep=self.stop.sleep)
         self._frames_without_reflectance = 0
         stream_name = re.sub(r"[^\w.]+", "-", self.stream.info.name)
         self.directory = RunDirectory(out or Path("runs") / f"{stream_name}-{request.mode}")
