@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import platform
 import resource
+import sys
 from importlib import metadata
 from pathlib import Path
 
@@ -15,6 +17,9 @@ from modt.errors import MisuseError
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 _MAX_HELPER_SHARE = 0.01
 """CPU time of other threads over that of the loop, up to which the process counts as single-threaded."""
+SWITCH_S = 0.0005
+"""For which another thread may keep the interpreter from the loop; 5 ms by default."""
+_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4  # mlockall(2)
 _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 
 
@@ -45,6 +50,49 @@ def pin_to_core(core: int | None) -> int | None:
 def last_core() -> int:
     """The last core available to this process: the least likely to serve interrupts."""
     return max(os.sched_getaffinity(0))
+
+
+def other_cores(core: int | None) -> frozenset[int] | None:
+    """The cores that this process may use beside one: for threads that serve the loop; None where there are none.
+
+    Call it before `pin_to_core`.
+    """
+    others = frozenset(os.sched_getaffinity(0)) - {core}
+    return others if core is not None and others else None
+
+
+def be_punctual(priority: int = 10) -> list[str]:
+    """Schedule this thread before ordinary ones (SCHED_FIFO), and keep its memory from being swapped out.
+
+    Threads begun afterwards stay ordinary. Returns what is not permitted, with the remedy.
+    """
+    sys.setswitchinterval(SWITCH_S)
+    lacking = []
+    if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK != os.SCHED_FIFO:
+        try:
+            policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+            os.sched_setscheduler(0, policy, os.sched_param(priority))
+        except OSError as error:
+            remedy = "set CPUSchedulingPolicy=fifo in the unit, or ulimit -r"
+            lacking.append(f"ordinary priority: SCHED_FIFO is not permitted ({error.strerror}); {remedy}")
+    cause = _lock_memory()
+    if cause:
+        lacking.append(f"memory may be swapped out: {cause}; set LimitMEMLOCK=infinity in the unit, or ulimit -l")
+    return lacking
+
+
+def _lock_memory() -> str:
+    """Keep all pages in memory once they are used; the reason where that is not permitted."""
+    if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
+        return "the limit of locked memory is finite"  # beyond it, allocations would fail later
+    if ctypes.CDLL(None, use_errno=True).mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT):
+        return os.strerror(ctypes.get_errno())
+    return ""
+
+
+def resident_mb() -> float:
+    """Memory of this process that is in use now [MB]."""
+    return float(psutil.Process().memory_info().rss) / 2**20
 
 
 def usage(core: int | None) -> dict[str, object]:

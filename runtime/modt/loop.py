@@ -16,7 +16,7 @@ from modt.sinks.output import LineSink, Sink
 from modt.sources.stream import Stream
 from modt.types import Budget, FrameResult
 
-
+STOPPING = (signal.SIGINT, signal.SIGTERM)
 NAP_S = 0.05
 """Longest sleep without a look at the signals."""
 
@@ -101,7 +101,7 @@ class Stop:
         if threading.current_thread() is not threading.main_thread():
             yield self
             return
-        handlers = {signal.SIGINT: self._on_stop, signal.SIGTERM: self._on_stop}
+        handlers: dict[signal.Signals, Callable[[int, object], None]] = dict.fromkeys(STOPPING, self._on_stop)
         if reload:
             handlers[signal.SIGHUP] = self._on_reload
         previous = {number: signal.signal(number, handler) for number, handler in handlers.items()}

@@ -6,6 +6,7 @@ import argparse
 import logging
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Protocol
 
 from modt import profile
 from modt.config import OdometryConfig, ProfileConfig
@@ -15,7 +16,7 @@ from modt.sensor_fit.recognition import Recognition, recognise
 from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.recognise import open_stream
-from modt.sources.stream import Stream
+from modt.sources.stream import Stream, StreamInfo
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Frame
 
@@ -46,6 +47,12 @@ class Request:
         return cls(**{name: value for name, value in vars(arguments).items() if name in names})
 
 
+class Described(Protocol):
+    """A recorded or a live stream."""
+
+    info: StreamInfo
+
+
 def stream(request: Request) -> Stream:
     """The stream asked for, the embedded one where no path is given.
 
@@ -64,21 +71,23 @@ def stream(request: Request) -> Stream:
     return cut
 
 
-def recognised(request: Request, first: Frame | None) -> tuple[ProfileConfig, Recognition]:
+def recognised(request: Request, first: Frame | None, named: str | None = None) -> tuple[ProfileConfig, Recognition]:
     """The profile of a stream by its first frame, and what differs from the one asked for, which is warned of.
 
-    What is found takes the place of the default profile, never of one that was asked for.
+    What is found takes the place of the default profile, or of the one that a source has named, never of one that was
+    asked for.
     """
-    config, free = profile.load(request.profile), request.profile is None
+    name, free = request.profile or named, request.profile is None
+    config = profile.load(name)
     if first is None:
         return config, Recognition((), None, config)
     found = recognise(first.points, config)
     if found.differences:
-        log.warning("%s", found.warning(request.profile or profile.DEFAULT, replaced=free))
+        log.warning("%s", found.warning(name or profile.DEFAULT, replaced=free))
     return found.fitted if free else config, found
 
 
-def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSource:
+def odometry(request: Request, stream: Described, config: OdometryConfig) -> PoseSource:
     """Where the poses of a stream's frames come from.
 
     Raises:
@@ -93,7 +102,7 @@ def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSo
     return PoseSocket(open_socket(request.odometry), config, request.odometry)
 
 
-def field_of_view(request: Request, stream: Stream) -> FieldOfView:
+def field_of_view(request: Request, stream: Described) -> FieldOfView:
     """The part of space to look at.
 
     Raises:

@@ -19,8 +19,18 @@ def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, Non
     stream = "KITTI drive, sequence or folder of .bin scans (default: a synthetic stream)"
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
+    add_profile_option(p)
+    add_core_option(p)
+
+
+def add_profile_option(p: Parser) -> None:
+    """Profile."""
     sensor = f"sensor and board (default: {DEFAULT}, or what the first sweep shows)"
     p.add_argument("--profile", metavar="NAME|FILE", help=sensor)
+
+
+def add_core_option(p: Parser) -> None:
+    """Core."""
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
 
 

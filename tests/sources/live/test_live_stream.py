@@ -82,7 +82,11 @@ def test_frames_are_numbered_in_the_order_in_which_they_are_taken(live):
 
 @pytest.mark.parametrize(
     ("unusable", "cause"),
-    [(sweep(0.5), "0.500 s before the last sweep"), (sweep(60.0), "59.000 s after the last sweep"), (sweep(1.1, x=5000.0), "its columns are not")],
+    [
+        (sweep(0.5), "0.500 s before the last sweep"),
+        (sweep(60.0), "59.000 s after the last sweep"),
+        (sweep(1.1, x=5000.0), "its columns are not"),
+    ],
 )
 def test_an_unusable_sweep_is_a_fault_and_the_next_one_is_taken(live, caplog, unusable, cause):
     reader, stream = live

@@ -30,8 +30,18 @@ DOUBT_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+class Arrival:
+    """A sweep as the receiving thread hands it over, and what that has found wrong with it."""
+
+    sweep: Sweep
+    flaws: tuple[str, ...]
+    usable: bool
+    arrived_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class Received:
-    """A frame, and when its sweep was complete on the clock of the stream [s]."""
+    """A frame, and when its sweep was complete and checked, on the clock of the stream [s]."""
 
     frame: Frame
     arrived_s: float
@@ -44,8 +54,8 @@ class LiveStream:
         info: properties of the stream, with n_frames None.
         faults: unusable sweeps and points.
         sweeps, incomplete, dropped, silences, time_steps: counts of sweeps received, of those with missing messages,
-            of those replaced by a newer one before they were taken, of times that the sensor fell silent, and that its
-            clock was set.
+            of those replaced by a newer one before they were taken, of times that the sensor fell silent, and of times
+            that its clock was set.
     """
 
     def __init__(
@@ -61,7 +71,7 @@ class LiveStream:
         self.sweeps = self.incomplete = self.dropped = self.silences = self.time_steps = 0
         self._cores, self._clock = cores, clock
         self._arrived = threading.Condition()
-        self._newest: tuple[Sweep, float] | None = None
+        self._newest: Arrival | None = None
         self._error: Exception | None = None
         self._ended = self._silent = False
         self._last_s, self._index = clock(), 0
@@ -92,7 +102,7 @@ class LiveStream:
         if taken is None:
             self._watch_silence()
             return None
-        return self._frame(*taken)
+        return self._frame(taken)
 
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
@@ -132,31 +142,32 @@ class LiveStream:
                 self._put(sweep)
 
     def _put(self, sweep: Sweep) -> None:
+        try:  # here, off the loop's thread
+            flaws, usable = sanitised(sweep.points, self.info.name)[1], True
+        except ScanError as error:
+            flaws, usable = [error.cause], False
         with self._arrived:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
-            self._newest = (sweep, self._clock())
+            self._newest = Arrival(sweep, tuple(flaws), usable, self._clock())
             self._arrived.notify()
 
-    def _frame(self, sweep: Sweep, arrived_s: float) -> Received | None:
+    def _frame(self, arrival: Arrival) -> Received | None:
+        sweep, arrived_s = arrival.sweep, arrival.arrived_s
         if self._silent:
             log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
         self._silent, self._last_s = False, arrived_s
         index, self._index = self._index, self._index + 1
         doubt = self._doubt(sweep.stamp_s, arrived_s)
-        if doubt:
-            self._fault(index, doubt, skipped=True)
-            return None
-        try:
-            points, flaws = sanitised(sweep.points, self.info.name)
-        except ScanError as error:
-            self._fault(index, error.cause, skipped=True)
-            return None
+        flaws = (doubt,) if doubt else arrival.flaws
+        used = arrival.usable and not doubt
         if flaws:
-            self._fault(index, "; ".join(flaws), skipped=False)
+            self._fault(index, "; ".join(flaws), skipped=not used)
+        if not used:
+            return None
         self._taken, self._doubted_s = (sweep.stamp_s, arrived_s), None
-        return Received(Frame(index, sweep.stamp_s, points, turn_s=sweep.turn_s), arrived_s)
+        return Received(Frame(index, sweep.stamp_s, sweep.points, turn_s=sweep.turn_s), arrived_s)
 
     def _doubt(self, stamp_s: float, arrived_s: float) -> str:
         """Why a stamp is refused; empty if it is not."""

@@ -1,0 +1,177 @@
+"""One run of a service: assembly, loop, records and status."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from modt import host, profile
+from modt.cli import assemble, metering
+from modt.cli.live_stages import LiveStages
+from modt.loop import Stop
+from modt.reporting.summary import Summary
+from modt.service.ladder import Ladder
+from modt.service.live_loop import LiveLoop, NamedSink
+from modt.service.power import Power
+from modt.service.prometheus import write_metrics
+from modt.service.status import SCHEMA, Counts, loop_report, one_line
+from modt.sinks.background import Background
+from modt.sinks.recording import Recording
+from modt.sinks.run_directory import SUMMARY
+from modt.sinks.service_directory import STATUS, ServiceDirectory
+from modt.sources.live.live_stream import LiveStream
+from modt.supervisor import Supervisor
+from modt.types import FrameResult
+
+
+class LiveSession:
+    """A service over a live source.
+
+    Args:
+        request: what is asked for.
+        source: open, not started.
+        sinks: of the results, by their addresses.
+        out: run directory.
+        metrics: file for Prometheus; None for none.
+        core: of the loop.
+        command: for the record.
+        lacking: what the loop has to do without, for the status.
+
+    Raises:
+        MisuseError: an invalid request.
+    """
+
+    def __init__(
+        self,
+        request: assemble.Request,
+        source: LiveStream,
+        sinks: Sequence[NamedSink],
+        out: Path,
+        metrics: Path | None,
+        core: int | None,
+        command: list[str],
+        lacking: Sequence[str] = (),
+    ) -> None:
+        self.source, self.sinks, self.metrics, self.core = source, tuple(sinks), metrics, core
+        self.stages = LiveStages(request, source)
+        self.directory = ServiceDirectory(out)
+        self.stop = Stop()
+        self._command, self._lacking = command, list(lacking)
+        self._summary, self._power = Summary(), Power()
+        self._began_s = time.monotonic()
+        self._counts = Counts(self._began_s)
+        self._without_reflectance = 0
+        self._reporting = False  # a status is being written
+
+    def run(self, supervisor: Supervisor) -> dict[str, Any]:
+        """Until a signal or the end of the source; returns the summary, as written.
+
+        Raises:
+            ModtError: a failure that repeats.
+        """
+        config = self.stages.parts.config
+        self._background = Background()
+        self._recording = Recording(self.directory, config.recording, self._background, self._description)
+        energy = config.energy
+        self._windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
+        sinks = [*self.sinks, NamedSink("recording", self._recording)]
+        self._loop = LiveLoop(
+            self.source,
+            self.stages,
+            sinks,
+            self._observe,
+            lambda: self._report(supervisor),
+            Ladder(config.loop.power_W),
+            self.stop,
+            supervisor,
+        )
+        with ExitStack() as stack:
+            stack.callback(self._finish)
+            for part in (self.stages.odometry, self.source, *(named.sink for named in self.sinks), supervisor):
+                stack.callback(part.close)
+            stack.enter_context(self.stop.on_signals(reload=True))
+            self.source.start()
+            self._loop.run()
+        return self.status()
+
+    def status(self) -> dict[str, Any]:
+        """The document modt.status/1."""
+        now_s, parts = time.monotonic(), self.stages.parts
+        return {
+            "schema": SCHEMA,
+            "time_s": time.time(),
+            "pid": os.getpid(),
+            "up_s": round(now_s - self._began_s, 3),
+            "source": self.source.info.name,
+            "mode": parts.request.mode,
+            "profile": parts.name,
+            "period_s": self.stages.period_s,
+            "counts": self._counts.report(now_s),
+            "loop": loop_report(self._loop),
+            "power": self._power.report() | {"limit_W": self._loop.ladder.power_W},
+            "sensor": self.source.health() | {"faults": self.source.faults.count},
+            "odometry": self.stages.odometry.report(),
+            "sinks": {named.name: _health(named) for named in self.sinks},
+            "recording": self._recording.health(),
+            "host": {"core": self.core, "resident_mb": round(host.resident_mb(), 1), "lacking": self._lacking},
+        }
+
+    def _observe(self, result: FrameResult, line: dict[str, Any]) -> None:
+        self._counts.add(result)
+        self._summary.add_result(result)
+        self._summary.add_ledger(line)
+        self._recording.ledger(line)
+        window = self._windows.add(line)
+        if window is not None:
+            self._recording.ledger(window)
+            watts = self._power.add(window)
+            if watts is not None:
+                self._loop.power(watts)
+        misses = self.stages.parts.config.sensor.reflectance != "none" and result.proposals.reflectance is None
+        self._without_reflectance += misses and len(result.proposals) > 0
+
+    def _report(self, supervisor: Supervisor) -> None:
+        """Say what is going on; the files are written off the loop's thread."""
+        status = self.status()
+        supervisor.status(one_line(status))
+        if not self._reporting:
+            self._reporting = self._background.submit(lambda: self._write(status))
+
+    def _write(self, status: dict[str, Any]) -> None:
+        try:
+            if self._recording.parts:
+                self.directory.write(STATUS, json.dumps(status, indent=1) + "\n")
+            if self.metrics is not None:
+                write_metrics(self.metrics, status)
+        finally:
+            self._reporting = False
+
+    def _description(self) -> str:
+        parts, info = self.stages.parts, self.source.info
+        facts = parts.facts(info, self.stages.odometry, self.core, self._command)
+        return profile.to_yaml(facts | {"service": True})
+
+    def _finish(self) -> None:
+        """Write what waits, the last status and the summary."""
+        self._recording.ledger(self._windows.close())
+        status = self.status()
+        summary = self._summary.result() | {"run": _run(status), "status": status}
+        self._background.submit(self._recording.finish)
+        self._background.submit(lambda: self._write(status))
+        self._background.submit(lambda: self.directory.write(SUMMARY, json.dumps(summary, indent=2) + "\n"))
+        self._background.close()
+
+
+def _run(status: dict[str, Any]) -> dict[str, Any]:
+    names = {"source": "stream", "mode": "mode", "profile": "profile", "up_s": "elapsed_s"}
+    return {new: status[old] for old, new in names.items()}
+
+
+def _health(named: NamedSink) -> dict[str, Any]:
+    health: Callable[[], dict[str, Any]] | None = getattr(named.sink, "health", None)
+    return {} if health is None else health()
