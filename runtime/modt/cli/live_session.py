@@ -13,6 +13,7 @@ from typing import Any
 from modt import host, profile
 from modt.cli import assemble, metering
 from modt.cli.live_stages import LiveStages
+from modt.cli.parts import Parts
 from modt.loop import Stop
 from modt.reporting.summary import Summary
 from modt.service.ladder import Ladder
@@ -74,7 +75,8 @@ class LiveSession:
         Raises:
             ModtError: a failure that repeats.
         """
-        config = self.stages.parts.config
+        self._followed = self.stages.parts
+        config = self._followed.config
         self._background = Background()
         self._recording = Recording(self.directory, config.recording, self._background, self._description)
         energy = config.energy
@@ -122,6 +124,8 @@ class LiveSession:
         }
 
     def _observe(self, result: FrameResult, line: dict[str, Any]) -> None:
+        if self.stages.parts is not self._followed:
+            self._follow(self.stages.parts)
         self._counts.add(result)
         self._summary.add_result(result)
         self._summary.add_ledger(line)
@@ -134,6 +138,12 @@ class LiveSession:
                 self._loop.power(watts)
         misses = self.stages.parts.config.sensor.reflectance != "none" and result.proposals.reflectance is None
         self._without_reflectance += misses and len(result.proposals) > 0
+
+    def _follow(self, parts: Parts) -> None:
+        """Take over what a new profile says beside its stages."""
+        self._followed = parts
+        self._loop.ladder.power_W = parts.config.loop.power_W
+        self._recording.follow(parts.config.recording)
 
     def _report(self, supervisor: Supervisor) -> None:
         """Say what is going on; the files are written off the loop's thread."""

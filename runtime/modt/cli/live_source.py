@@ -22,7 +22,8 @@ def open_source(text: str, cores: frozenset[int] | None) -> LiveStream:
     if "://" in text:
         from modt.sources.live.schemes import open_live
 
-        return open_live(text, cores)
+        live: LiveStream = open_live(text, cores)
+        return live
     path, _, query = text.partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
     loop = options.pop("loop", "no")

@@ -27,7 +27,7 @@ def metrics_text(status: Mapping[str, Any]) -> str:
             typed.add(name)
             lines.append(f"# TYPE {name} {'counter' if name.endswith('_total') else 'gauge'}")
         inside = ",".join(f'{key}="{_escaped(text)}"' for key, text in labels.items())
-        lines.append(f"{name}{{{inside}}} {value:g}" if inside else f"{name} {value:.9g}")
+        lines.append(f"{name}{{{inside}}} {value:.15g}" if inside else f"{name} {value:.15g}")
     return "\n".join(lines) + "\n"
 
 

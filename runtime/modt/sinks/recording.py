@@ -12,7 +12,7 @@ from modt.errors import ModtError
 from modt.sinks.background import Background
 from modt.sinks.output import LineFile
 from modt.sinks.records import line
-from modt.sinks.run_directory import LEDGER, TRACKS
+from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.service_directory import ServiceDirectory
 from modt.sinks.tracks import frame_line
 from modt.types import FrameResult
@@ -46,6 +46,7 @@ class Recording:
     ) -> None:
         self.directory, self.config = directory, config
         self.lines = self.lost = self.pauses = self.parts = 0
+        self._refused = 0  # lines, counted by the loop; all others by the writing thread
         self.cause: str | None = None  # why nothing can be written now
         self._background, self._describe, self._clock = background, describe, clock
         self._files: dict[str, LineFile[str]] = {}
@@ -62,9 +63,19 @@ class Recording:
         if LEDGER in KEPT[self.config.keep]:
             self._submit(LEDGER, line(record))
 
+    def follow(self, config: RecordingConfig) -> None:
+        """Keep what another profile says, and describe it."""
+        self.config = config
+        self._background.submit(self._redescribe)
+
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
-        counts = {"lines": self.lines, "lost_lines": self.lost, "pauses": self.pauses, "parts": self.parts}
+        counts = {
+            "lines": self.lines,
+            "lost_lines": self.lost + self._refused,
+            "pauses": self.pauses,
+            "parts": self.parts,
+        }
         return {"keep": self.config.keep, **counts, "failing": self.cause}
 
     def close(self) -> None:
@@ -77,7 +88,8 @@ class Recording:
             file.close()
 
     def _submit(self, name: str, text: str) -> None:
-        self.lost += not self._background.submit(lambda: self._append(name, text))
+        if not self._background.submit(lambda: self._append(name, text)):
+            self._refused += 1
 
     def _append(self, name: str, text: str) -> None:
         if self.cause is not None and self._clock() < self._retry_s:
@@ -98,6 +110,10 @@ class Recording:
         limit_bytes = 1e6 * self.config.disk_mb * (1 - 1 / PARTS)
         self._begun = self._attempt(lambda: self.directory.begin(self._describe(), limit_bytes))
         self._bytes, self.parts = 0, self.parts + self._begun
+
+    def _redescribe(self) -> None:
+        if self._begun:
+            self._attempt(lambda: self.directory.write(RUN, self._describe()))
 
     def _line(self, name: str, text: str) -> None:
         if name not in self._files:

@@ -53,9 +53,9 @@ class LiveStream:
     Attributes:
         info: properties of the stream, with n_frames None.
         faults: unusable sweeps and points.
-        sweeps, incomplete, dropped, silences, time_steps: counts of sweeps received, of those with missing messages,
-            of those replaced by a newer one before they were taken, of times that the sensor fell silent, and of times
-            that its clock was set.
+        sweeps, incomplete, dropped: counts of sweeps received, of those with missing messages, of those replaced by a
+            newer one before they were taken.
+        silences, time_steps: number of times that the sensor fell silent, and that its clock was set.
     """
 
     def __init__(
