@@ -134,8 +134,8 @@ def description() -> dict[str, object]:
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
         "system": f"{platform.system()} {platform.release()}",
-        "governor": _content(cpu / "scaling_governor").strip() or "unavailable",
-        "frequency_khz": _content(cpu / "scaling_cur_freq").strip() or "unavailable",
+        "governor": content(cpu / "scaling_governor").strip() or "unavailable",
+        "frequency_khz": content(cpu / "scaling_cur_freq").strip() or "unavailable",
     }
 
 
@@ -151,12 +151,18 @@ def versions() -> dict[str, str]:
 
 
 def _cpu_model() -> str:
-    lines = (line.partition(":") for line in _content(Path("/proc/cpuinfo")).splitlines())
+    lines = (line.partition(":") for line in content(Path("/proc/cpuinfo")).splitlines())
     fields = {key.strip(): value.strip() for key, _, value in lines}
     return fields.get("model name") or fields.get("Model") or platform.processor() or "unknown"
 
 
-def _content(path: Path) -> str:
+def core_list(text: str) -> set[int]:
+    """Cores of a list of the kernel, as 0-2,5."""
+    ranges = (part.partition("-") for part in text.strip().split(",") if part)
+    return {core for first, _, last in ranges for core in range(int(first), int(last or first) + 1)}
+
+
+def content(path: Path) -> str:
     """Text of a file, empty where it cannot be read."""
     try:
         return path.read_text(encoding="utf-8", errors="replace")

@@ -163,3 +163,40 @@ def test_an_empty_sweep_and_a_broken_one_end_nothing(scans, tmp_path):
     sensor = json.loads((tmp_path / "run" / "status.json").read_text())["sensor"]
     assert sensor["refused_messages"] == {"faulty scans": 2}
     assert os.path.getsize(tmp_path / "run" / "tracks.jsonl") > 0
+
+
+def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path):
+    nothing = modt("status", tmp_path / "run", cwd=tmp_path)
+    assert (nothing.returncode, len(nothing.stderr.splitlines())) == (2, 1)
+    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
+    service.hear("READY=1")
+    while not (service.out / "status.json").exists():
+        service.hear("STATUS=")
+    running = modt("status", service.out, cwd=tmp_path)
+    assert running.returncode == 0, running.stderr
+    assert "running for" in running.stdout
+    status = json.loads(modt("status", service.out, "--json", cwd=tmp_path).stdout)
+    assert status["pid"] == service.process.pid
+    assert service.end()[0] == 0
+    path = service.out / "status.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"time_s": time.time() - 60}))
+    ended = modt("status", service.out, cwd=tmp_path)
+    assert (ended.returncode, "NOT running" in ended.stdout) == (1, True)
+
+
+def test_check_says_what_is_lacking_here_and_fails_without_a_sensor(scans, tmp_path):
+    done = modt("check", scans, "--profile", "vlp-16", "--out", tmp_path / "run", cwd=tmp_path)
+    lines = done.stdout.splitlines()
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {line.split(":")[0].split()[1] for line in lines} >= {
+        "core",
+        "governor",
+        "meters",
+        "model",
+        "disk",
+        "sensor",
+    }
+    assert all("; " in line for line in lines if line.startswith(("warn", "fail")))
+    lost = modt("check", tmp_path / "nowhere", cwd=tmp_path)
+    assert lost.returncode == 1
+    assert "fail  sensor" in lost.stdout
