@@ -147,3 +147,24 @@ def test_failures_are_counted_by_kind_and_fatal_only_in_a_row(caplog):
         failures.succeed()
     assert failures.counts == {"frame: ValueError": 3 * RENEW_AFTER}
     assert len(caplog.records) == 1
+
+
+def test_another_sensor_is_noticed_and_followed(caplog):
+    stages, before = stages_of(profile=None), next(iter(SyntheticStream("street", "hdl-64e", 0.1, 0)))
+    stages.step(dataclasses.replace(before, T_world_sensor=None), UNLIMITED, reduced=False)
+    assert stages.parts.name == "hdl-64e"
+    for frame in frames():
+        stages.step(dataclasses.replace(frame, stamp_s=frame.stamp_s + 0.1), UNLIMITED, reduced=False)
+        if stages.looking is not None:
+            stages.looking.join()
+    assert stages.misfits == 1
+    assert stages.parts.name == "as found"
+    assert stages.parts.config.sensor.elevation_step_deg > 1.0 or stages.parts.config.sensor.elevations_deg
+
+
+def test_fewer_returns_of_the_same_sensor_change_nothing():
+    stages = stages_of()
+    for k, frame in enumerate(frames()):
+        some = frame.points if k < 3 else frame.points[frame.points[:, 0] > 0]
+        stages.step(dataclasses.replace(frame, points=some), UNLIMITED, reduced=False)
+    assert stages.misfits == 0

@@ -3,8 +3,8 @@
     python -m tools.deploy.install --with lan-sensor --source velodyne://0.0.0.0:2368
     python -m tools.deploy.install --remove
 
-    python -m tools.deploy.install --with lan-sensor --source velodyne://0.0.0.0:2368
-and is removed only as it was installed. `--root DIR` installs into an image, and tells no running systemd.
+Doing it again changes nothing. Drop-ins that are not asked for are removed. /etc/modt/modt.env is kept once it
+exists, and removed as long as its first line says that it was installed. `--root DIR` installs into an image.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ class LiveSession:
         self.directory = ServiceDirectory(out)
         self.stop = Stop()
         self._command, self._lacking = command, list(lacking)
-        self._summary, self._power = Summary(), Power()
+        self._summary, self.power = Summary(), Power()
         self._began_s = time.monotonic()
         self._counts = Counts(self._began_s)
         self._without_reflectance = 0
@@ -78,11 +78,11 @@ class LiveSession:
         self._followed = self.stages.parts
         config = self._followed.config
         self._background = Background()
-        self._recording = Recording(self.directory, config.recording, self._background, self._description)
+        self.recording = Recording(self.directory, config.recording, self._background, self._description)
         energy = config.energy
         self._windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
-        sinks = [*self.sinks, NamedSink("recording", self._recording)]
-        self._loop = LiveLoop(
+        sinks = [*self.sinks, NamedSink("recording", self.recording)]
+        self.loop = LiveLoop(
             self.source,
             self.stages,
             sinks,
@@ -98,7 +98,7 @@ class LiveSession:
                 stack.callback(part.close)
             stack.enter_context(self.stop.on_signals(reload=True))
             self.source.start()
-            self._loop.run()
+            self.loop.run()
         return self.status()
 
     def status(self) -> dict[str, Any]:
@@ -114,12 +114,12 @@ class LiveSession:
             "profile": parts.name,
             "period_s": self.stages.period_s,
             "counts": self._counts.report(now_s),
-            "loop": loop_report(self._loop),
-            "power": self._power.report() | {"limit_W": self._loop.ladder.power_W},
-            "sensor": self.source.health() | {"faults": self.source.faults.count},
+            "loop": loop_report(self.loop),
+            "power": self.power.report() | {"limit_W": self.loop.ladder.power_W},
+            "sensor": self.source.health() | {"faults": self.source.faults.count, "misfits": self.stages.misfits},
             "odometry": self.stages.odometry.report(),
             "sinks": {named.name: _health(named) for named in self.sinks},
-            "recording": self._recording.health(),
+            "recording": self.recording.health(),
             "host": {"core": self.core, "resident_mb": round(host.resident_mb(), 1), "lacking": self._lacking},
         }
 
@@ -129,21 +129,21 @@ class LiveSession:
         self._counts.add(result)
         self._summary.add_result(result)
         self._summary.add_ledger(line)
-        self._recording.ledger(line)
+        self.recording.ledger(line)
         window = self._windows.add(line)
         if window is not None:
-            self._recording.ledger(window)
-            watts = self._power.add(window)
+            self.recording.ledger(window)
+            watts = self.power.add(window)
             if watts is not None:
-                self._loop.power(watts)
+                self.loop.power(watts)
         misses = self.stages.parts.config.sensor.reflectance != "none" and result.proposals.reflectance is None
         self._without_reflectance += misses and len(result.proposals) > 0
 
     def _follow(self, parts: Parts) -> None:
         """Take over what a new profile says beside its stages."""
         self._followed = parts
-        self._loop.ladder.power_W = parts.config.loop.power_W
-        self._recording.follow(parts.config.recording)
+        self.loop.ladder.power_W = parts.config.loop.power_W
+        self.recording.follow(parts.config.recording)
 
     def _report(self, supervisor: Supervisor) -> None:
         """Say what is going on; the files are written off the loop's thread."""
@@ -154,7 +154,7 @@ class LiveSession:
 
     def _write(self, status: dict[str, Any]) -> None:
         try:
-            if self._recording.parts:
+            if self.recording.parts:
                 self.directory.write(STATUS, json.dumps(status, indent=1) + "\n")
             if self.metrics is not None:
                 write_metrics(self.metrics, status)
@@ -168,10 +168,10 @@ class LiveSession:
 
     def _finish(self) -> None:
         """Write what waits, the last status and the summary."""
-        self._recording.ledger(self._windows.close())
+        self.recording.ledger(self._windows.close())
         status = self.status()
         summary = self._summary.result() | {"run": _run(status), "status": status}
-        self._background.submit(self._recording.finish)
+        self._background.submit(self.recording.finish)
         self._background.submit(lambda: self._write(status))
         self._background.submit(lambda: self.directory.write(SUMMARY, json.dumps(summary, indent=2) + "\n"))
         self._background.close()

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from threading import Thread
 from typing import Any
 
 import numpy as np
 
 from modt.cli import assemble
 from modt.cli.parts import Parts, pipeline_of
+from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Pipeline
+from modt.sensor_fit.recognition import Recognition, recognise
+from modt.service.sensor_watch import SensorWatch
 from modt.sinks.output import Sink
 from modt.sources.pose_source import PoseSource
 from modt.tracking.track_table import TrackTable
@@ -25,6 +29,8 @@ class LiveStages:
     Attributes:
         parts: of the present profile.
         odometry: of the poses.
+        looking: thread that compares a sweep with the profile; None before the first one.
+        misfits: number of times that sweeps were found to be of another sensor than before.
 
     Raises:
         MisuseError: an invalid request.
@@ -34,7 +40,10 @@ class LiveStages:
         self._request, self._stream = request, stream
         self._ledger = Ledger()
         self._seen = False  # the sensor
-        self.parts = self._made(None)
+        self.misfits, self._watch = 0, SensorWatch()
+        self.looking: Thread | None = None
+        self._found: list[tuple[ProfileConfig, Recognition]] = []  # by the thread that looks again
+        self.parts = self._made(*self._recognised(None))
         self.odometry: PoseSource = assemble.odometry(request, stream, self.parts.config.odometry)
         self._good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id after the last good frame
 
@@ -50,9 +59,16 @@ class LiveStages:
 
     def step(self, frame: Frame, budget: Budget, *, reduced: bool) -> FrameResult:
         """One frame; reduced: without what is far."""
+        unlike = self._watch.unlike(frame.points)
         if not self._seen:
             self._seen = True
-            self._exchange(self._made(frame))
+            self._exchange(self._made(*self._recognised(frame)))
+        elif unlike:  # it takes longer than a frame
+            self.looking = Thread(target=self._look_again, args=(frame,), name="recognition", daemon=True)
+            self.looking.start()
+        elif self._found:
+            self.misfits += 1
+            self._exchange(self._made(*self._found.pop()))
         frame = self.odometry.place(frame)
         if reduced:
             config = self.parts.config
@@ -87,15 +103,20 @@ class LiveStages:
         Raises:
             ModtError: it is not valid; nothing has changed.
         """
-        self._exchange(self._made(None))
+        self._exchange(self._made(*self._recognised(None)))
         self._seen = self._request.profile is not None  # else the next sweep says what differs
 
-    def _made(self, first: Frame | None) -> Parts:
-        named = getattr(self._stream.info, "profile", None)
-        config, recognition = assemble.recognised(self._request, first, named)
-        return Parts(
-            self._request, config, recognition, pipeline_of(self._request, self._stream, config, self._ledger)
-        )
+    def _look_again(self, frame: Frame) -> None:
+        """Sweeps have changed: whether they still are of the sensor of the profile in use."""
+        if recognise(frame.points, self.parts.config).differences:
+            self._found.append(self._recognised(frame))
+
+    def _recognised(self, first: Frame | None) -> tuple[ProfileConfig, Recognition]:
+        return assemble.recognised(self._request, first, getattr(self._stream.info, "profile", None))
+
+    def _made(self, config: ProfileConfig, recognition: Recognition) -> Parts:
+        pipeline = pipeline_of(self._request, self._stream, config, self._ledger)
+        return Parts(self._request, config, recognition, pipeline)
 
     def _exchange(self, parts: Parts) -> None:
         continue_from(self.parts.pipeline, parts.pipeline)

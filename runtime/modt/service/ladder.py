@@ -7,8 +7,8 @@ from enum import Enum, IntEnum
 
 from modt.types import Budget
 
-CALM_S = 0.9
-"""Slack after which something is taken back: the frame after a second of it, at 10 Hz, is a better one."""
+CALM_S = 0.8
+"""Slack after which something is taken back: within a second, at 10 Hz, the result is a better one."""
 BUSY_SHARE, AMPLE_SHARE = 0.8, 0.5
 """Of the period between arrival and result: below it there is slack; slack for everything at once."""
 NEAR_SHARE = 0.9

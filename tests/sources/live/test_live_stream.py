@@ -83,6 +83,7 @@ def test_frames_are_numbered_in_the_order_in_which_they_are_taken(live):
 @pytest.mark.parametrize(
     ("unusable", "cause"),
     [
+        (sweep(1.0), "0.000 s after the last sweep"),
         (sweep(0.5), "0.500 s before the last sweep"),
         (sweep(60.0), "59.000 s after the last sweep"),
         (sweep(1.1, x=5000.0), "its columns are not"),

@@ -174,7 +174,7 @@ class LiveStream:
         if self._taken is None:
             return ""
         passed_s, waited_s = stamp_s - self._taken[0], arrived_s - self._taken[1]
-        if 0 <= passed_s <= waited_s + STEP_S:
+        if 0 < passed_s <= waited_s + STEP_S:
             return ""
         self._doubted_s = arrived_s if self._doubted_s is None else self._doubted_s
         what = f"{abs(passed_s):.3f} s {'before' if passed_s < 0 else 'after'} the last sweep"
