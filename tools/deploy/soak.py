@@ -3,7 +3,7 @@
     python -m tools.deploy.soak DRIVE --minutes 30 --seed 1
 
 Every fault must be told by its counter and be recovered from; between faults no deadline may be missed; memory stays
-flat. The exit status is 0 if all of this holds. `--fifo` takes the priority of a service, and gives hogs a higher one.
+flat. The exit status is 0 if all this holds. `--fifo` takes the priority of a service, and gives hogs a higher one.
 """
 
 from __future__ import annotations
