@@ -7,6 +7,8 @@ import os
 import platform
 import resource
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 
@@ -59,6 +61,21 @@ def other_cores(core: int | None) -> frozenset[int] | None:
     """
     others = frozenset(os.sched_getaffinity(0)) - {core}
     return others if core is not None and others else None
+
+
+@contextmanager
+def elsewhere(cores: frozenset[int] | None) -> Iterator[None]:
+    """Threads that are begun within the context run on other cores than the loop."""
+    if cores is None:
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    with suppress(OSError):  # not permitted any more: they share the core
+        os.sched_setaffinity(0, cores)
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
 
 
 def be_punctual(priority: int = 10) -> list[str]:

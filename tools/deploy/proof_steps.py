@@ -107,7 +107,7 @@ def reload(text: str) -> str:
     return str(json.loads((RECORDS / "status.json").read_text())["loop"])
 
 
-def main(folder: Path) -> None:
+def steps(folder: Path) -> None:
     """All steps in order."""
     report, profile = Report(folder), PROFILE.read_text()
     begin_s = time.monotonic()
@@ -167,7 +167,7 @@ def probe(report: Report) -> None:
 
 if __name__ == "__main__":
     try:
-        main(Path(sys.argv[1]))
+        steps(Path(sys.argv[1]))
     except Exception as error:
         journal = subprocess.run(["journalctl", "-u", UNIT, "-n", "30"], capture_output=True, text=True, check=False)
         Report(Path(sys.argv[1])).say(f"{error!r}\n{journal.stdout}", False)

@@ -195,7 +195,7 @@ def main(arguments: list[str] | None = None) -> int:
     witness = Witness()
     source = LiveStream(recording.info, reader, cores=others)
     request = Request(profile=given.profile)
-    session = LiveSession(request, source, [NamedSink("witness", witness)], given.out, None, core, ["soak"])
+    session = LiveSession(request, source, [NamedSink("witness", witness)], given.out, None, core, others, ["soak"])
     witness.session = reader.session = session
     try:
         session.run(NoSupervisor())

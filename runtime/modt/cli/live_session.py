@@ -39,7 +39,7 @@ class LiveSession:
         sinks: of the results, by their addresses.
         out: run directory.
         metrics: file for Prometheus; None for none.
-        core: of the loop.
+        core, cores: of the loop, and of threads that serve it; None leaves them where they are.
         command: for the record.
         lacking: what the loop has to do without, for the status.
 
@@ -55,6 +55,7 @@ class LiveSession:
         out: Path,
         metrics: Path | None,
         core: int | None,
+        cores: frozenset[int] | None,
         command: list[str],
         lacking: Sequence[str] = (),
     ) -> None:
@@ -62,7 +63,7 @@ class LiveSession:
         self.stages = LiveStages(request, source)
         self.directory = ServiceDirectory(out)
         self.stop = Stop()
-        self._command, self._lacking = command, list(lacking)
+        self._cores, self._command, self._lacking = cores, command, list(lacking)
         self._summary, self.power = Summary(), Power()
         self._began_s = time.monotonic()
         self._counts = Counts(self._began_s)
@@ -77,7 +78,8 @@ class LiveSession:
         """
         self._followed = self.stages.parts
         config = self._followed.config
-        self._background = Background()
+        with host.elsewhere(self._cores):
+            self._background = Background()
         self.recording = Recording(self.directory, config.recording, self._background, self._description)
         energy = config.energy
         self._windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)

@@ -55,12 +55,14 @@ def run(arguments: argparse.Namespace) -> int:
     lacking = host.be_punctual()
     for what in lacking:
         log.warning("%s", what)
-    source = open_source(arguments.source, cores)
-    sinks = [NamedSink(address, sink) for address, sink in zip(arguments.sink, _opened(arguments.sink), strict=True)]
+    with host.elsewhere(cores):
+        source = open_source(arguments.source, cores)
+        sinks = [
+            NamedSink(address, sink) for address, sink in zip(arguments.sink, _opened(arguments.sink), strict=True)
+        ]
     command = ["modt", *sys.argv[1:]]
-    session = LiveSession(
-        Request.of(arguments), source, sinks, arguments.out, arguments.metrics, pinned, command, lacking
-    )
+    request = Request.of(arguments)
+    session = LiveSession(request, source, sinks, arguments.out, arguments.metrics, pinned, cores, command, lacking)
     status = session.run(supervisor)
     print(
         f"modt: {status['counts']['frames']} frames; {one_line(status)}; records in {arguments.out}", file=sys.stderr

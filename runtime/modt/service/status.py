@@ -11,6 +11,8 @@ from modt.service.live_loop import LiveLoop
 from modt.types import NONE, FrameResult
 
 SCHEMA = "modt.status/1"
+MIN_RATE_S = 0.5
+"""Shortest time over which a rate is formed."""
 STALE_S = 5.0
 """Age from which a status is no longer that of a running service."""
 
@@ -37,11 +39,11 @@ class Counts:
         self.classes = dict(zip(CLASS_NAMES, np.bincount(seen, minlength=len(CLASS_NAMES)).tolist(), strict=True))
 
     def report(self, now_s: float) -> dict[str, Any]:
-        """Figures for the status; the rate is that since the last report."""
+        """Figures for the status; the rate is that of the time between reports."""
         frames, seconds = self._frames - self._last_frames, now_s - self._last_s
-        if seconds > 0:
+        if seconds >= MIN_RATE_S:
             self.rate_hz = frames / seconds
-        self._last_frames, self._last_s = self._frames, now_s
+            self._last_frames, self._last_s = self._frames, now_s
         return {
             "frames": self._frames,
             "rate_hz": round(self.rate_hz, 2),
