@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from modt.config import OdometryConfig
 from modt.energy.ledger import NullLedger
-from modt.loop import FixedPeriod, FullSpeed, Stop, drive
+from modt.loop import NAP_S, FixedPeriod, FullSpeed, Stop, drive
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.pose_source import PosedStream
 from modt.sources.stream import Faults, StreamInfo
@@ -63,6 +63,12 @@ def test_small_overrun_is_made_up():
     assert out == pytest.approx([0.0, 0.12, 0.2])
     assert pace.missed == 0
     assert pace.report()["max_lateness_ms"] == pytest.approx(20)
+
+
+def test_every_period_lost_is_counted():
+    out, pace = starts([0.15] * 301)
+    assert out[-1] == pytest.approx(45.0)
+    assert pace.missed == 150
 
 
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
@@ -167,3 +173,34 @@ def test_a_signal_ends_the_loop_after_the_frame_in_hand():
     assert done == 3
     assert sink.indices == [0, 1, 2]
     assert stop.signal == "SIGINT"
+
+
+def test_a_signal_ends_a_long_sleep_within_a_nap():
+    time, naps = Time(), []
+
+    def nap(seconds):
+        naps.append(seconds)
+        time.sleep(seconds)
+        if len(naps) == 3:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with Stop(nap, time).on_signals() as stop:
+        stop.sleep(100.0)
+    assert len(naps) == 3
+    assert max(naps) <= NAP_S
+
+
+def test_naps_do_not_add_up_to_more_than_the_sleep():
+    time = Time()
+    stop = Stop(lambda seconds: time.sleep(seconds + 0.003), time)
+    stop.sleep(1.0)
+    assert time.now == pytest.approx(101.0, abs=0.004)
+
+
+def test_a_reload_is_asked_for_once_by_a_signal():
+    with Stop().on_signals(reload=True) as stop:
+        assert not stop.take_reload()
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert stop.take_reload()
+        assert not stop.take_reload()
+        assert stop.signal is None

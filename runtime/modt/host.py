@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import platform
 import resource
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from importlib import metadata
 from pathlib import Path
 
@@ -15,6 +19,9 @@ from modt.errors import MisuseError
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 _MAX_HELPER_SHARE = 0.01
 """CPU time of other threads over that of the loop, up to which the process counts as single-threaded."""
+SWITCH_S = 0.0005
+"""For which another thread may keep the interpreter from the loop; 5 ms by default."""
+_MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4  # mlockall(2)
 _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 
 
@@ -45,6 +52,64 @@ def pin_to_core(core: int | None) -> int | None:
 def last_core() -> int:
     """The last core available to this process: the least likely to serve interrupts."""
     return max(os.sched_getaffinity(0))
+
+
+def other_cores(core: int | None) -> frozenset[int] | None:
+    """The cores that this process may use beside one: for threads that serve the loop; None where there are none.
+
+    Call it before `pin_to_core`.
+    """
+    others = frozenset(os.sched_getaffinity(0)) - {core}
+    return others if core is not None and others else None
+
+
+@contextmanager
+def elsewhere(cores: frozenset[int] | None) -> Iterator[None]:
+    """Threads that are begun within the context run on other cores than the loop."""
+    if cores is None:
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    with suppress(OSError):  # not permitted any more: they share the core
+        os.sched_setaffinity(0, cores)
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def be_punctual(priority: int = 10) -> list[str]:
+    """Schedule this thread before ordinary ones (SCHED_FIFO), and keep its memory from being swapped out.
+
+    Threads begun afterwards stay ordinary. Returns what is not permitted, with the remedy.
+    """
+    sys.setswitchinterval(SWITCH_S)
+    lacking = []
+    if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK != os.SCHED_FIFO:
+        try:
+            policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+            os.sched_setscheduler(0, policy, os.sched_param(priority))
+        except OSError as error:
+            remedy = "set CPUSchedulingPolicy=fifo in the unit, or ulimit -r"
+            lacking.append(f"ordinary priority: SCHED_FIFO is not permitted ({error.strerror}); {remedy}")
+    cause = _lock_memory()
+    if cause:
+        lacking.append(f"memory may be swapped out: {cause}; set LimitMEMLOCK=infinity in the unit, or ulimit -l")
+    return lacking
+
+
+def _lock_memory() -> str:
+    """Keep all pages in memory once they are used; the reason where that is not permitted."""
+    if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
+        return "the limit of locked memory is finite"  # beyond it, allocations would fail later
+    if ctypes.CDLL(None, use_errno=True).mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT):
+        return os.strerror(ctypes.get_errno())
+    return ""
+
+
+def resident_mb() -> float:
+    """Memory of this process that is in use now [MB]."""
+    return float(psutil.Process().memory_info().rss) / 2**20
 
 
 def usage(core: int | None) -> dict[str, object]:
@@ -86,8 +151,8 @@ def description() -> dict[str, object]:
         "cores": os.cpu_count(),
         "memory_mb": psutil.virtual_memory().total // 2**20,
         "system": f"{platform.system()} {platform.release()}",
-        "governor": _content(cpu / "scaling_governor").strip() or "unavailable",
-        "frequency_khz": _content(cpu / "scaling_cur_freq").strip() or "unavailable",
+        "governor": content(cpu / "scaling_governor").strip() or "unavailable",
+        "frequency_khz": content(cpu / "scaling_cur_freq").strip() or "unavailable",
     }
 
 
@@ -103,12 +168,18 @@ def versions() -> dict[str, str]:
 
 
 def _cpu_model() -> str:
-    lines = (line.partition(":") for line in _content(Path("/proc/cpuinfo")).splitlines())
+    lines = (line.partition(":") for line in content(Path("/proc/cpuinfo")).splitlines())
     fields = {key.strip(): value.strip() for key, _, value in lines}
     return fields.get("model name") or fields.get("Model") or platform.processor() or "unknown"
 
 
-def _content(path: Path) -> str:
+def core_list(text: str) -> set[int]:
+    """Cores of a list of the kernel, as 0-2,5."""
+    ranges = (part.partition("-") for part in text.strip().split(",") if part)
+    return {core for first, _, last in ranges for core in range(int(first), int(last or first) + 1)}
+
+
+def content(path: Path) -> str:
     """Text of a file, empty where it cannot be read."""
     try:
         return path.read_text(encoding="utf-8", errors="replace")

@@ -16,6 +16,10 @@ from modt.sinks.output import LineSink, Sink
 from modt.sources.stream import Stream
 from modt.types import Budget, FrameResult
 
+STOPPING = (signal.SIGINT, signal.SIGTERM)
+NAP_S = 0.05
+"""Longest sleep without a look at the signals."""
+
 
 class FullSpeed:
     """Frames without waiting."""
@@ -35,12 +39,17 @@ class FixedPeriod:
     period_s: float
     clock: Callable[[], float] = time.monotonic
     sleep: Callable[[float], None] = time.sleep
-    missed: int = 0  # deadlines that passed before their frame started
     max_lateness_s: float = 0.0
+    lost_s: float = 0.0  # by which the deadlines were put off
     _deadline_s: float | None = None
 
+    @property
+    def missed(self) -> int:
+        """Periods without a frame."""
+        return int(self.lost_s / self.period_s + 1e-6)
+
     def wait(self) -> None:
-        """Sleep until the deadline, or count it as missed."""
+        """Sleep until the deadline; when late by more than a period, begin a new row of deadlines."""
         now = self.clock()
         if self._deadline_s is None:
             self._deadline_s = now
@@ -50,7 +59,7 @@ class FixedPeriod:
         late_s = now - self._deadline_s
         self.max_lateness_s = max(self.max_lateness_s, late_s)
         if late_s > self.period_s:
-            self.missed += int(late_s / self.period_s)
+            self.lost_s += late_s
             self._deadline_s = now
         self._deadline_s += self.period_s
 
@@ -67,28 +76,48 @@ Pace = FullSpeed | FixedPeriod
 
 
 class Stop:
-    """Stop request by SIGINT or SIGTERM: the loop ends after the current frame."""
+    """Requests by signals: SIGINT and SIGTERM end the loop after the current frame, SIGHUP asks for a reload."""
 
-    def __init__(self) -> None:
+    def __init__(
+        self, sleep: Callable[[float], None] = time.sleep, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self.signal: str | None = None
+        self._reload, self._sleep, self._clock = False, sleep, clock
+
+    def sleep(self, seconds: float) -> None:
+        """Sleep, in naps: a signal does not end one, and is seen after it."""
+        end_s = self._clock() + seconds
+        while self.signal is None and (left_s := end_s - self._clock()) > 0:
+            self._sleep(min(left_s, NAP_S))
+
+    def take_reload(self) -> bool:
+        """Whether a reload has been asked for since the last call."""
+        asked, self._reload = self._reload, False
+        return asked
 
     @contextmanager
-    def on_signals(self) -> Iterator[Stop]:
-        """Handle the signals within the context; a second signal ends the process."""
+    def on_signals(self, *, reload: bool = False) -> Iterator[Stop]:
+        """Handle the signals within the context, SIGHUP where `reload`; a second one to stop ends the process."""
         if threading.current_thread() is not threading.main_thread():
             yield self
             return
-        previous = {s: signal.signal(s, self._on_signal) for s in (signal.SIGINT, signal.SIGTERM)}
+        handlers: dict[signal.Signals, Callable[[int, object], None]] = dict.fromkeys(STOPPING, self._on_stop)
+        if reload:
+            handlers[signal.SIGHUP] = self._on_reload
+        previous = {number: signal.signal(number, handler) for number, handler in handlers.items()}
         try:
             yield self
         finally:
             for number, handler in previous.items():
                 signal.signal(number, handler)
 
-    def _on_signal(self, number: int, _frame: object) -> None:
+    def _on_stop(self, number: int, _frame: object) -> None:
         self.signal = signal.Signals(number).name
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+    def _on_reload(self, _number: int, _frame: object) -> None:
+        self._reload = True
 
 
 Observer = Callable[[FrameResult, dict[str, Any]], None]
@@ -116,6 +145,8 @@ def drive(
     done = 0
     while stop.signal is None:
         pace.wait()  # before the frame is taken, so that poses received meanwhile apply to it
+        if stop.signal is not None:
+            break
         frame = run(SOURCE, next, frames, None)
         if frame is None:
             break

@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import logging
 import socket
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 
 from modt.errors import MisuseError
 
 log = logging.getLogger(__name__)
 
-_VARIABLE = "NOTIFY_SOCKET"
+_VARIABLE, _WATCHDOG = "NOTIFY_SOCKET", "WATCHDOG_USEC"
 
 
 class NoSupervisor:
     """No receiver of the state of the loop."""
+
+    def ready(self) -> None:
+        """No effect."""
+
+    def alive(self) -> None:
+        """No effect."""
+
+    def status(self, text: str) -> None:
+        """No effect."""
+
+    def reloading(self) -> None:
+        """No effect."""
 
     def frame_done(self) -> None:
         """No effect."""
@@ -24,22 +37,48 @@ class NoSupervisor:
 
 
 class Systemd:
-    """READY=1 with the first frame, WATCHDOG=1 with every frame, STOPPING=1 at the end; sending never blocks.
+    """READY=1, WATCHDOG=1 at half its period, STATUS, RELOADING=1 and, at the end, STOPPING=1; sending never blocks.
 
     The first message that cannot be sent is logged; READY=1 is repeated until it is sent.
+
+    Args:
+        address: of the socket.
+        watchdog_s: period of the watchdog; None where there is none.
+        clock: monotonic [s].
     """
 
-    def __init__(self, address: str) -> None:
-        self._address, self._ready, self._failed = address, False, False
+    def __init__(
+        self, address: str, watchdog_s: float | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._address, self._clock = address, clock
+        self._interval_s = 0.0 if watchdog_s is None else watchdog_s / 2
+        self._ready = self._failed = False
+        self._alive_s = float("-inf")
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
 
+    def ready(self) -> None:
+        """Report that the service is up."""
+        self._ready = self._send("READY=1")
+
+    def alive(self) -> None:
+        """Report that the loop goes round, when half the period of the watchdog has passed."""
+        if self._clock() - self._alive_s >= self._interval_s:
+            self._alive_s = self._clock()
+            self._ready |= self._send("WATCHDOG=1" if self._ready else "READY=1\nWATCHDOG=1")
+
+    def status(self, text: str) -> None:
+        """Show a line to the user."""
+        self._send(f"STATUS={text}")
+
+    def reloading(self) -> None:
+        """Report the begin of a reload, which `ready` ends."""
+        self._ready = False
+        self._send(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
+
     def frame_done(self) -> None:
-        """Report that the service is ready and alive."""
-        if self._ready:
-            self._send("WATCHDOG=1")
-        else:
-            self._ready = self._send("READY=1\nWATCHDOG=1")
+        """Report that a frame is done: that the service is ready and alive."""
+        self.alive()
 
     def close(self) -> None:
         """Report that the service ends."""
@@ -52,8 +91,7 @@ class Systemd:
         except OSError as error:
             if not self._failed:
                 self._failed = True
-                cause = error.strerror
-                log.warning("%s: systemd cannot be notified (%s); tried again with every frame", _VARIABLE, cause)
+                log.warning("%s: systemd cannot be notified (%s); tried again", _VARIABLE, error.strerror)
             return False
         return True
 
@@ -68,4 +106,6 @@ def supervisor_of(environment: Mapping[str, str]) -> Supervisor:
         return NoSupervisor()
     if name[0] not in "/@" or len(name) == 1:
         raise MisuseError(_VARIABLE, f"{name!r} is neither /PATH nor @NAME", "unset it, or let systemd set it")
-    return Systemd("\0" + name[1:] if name[0] == "@" else name)
+    watchdog = environment.get(_WATCHDOG, "")
+    watchdog_s = 1e-6 * int(watchdog) if watchdog.isdecimal() else None
+    return Systemd("\0" + name[1:] if name[0] == "@" else name, watchdog_s)

@@ -19,7 +19,7 @@ DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "profile-keys.md"
 WHOLE = DOCUMENT.with_suffix(".yaml")
 SCHEMA = assets.folder("profiles") / FILE
 MARK = "tools.docs.profile_keys"
-PAGE = ("sensor", "classification", "scheduler", "odometry", "energy")
+PAGE = ("sensor", "classification", "scheduler", "odometry", "energy", "loop", "recording")
 """Stages whose own keys are on the page."""
 
 CONDITIONS = {
@@ -50,6 +50,8 @@ CONDITIONS = {
     "energy.idle_W": "figures of energy; scheduler.energy_mJ_per_frame",
     "energy.busy_W": "figures of energy; scheduler.energy_mJ_per_frame",
     "energy.meter": "none: kept in run.yaml",
+    "loop": "modt run",
+    "recording": "modt run",
 }
 """When keys have an effect, by the longest prefix of their paths; keys without an entry always have."""
 

@@ -7,18 +7,17 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Protocol
 
 from modt import profile
-from modt.config import OdometryConfig, ProfileConfig
+from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.sensor_fit.recognition import Recognition, recognise
 from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.recognise import open_stream
-from modt.sources.stream import Stream
+from modt.sources.stream import Stream, StreamInfo
 from modt.sources.synthetic_stream import SyntheticStream
-from modt.types import Frame
 
 EMBEDDED_SECONDS = 10.0
 RECORDED, NONE = "recording", "none"
@@ -49,6 +48,12 @@ class Request:
         return cls(**{name: value for name, value in vars(arguments).items() if name in names})
 
 
+class Described(Protocol):
+    """A recorded or a live stream."""
+
+    info: StreamInfo
+
+
 def stream(request: Request) -> Stream:
     """The stream asked for, the embedded one where no path is given.
 
@@ -68,21 +73,7 @@ def stream(request: Request) -> Stream:
     return cut
 
 
-def recognised(request: Request, first: Frame | None) -> tuple[ProfileConfig, Recognition]:
-    """The configuration of a stream by its first frame, and what differs from the one asked for, which is warned of.
-
-    What is found takes the place of the default profile, never of one of a sensor that was asked for.
-    """
-    asked = profile.resolve(request.profile)
-    if first is None:
-        return asked.config, Recognition((), None, asked.config)
-    found = recognise(first.points, asked.config)
-    if found.differences:
-        log.warning("%s", found.warning(asked.sensor or profile.DEFAULT, replaced=asked.sensor is None))
-    return asked.over(found.fitted) if asked.sensor is None else asked.config, found
-
-
-def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSource:
+def odometry(request: Request, stream: Described, config: OdometryConfig) -> PoseSource:
     """Where the poses of a stream's frames come from.
 
     Raises:
@@ -101,7 +92,7 @@ def odometry(request: Request, stream: Stream, config: OdometryConfig) -> PoseSo
     return PoseSocket(open_socket(request.odometry), config, request.odometry)
 
 
-def field_of_view(request: Request, stream: Stream) -> FieldOfView:
+def field_of_view(request: Request, stream: Described) -> FieldOfView:
     """The part of space to look at.
 
     Raises:

@@ -11,6 +11,7 @@ from modt.profile import DEFAULT
 from modt.sinks.schemes import SCHEMES
 
 Parser = argparse.ArgumentParser
+PROFILES = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
 CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
 
 
@@ -24,12 +25,16 @@ def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, Non
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     add_capture_option(p)
     p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
-    sensor = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
-    add_profile_option(p, sensor)
+    add_profile_option(p)
+    add_core_option(p)
+
+
+def add_core_option(p: Parser) -> None:
+    """Core."""
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
 
 
-def add_profile_option(p: Parser, meaning: str) -> None:
+def add_profile_option(p: Parser, meaning: str = PROFILES) -> None:
     """Profiles."""
     p.add_argument("--profile", action="append", default=[], metavar="NAME|FILE", help=meaning)
 

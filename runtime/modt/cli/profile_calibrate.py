@@ -41,6 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt import profile
     from modt.classification.pointnet import PointNet
     from modt.cli import assemble, metering
+    from modt.cli.chosen_profile import choose
     from modt.config import WindowConfig
     from modt.energy.attribution import FitError
     from modt.energy.instrumentation import CountingClassifier
@@ -55,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     scans = list(stream)
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
-    loaded, _ = assemble.recognised(request, scans[0])
+    loaded = choose(request.profile, scans[0], stream.info.profile).config
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch)

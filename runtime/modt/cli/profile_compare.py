@@ -31,6 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.cli import assemble, metering
+    from modt.cli.chosen_profile import choose
     from modt.cli.mode_runs import MODES, VARIED, Comparison
     from modt.energy.conditions import Conditions
     from modt.energy.meters.meter import Kind
@@ -41,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     request = assemble.Request.of(arguments)
     stream = assemble.stream(request)
-    loaded, _ = assemble.recognised(request, next(iter(stream), None))
+    loaded = choose(request.profile, next(iter(stream), None), stream.info.profile).config
     board, info = loaded.energy, stream.info
     meters = metering.discovery(board).choose(arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED

@@ -8,9 +8,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from modt import assembly, host, profile
-from modt.classes import CLASS_NAMES
+from modt import host, profile
 from modt.cli import assemble, metering
+from modt.cli.chosen_profile import choose
+from modt.cli.parts import Parts, pipeline_of
 from modt.cli.progress import Tick
 from modt.energy.ledger import Ledger
 from modt.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
@@ -36,21 +37,21 @@ class Session:
 
     def __init__(self, request: assemble.Request, out: Path | None, core: int | None, command: list[str]) -> None:
         self.request, self.core = request, core
-        self.mode = assembly.MODES[request.mode]
         found = PeekedStream(assemble.stream(request))
-        self.profile, self.recognition = assemble.recognised(request, found.first)
-        self.asked = profile.resolve(request.profile)
-        self.odometry = assemble.odometry(request, found, self.profile.odometry)
+        chosen = choose(request.profile, found.first, found.info.profile)
+        self.odometry = assemble.odometry(request, found, chosen.config.odometry)
         self.stream = PosedStream(found, self.odometry)
-        fov = assemble.field_of_view(request, self.stream)
-        self.pipeline = assembly.pipeline(self.mode, self.profile, fov, Ledger())
+        self.parts = Parts(request, chosen, pipeline_of(request, self.stream, chosen.config, Ledger()))
         self.stop = Stop()
-        self.pace: Pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz)
+        self.pace: Pace = (
+            FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz, sleep=self.stop.sleep)
+        )
         self._frames_without_reflectance = 0
         self.sinks = {address: open_sink(address) for address in dict.fromkeys(request.sink)}
         stream_name = re.sub(r"[^\w.]+", "-", self.stream.info.name)
         self.directory = RunDirectory(out or Path("runs") / f"{stream_name}-{request.mode}")
-        self._describe(command)
+        facts = self.parts.facts(self.stream.info, self.odometry, core, command)
+        self.directory.describe(profile.to_yaml(facts))
 
     @property
     def notes(self) -> list[str]:
@@ -64,7 +65,7 @@ class Session:
         recorded = self._sinks()
         sinks = [*recorded, *self.sinks.values()]
         ledger_lines = LedgerLines(self.directory.ledger(), sinks)
-        energy = self.profile.energy
+        energy = self.parts.config.energy
         windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
 
         def observe(result: FrameResult, ledger_line: dict[str, Any]) -> None:
@@ -77,14 +78,14 @@ class Session:
             supervisor.frame_done()
             tick(result)
 
-        budget = self.mode.budget(self.profile)
         began_s = time.monotonic()
         with ExitStack() as stack:
             stack.callback(close_together, self.sinks.values())
             for part in (self.odometry, ledger_lines, *recorded, supervisor):
                 stack.callback(part.close)
             stack.enter_context(self.stop.on_signals())
-            drive(self.stream, self.pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
+            pipeline, budget = self.parts.pipeline, self.parts.budget
+            drive(self.stream, pipeline, sinks, ledger_lines, budget, self.pace, self.stop, observe)
             ledger_lines.write(windows.close())
         elapsed_s = time.monotonic() - began_s
         figures = summary.result() | self._environment(summary.frames, elapsed_s)
@@ -93,46 +94,13 @@ class Session:
 
     def _misses_reflectance(self, proposals: Proposals) -> bool:
         """Whether they lack reflectance, though the sensor of the profile records it."""
-        return self.profile.sensor.reflectance != "none" and len(proposals) > 0 and proposals.reflectance is None
+        return self.parts.config.sensor.reflectance != "none" and len(proposals) > 0 and proposals.reflectance is None
 
     def _sinks(self) -> list[Sink]:
         info, path = self.stream.info, self.directory.path
         kitti = KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera)
         labels: list[Sink] = [PointLabels(path / "labels")] if self.request.labels else []
         return [self.directory.tracks(), kitti, *labels]
-
-    def _profile_names(self) -> tuple[str, ...]:
-        return self.asked.used(self.recognition.default_name)
-
-    def _describe(self, command: list[str]) -> None:
-        info = self.stream.info
-        facts = {
-            "schema": "modt.run/1",
-            "command": command,
-            "stream": {
-                "name": info.name,
-                "layout": info.layout,
-                "path": str(self.request.path.resolve()) if self.request.path else None,
-                "frames": info.n_frames,
-                "poses": info.has_poses,
-                "odometry": self.odometry.report()["source"],
-                "notes": [*info.notes, *info.pose_notes],
-            },
-            "mode": self.request.mode,
-            "fov": self.request.fov,
-            "core": self.core,
-            "versions": host.versions(),
-            "model": self.pipeline.classifier.facts(),
-            "host": host.description(),
-            "recognition": {
-                "used": self.asked.sensor or self.recognition.default_name,
-                "differences": list(self.recognition.differences),
-                "nearest": self.recognition.nearest,
-            },
-            "profiles": list(self._profile_names()),
-            "profile": profile.dump(self.profile),
-        }
-        self.directory.describe(profile.to_yaml(facts))
 
     def _environment(self, frames: int, elapsed_s: float) -> dict[str, Any]:
         """Timing, pose source, host and faults of the run."""
@@ -142,7 +110,7 @@ class Session:
                 "stream": self.stream.info.name,
                 "mode": self.request.mode,
                 "fov": self.request.fov,
-                "profile": " + ".join(self._profile_names()),
+                "profile": self.parts.name,
                 "elapsed_s": elapsed_s,
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * self.stream.info.period_s / elapsed_s,
@@ -150,7 +118,7 @@ class Session:
                 **self.pace.report(),
             },
             "odometry": self.odometry.report(),
-            "class_frequency": dict(zip(CLASS_NAMES, self.pipeline.decision.frequency.tolist(), strict=True)),
+            "class_frequency": self.parts.class_frequency(),
             "host": host.usage(self.core),
             "sinks": {address: sink.health() for address, sink in self.sinks.items()},
             "faults": {

@@ -15,6 +15,7 @@ from modt.config.odometry import LandmarkConfig, OdometryConfig, RegistrationCon
 from modt.config.profile import ProfileConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.sensor import SensorConfig
+from modt.config.service import LoopConfig, RecordingConfig
 from modt.config.tracking import (
     BackgroundMapConfig,
     FilterConfig,
@@ -39,10 +40,12 @@ __all__ = [
     "FusionConfig",
     "KdopAssociationConfig",
     "LandmarkConfig",
+    "LoopConfig",
     "MergeConfig",
     "OdometryConfig",
     "PaperAssociationConfig",
     "ProfileConfig",
+    "RecordingConfig",
     "RegistrationConfig",
     "SchedulerConfig",
     "SegmentationConfig",

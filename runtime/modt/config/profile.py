@@ -10,6 +10,7 @@ from modt.config.energy import EnergyConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.sensor import SensorConfig
+from modt.config.service import LoopConfig, RecordingConfig
 from modt.config.tracking import TrackingConfig
 
 
@@ -26,6 +27,8 @@ class ProfileConfig:
     decision: DecisionConfig = field(default_factory=DecisionConfig)
     odometry: OdometryConfig = field(default_factory=OdometryConfig)
     energy: EnergyConfig = field(default_factory=EnergyConfig)
+    loop: LoopConfig = field(default_factory=LoopConfig)
+    recording: RecordingConfig = field(default_factory=RecordingConfig)
 
     def __post_init__(self) -> None:
         if self.scheduler.energy_mJ_per_frame is not None and self.energy.active_W <= 0:

@@ -34,6 +34,12 @@ class Odometry:
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
 
+    def adopt(self, other: Odometry) -> None:
+        """Go on in the world of another odometry, where it stands."""
+        self._landmarks.clear()
+        self._stamp_s, self._before, self._last = other._stamp_s, other._before, other._last
+        self._T_world_odometry, self._restarts = other._T_world_odometry, other._restarts
+
     def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
         """Placement of a frame, and its proposals in the world.
 

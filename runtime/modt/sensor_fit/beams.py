@@ -13,9 +13,9 @@ from typing import Self
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
-from scipy.signal import find_peaks
 
 from modt.geometry.beams import Beams, BeamTable, EvenBeams
+from modt.sensor_fit.peaks import prominent_peaks
 from modt.types import Float32, Float64, Int
 
 BIN = np.deg2rad(0.01)  # of the histogram, tangent
@@ -119,8 +119,8 @@ def _mean(count: Float64) -> Float64:
 
 def _peaks(count: Float64) -> Int:
     """(B,) bins of the beams."""
-    peaks, shape = find_peaks(count, prominence=1e-9)
-    peaks = peaks[shape["prominences"] > MIN_PROMINENCE * count[peaks]]
+    peaks, prominence = prominent_peaks(count)
+    peaks = peaks[prominence > MIN_PROMINENCE * count[peaks]]
     if not len(peaks):
         return np.zeros(0, np.int64)
     mass = np.add.reduceat(count, np.append(0, (peaks[1:] + peaks[:-1]) // 2))

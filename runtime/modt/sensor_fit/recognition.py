@@ -35,11 +35,6 @@ class Recognition:
     nearest: str | None
     fitted: ProfileConfig
 
-    @property
-    def default_name(self) -> str:
-        """What to call the profile used where none was asked for."""
-        return "as found" if self.differences else profile.DEFAULT
-
     def warning(self, name: str, *, replaced: bool) -> str:
         """One line of what differs from the profile of a name, what became of it, and the remedy."""
         done = "used instead: what the first sweep shows" if replaced else "used all the same"

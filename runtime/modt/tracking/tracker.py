@@ -67,13 +67,22 @@ class Tracker:
         position, speed = config.filter.initial_position_sigma_m, config.filter.initial_speed_sigma_mps
         self._P_new = np.diag(np.square([position, position, np.pi, speed]))  # a heading of pi: unknown
         self._tracks = TrackTable.blank()
-        self._next_id = 0
+        self.next_id = 0
         self._stamp_s: float | None = None
 
     @property
     def tracks(self) -> TrackTable:
         """The live table."""
         return self._tracks
+
+    def restore(self, tracks: TrackTable, next_id: int) -> None:
+        """Hold a copy of these tracks, and give new ones ids from `next_id` on."""
+        self._tracks, self.next_id = tracks.copy(), next_id
+
+    def adopt(self, other: Tracker) -> None:
+        """Go on where another tracker stands."""
+        self.restore(other.tracks, other.next_id)
+        self._stamp_s = other._stamp_s
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -260,8 +269,8 @@ class Tracker:
         known = self.background_map.recall(self._tracks, at_rest, observations, proposals)
         t = self._tracks = self._tracks.renewed(kept, len(proposals))
         new = np.arange(len(kept), len(t))
-        t.id[new] = self._next_id + np.arange(len(new))
-        self._next_id += len(new)
+        t.id[new] = self.next_id + np.arange(len(new))
+        self.next_id += len(new)
         event = np.where(known, Event.ASSOCIATED, Event.UNASSOCIATED)
         t.state[new] = self.machine.transition(np.full(len(new), self.machine.proposal), event)
         heirs = new[known]

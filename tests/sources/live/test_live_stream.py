@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from modt.sources.live.live_stream import LiveStream, Received
-from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.live.sweep_reader import Reception, StreamEndedError, Sweep
 from modt.sources.stream import StreamInfo
 
 INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
@@ -18,6 +18,8 @@ INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)
 
 class ScriptedReader:
     """Hands over batches of sweeps, one a call, when the test says so."""
+
+    profile = None
 
     def __init__(self) -> None:
         self.reception = Reception()
@@ -82,7 +84,12 @@ def test_frames_are_numbered_in_the_order_in_which_they_are_taken(live):
 
 @pytest.mark.parametrize(
     ("unusable", "cause"),
-    [(sweep(0.5), "0.500 s before the last sweep"), (sweep(1.1, x=5000.0), "its columns are not")],
+    [
+        (sweep(1.0), "0.000 s after the last sweep"),
+        (sweep(0.5), "0.500 s before the last sweep"),
+        (sweep(60.0), "59.000 s after the last sweep"),
+        (sweep(1.1, x=5000.0), "its columns are not"),
+    ],
 )
 def test_an_unusable_sweep_is_a_fault_and_the_next_one_is_taken(live, caplog, unusable, cause):
     reader, stream = live
@@ -123,3 +130,49 @@ def test_a_silent_sensor_is_diagnosed_once_and_its_return_is_logged(caplog):
         "sensor: no sweep for 2 s; check its power, cable, address and port; tracks are kept until it returns",
         "sensor: sweeps again after 4.0 s",
     ]
+
+
+@pytest.mark.parametrize("step_s", [-3600.0, 3600.0])
+def test_a_clock_that_was_set_is_followed_within_a_second(step_s, caplog):
+    reader, now_s = ScriptedReader(), [0.0]
+    stream = LiveStream(INFO, reader, clock=lambda: now_s[0])
+    stream.start()
+    followed = []
+    for k in range(1, 31):
+        now_s[0] = 0.1 * k
+        reader.give([sweep(now_s[0] + step_s * (k > 10))])
+        received = stream.take(5.0)
+        if received is not None:
+            followed.append(k)
+    stream.close()
+    refused = sorted(set(range(1, 31)) - set(followed))
+    assert refused == list(range(11, 11 + len(refused)))
+    assert 1 <= len(refused) <= 9
+    assert stream.health()["time_steps"] == 1
+    assert "its clock was set" in caplog.text
+
+
+def test_one_lying_stamp_costs_only_its_sweep():
+    reader, now_s = ScriptedReader(), [0.0]
+    stream = LiveStream(INFO, reader, clock=lambda: now_s[0])
+    stream.start()
+    refused = []
+    for k in range(1, 31):
+        now_s[0] = 0.1 * k
+        reader.give([sweep(now_s[0] + 59.0 * (k == 10))])
+        if stream.take(5.0) is None:
+            refused.append(k)
+    stream.close()
+    assert refused == [10]
+
+
+def test_the_end_of_a_recording_comes_after_its_last_sweep(live):
+    reader, stream = live
+    reader.give([sweep(1.0)])
+    reader.give(StreamEndedError())
+    waiting = threading.Event()
+    while stream._thread.is_alive():
+        waiting.wait(0.01)
+    assert taken(stream).frame.stamp_s == 1.0
+    with pytest.raises(StreamEndedError):
+        stream.take(5.0)

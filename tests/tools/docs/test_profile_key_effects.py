@@ -24,6 +24,7 @@ import yaml
 from modt import assembly, profile
 from modt.classification import pointnet
 from modt.cli import assemble
+from modt.cli.live_stages import within
 from modt.config import ProfileConfig
 from modt.config.keys import Key, keys, value_of
 from modt.energy.conditions import Conditions
@@ -31,10 +32,14 @@ from modt.energy.ledger import Ledger
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
 from modt.reporting.run_report import run_tree
+from modt.service.ladder import Ladder
+from modt.sinks.recording import Recording
+from modt.sinks.service_directory import MARK, ServiceDirectory
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.synthetic_stream import CAMERA, SyntheticStream
 from modt.types import Frame
 from tests.reporting.test_run_report import write_run
+from tests.results import result
 from tools.docs.profile_keys import condition
 
 pytestmark = pytest.mark.slow
@@ -207,6 +212,28 @@ def windows(config: ProfileConfig, _folder: Path) -> str:
     return str([line and (line["frames"], line["marks"]) for line in lines])
 
 
+def live(config: ProfileConfig, _folder: Path) -> str:
+    """The ladder of a board whose windows are of 1 and 3 W, and what it leaves of a sweep."""
+    ladder, said = Ladder(config.loop.power_W), []
+    for k, watts in enumerate((1.0, 3.0, 3.0, 3.0, 1.0)):
+        ladder.power(2.0 * k, watts)
+        said.append(ladder.step.name)
+    frame = frames(3, 1.0)[0]
+    return f"{said}{len(within(frame.points, config.loop.range_share * config.sensor.max_range_m))}"
+
+
+def recorded(config: ProfileConfig, folder: Path) -> str:
+    """Which records are kept, and how many bytes of them."""
+    background = mock.Mock(submit=lambda job: job() or True)
+    folder.mkdir(parents=True, exist_ok=True)
+    recording = Recording(ServiceDirectory(folder / "run"), config.recording, background, lambda: f"{MARK}\n")
+    for k in range(2):
+        recording.ledger({"frame": k, "filler": "x" * 1_000_000})
+        recording.write(result(k, [5], {0: 1}))
+    recording.finish()
+    return str(sorted((str(p.relative_to(folder)), p.stat().st_size) for p in folder.rglob("*") if p.is_file()))
+
+
 SCENARIOS: dict[str, Scenario] = {
     "": street,
     "sensor.height_m: null": unknown_height,
@@ -228,12 +255,15 @@ SCENARIOS: dict[str, Scenario] = {
     "figures of energy": report_of_a_run,
     "figures of energy; scheduler.energy_mJ_per_frame": report_of_a_run,
     "none: kept in run.yaml": described,
+    "modt run": live,
 }
 """Scenario of each condition of tools.docs.profile_keys."""
 
 
 RARE: dict[str, Scenario] = {
     "sensor.period_s": scan_folder,
+    "loop.": live,
+    "recording.": recorded,
     "sensor.blind_sectors_deg": far_blind,
     "segmentation.ground.start_m": long_street,
     "segmentation.person_splitting.min_gap_columns": long_street,

@@ -23,11 +23,25 @@ SILENT_S = 2.0
 """Time without a sweep after which a sensor counts as silent."""
 READ_S = 0.2
 """Time that the receiving thread waits for a message before it looks whether it is to end."""
+STEP_S = 1.0
+"""Difference of the time that passed by stamps and by arrivals, from which a stamp is doubted."""
+DOUBT_S = 0.5
+"""Time for which doubtful stamps are refused; if they keep coming, a clock was set, and they are followed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """A sweep as the receiving thread hands it over, and what that has found wrong with it."""
+
+    sweep: Sweep
+    flaws: tuple[str, ...]
+    usable: bool
+    arrived_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A frame, and when its sweep was complete on the clock of the stream [s]."""
+    """A frame, and when its sweep was complete and checked, on the clock of the stream [s]."""
 
     frame: Frame
     arrived_s: float
@@ -39,8 +53,9 @@ class LiveStream:
     Attributes:
         info: properties of the stream, with n_frames None.
         faults: unusable sweeps and points.
-        sweeps, incomplete, dropped, silences: counts of sweeps received, of those with missing messages, of those
-            replaced by a newer one before they were taken, and of times that the sensor fell silent.
+        sweeps, incomplete, dropped: counts of sweeps received, of those with missing messages, of those replaced by a
+            newer one before they were taken.
+        silences, time_steps: number of times that the sensor fell silent, and that its clock was set.
     """
 
     def __init__(
@@ -53,14 +68,21 @@ class LiveStream:
     ) -> None:
         """`cores`: where the receiving thread may run; None leaves it where it is started."""
         self.info, self.reader, self.faults = info, reader, Faults()
-        self.sweeps = self.incomplete = self.dropped = self.silences = 0
+        self.sweeps = self.incomplete = self.dropped = self.silences = self.time_steps = 0
         self._cores, self._clock = cores, clock
         self._arrived = threading.Condition()
-        self._newest: tuple[Sweep, float] | None = None
+        self._newest: Arrival | None = None
         self._error: Exception | None = None
         self._ended = self._silent = False
-        self._last_s, self._index, self._stamp_s = clock(), 0, float("-inf")
+        self._last_s, self._index = clock(), 0
+        self._taken: tuple[float, float] | None = None  # stamp and arrival of the last frame
+        self._doubted_s: float | None = None  # arrival of the first doubtful stamp since then
         self._thread = threading.Thread(target=self._receive, name="receiver", daemon=True)
+
+    @property
+    def profile(self) -> str | None:
+        """Shipped profile of the sensor; None where there is none, or before its messages have told."""
+        return self.info.profile or self.reader.profile
 
     def start(self) -> None:
         """Begin to receive."""
@@ -71,21 +93,21 @@ class LiveStream:
         """The newest sweep not yet taken, waited for at most `timeout_s`; None without one.
 
         A sensor that is silent for SILENT_S is logged once, and once more when it returns. Sweeps that cannot be used
-        and those older than the last one taken are counted and skipped.
+        and those with a doubtful stamp are counted and skipped.
 
         Raises:
-            Exception: what ended the receiving thread.
+            Exception: what ended the receiving thread, once the sweeps before it are taken.
         """
         with self._arrived:
             if self._newest is None and self._error is None:
                 self._arrived.wait(timeout_s)
-            if self._error is not None:
+            if self._newest is None and self._error is not None:
                 raise self._error
             taken, self._newest = self._newest, None
         if taken is None:
             self._watch_silence()
             return None
-        return self._frame(*taken)
+        return self._frame(taken)
 
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
@@ -98,6 +120,7 @@ class LiveStream:
             "incomplete_sweeps": self.incomplete,
             "dropped_sweeps": self.dropped,
             "silences": self.silences,
+            "time_steps": self.time_steps,
             "silent": self._silent,
         }
 
@@ -124,30 +147,47 @@ class LiveStream:
                 self._put(sweep)
 
     def _put(self, sweep: Sweep) -> None:
+        try:  # here, off the loop's thread
+            flaws, usable = sanitised(sweep.points, self.info.name)[1], True
+        except ScanError as error:
+            flaws, usable = [error.cause], False
         with self._arrived:
             self.sweeps += 1
             self.incomplete += not sweep.complete
             self.dropped += self._newest is not None
-            self._newest = (sweep, self._clock())
+            self._newest = Arrival(sweep, tuple(flaws), usable, self._clock())
             self._arrived.notify()
 
-    def _frame(self, sweep: Sweep, arrived_s: float) -> Received | None:
+    def _frame(self, arrival: Arrival) -> Received | None:
+        sweep, arrived_s = arrival.sweep, arrival.arrived_s
         if self._silent:
             log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
         self._silent, self._last_s = False, arrived_s
         index, self._index = self._index, self._index + 1
-        if sweep.stamp_s < self._stamp_s:
-            self._fault(index, f"stamped {self._stamp_s - sweep.stamp_s:.3f} s before the last sweep", skipped=True)
-            return None
-        try:
-            points, flaws = sanitised(sweep.points, self.info.name)
-        except ScanError as error:
-            self._fault(index, error.cause, skipped=True)
-            return None
+        doubt = self._doubt(sweep.stamp_s, arrived_s)
+        flaws = (doubt,) if doubt else arrival.flaws
+        used = arrival.usable and not doubt
         if flaws:
-            self._fault(index, "; ".join(flaws), skipped=False)
-        self._stamp_s = sweep.stamp_s
-        return Received(Frame(index, sweep.stamp_s, points, turn_s=sweep.turn_s), arrived_s)
+            self._fault(index, "; ".join(flaws), skipped=not used)
+        if not used:
+            return None
+        self._taken, self._doubted_s = (sweep.stamp_s, arrived_s), None
+        return Received(Frame(index, sweep.stamp_s, sweep.points, turn_s=sweep.turn_s), arrived_s)
+
+    def _doubt(self, stamp_s: float, arrived_s: float) -> str:
+        """Why a stamp is refused; empty if it is not."""
+        if self._taken is None:
+            return ""
+        passed_s, waited_s = stamp_s - self._taken[0], arrived_s - self._taken[1]
+        if 0 < passed_s <= waited_s + STEP_S:
+            return ""
+        self._doubted_s = arrived_s if self._doubted_s is None else self._doubted_s
+        what = f"{abs(passed_s):.3f} s {'before' if passed_s < 0 else 'after'} the last sweep"
+        if arrived_s - self._doubted_s < DOUBT_S:
+            return f"stamped {what}, which arrived {waited_s:.3f} s ago"
+        self.time_steps += 1
+        log.warning("%s: its clock was set: stamps are %s; they are followed", self.info.name, what)
+        return ""
 
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
         if self.faults.add(Fault(index, self.info.name, cause, skipped)):

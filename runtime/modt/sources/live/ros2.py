@@ -29,6 +29,8 @@ RELIABILITIES = {"best_effort": False, "reliable": True}
 class PointCloudReader:
     """Messages of a topic to sweeps; `frame_id` names the frame of their points, which is taken for the sensor's."""
 
+    profile = None  # a message does not tell
+
     def __init__(self, subscription: Subscription, name: str) -> None:
         self.reception = Reception()
         self.frame_id = ""

@@ -9,6 +9,10 @@ from typing import Protocol
 from modt.types import Float32
 
 
+class StreamEndedError(Exception):
+    """The source has no more sweeps."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sweep:
     """One turn of a sensor.
@@ -43,10 +47,17 @@ class SweepReader(Protocol):
 
     reception: Reception
 
+    @property
+    def profile(self) -> str | None:
+        """Shipped profile of the sensor; None where there is none, or before its messages have told."""
+
     def read(self, timeout_s: float) -> Sequence[Sweep]:
         """Sweeps finished by the messages received until the timeout, oldest first; returns as soon as there is one.
 
         Bytes that are no message of the sensor are counted, never raised.
+
+        Raises:
+            StreamEndedError: nothing follows, as at the end of a recording.
         """
 
     def close(self) -> None:

@@ -1,0 +1,50 @@
+"""`modt check`: what will not work here, and how to mend it."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from modt import host
+from modt.cli import options
+from modt.cli.run import OUT
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("check", help="say what modt run will lack here, and how to mend it")
+    source = "address of the sensor to listen to, or a recording (default: none)"
+    p.add_argument("source", nargs="?", metavar="SOURCE", help=source)
+    options.add_profile_option(p)
+    options.add_core_option(p)
+    p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print a line a check; 0 if none fails, else 1."""
+    cores = host.other_cores(arguments.core)
+    pinned = host.pin_to_core(arguments.core)
+    # NumPy is imported from here on, after the process is pinned.
+    from modt import profile
+    from modt.classification.pointnet import PointNet
+    from modt.cli import metering
+    from modt.cli.live_source import open_source
+    from modt.service import checks
+
+    config = profile.load(arguments.profile)
+    limits = config.classification
+    found = [
+        checks.core(pinned),
+        checks.governor(pinned),
+        *checks.permissions(),
+        checks.meters(metering.discovery(config.energy)),
+        checks.model(limits, lambda: PointNet(limits, config.sensor).facts()),
+        checks.disk(arguments.out, config),
+        checks.clock(),
+    ]
+    if arguments.source is not None:
+        found += checks.sensor(lambda: open_source(arguments.source, cores))
+    for finding in found:
+        print(finding)
+    return int(any(finding.level == checks.FAIL for finding in found))

@@ -1,0 +1,54 @@
+"""The profile of a stream: what is asked for, else what the source names, else what the first sweep shows."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+
+from modt import profile
+from modt.config import ProfileConfig
+from modt.sensor_fit.recognition import Recognition, recognise
+from modt.types import Frame
+
+log = logging.getLogger(__name__)
+
+FOUND = "as found"
+"""Name of a sensor's profile that the first sweep has replaced."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenProfile:
+    """The profile of a stream.
+
+    Attributes:
+        config: the configuration.
+        sensor: name of the sensor's profile, FOUND where the first sweep has replaced it.
+        names: of all profiles put together, the sensor's first where nobody has asked for it.
+        recognition: what differs between the first sweep and the profile.
+    """
+
+    config: ProfileConfig
+    sensor: str
+    names: tuple[str, ...]
+    recognition: Recognition
+
+
+def choose(asked_for: profile.Names, first: Frame | None, named: str | None = None) -> ChosenProfile:
+    """The profile of a stream by its first frame; what differs is warned of.
+
+    What is found takes the place of the default profile, and of that which the source has named, never of one of a
+    sensor that was asked for.
+
+    Raises:
+        MisuseError: a profile that cannot be used.
+    """
+    asked = profile.resolve(asked_for)
+    base = named or profile.DEFAULT
+    config = asked.config if asked.sensor else asked.over(profile.load(base))
+    recognition = Recognition((), None, config) if first is None else recognise(first.points, config)
+    if recognition.differences:
+        log.warning("%s", recognition.warning(asked.sensor or base, replaced=asked.sensor is None))
+    if asked.sensor:
+        return ChosenProfile(config, asked.sensor, asked.used(""), recognition)
+    sensor = FOUND if recognition.differences else base
+    return ChosenProfile(asked.over(recognition.fitted), sensor, asked.used(sensor), recognition)

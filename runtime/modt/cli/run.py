@@ -1,0 +1,64 @@
+"""`modt run`: follow a live source for as long as it runs."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import os
+import sys
+from pathlib import Path
+
+from modt import host
+from modt.cli import options
+from modt.cli.command import INTERRUPTED
+from modt.cli.replay import MODES
+
+log = logging.getLogger(__name__)
+
+OUT = Path("runs/live")
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("run", help="follow a live source: the service of a robot")
+    source = "address of a sensor, or a recording to play: PATH, PATH?loop=yes (default: a synthetic stream)"
+    p.add_argument("source", nargs="?", default="", metavar="SOURCE", help=source)
+    options.add_sink_option(p)
+    options.add_profile_option(p)
+    options.add_core_option(p)
+    p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
+    odometry = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
+    p.add_argument("--odometry", default="recording", metavar="SOURCE", help=odometry)
+    p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
+    p.add_argument("--metrics", type=Path, metavar="FILE", help="file of metrics for Prometheus")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Follow; SIGTERM ends it with exit status 0, SIGINT with 130, both with complete records."""
+    cores = host.other_cores(arguments.core)
+    pinned = host.pin_to_core(arguments.core)
+    # NumPy is imported from here on, after the process is pinned.
+    from modt.cli.assemble import Request
+    from modt.cli.live_session import LiveSession
+    from modt.cli.live_source import open_source
+    from modt.service.live_loop import NamedSink
+    from modt.service.status import one_line
+    from modt.sinks.addresses import open_sink
+    from modt.supervisor import supervisor_of
+
+    supervisor = supervisor_of(os.environ)
+    lacking = host.be_punctual()
+    for what in lacking:
+        log.warning("%s", what)
+    with host.elsewhere(cores):
+        source = open_source(arguments.source, cores)
+        sinks = [NamedSink(address, open_sink(address)) for address in dict.fromkeys(arguments.sink)]
+        command, request = ["modt", *sys.argv[1:]], Request.of(arguments)
+        out, metrics = arguments.out, arguments.metrics
+        session = LiveSession(request, source, sinks, out, metrics, pinned, cores, command, lacking)
+    status = session.run(supervisor)
+    print(
+        f"modt: {status['counts']['frames']} frames; {one_line(status)}; records in {arguments.out}", file=sys.stderr
+    )
+    return INTERRUPTED if session.stop.signal == "SIGINT" else 0

@@ -1,0 +1,50 @@
+"""`modt status`: what a running service is doing."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from modt.cli.run import OUT
+from modt.errors import MisuseError
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("status", help="say what a running modt run is doing")
+    run_directory = "its run directory (default: %(default)s)"
+    p.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
+    p.add_argument("--json", action="store_true", help="print JSON")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the status; 0 while the service runs, else 1."""
+    from modt.service.status import STALE_S
+    from modt.service.status_text import status_text
+    from modt.sinks.service_directory import STATUS
+
+    status = read(arguments.directory / STATUS)
+    now_s = time.time()
+    print(json.dumps(status, indent=1) if arguments.json else status_text(status, now_s))
+    return int(now_s - status["time_s"] >= STALE_S)
+
+
+def read(path: Path) -> dict[str, Any]:
+    """A status.
+
+    Raises:
+        MisuseError: there is none.
+    """
+    from modt.service.status import SCHEMA
+
+    try:
+        status = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise MisuseError(path, f"no status ({error})", "give the run directory of a modt run") from None
+    if not isinstance(status, dict) or status.get("schema") != SCHEMA:
+        raise MisuseError(path, "another schema", f"this version reads {SCHEMA}")
+    return status

@@ -1,0 +1,1 @@
+"""The live loop: on time, within its limits, observable."""

@@ -1,0 +1,147 @@
+"""What will not work here, found out before the first frame: each check is one line with its remedy."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modt import host
+from modt.config import ClassificationConfig, ProfileConfig
+from modt.energy.meters.discovery import Discovery
+from modt.energy.meters.meter import Kind
+from modt.errors import ModtError
+from modt.sources.live.live_stream import LiveStream
+
+OK, WARN, FAIL = "ok", "warn", "fail"
+REACH_S = 2.0
+"""Time in which a sensor is heard of."""
+_TIME_ERROR = 5  # adjtimex(2)
+_SANE_YEAR = 2024
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """The outcome of a check: ok, warn (works, less well) or fail (does not work)."""
+
+    level: str
+    subject: str
+    what: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.level:<4}  {self.subject}: {self.what}" + (f"; {self.remedy}" if self.remedy else "")
+
+
+def core(number: int | None, sys: Path = Path("/sys")) -> Finding:
+    """Whether the core of the loop is kept free of other work."""
+    if number is None:
+        return Finding(WARN, "core", "the loop is not pinned to a core", "leave out --core none")
+    isolated = host.core_list(host.content(sys / "devices/system/cpu/isolated"))
+    if number in isolated:
+        return Finding(OK, "core", f"{number}, isolated")
+    remedy = f"add isolcpus={number} to the kernel's command line"
+    return Finding(WARN, "core", f"{number} is shared with other processes", remedy)
+
+
+def governor(number: int | None, sys: Path = Path("/sys")) -> Finding:
+    """Whether the clock of the core is fixed."""
+    path = sys / f"devices/system/cpu/cpu{number or 0}/cpufreq/scaling_governor"
+    name = host.content(path).strip()
+    if name in ("performance", ""):
+        return Finding(OK, "governor", name or "none here: the clock is not controlled by this system")
+    return Finding(WARN, "governor", f"{name}: frames begin on a slow clock", "cpupower frequency-set -g performance")
+
+
+def permissions() -> list[Finding]:
+    """Priority and memory; takes what is permitted."""
+    lacking = [Finding(WARN, "permissions", *what.split("; ", 1)) for what in host.be_punctual()]
+    return lacking or [Finding(OK, "permissions", "SCHED_FIFO, memory locked")]
+
+
+def meters(found: Discovery) -> Finding:
+    """Whether energy is measured."""
+    best = found.best
+    facts = best.facts
+    if facts is not None and facts.kind is not Kind.ESTIMATED:
+        return Finding(OK, "meters", f"{best.name}, {facts.kind}")
+    denied = next((c for c in found.candidates if c.meters and not c.usable), None)
+    known = "no meter" if denied is None else f"{denied.name}: {denied.why_not}"
+    remedy = "state idle_W and busy_W of the board" if denied is None else denied.remedy
+    return Finding(WARN, "meters", f"energy is estimated ({known})", remedy)
+
+
+def model(config: ClassificationConfig, load: Callable[[], dict[str, str]]) -> Finding:
+    """Whether the network is that of its card."""
+    try:
+        facts = load()
+    except ModtError as error:
+        return Finding(FAIL, "model", f"{error.subject}: {error.cause}", error.remedy)
+    return Finding(OK, "model", f"{config.model}, SHA-256 {facts['sha256'][:12]} as on its card")
+
+
+def disk(out: Path, config: ProfileConfig, free_bytes: Callable[[Path], int] | None = None) -> Finding:
+    """Whether the records have room."""
+    place = next(path for path in (out, *out.absolute().parents) if path.exists())
+    if not os.access(place, os.W_OK):
+        return Finding(FAIL, "disk", f"{place} cannot be written", "give another --out, or its owner the right")
+    free_mb = 1e-6 * (free_bytes(place) if free_bytes else shutil.disk_usage(place).free)
+    wanted_mb = 0.0 if config.recording.keep == "none" else config.recording.disk_mb
+    if free_mb < wanted_mb:
+        what = f"{free_mb:.0f} MB free at {place}, less than recording.disk_mb ({wanted_mb:.0f})"
+        return Finding(WARN, "disk", what, "free it, or lower recording.disk_mb: recording pauses on a full disk")
+    return Finding(OK, "disk", f"{free_mb:.0f} MB free, at most {wanted_mb:.0f} are used")
+
+
+def clock(state: int | None = None, now_s: float | None = None) -> Finding:
+    """Whether the calendar clock is set: poses and sweeps meet by it."""
+    year = time.gmtime(time.time() if now_s is None else now_s).tm_year
+    if year < _SANE_YEAR:
+        return Finding(FAIL, "clock", f"the year is {year}", "set it, or fit a battery to the clock")
+    state = _adjtimex() if state is None else state
+    if state == _TIME_ERROR:
+        remedy = "start chrony or systemd-timesyncd, or have sensor and odometry stamp by one clock"
+        return Finding(WARN, "clock", "not synchronised", remedy)
+    return Finding(OK, "clock", "synchronised")
+
+
+def sensor(open_source: Callable[[], LiveStream], timeout_s: float = REACH_S) -> list[Finding]:
+    """Whether a source can be opened, and sends sweeps."""
+    try:
+        stream = open_source()
+    except ModtError as error:
+        return [Finding(FAIL, "sensor", f"{error.subject}: {error.cause}", error.remedy)]
+    stream.start()
+    end_s = time.monotonic() + timeout_s
+    received = None
+    try:
+        while received is None and time.monotonic() < end_s:
+            received = stream.take(max(end_s - time.monotonic(), 0.0))
+        health = stream.health()
+    except Exception as error:
+        return [Finding(FAIL, "sensor", f"{stream.info.name}: {error}", "check its address")]
+    finally:
+        stream.close()
+    return [_heard(stream.info.name, health, None if received is None else len(received.frame.points))]
+
+
+def _heard(name: str, health: dict[str, Any], points: int | None) -> Finding:
+    if points is not None:
+        return Finding(OK, "sensor", f"{name}: a sweep of {points} points")
+    messages, refused = health["messages"], health["refused_messages"]
+    if refused:
+        remedy = "give the address of the sensor that sends here"
+        return Finding(FAIL, "sensor", f"{name}: only unusable messages ({', '.join(refused)})", remedy)
+    if messages:
+        return Finding(FAIL, "sensor", f"{name}: {messages} messages, but no sweep", "is its rate below 0.5 Hz?")
+    remedy = "check its power, cable, address and port, and the firewall"
+    return Finding(FAIL, "sensor", f"{name}: nothing received in {REACH_S:g} s", remedy)
+
+
+def _adjtimex() -> int:
+    return int(ctypes.CDLL(None).adjtimex(ctypes.create_string_buffer(512)))

@@ -1,0 +1,50 @@
+"""Failures of single frames: counted, said once of each kind, fatal only when they repeat."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+
+from modt.errors import ModtError
+
+log = logging.getLogger(__name__)
+
+MAX_IN_A_ROW = 10
+"""Failures in a row that end the run."""
+RENEW_AFTER = 5
+"""Failures in a row after which the stages are made anew."""
+
+
+class Containment:
+    """Counts of contained exceptions by kind."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+        self.in_a_row = 0
+
+    def succeed(self) -> None:
+        """A frame went well."""
+        self.in_a_row = 0
+
+    def fail(self, error: Exception, where: str) -> None:
+        """Count an exception of a frame.
+
+        Raises:
+            ModtError: it is the last of MAX_IN_A_ROW failures in a row.
+        """
+        self.in_a_row += 1
+        self.note(error, where)
+        if self.in_a_row >= MAX_IN_A_ROW:
+            cause = f"{self.in_a_row} failures in a row, the last one {_kind(error)}: {error}"
+            raise ModtError(where, cause, "report it, with the traceback above") from error
+
+    def note(self, error: Exception, where: str) -> None:
+        """Count an exception that cost no frame."""
+        kind = f"{where}: {_kind(error)}"
+        self.counts[kind] += 1
+        if self.counts[kind] == 1:
+            log.error("%s; later ones are only counted", kind, exc_info=error)
+
+
+def _kind(error: Exception) -> str:
+    return type(error).__name__

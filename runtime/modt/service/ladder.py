@@ -1,0 +1,128 @@
+"""What the loop gives up under load, step by step, and takes back by itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+from modt.types import Budget
+
+CALM_S = 0.8
+"""Slack after which something is taken back: within a second, at 10 Hz, the result is a better one."""
+BUSY_SHARE, AMPLE_SHARE = 0.8, 0.5
+"""Of the period between arrival and result: below it there is slack; slack for everything at once."""
+NEAR_SHARE = 0.9
+"""Of the power limit: below it there is slack."""
+PROBE_S = 3.0
+"""A step down that is taken back within this time has failed: the next one waits twice as long ..."""
+MAX_PATIENCE_S = 30.0
+"""... up to this."""
+DEFERRED_EVERY = 5
+"""While classification is deferred, every so many frames the call that has waited longest is made."""
+
+
+class Step(IntEnum):
+    """What is given up; each step includes those before it."""
+
+    ALL = 0  # nothing
+    DEFERRED = 1  # classification, but for a call now and then
+    REDUCED = 2  # what is far
+    DROPPED = 3  # every second sweep
+
+
+GIVEN_UP = {
+    Step.ALL: "nothing is given up",
+    Step.DEFERRED: "classification is deferred",
+    Step.REDUCED: "what is far is left out",
+    Step.DROPPED: "every second sweep is left out",
+}
+
+
+class Event(Enum):
+    """What a frame or a window of the meters says of the load."""
+
+    OVERRUN = "the result came after its deadline"
+    OVER_POWER = "more power than the limit"
+    SLACK = "slack"
+    AMPLE = "ample slack"
+
+
+TRANSITIONS = {
+    (Step.ALL, Event.OVERRUN): Step.DEFERRED,
+    (Step.ALL, Event.OVER_POWER): Step.DEFERRED,
+    (Step.DEFERRED, Event.OVERRUN): Step.REDUCED,
+    (Step.DEFERRED, Event.OVER_POWER): Step.REDUCED,
+    (Step.DEFERRED, Event.SLACK): Step.ALL,
+    (Step.DEFERRED, Event.AMPLE): Step.ALL,
+    (Step.REDUCED, Event.OVERRUN): Step.DROPPED,
+    (Step.REDUCED, Event.OVER_POWER): Step.DROPPED,
+    (Step.REDUCED, Event.SLACK): Step.DEFERRED,
+    (Step.REDUCED, Event.AMPLE): Step.ALL,
+    (Step.DROPPED, Event.SLACK): Step.REDUCED,
+    (Step.DROPPED, Event.AMPLE): Step.ALL,
+}
+"""The next step; an event without an entry changes nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A change of the step."""
+
+    before: Step
+    after: Step
+    event: Event
+
+
+class Ladder:
+    """Where the loop stands, by the times of its frames and its power; times are of one monotonic clock [s].
+
+    Args:
+        power_W: limit; None without one.
+    """
+
+    def __init__(self, power_W: float | None = None) -> None:
+        self.step = Step.ALL
+        self.power_W = power_W
+        self.patience_s = CALM_S
+        self._cause = Event.OVERRUN  # of the last step up
+        self._calm_s = self._ample_s = self._down_s = float("-inf")  # since when; last step down
+
+    def frame(self, now_s: float, share: float) -> Change | None:
+        """A frame whose result came `share` of a period after its sweep."""
+        if share > BUSY_SHARE:
+            self._calm_s = now_s
+        if share > AMPLE_SHARE:
+            self._ample_s = now_s
+        if share > 1.0:
+            return self._fire(Event.OVERRUN, now_s)
+        if self._cause is Event.OVERRUN and now_s - self._ample_s >= CALM_S:
+            return self._fire(Event.AMPLE, now_s)
+        if now_s - self._calm_s >= self.patience_s:
+            return self._fire(Event.SLACK, now_s)
+        return None
+
+    def power(self, now_s: float, watts: float) -> Change | None:
+        """A window of the meters."""
+        if self.power_W is None or watts <= NEAR_SHARE * self.power_W:
+            return None
+        self._calm_s = self._ample_s = now_s
+        return self._fire(Event.OVER_POWER, now_s) if watts > self.power_W else None
+
+    def _fire(self, event: Event, now_s: float) -> Change | None:
+        before = self.step
+        self.step = TRANSITIONS.get((before, event), before)
+        if self.step > before:
+            failed = now_s - self._down_s < PROBE_S
+            self.patience_s = min(2 * self.patience_s, MAX_PATIENCE_S) if failed else CALM_S
+            self._cause, self._calm_s, self._ample_s = event, now_s, now_s
+        elif self.step < before:
+            self._down_s = self._calm_s = self._ample_s = now_s
+        return Change(before, self.step, event) if self.step != before else None
+
+
+def budget_at(step: Step, budget: Budget, left_ms: float, frame: int) -> Budget:
+    """What a frame may spend at a step, by the budget of the profile and the time that is left to it [ms]."""
+    if step >= Step.DEFERRED:
+        calls = 1 if frame % DEFERRED_EVERY == 0 else 0
+        return Budget(calls if budget.calls is None else min(calls, budget.calls), budget.cpu_ms)
+    return Budget(budget.calls, left_ms if budget.cpu_ms is None else min(budget.cpu_ms, left_ms))

@@ -1,0 +1,68 @@
+"""The status as metrics: a file for the textfile collector of Prometheus' node exporter."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+COUNTERS = re.compile(
+    r"(frames|proposals|classifications|deferred|missed_deadlines|shed_sweeps|reloads|refused_reloads|steps_entered"
+    r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|sent|dropped)"
+)
+"""Names of what only grows."""
+LABELS = {"visible": "class", "steps_entered": "step", "failures": "kind", "refused_messages": "reason"}
+"""Tables, and what their keys are."""
+STEPS = ("all", "deferred", "reduced", "dropped")
+
+
+def metrics_text(status: Mapping[str, Any]) -> str:
+    """Every number of a status, as modt_PART_NAME; names ending in _total only grow."""
+    lines: list[str] = []
+    typed: set[str] = set()
+    for name, labels, value in _samples(status):
+        if name not in typed:
+            typed.add(name)
+            lines.append(f"# TYPE {name} {'counter' if name.endswith('_total') else 'gauge'}")
+        inside = ",".join(f'{key}="{_escaped(text)}"' for key, text in labels.items())
+        lines.append(f"{name}{{{inside}}} {value:.15g}" if inside else f"{name} {value:.15g}")
+    return "\n".join(lines) + "\n"
+
+
+def write_metrics(path: Path, status: Mapping[str, Any]) -> None:
+    """Replace a file by the metrics of a status; one that cannot be written is left as it is."""
+    partial = path.with_name(f".{path.name}.part")
+    with suppress(OSError):
+        partial.write_text(metrics_text(status), encoding="utf-8")
+        partial.replace(path)
+
+
+Sample = tuple[str, dict[str, str], float]
+
+
+def _samples(status: Mapping[str, Any]) -> Iterator[Sample]:
+    for key in ("time_s", "up_s", "period_s"):
+        yield f"modt_{key}", {}, status[key]
+    yield "modt_loop_step", {}, STEPS.index(status["loop"]["step"])
+    for part in ("counts", "loop", "power", "sensor", "odometry", "recording", "host"):
+        yield from _of_table(f"modt_{part}", status[part], {})
+    for sink, health in status["sinks"].items():
+        yield from _of_table("modt_sink", health, {"sink": sink})
+
+
+def _of_table(prefix: str, table: Mapping[str, Any], labels: dict[str, str]) -> Iterator[Sample]:
+    for key, value in table.items():
+        name = f"{prefix}_{key}" + ("_total" if COUNTERS.fullmatch(key) else "")
+        if isinstance(value, bool | int | float):
+            yield name, labels, float(value)
+        elif isinstance(value, Mapping):
+            label = LABELS.get(key, "quantile" if key.endswith("_ms") else "name")
+            for entry, number in value.items():
+                if isinstance(number, bool | int | float):
+                    yield name, {**labels, label: str(entry)}, float(number)
+
+
+def _escaped(text: str) -> str:
+    return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")

@@ -1,0 +1,110 @@
+"""The run directory of a service: DIR is the present part of its records, DIR~1, DIR~2 … are earlier ones."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from modt.errors import MisuseError
+from modt.sinks.output import writing
+from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
+
+STATUS = "status.json"
+MARK = "service: true"
+"""Line of run.yaml in the directories of a service: no other directory is ever deleted."""
+_FILES = {name: f".{name}.part" for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS)}
+_KNOWN = {*_FILES, *_FILES.values()}
+
+
+class ServiceDirectory:
+    """Every part is a whole run; a half-made one, which a failed start has left, is made anew.
+
+    Raises:
+        MisuseError: the path is a file, or a directory that holds other files.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if path.exists() and not path.is_dir():
+            raise MisuseError(path, "is a file", "give a directory as --out")
+        foreign = sorted({p.name for p in path.iterdir()} - _KNOWN) if path.is_dir() else []
+        if foreign and not (path / TRACKS).exists():
+            raise MisuseError(path, f"holds {foreign[0]}, which is no record", "give an empty or a new directory")
+
+    def begin(self, description: str, limit_bytes: float) -> None:
+        """Keep the part before under the next name, delete the oldest ones beyond a limit, and begin a new part.
+
+        Raises:
+            ModtError: the disk is full, or cannot be written.
+        """
+        with writing(self.path):
+            self._keep()
+            self._trim(limit_bytes)
+            self.path.mkdir(parents=True, exist_ok=True)
+        self.write(RUN, description)
+
+    def write(self, name: str, text: str) -> None:
+        """Write a file of the present part atomically.
+
+        Raises:
+            ModtError: it cannot be written.
+        """
+        partial = self.path / _FILES[name]
+        with writing(self.path / name):
+            try:
+                partial.write_text(text, encoding="utf-8")
+                partial.replace(self.path / name)
+            except OSError:
+                with suppress(OSError):
+                    partial.unlink()
+                raise
+
+    def kept(self) -> list[Path]:
+        """Earlier parts, the oldest first."""
+        return [path for _, path in sorted(self._numbered()) if _is_ours(path)]
+
+    def _numbered(self) -> Iterator[tuple[int, Path]]:
+        for path in self.path.parent.glob("*~*"):
+            match = re.fullmatch(re.escape(self.path.name) + r"~(\d+)", path.name)
+            if match:
+                yield int(match[1]), path
+
+    def _keep(self) -> None:
+        if not self.path.is_dir():
+            return
+        if any((self.path / name).is_file() for name in (TRACKS, LEDGER)):
+            (self.path / STATUS).unlink(missing_ok=True)
+            number = 1 + max((n for n, _ in self._numbered()), default=0)
+            self.path.rename(self.path.with_name(f"{self.path.name}~{number}"))
+        else:
+            _remove_known(self.path)
+
+    def _trim(self, limit_bytes: float) -> None:
+        parts = [(path, _size(path)) for path in self.kept()]
+        excess = sum(size for _, size in parts) - limit_bytes
+        for path, size in parts:
+            if excess <= 0:
+                return
+            _remove_known(path)
+            with suppress(OSError):  # holds files of someone else
+                path.rmdir()
+            excess -= size
+
+
+def _is_ours(path: Path) -> bool:
+    try:
+        return MARK in (path / RUN).read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return False
+
+
+def _size(path: Path) -> int:
+    return sum(file.stat().st_size for file in path.iterdir() if file.name in _KNOWN)
+
+
+def _remove_known(path: Path) -> None:
+    for name in _KNOWN - {RUN}:
+        (path / name).unlink(missing_ok=True)
+    (path / RUN).unlink(missing_ok=True)  # the last one: what is left half deleted is still known as ours

@@ -1,0 +1,202 @@
+"""`modt run` from the outside: a recording as a live source, signals, records, and what systemd is told."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import yaml
+
+from modt import profile
+from modt.sinks.records import read_records
+from modt.sinks.tracks import SCHEMA
+from modt.sources.synthetic_stream import SyntheticStream
+
+from .commands import environment, modt
+
+DEADLINE_S = 20.0
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory):
+    """Fifteen scans of a small sensor."""
+    folder = tmp_path_factory.mktemp("scans")
+    for frame in SyntheticStream("street", "vlp-16", 1.5, 0):
+        frame.points.tofile(folder / f"{frame.index:06d}.bin")
+    return folder
+
+
+class Service:
+    """A running `modt run`, and where it notifies."""
+
+    def __init__(self, folder, *arguments, watchdog_s=2.0):
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(str(folder / "notify"))
+        self.socket.settimeout(DEADLINE_S)
+        self.heard = []
+        told = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": str(int(1e6 * watchdog_s))}
+        command = [sys.executable, "-m", "modt.cli.main", "run", *map(str, arguments), "--out", str(folder / "run")]
+        self.out, self.begun_s = folder / "run", time.monotonic()
+        self.process = subprocess.Popen(
+            command, stderr=subprocess.PIPE, text=True, env={**environment(), **told}, cwd=folder
+        )
+
+    def hear(self, beginning):
+        """The next message that begins so; the test fails if none comes."""
+        while True:
+            message = self.socket.recv(4096).decode()
+            self.heard.append((time.monotonic() - self.begun_s, message))
+            if message.startswith(beginning):
+                return message
+
+    def end(self, number=signal.SIGTERM):
+        """Status, messages, and the time that it took."""
+        began_s = time.monotonic()
+        self.process.send_signal(number)
+        _, said = self.process.communicate(timeout=DEADLINE_S)
+        return self.process.returncode, said, time.monotonic() - began_s
+
+    def close(self):
+        self.socket.close()
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.communicate()
+
+
+@pytest.fixture(name="start")
+def services(tmp_path):
+    made = []
+
+    def start(*arguments, **options):
+        made.append(Service(tmp_path, *arguments, **options))
+        return made[-1]
+
+    yield start
+    for service in made:
+        service.close()
+
+
+def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
+    done = modt("run", scans, "--out", tmp_path / "run", "--metrics", tmp_path / "modt.prom", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = {p.name for p in (tmp_path / "run").iterdir()}
+    assert names == {"run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"}
+    status = json.loads((tmp_path / "run" / "status.json").read_text())
+    frames = [r["frame"] for r in read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA)]
+    sensor = status["sensor"]
+    assert sensor["sweeps"] == 15
+    assert len(frames) == status["counts"]["frames"]
+    assert len(frames) + sensor["dropped_sweeps"] + status["loop"]["shed_sweeps"] == 15
+    described = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())
+    assert described["service"] is True
+    assert described["recognition"]["used"] == "as found"
+    assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
+    report = modt("report", tmp_path / "run", cwd=tmp_path, module="modt.cli.profile")
+    assert report.returncode == 0, report.stderr
+
+
+def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):
+    own = tmp_path / "robot.yaml"
+    own.write_text(profile.to_yaml(profile.dump(profile.load("vlp-16"))))
+    service = start(f"{scans}?loop=yes", "--profile", own)
+    service.hear("READY=1")
+    service.hear("WATCHDOG=1")
+    assert "tracks" in service.hear("STATUS=")
+    own.write_text(own.read_text().replace("keep: all", "keep: everything"))
+    service.process.send_signal(signal.SIGHUP)
+    assert "MONOTONIC_USEC=" in service.hear("RELOADING=1")
+    service.hear("READY=1")
+    service.hear("STATUS=")
+    own.write_text(own.read_text().replace("keep: everything", "keep: all"))
+    service.process.send_signal(signal.SIGHUP)
+    service.hear("RELOADING=1")
+    service.hear("READY=1")
+    service.hear("STATUS=")
+    status, said, seconds = service.end()
+    assert status == 0
+    assert seconds < 5.0
+    assert service.hear("STOPPING=1")
+    assert "keep" in said
+    assert "the profile before stays in use" in said
+    loop = json.loads((service.out / "status.json").read_text())["loop"]
+    assert (loop["reloads"], loop["refused_reloads"]) == (1, 1)
+
+
+def test_a_killed_service_has_lost_no_more_than_a_second_and_starts_again(scans, start, tmp_path):
+    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
+    service.hear("READY=1")
+    while not (service.out / "tracks.jsonl").exists() or len((service.out / "tracks.jsonl").read_bytes()) < 100_000:
+        service.hear("STATUS=")
+    service.process.kill()
+    service.process.communicate()
+    frames = list(read_records(service.out / "tracks.jsonl", SCHEMA))
+    assert len(frames) > 5
+    again = modt("run", scans, "--out", service.out, cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert len(list(read_records(tmp_path / "run~1" / "tracks.jsonl", SCHEMA))) == len(frames)
+
+
+@pytest.mark.parametrize("source", ["nowhere", "nowhere?loop=maybe", "nowhere?speed=2"])
+def test_a_source_that_cannot_be_is_a_misuse(source, tmp_path):
+    done = modt("run", source, cwd=tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) <= 3
+    assert "nowhere" in done.stderr
+
+
+def test_an_empty_sweep_and_a_broken_one_end_nothing(scans, tmp_path):
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    for k, scan in enumerate(sorted(scans.iterdir())):
+        points = np.fromfile(scan, np.float32).reshape(-1, 4)
+        if k == 5:
+            points[:] = np.nan
+        points.tofile(folder / scan.name)
+    (folder / "000007.bin").write_bytes(b"xyz")
+    done = modt("run", folder, "--out", tmp_path / "run", "--profile", "vlp-16", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    sensor = json.loads((tmp_path / "run" / "status.json").read_text())["sensor"]
+    assert sensor["refused_messages"] == {"faulty scans": 2}
+    assert os.path.getsize(tmp_path / "run" / "tracks.jsonl") > 0
+
+
+def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path):
+    nothing = modt("status", tmp_path / "run", cwd=tmp_path)
+    assert (nothing.returncode, len(nothing.stderr.splitlines())) == (2, 1)
+    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
+    service.hear("READY=1")
+    while not (service.out / "status.json").exists():
+        service.hear("STATUS=")
+    running = modt("status", service.out, cwd=tmp_path)
+    assert running.returncode == 0, running.stderr
+    assert "running for" in running.stdout
+    status = json.loads(modt("status", service.out, "--json", cwd=tmp_path).stdout)
+    assert status["pid"] == service.process.pid
+    assert service.end()[0] == 0
+    path = service.out / "status.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"time_s": time.time() - 60}))
+    ended = modt("status", service.out, cwd=tmp_path)
+    assert (ended.returncode, "NOT running" in ended.stdout) == (1, True)
+
+
+def test_check_says_what_is_lacking_here_and_fails_without_a_sensor(scans, tmp_path):
+    done = modt("check", scans, "--profile", "vlp-16", "--out", tmp_path / "run", cwd=tmp_path)
+    lines = done.stdout.splitlines()
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {line.split(":")[0].split()[1] for line in lines} >= {
+        "core",
+        "governor",
+        "meters",
+        "model",
+        "disk",
+        "sensor",
+    }
+    assert all("; " in line for line in lines if line.startswith(("warn", "fail")))
+    lost = modt("check", tmp_path / "nowhere", cwd=tmp_path)
+    assert lost.returncode == 1
+    assert "fail  sensor" in lost.stdout

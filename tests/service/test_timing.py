@@ -1,0 +1,55 @@
+"""Lateness, execution and latency against deadlines."""
+
+import numpy as np
+import pytest
+
+from modt.reporting.log_histogram import LogHistogram
+from modt.service.timing import RestCost, Timing
+
+
+def test_a_frame_is_missed_when_its_result_comes_after_the_next_sweep():
+    timing = Timing()
+    assert timing.add(10.0, 10.001, 10.05, 0.1) == pytest.approx(0.5)
+    assert timing.add(10.1, 10.15, 10.21, 0.1) == pytest.approx(1.1)
+    report = timing.report()
+    assert (report["frames"], report["missed_deadlines"]) == (2, 1)
+    assert report["lateness_ms"]["max"] == pytest.approx(50.0)
+    assert report["execution_ms"]["max"] == pytest.approx(60.0)
+    assert report["latency_ms"]["max"] == pytest.approx(110.0)
+
+
+def test_quantiles_are_those_of_the_times_within_five_percent():
+    times = np.random.default_rng(1).lognormal(-6.0, 1.5, 20_000)
+    histogram = LogHistogram()
+    for seconds in times.tolist():
+        histogram.add(seconds)
+    for share in (0.5, 0.9, 0.99):
+        assert histogram.quantile_s(share) == pytest.approx(np.quantile(times, share), rel=0.05)
+    assert histogram.maximum_s == times.max()
+    assert histogram.total_s == pytest.approx(times.sum())
+
+
+def test_no_times_and_extreme_ones_have_figures():
+    histogram = LogHistogram()
+    assert histogram.figures_ms() == {"mean": 0, "p50": 0, "p99": 0, "max": 0}
+    for seconds in (-1.0, 0.0, 1e9):
+        histogram.add(seconds)
+    assert histogram.count == 3
+    assert histogram.quantile_s(0.1) <= 1.1e-6
+
+
+def line(**ms):
+    return {"stages": {stage: {"wall_ns": int(1e6 * value)} for stage, value in ms.items()}}
+
+
+def test_the_cost_of_the_rest_rises_at_once_and_falls_slowly():
+    rest = RestCost()
+    rest.add(line(segmentation=10, tracking=5, classification=50))
+    assert rest.ms == pytest.approx(15)
+    rest.add(line(segmentation=30))
+    assert rest.ms == pytest.approx(30)
+    rest.add(line(segmentation=10))
+    assert 28 < rest.ms < 30
+    for _ in range(200):
+        rest.add(line(segmentation=10))
+    assert rest.ms == pytest.approx(10, rel=0.01)

@@ -1,0 +1,90 @@
+"""The run directory of a service: half-made ones are no obstacle, old ones go, nothing else is touched."""
+
+import pytest
+
+from modt.errors import MisuseError, ModtError
+from modt.sinks.service_directory import MARK, STATUS, ServiceDirectory
+
+OURS = f"schema: modt.run/1\n{MARK}\n"
+
+
+def begun(path, limit_bytes=1e9):
+    directory = ServiceDirectory(path)
+    directory.begin(OURS, limit_bytes)
+    return directory
+
+
+def fill(path, size=1000):
+    (path / "tracks.jsonl").write_bytes(b"x" * size)
+
+
+def names(folder):
+    return sorted(p.name for p in folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    "left", [[], [".run.yaml.part"], ["run.yaml"], ["run.yaml", "status.json"], [".status.json.part"]]
+)
+def test_a_half_made_directory_is_made_anew(tmp_path, left):
+    run = tmp_path / "run"
+    run.mkdir()
+    for name in left:
+        (run / name).write_text("half")
+    begun(run)
+    assert names(tmp_path) == ["run"]
+    assert names(run) == ["run.yaml"]
+    assert (run / "run.yaml").read_text() == OURS
+
+
+def test_each_part_is_kept_under_the_next_number(tmp_path):
+    for k in range(4):
+        fill(begun(tmp_path / "run").path, 10 + k)
+    assert names(tmp_path) == ["run", "run~1", "run~2", "run~3"]
+    assert (tmp_path / "run~1" / "tracks.jsonl").stat().st_size == 10
+    assert not (tmp_path / "run~1" / STATUS).exists()
+
+
+def test_the_oldest_parts_go_first_and_numbers_go_on(tmp_path):
+    for _ in range(6):
+        fill(begun(tmp_path / "run", 2500).path)
+    assert names(tmp_path) == ["run", "run~4", "run~5"]
+
+
+def test_numbers_beyond_nine_are_older_than_those_after(tmp_path):
+    for _ in range(13):
+        fill(begun(tmp_path / "run", 2500).path)
+    assert names(tmp_path) == ["run", "run~11", "run~12"]
+
+
+def test_nothing_but_records_of_a_service_is_deleted(tmp_path):
+    replay, notes, foreign = tmp_path / "run~1", tmp_path / "run~2", tmp_path / "run~3"
+    for folder in (replay, notes, foreign):
+        folder.mkdir()
+        fill(folder, 5000)
+    (replay / "run.yaml").write_text("schema: modt.run/1\ncommand: [modt, replay]\n")
+    (foreign / "run.yaml").write_text(OURS)
+    (foreign / "thesis.tex").write_text("mine")
+    begun(tmp_path / "run", 0.0)
+    assert names(tmp_path) == ["run", "run~1", "run~2", "run~3"]
+    assert (replay / "tracks.jsonl").stat().st_size == 5000
+    assert (notes / "tracks.jsonl").stat().st_size == 5000
+    assert names(foreign) == ["thesis.tex"]
+
+
+@pytest.mark.parametrize("kind", ["file", "foreign"])
+def test_a_path_that_is_no_run_is_refused(tmp_path, kind):
+    out = tmp_path / "out"
+    if kind == "file":
+        out.write_text("mine")
+    else:
+        out.mkdir()
+        (out / "thesis.tex").write_text("mine")
+    with pytest.raises(MisuseError):
+        ServiceDirectory(out)
+
+
+def test_a_directory_that_cannot_be_made_is_an_error_of_the_disk(tmp_path):
+    (tmp_path / "file").write_text("")
+    directory = ServiceDirectory(tmp_path / "file" / "run")
+    with pytest.raises(ModtError, match="cannot be written"):
+        directory.begin(OURS, 1e9)

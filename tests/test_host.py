@@ -1,0 +1,50 @@
+"""Cores of the loop and of what serves it."""
+
+import os
+import threading
+
+import pytest
+
+from modt import host
+
+
+@pytest.mark.parametrize(
+    ("text", "cores"), [("", set()), ("\n", set()), ("3\n", {3}), ("0-2,5\n", {0, 1, 2, 5}), ("1,3-4", {1, 3, 4})]
+)
+def test_lists_of_cores_of_the_kernel(text, cores):
+    assert host.core_list(text) == cores
+
+
+def test_threads_begun_elsewhere_stay_there_and_the_loop_where_it_is():
+    allowed = os.sched_getaffinity(0)
+    if len(allowed) < 2:
+        pytest.skip("one core only")
+    loop = max(allowed)
+    others = host.other_cores(loop)
+    assert others == allowed - {loop}
+    assert host.other_cores(None) is None
+    seen = []
+    try:
+        os.sched_setaffinity(0, {loop})
+        assert host.other_cores(loop) is None
+        with host.elsewhere(others):
+            thread = threading.Thread(target=lambda: seen.append(os.sched_getaffinity(0)))
+            thread.start()
+            thread.join()
+        assert os.sched_getaffinity(0) == {loop}
+    finally:
+        os.sched_setaffinity(0, allowed)
+    assert seen == [others]
+
+
+def test_what_is_not_permitted_has_a_remedy(monkeypatch):
+    def refuse(*_):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: os.SCHED_OTHER)
+    monkeypatch.setattr(host.os, "sched_setscheduler", refuse)
+    monkeypatch.setattr(host.sys, "setswitchinterval", lambda _: None)
+    monkeypatch.setattr(host, "_lock_memory", lambda: "the limit of locked memory is finite")
+    lacking = host.be_punctual()
+    assert len(lacking) == 2
+    assert all("; " in what for what in lacking)

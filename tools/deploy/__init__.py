@@ -1,0 +1,1 @@
+"""Installation of the service, and proofs of it."""

@@ -1,0 +1,122 @@
+"""Proves the unit under a real systemd: in namespaces of its own, on a copy of this system that is then forgotten.
+
+    sudo python -m tools.deploy.proof
+
+The unit is installed, started on a recording, reloaded, hung, killed and stopped; a probe in the same sandbox tries
+what it must not be able to do. Prints a line a step; the exit status is 0 if all went well. Needs root and systemd.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import time
+from pathlib import Path
+
+from modt.sources.synthetic_stream import SyntheticStream
+from tools.deploy.install import main as install
+from tools.deploy.proof_steps import END
+from tools.options import parser
+
+ROOT = Path(__file__).resolve().parents[2]
+STEPS = Path(__file__).with_name("proof_steps.py")
+SCANS, PROFILE = "srv/modt/scans", "srv/modt/robot.yaml"
+PYTHON, LIBRARIES, PACKAGE = "/opt/modt/python", "/opt/modt/libraries", "/opt/modt/package"
+"""Where the interpreter, its libraries and this checkout are seen: a home would be hidden from the unit."""
+INTERPRETER = f"{PYTHON}/bin/python{sys.version_info.major}.{sys.version_info.minor}"
+TARGET = """
+[Unit]
+Requires=proof.service basic.target
+After=basic.target
+AllowIsolate=yes
+"""
+DRIVER = """
+[Unit]
+DefaultDependencies=no
+After=basic.target
+[Service]
+Type=oneshot
+ExecStart={python} {steps} /srv/modt/report
+"""
+BOOT = """
+set -e
+mount --make-rprivate /
+mount -t tmpfs tmpfs {work}
+mkdir {work}/upper {work}/work {work}/root
+mount -t overlay overlay -o lowerdir={lower},upperdir={work}/upper,workdir={work}/work {work}/root
+cd {work}/root
+cp -a {prepared}/. .
+mkdir -p proc sys dev run tmp
+mount -t proc proc proc
+mount -t sysfs sysfs sys
+mount -t cgroup2 cgroup2 sys/fs/cgroup
+mount --rbind /dev dev
+mount -t tmpfs tmpfs run
+mount -t tmpfs tmpfs tmp
+mkdir -p srv/modt/report
+mount --bind {report} srv/modt/report
+{shared}
+container=lxc exec chroot . /lib/systemd/systemd --unit=proof.target --show-status=no
+"""
+
+
+def prepare(root: Path) -> None:
+    """Files of the copy: the unit as it is installed, a program, a recording, and what drives the proof."""
+    source = f"/{SCANS}?loop=yes"
+    install(["--root", str(root), "--source", source, "--options", f"--profile /{PROFILE}"])
+    scans = root / SCANS
+    scans.mkdir(parents=True)
+    for frame in SyntheticStream("street", "vlp-16", 1.5, 0):
+        frame.points.tofile(scans / f"{frame.index:06d}.bin")
+    shutil.copy(ROOT / "profiles" / "vlp-16.yaml", root / PROFILE)
+    shutil.copy(STEPS, root / "srv/modt/steps.py")
+    program = root / "opt/modt/bin/modt"
+    program.parent.mkdir(parents=True)
+    path = f"{PACKAGE}/runtime:{LIBRARIES}"
+    program.write_text(f'#!/bin/sh\nPYTHONPATH={path} exec {INTERPRETER} -m modt.cli.main "$@"\n')
+    program.chmod(0o755)
+    units = root / "etc/systemd/system"
+    (units / "proof.target").write_text(TARGET)
+    (units / "proof.service").write_text(DRIVER.format(python=INTERPRETER, steps="/srv/modt/steps.py"))
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options = parser(__doc__)
+    options.add_argument("--timeout", type=float, default=120.0, help="in seconds (default: %(default)s)")
+    given = options.parse_args(arguments)
+    if os.geteuid() or shutil.which("systemctl") is None:
+        raise SystemExit("proof: needs root and systemd")
+    with tempfile.TemporaryDirectory() as folder:
+        base = Path(folder)
+        for name in ("prepared", "report", "work"):
+            (base / name).mkdir()
+        prepare(base / "prepared")
+        mounts = {PYTHON: Path(sys.base_prefix).resolve(), LIBRARIES: sysconfig.get_path("purelib"), PACKAGE: ROOT}
+        shared = "\n".join(f"mkdir -p .{place}; mount --rbind {path} .{place}" for place, path in mounts.items())
+        script = BOOT.format(
+            lower="/", work=base / "work", prepared=base / "prepared", report=base / "report", shared=shared
+        )
+        (base / "boot.sh").write_text(script)
+        namespaces = ["--mount", "--pid", "--fork", "--kill-child", "--ipc", "--uts", "--cgroup", "--net"]
+        command = ["unshare", *namespaces, "sh", str(base / "boot.sh")]
+        report, end_s, text = base / "report" / "report.txt", time.monotonic() + given.timeout, ""
+        system = subprocess.Popen(command, stdout=subprocess.DEVNULL)
+        try:
+            while time.monotonic() < end_s and system.poll() is None and not text.endswith(END):
+                time.sleep(0.2)
+                text = report.read_text() if report.exists() else ""
+        finally:
+            system.kill()  # and by --kill-child all that it has begun
+            system.wait()
+    print(text.removesuffix(END), end="")
+    whole = text.endswith(END)
+    print("verdict: " + ("good" if whole and "fail " not in text else "bad" if whole else "did not come to its end"))
+    return int(not whole or "fail " in text)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

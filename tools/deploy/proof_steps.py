@@ -1,0 +1,173 @@
+"""The steps of tools.deploy.proof, run by systemd inside the copy of the system; needs nothing but Python."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+UNIT = "modt.service"
+PROFILE = Path("/srv/modt/robot.yaml")
+END = "end\n"
+RECORDS = Path("/var/lib/modt/run")
+PROBE = """
+import ctypes, json, os, socket
+def tried(what):
+    try:
+        what()
+    except OSError as error:
+        return error.strerror
+    return "done"
+libc = ctypes.CDLL(None, use_errno=True)
+def call(name, *arguments):
+    if getattr(libc, name)(*arguments) < 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+tries = {
+    "write to /etc": lambda: open("/etc/modt-probe", "w"),
+    "write to /usr": lambda: open("/usr/modt-probe", "w"),
+    "look into /root": lambda: os.listdir("/root"),
+    "open an internet socket": lambda: socket.socket(socket.AF_INET, socket.SOCK_DGRAM).close(),
+    "become root": lambda: os.setuid(0),
+    "make a namespace": lambda: call("unshare", 0x10000000),
+    "mount": lambda: call("mount", b"none", b"/tmp", b"tmpfs", 0, None),
+    "trace a process": lambda: call("ptrace", 16, 1, 0, 0),
+    "set the clock": lambda: call("clock_settime", 0, ctypes.create_string_buffer(16)),
+    "see other processes": lambda: os.stat("/proc/1/cmdline"),
+    "write its state": lambda: open(os.environ["STATE_DIRECTORY"] + "/probe", "w").close(),
+}
+print(json.dumps({name: tried(what) for name, what in tries.items()}))
+"""
+ALLOWED = "write its state"
+
+
+class Report:
+    """A line a step, on disk at once."""
+
+    def __init__(self, folder: Path) -> None:
+        self._path = folder / "report.txt"
+
+    def say(self, what: str, good: bool, figure: str = "") -> None:
+        """Add a line."""
+        with self._path.open("a") as file:
+            file.write(f"{'ok' if good else 'fail':<5} {what}{': ' if figure else ''}{figure}\n")
+
+
+def systemctl(*arguments: str) -> str:
+    """Output of systemctl."""
+    return subprocess.run(["systemctl", *arguments], capture_output=True, text=True, check=False).stdout.strip()
+
+
+def shown(name: str) -> str:
+    """A property of the unit."""
+    return systemctl("show", UNIT, f"--property={name}", "--value")
+
+
+def until(holds: Callable[[], bool], seconds: float) -> float | None:
+    """Seconds until something holds, None if it does not in time."""
+    begin_s = time.monotonic()
+    while time.monotonic() - begin_s < seconds:
+        if holds():
+            return time.monotonic() - begin_s
+        time.sleep(0.02)
+    return None
+
+
+def figure(seconds: float | None) -> str:
+    """Text of a time."""
+    return "never" if seconds is None else f"{seconds:.2f} s"
+
+
+def active() -> bool:
+    """Whether the unit is up."""
+    return shown("ActiveState") == "active" and shown("SubState") == "running"
+
+
+def restarted(before: str) -> bool:
+    """Whether another process is up, and has recorded some frames."""
+    try:
+        status = json.loads((RECORDS / "status.json").read_text())
+    except (OSError, ValueError):
+        return False
+    pid = shown("MainPID")
+    return active() and pid != before and str(status["pid"]) == pid and status["counts"]["frames"] > 5
+
+
+def reload(text: str) -> str:
+    """Reload with a profile; the last lines of the journal of the unit."""
+    PROFILE.write_text(text)
+    systemctl("reload", UNIT)
+    until(lambda: active() and shown("SubState") == "running", 5.0)
+    time.sleep(1.5)
+    return str(json.loads((RECORDS / "status.json").read_text())["loop"])
+
+
+def steps(folder: Path) -> None:
+    """All steps in order."""
+    report, profile = Report(folder), PROFILE.read_text()
+    begin_s = time.monotonic()
+    systemctl("start", UNIT)
+    ready_s = time.monotonic() - begin_s
+    report.say("starts, and notifies that it is ready", active(), figure(ready_s))
+    took_s = until(lambda: "Hz" in shown("StatusText"), 10.0)
+    report.say("reports its status", took_s is not None, shown("StatusText"))
+    pid = shown("MainPID")
+    status = Path(f"/proc/{pid}/status").read_text()
+    fields = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
+    report.say("runs as a user of its own", not fields["Uid"].startswith("0\t"), fields["Uid"])
+    report.say("runs with a filter of system calls", fields["Seccomp"] == "2")
+    report.say("runs at real-time priority", os.sched_getscheduler(int(pid)) & 7 == os.SCHED_FIFO)
+    permitted = resource.getrlimit(resource.RLIMIT_MEMLOCK)[1] == resource.RLIM_INFINITY
+    locked = fields["VmLck"].strip() if permitted else "not permitted to this copy of the system"
+    report.say("keeps its memory", locked != "0 kB", locked)
+    said = reload(profile + "\nscheduler: {calls_per_frame: 3}\n")
+    report.say("reloads a profile", "'reloads': 1" in said and shown("MainPID") == pid)
+    said = reload(profile + "\nscheduler: {calls_per_fraem: 3}\n")
+    report.say("refuses an invalid profile", "'refused_reloads': 1" in said and shown("MainPID") == pid)
+    PROFILE.write_text(profile)
+    os.kill(int(pid), signal.SIGSTOP)
+    took_s = until(lambda: restarted(pid), 40.0)
+    report.say("is killed when it hangs, and comes back", took_s is not None, figure(took_s))
+    pid = shown("MainPID")
+    os.kill(int(pid), signal.SIGKILL)
+    took_s = until(lambda: restarted(pid), 10.0)
+    report.say("comes back after kill -9", took_s is not None, figure(took_s))
+    kept = sorted(path.name for path in RECORDS.resolve().parent.iterdir())
+    report.say("keeps the records of all three", {"run", "run~1", "run~2"} <= set(kept), " ".join(kept))
+    begin_s = time.monotonic()
+    systemctl("stop", UNIT)
+    stop_s = time.monotonic() - begin_s
+    report.say("stops within a second", stop_s < 1.0 and shown("Result") == "success", figure(stop_s))
+    probe(report)
+    with (folder / "report.txt").open("a") as file:
+        file.write(END)
+
+
+def probe(report: Report) -> None:
+    """What a process can do in the sandbox of the unit."""
+    Path("/srv/modt/probe.py").write_text(PROBE)
+    drop_in = Path(f"/run/systemd/system/{UNIT}.d/probe.conf")
+    drop_in.parent.mkdir(parents=True)
+    out = Path("/var/lib/modt-probe.json")
+    drop_in.write_text(
+        f"[Service]\nType=oneshot\nRestart=no\nExecStart=\nExecStart={sys.executable} /srv/modt/probe.py\n"
+        f"StandardOutput=file:{out}\n"
+    )
+    systemctl("daemon-reload")
+    systemctl("start", UNIT)
+    for name, outcome in json.loads(out.read_text() or "{}").items():
+        permitted = outcome == "done"
+        report.say(f"sandbox: {name}", permitted == (name == ALLOWED), outcome)
+
+
+if __name__ == "__main__":
+    try:
+        steps(Path(sys.argv[1]))
+    except Exception as error:
+        journal = subprocess.run(["journalctl", "-u", UNIT, "-n", "30"], capture_output=True, text=True, check=False)
+        Report(Path(sys.argv[1])).say(f"{error!r}\n{journal.stdout}", False)

@@ -1,0 +1,220 @@
+"""Runs a recording as a live source under faults by seed, and ends with figures and a verdict.
+
+    python -m tools.deploy.soak DRIVE --minutes 30 --seed 1
+
+Every fault must be told by its counter and be recovered from; between faults no deadline may be missed; memory stays
+flat. The exit status is 0 if all this holds. `--fifo` takes the priority of a service, and gives hogs a higher one.
+"""
+
+from __future__ import annotations
+
+import logging
+import resource
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from modt import host
+from modt.cli import metering
+from modt.cli.assemble import Request, stream
+from modt.cli.live_session import LiveSession
+from modt.reporting.log_histogram import LogHistogram
+from modt.service.ladder import Step
+from modt.service.live_loop import NamedSink
+from modt.sinks.output import Health
+from modt.sources.live.live_stream import LiveStream
+from modt.sources.live.played_reader import PlayedReader
+from modt.sources.live.sweep_reader import StreamEndedError, Sweep
+from modt.supervisor import NoSupervisor
+from modt.types import FrameResult
+from tools.deploy.faults import FAULTS, Fault, World
+from tools.options import parser
+
+WARM_UP_S, REST_S, SETTLE_S = 15.0, 4.0, 2.5
+"""Before the first fault; between two; after one, until misses count as not of its making."""
+MAX_RECOVERY_S, MAX_GROWTH = 2.0, 0.05
+
+
+@dataclass(slots=True)
+class Episode:
+    """One occurrence of a fault: when [s], what its counter said before and after, and the time to recover [s]."""
+
+    fault: Fault
+    begin_s: float
+    before: int
+    end_s: float = float("inf")
+    told: int = 0
+    recovery_s: float = float("inf")
+
+
+class Witness:
+    """A sink that notes when results come, what has been missed, and the memory."""
+
+    def __init__(self) -> None:
+        self.session: LiveSession | None = None
+        self.times_s: list[float] = []
+        self.full: list[bool] = []  # nothing was given up
+        self.missed: list[int] = []
+        self.resident_mb: list[float] = []
+
+    def write(self, result: FrameResult) -> None:
+        """Note a result."""
+        assert self.session is not None
+        loop = self.session.loop
+        self.times_s.append(time.monotonic())
+        self.full.append(loop.ladder.step is Step.ALL)
+        self.missed.append(loop.timing.missed)
+        if len(self.times_s) % 50 == 0:
+            self.resident_mb.append(host.resident_mb())
+
+    def health(self) -> Health:
+        """Nothing to report."""
+        return {}
+
+    def close(self) -> None:
+        """No effect."""
+
+
+class FaultyReader:
+    """Plays a recording for a time, with one fault after the other."""
+
+    profile = None
+
+    def __init__(self, reader: PlayedReader, world: World, seconds: float, seed: int) -> None:
+        self.reception, self._reader, self._world = reader.reception, reader, world
+        self._rng = np.random.default_rng(seed)
+        self._begin_s = self._rest_s = time.monotonic()
+        self._rest_s += WARM_UP_S
+        self._end_s = self._begin_s + seconds
+        self._waiting: list[Fault] = []
+        self.session: LiveSession | None = None
+        self.episodes: list[Episode] = []
+        self._now: Episode | None = None
+
+    def read(self, timeout_s: float) -> Sequence[Sweep]:
+        """Sweeps as the present fault has them."""
+        now_s = time.monotonic()
+        if now_s > self._end_s:
+            self._turn_off(now_s)
+            raise StreamEndedError
+        if self._now is None and self._rest_s < now_s < self._end_s - 15.0:
+            self._turn_on(now_s)
+        elif self._now is not None and now_s >= self._now.begin_s + self._now.fault.seconds:
+            self._turn_off(now_s)
+        sweeps = self._reader.read(min(timeout_s, 0.05))
+        back_s = self._world.back_s
+        sweeps = [replace(sweep, stamp_s=sweep.stamp_s - back_s, points=sweep.points.copy()) for sweep in sweeps]
+        if self._now is None:
+            return sweeps
+        return [out for sweep in sweeps for out in self._now.fault.sweeps(sweep, self._rng)]
+
+    def close(self) -> None:
+        """End the recording."""
+        self._reader.close()
+
+    def ask(self) -> None:
+        """What the counter of the last fault says now."""
+        if self.episodes and self.session is not None:
+            self.episodes[-1].told = self.episodes[-1].fault.told(self.session)
+
+    def _turn_on(self, now_s: float) -> None:
+        if not self._waiting:
+            self._waiting = [FAULTS[k] for k in self._rng.permutation(len(FAULTS))]
+        fault = self._waiting.pop()
+        assert self.session is not None
+        self.ask()
+        self._now = Episode(fault, now_s, fault.told(self.session))
+        self.episodes.append(self._now)
+        fault.switch(self._world, True)
+
+    def _turn_off(self, now_s: float) -> None:
+        if self._now is not None:
+            self._now.fault.switch(self._world, False)
+            self._now.end_s = now_s
+            self._now, self._rest_s = None, now_s + REST_S + float(self._rng.uniform(0, 2))
+
+
+def judge(witness: Witness, episodes: list[Episode], session: LiveSession) -> list[str]:
+    """Print the figures; returns what is wrong."""
+    wrong: list[str] = []
+    times_s = np.array(witness.times_s)
+    whole = times_s[np.array(witness.full)]
+    print(f"{'fault':<16}{'times':>6}{'told':>8}{'recovery':>10}  (s, worst)")
+    for fault in FAULTS:
+        own = [e for e in episodes if e.fault is fault and np.isfinite(e.end_s)]
+        for e in own:
+            after = whole[whole > e.end_s]
+            e.recovery_s = float(after[0] - e.end_s) if len(after) else float("inf")
+        worst = max((e.recovery_s for e in own), default=0.0)
+        silent = [e for e in own if e.told <= e.before]
+        print(f"{fault.name:<16}{len(own):>6}{sum(e.told - e.before for e in own):>8}{worst:>10.2f}")
+        if silent:
+            wrong.append(f"{fault.name}: no counter told of {len(silent)} of {len(own)}")
+        if worst > MAX_RECOVERY_S:
+            wrong.append(f"{fault.name}: recovery took {worst:.1f} s")
+    clear = np.ones(len(times_s), np.bool_)
+    for e in episodes:
+        clear &= (times_s < e.begin_s) | (times_s > e.end_s + SETTLE_S)
+    missed = np.diff(witness.missed, prepend=0)[clear].sum()
+    memory = np.array(witness.resident_mb)
+    third = max(len(memory) // 3, 1)
+    growth = float(np.median(memory[-third:]) / np.median(memory[third : 2 * third]) - 1) if len(memory) > 2 else 0.0
+    gaps = LogHistogram()
+    for gap_s in np.diff(times_s).tolist():
+        gaps.add(gap_s)
+    print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
+    print(f"deadlines missed between faults: {missed}; {session.loop.timing.report()}")
+    print(
+        f"memory {memory.max():.0f} MB at most, growth {100 * growth:.1f} %; recording {session.recording.health()}"
+    )
+    if missed:
+        wrong.append(f"{missed} deadlines missed between faults")
+    if growth > MAX_GROWTH:
+        wrong.append(f"memory grew by {100 * growth:.1f} %")
+    return wrong
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options = parser(__doc__)
+    options.add_argument("drive", type=Path, nargs="?", help="a recording (default: a synthetic one)")
+    options.add_argument("--minutes", type=float, default=5.0)
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--hogs", type=int, default=1, help="processes on the loop's core (default: %(default)s)")
+    options.add_argument("--profile", help="default: as modt run")
+    options.add_argument("--out", type=Path, default=Path("runs/soak"))
+    options.add_argument("--fifo", action="store_true", help="with the priority of a service")
+    given = options.parse_args(arguments)
+    logging.basicConfig(level=logging.ERROR, format="%(message)s", stream=sys.stderr)
+    core = host.last_core()
+    others = host.other_cores(core)
+    host.pin_to_core(core)
+    if given.fifo:
+        host.be_punctual()
+    world = World(core, given.hogs, fifo=given.fifo)
+    world.install()
+    metering.discovery = lambda config: world.meters(time.monotonic)  # type: ignore[attr-defined]
+    recording = stream(Request(path=given.drive))
+    reader = FaultyReader(PlayedReader(recording, loop=True), world, 60 * given.minutes, given.seed)
+    witness = Witness()
+    source = LiveStream(recording.info, reader, cores=others)
+    request = Request(profile=given.profile)
+    session = LiveSession(request, source, [NamedSink("witness", witness)], given.out, None, core, others, ["soak"])
+    witness.session = reader.session = session
+    try:
+        session.run(NoSupervisor())
+    finally:
+        world.set_hogs(False)
+    reader.ask()
+    wrong = judge(witness, reader.episodes, session)
+    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"peak memory {peak_mb:.0f} MB")
+    print("verdict: " + ("; ".join(wrong) or "good"))
+    return int(bool(wrong))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
