@@ -256,6 +256,17 @@ def test_a_reload_is_between_two_frames_and_an_invalid_one_is_refused(caplog):
     assert (loop.reloads, stages.loads) == (1, 1)
 
 
+def test_the_end_of_receiving_is_one_error_with_a_remedy():
+    loop, sensor, *_ = loop_of(1.0)
+
+    def gone(timeout_s):
+        raise OSError("network is down")
+
+    sensor.take = gone
+    with pytest.raises(ModtError, match="nothing can be received any more \\(OSError: network is down\\)"):
+        loop.run()
+
+
 def test_a_signal_ends_the_loop_though_the_sensor_is_silent():
     stop = Stop()
     loop, sensor, *_ = loop_of(100.0, stop=stop)

@@ -71,7 +71,7 @@ class LiveSession:
         self._reporting = False  # a status is being written
 
     def run(self, supervisor: Supervisor) -> dict[str, Any]:
-        """Until a signal or the end of the source; returns the summary, as written.
+        """Until a signal or the end of the source; returns the last status.
 
         Raises:
             ModtError: a failure that repeats.
@@ -118,7 +118,12 @@ class LiveSession:
             "counts": self._counts.report(now_s),
             "loop": loop_report(self.loop),
             "power": self.power.report() | {"limit_W": self.loop.ladder.power_W},
-            "sensor": self.source.health() | {"faults": self.source.faults.count, "misfits": self.stages.misfits},
+            "sensor": self.source.health()
+            | {
+                "faults": self.source.faults.count,
+                "misfits": self.stages.misfits,
+                "frames_without_reflectance": self._without_reflectance,
+            },
             "odometry": self.stages.odometry.report(),
             "sinks": {named.name: _health(named) for named in self.sinks},
             "recording": self.recording.health(),

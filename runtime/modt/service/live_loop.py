@@ -124,6 +124,11 @@ class LiveLoop:
                 received = self._source.take(WAIT_S)
             except StreamEndedError:
                 break
+            except ModtError:
+                raise
+            except Exception as error:
+                cause = f"nothing can be received any more ({type(error).__name__}: {error})"
+                raise ModtError("source", cause, "check its network interface and start again") from error
             if received is not None:
                 self._sweep(received)
             self._supervisor.alive()

@@ -22,6 +22,8 @@ log = logging.getLogger(__name__)
 KEPT = {"all": (TRACKS, LEDGER), "tracks": (TRACKS,), "ledger": (LEDGER,), "none": ()}
 PARTS = 8
 """The disk holds this many parts."""
+RESERVED_BYTES = 20_000
+"""Of a part, for run.yaml, status.json and summary.json."""
 RETRY_S = 2.0
 """Between attempts to write again after a failure."""
 
@@ -109,7 +111,7 @@ class Recording:
     def _begin(self) -> None:
         limit_bytes = 1e6 * self.config.disk_mb * (1 - 1 / PARTS)
         self._begun = self._attempt(lambda: self.directory.begin(self._describe(), limit_bytes))
-        self._bytes, self.parts = 0, self.parts + self._begun
+        self._bytes, self.parts = RESERVED_BYTES, self.parts + self._begun
 
     def _redescribe(self) -> None:
         if self._begun:
