@@ -21,7 +21,7 @@ from modt.service.live_loop import LiveLoop, NamedSink
 from modt.service.power import Power
 from modt.service.prometheus import write_metrics
 from modt.service.status import SCHEMA, Counts, loop_report, one_line
-from modt.sinks.background import Background
+from modt.sinks.job_thread import JobThread
 from modt.sinks.recording import Recording
 from modt.sinks.run_directory import SUMMARY
 from modt.sinks.service_directory import STATUS, ServiceDirectory
@@ -79,8 +79,8 @@ class LiveSession:
         self._followed = self.stages.parts
         config = self._followed.config
         with host.elsewhere(self._cores):
-            self._background = Background()
-        self.recording = Recording(self.directory, config.recording, self._background, self._description)
+            self._writer = JobThread()
+        self.recording = Recording(self.directory, config.recording, self._writer, self._description)
         energy = config.energy
         self._windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
         sinks = [*self.sinks, NamedSink("recording", self.recording)]
@@ -157,7 +157,7 @@ class LiveSession:
         status = self.status()
         supervisor.status(one_line(status))
         if not self._reporting:
-            self._reporting = self._background.submit(lambda: self._write(status))
+            self._reporting = self._writer.submit(lambda: self._write(status))
 
     def _write(self, status: dict[str, Any]) -> None:
         try:
@@ -178,10 +178,10 @@ class LiveSession:
         self.recording.ledger(self._windows.close())
         status = self.status()
         summary = self._summary.result() | {"run": _run(status), "status": status}
-        self._background.submit(self.recording.finish)
-        self._background.submit(lambda: self._write(status))
-        self._background.submit(lambda: self.directory.write(SUMMARY, json.dumps(summary, indent=2) + "\n"))
-        self._background.close()
+        self._writer.submit(self.recording.finish)
+        self._writer.submit(lambda: self._write(status))
+        self._writer.submit(lambda: self.directory.write(SUMMARY, json.dumps(summary, indent=2) + "\n"))
+        self._writer.close()
 
 
 def _run(status: dict[str, Any]) -> dict[str, Any]:

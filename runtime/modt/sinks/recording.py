@@ -9,7 +9,7 @@ from typing import Any
 
 from modt.config import RecordingConfig
 from modt.errors import ModtError
-from modt.sinks.background import Background
+from modt.sinks.job_thread import JobThread
 from modt.sinks.output import LineFile
 from modt.sinks.records import line
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
@@ -34,7 +34,7 @@ class Recording:
     Args:
         directory: where they go.
         config: what is kept.
-        background: the thread that writes; `write` and `ledger` are called by the loop, all else by that thread.
+        writer: the thread that writes; `write` and `ledger` are called by the loop, all else by that thread.
         describe: text of run.yaml for a new part.
     """
 
@@ -42,7 +42,7 @@ class Recording:
         self,
         directory: ServiceDirectory,
         config: RecordingConfig,
-        background: Background,
+        writer: JobThread,
         describe: Callable[[], str],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -50,10 +50,10 @@ class Recording:
         self.lines = self.lost = self.pauses = self.parts = 0
         self._refused = 0  # lines, counted by the loop; all others by the writing thread
         self.cause: str | None = None  # why nothing can be written now
-        self._background, self._describe, self._clock = background, describe, clock
+        self._writer, self._describe, self._clock = writer, describe, clock
         self._files: dict[str, LineFile[str]] = {}
         self._begun, self._bytes, self._retry_s = False, 0, float("-inf")
-        background.submit(self._begin)
+        writer.submit(self._begin)
 
     def write(self, result: FrameResult) -> None:
         """Hand over the line of a frame."""
@@ -68,7 +68,7 @@ class Recording:
     def follow(self, config: RecordingConfig) -> None:
         """Keep what another profile says, and describe it."""
         self.config = config
-        self._background.submit(self._redescribe)
+        self._writer.submit(self._redescribe)
 
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
@@ -90,7 +90,7 @@ class Recording:
             file.close()
 
     def _submit(self, name: str, text: str) -> None:
-        if not self._background.submit(lambda: self._append(name, text)):
+        if not self._writer.submit(lambda: self._append(name, text)):
             self._refused += 1
 
     def _append(self, name: str, text: str) -> None:

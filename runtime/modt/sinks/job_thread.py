@@ -14,7 +14,7 @@ CAPACITY = 128
 Job = Callable[[], None]
 
 
-class Background:
+class JobThread:
     """Runs jobs in their order; a job that does not fit into the queue is refused.
 
     Attributes:

@@ -2,7 +2,7 @@
 
 import threading
 
-from modt.sinks.background import Background
+from modt.sinks.job_thread import JobThread
 
 
 def test_jobs_run_in_their_order_on_another_thread():
@@ -12,7 +12,7 @@ def test_jobs_run_in_their_order_on_another_thread():
         done.append(k)
         threads.add(threading.get_ident())
 
-    background = Background()
+    background = JobThread()
     for k in range(100):
         assert background.submit(lambda k=k: job(k))
     assert background.close(5.0)
@@ -22,7 +22,7 @@ def test_jobs_run_in_their_order_on_another_thread():
 
 def test_a_full_queue_refuses_and_counts():
     held, begun = threading.Event(), threading.Event()
-    background = Background(capacity=2)
+    background = JobThread(capacity=2)
     background.submit(lambda: (begun.set(), held.wait(5.0)))
     assert begun.wait(5.0)
     assert [background.submit(lambda: None) for _ in range(4)] == [True, True, False, False]
@@ -33,7 +33,7 @@ def test_a_full_queue_refuses_and_counts():
 
 
 def test_a_job_that_fails_does_not_end_the_thread(caplog):
-    done, background = [], Background()
+    done, background = [], JobThread()
     for job in (lambda: 1 / 0, lambda: 1 / 0, lambda: done.append(1)):
         background.submit(job)
     assert background.close(5.0)
