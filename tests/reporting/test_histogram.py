@@ -33,6 +33,15 @@ def test_a_short_run_is_exact(values):
         assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1e-12)
 
 
+def test_without_exact_values_the_error_is_the_stated_one_from_the_start():
+    values, spread = long_run(1, 500), Histogram(max_exact=0)
+    for value in values:
+        spread.add(value)
+    assert len(spread) < len(set(values))
+    for share in QUANTILES:
+        assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1 / 128)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_quantiles_of_many_values_are_within_the_stated_error(seed):
     values = long_run(seed)

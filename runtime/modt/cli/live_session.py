@@ -66,7 +66,7 @@ class LiveSession:
         self.directory = ServiceDirectory(out)
         self.stop = Stop()
         self._cores, self._command, self._lacking = cores, command, list(lacking)
-        self._summary, self.power = Summary(), Power()
+        self._summary, self.power = Summary(max_exact=0), Power()
         self._began_s = time.monotonic()
         self._counts = Counts(self._began_s)
         self._without_reflectance = 0

@@ -7,7 +7,7 @@ from collections import Counter
 import numpy as np
 
 MAX_EXACT = 4096
-"""Distinct values held exactly."""
+"""Distinct values held exactly by default."""
 _BITS = 8
 """Leading bits held of each value beyond that."""
 
@@ -15,13 +15,14 @@ _BITS = 8
 class Histogram:
     """Count, sum, maximum and quantiles of non-negative integers.
 
-    Count, sum and maximum are exact. Quantiles are exact up to MAX_EXACT distinct values; then each value is replaced
-    by the middle of those that share its _BITS leading bits, an error below 1 / 256. Integers of 63 bits have fewer
-    than 8,000 such middles, which bounds the memory.
+    Count, sum and maximum are exact. Quantiles are exact up to `max_exact` distinct values; then each value is
+    replaced by the middle of those that share its _BITS leading bits, an error below 1 / 256. Integers of 63 bits have
+    fewer than 8,000 such middles, which bounds the memory.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, max_exact: int = MAX_EXACT) -> None:
         self.count = self.total = self.maximum = 0
+        self._max_exact = max_exact
         self._occurrences: Counter[int] = Counter()
         self._exact = True
 
@@ -35,7 +36,7 @@ class Histogram:
         self.total += value
         self.maximum = max(self.maximum, value)
         self._occurrences[value if self._exact else bucket_middle(value)] += 1
-        if len(self) > MAX_EXACT and self._exact:
+        if self._exact and len(self) > self._max_exact:
             self._exact = False
             exact, self._occurrences = self._occurrences, Counter()
             for each, occurrences in exact.items():
