@@ -15,8 +15,9 @@ from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import NONE, UNLIMITED
 
 
-class Described:
+class Source:
     info = SyntheticStream("street", "vlp-16", 2.0, 0).info
+    profile = None
 
 
 @cache
@@ -25,7 +26,7 @@ def frames():
 
 
 def stages_of(**request):
-    return LiveStages(Request(**{"profile": "vlp-16", **request}), Described())
+    return LiveStages(Request(**{"profile": ("vlp-16",), **request}), Source())
 
 
 CALLS = ("segmenter.segment", "odometry.locate", "tracker.follow", "fusion.asks", "scheduler.select")
@@ -123,8 +124,8 @@ def test_without_a_profile_the_first_sweep_decides(caplog):
 
 
 def test_a_profile_that_the_source_names_is_the_base_of_what_is_found():
-    stages = LiveStages(Request(), Described())
-    stages._stream = type("Named", (), {"info": type("Info", (), {"profile": "vlp-16", "period_s": 0.1})})()
+    stages = LiveStages(Request(), Source())
+    stages._stream = type("Named", (Source,), {"profile": "vlp-16"})()
     stages.step(frames()[0], UNLIMITED, reduced=False)
     assert stages.parts.config.sensor.elevation_step_deg == profile.load("vlp-16").sensor.elevation_step_deg
 
