@@ -16,8 +16,8 @@ class Histogram:
     """Count, sum, maximum and quantiles of non-negative integers.
 
     Count, sum and maximum are exact. Quantiles are exact up to `max_exact` distinct values; then each value is
-    replaced by the middle of those that share its _BITS leading bits, an error below 1 / 256. Integers of 63 bits have
-    fewer than 8,000 such middles, which bounds the memory.
+    replaced by the middle of those that share its _BITS leading bits, an error below 1 / 256. Integers of 63 bits
+    have fewer than 8,000 such middles, which bounds the memory.
     """
 
     def __init__(self, max_exact: int = MAX_EXACT) -> None:
