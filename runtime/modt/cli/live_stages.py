@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from modt import host
 from modt.cli import assemble
 from modt.cli.parts import Parts, pipeline_of
 from modt.config import ProfileConfig
@@ -121,6 +122,7 @@ class LiveStages:
     def _exchange(self, parts: Parts) -> None:
         continue_from(self.parts.pipeline, parts.pipeline)
         self.parts = parts
+        host.release_freed_pages()
 
 
 def continue_from(old: Pipeline, new: Pipeline) -> None:
