@@ -200,3 +200,16 @@ def test_check_says_what_is_lacking_here_and_fails_without_a_sensor(scans, tmp_p
     lost = modt("check", tmp_path / "nowhere", cwd=tmp_path)
     assert lost.returncode == 1
     assert "fail  sensor" in lost.stdout
+
+
+def test_a_power_limit_is_kept_and_named_an_estimate_where_it_is_one(scans, tmp_path):
+    own = tmp_path / "robot.yaml"
+    text = profile.to_yaml(profile.dump(profile.load("vlp-16")))
+    own.write_text(text.replace("power_W: null", "power_W: 0.5").replace("min_s: 1.0", "min_s: 0.2"))
+    done = modt("run", scans, "--profile", own, "--out", tmp_path / "run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    status = json.loads((tmp_path / "run" / "status.json").read_text())
+    if status["power"]["kind"] == "estimated":
+        assert "loop.power_W is kept by the model" in done.stderr
+    assert status["loop"]["steps_entered"]["deferred"] >= 1  # the board idles at 3 W
+    assert "more power than the limit" in done.stderr

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import time
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from modt import host, profile
 from modt.cli import assemble, metering
 from modt.cli.live_stages import LiveStages
 from modt.cli.parts import Parts
+from modt.energy.meters.meter import Kind
 from modt.loop import Stop
 from modt.reporting.summary import Summary
 from modt.service.ladder import Ladder
@@ -30,6 +32,8 @@ from modt.sinks.service_directory import STATUS, ServiceDirectory
 from modt.sources.live.live_stream import LiveStream
 from modt.supervisor import Supervisor
 from modt.types import FrameResult
+
+log = logging.getLogger(__name__)
 
 
 class LiveSession:
@@ -84,7 +88,10 @@ class LiveSession:
             self._writer = JobThread()
         self.recording = Recording(self.directory, config.recording, self._writer, self._description)
         energy = config.energy
-        self._windows = metering.windows(metering.discovery(energy).best.meters, self.core, energy.windows)
+        meter = metering.discovery(energy).best
+        self._windows = metering.windows(meter.meters, self.core, energy.windows)
+        if config.loop.power_W is not None and meter.facts is not None and meter.facts.kind is Kind.ESTIMATED:
+            log.warning("loop.power_W is kept by the %s: an estimate, as no meter can be read", meter.name)
         sinks = [*self.sinks, NamedSink("recording", self.recording)]
         self.loop = LiveLoop(
             self.source,

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from modt import host
 from modt.cli import assemble
 from modt.cli.chosen_profile import ChosenProfile, choose
 from modt.cli.parts import Parts, pipeline_of
@@ -129,6 +130,7 @@ class LiveStages:
     def _exchange(self, parts: Parts) -> None:
         continue_from(self.parts.pipeline, parts.pipeline)
         self.parts = parts
+        host.release_freed_pages()
 
 
 def continue_from(old: Pipeline, new: Pipeline) -> None:

@@ -7,7 +7,7 @@ from enum import Enum, IntEnum
 
 from modt.types import Budget
 
-CALM_S = 0.8
+CALM_S = 0.7
 """Slack after which something is taken back: within a second, at 10 Hz, the result is a better one."""
 BUSY_SHARE, AMPLE_SHARE = 0.8, 0.5
 """Of the period between arrival and result: below it there is slack; slack for everything at once."""
