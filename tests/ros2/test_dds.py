@@ -81,7 +81,7 @@ def test_the_threads_of_a_domain_run_where_they_are_told():
     before = threads()
     joined = dds.participant(NEAR - 1, frozenset(allowed[:1]))
     begun = threads() - before
-    assert {"recv", "tev"} <= {(Path("/proc/self/task") / thread / "comm").read_text().strip() for thread in begun}
+    until(lambda: {"recv", "tev"} <= {(Path("/proc/self/task") / t / "comm").read_text().strip() for t in begun})
     assert {frozenset(os.sched_getaffinity(int(thread))) for thread in begun} == {frozenset(allowed[:1])}
     assert sorted(os.sched_getaffinity(0)) == allowed
     assert dds.participant(NEAR - 1) is joined

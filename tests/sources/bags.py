@@ -17,7 +17,7 @@ Recorded = list[tuple[str, str, float, bytes]]
 
 
 def write_rosbag2(path: Path, recorded: Recorded) -> Path:
-    writer = pytest.importorskip("rosbags.rosbag2").Writer(path)
+    writer = pytest.importorskip("rosbags.rosbag2").Writer(path, version=8)
     with writer as bag:
         connections = {}
         for topic, kind, recorded_s, data in recorded:

@@ -32,6 +32,8 @@ from modt.energy.ledger import Ledger
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
 from modt.reporting.run_report import run_tree
+from modt.segmentation.point_columns import PointColumns
+from modt.segmentation.sensor_height import HeightEstimator
 from modt.service.ladder import Ladder
 from modt.sinks.recording import Recording
 from modt.sinks.service_directory import MARK, ServiceDirectory
@@ -89,6 +91,12 @@ def long_street(config: ProfileConfig, _folder: Path) -> str:
 
 def unknown_height(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "sensor.height_m", None))
+
+
+def heights(config: ProfileConfig, _folder: Path) -> str:
+    """Estimates of the sensor's height, frame by frame."""
+    estimator = HeightEstimator(config.sensor, config.segmentation)
+    return str([estimator.height_m(PointColumns.from_array(frame.points)) for frame in frames(3, 1.0)])
 
 
 def no_ground(config: ProfileConfig, _folder: Path) -> str:
@@ -266,6 +274,7 @@ RARE: dict[str, Scenario] = {
     "recording.": recorded,
     "sensor.blind_sectors_deg": far_blind,
     "segmentation.ground.start_m": long_street,
+    "segmentation.sensor_height.sweeps": heights,
     "segmentation.person_splitting.min_gap_columns": long_street,
     "segmentation.car_merging.min_person_top_m": long_street,
     "tracking.split.": long_street,
