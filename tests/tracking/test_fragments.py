@@ -115,18 +115,16 @@ def test_parts_that_are_longer_than_their_class_together_are_not_one_object(leng
 
 
 @pytest.mark.parametrize(
-    ("older_class", "younger_class", "final", "swapped"),
+    ("older_class", "younger_class", "swapped"),
     [
-        (CAR, CAR, True, True),
-        (BACKGROUND, CAR, True, True),  # background and cars are easily confused
-        (CAR, PEDESTRIAN, True, False),
-        (CAR, PEDESTRIAN, False, True),  # it is not final that it is a pedestrian
-        (BACKGROUND, PEDESTRIAN, True, False),
+        (CAR, CAR, True),
+        (BACKGROUND, CAR, True),  # background and cars are easily confused
+        (CAR, PEDESTRIAN, False),
+        (BACKGROUND, PEDESTRIAN, False),
     ],
 )
-def test_parts_of_different_classes_are_not_one_object(older_class, younger_class, final, swapped):
+def test_parts_of_different_classes_are_not_one_object(older_class, younger_class, swapped):
     tracks = tracks_at([WHOLE, FRONT], older_class, younger_class)
-    tracks.final[1] = final
     assert (reunited(tracks, [REAR, FRONT], [0, 1], (40, 80))[0] == [1, 0]) == swapped
 
 

@@ -72,11 +72,10 @@ def test_the_match_of_a_part_is_dropped_and_proposals_are_renumbered():
     [
         (BACKGROUND, {}, "it is no car"),
         (PEDESTRIAN, {}, "it is no car"),
-        (CAR, {"final": False}, "its class is not final"),
         (CAR, {"hits": 3}, "it was seen too few times"),
     ],
 )
-def test_only_established_cars_with_a_final_class_merge(object_class, columns, why):
+def test_only_established_cars_merge(object_class, columns, why):
     groups, _ = merged(tracks_at([WHOLE], object_class, **columns), [REAR, FRONT], [0])
     assert groups == [[0], [1]], why
 
@@ -105,17 +104,11 @@ def test_the_thresholds_are_those_of_the_configuration(option, value):
 
 
 @pytest.mark.parametrize(
-    ("object_class", "final", "groups"),
-    [
-        (PEDESTRIAN, True, [[0], [1]]),
-        (ObjectClass.CYCLIST, True, [[0], [1]]),
-        (PEDESTRIAN, False, [[0, 1]]),  # not classified yet
-        (BACKGROUND, True, [[0, 1]]),
-    ],
+    ("object_class", "groups"),
+    [(PEDESTRIAN, [[0], [1]]), (ObjectClass.CYCLIST, [[0], [1]]), (BACKGROUND, [[0, 1]])],
 )
-def test_a_classified_person_is_no_part(object_class, final, groups):
+def test_a_person_is_no_part(object_class, groups):
     tracks = tracks_at([WHOLE, FRONT], CAR, object_class)
-    tracks.final[1] = final
     assert merged(tracks, [REAR, FRONT], [0, 1])[0] == groups
 
 

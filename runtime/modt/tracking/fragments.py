@@ -78,8 +78,8 @@ class Reunion:
         return older[related], part[related]
 
     def _gives_way(self, tracks: TrackTable, older: Int, other: Int) -> Bool:
-        """(k,) whether a part has no established track (other NONE: no track), or the older track is a final car."""
-        car = tracks.final[older] & (tracks.last_class[older] == ObjectClass.CAR.value)
+        """(k,) whether a part has no established track (other NONE: no track), or the older track is a car."""
+        car: Bool = tracks.last_class[older] == ObjectClass.CAR.value
         gives_way: Bool = (other == NONE) | (tracks.hits[other] < self.min_hits) | car
         return gives_way
 
@@ -113,7 +113,7 @@ def swap_proposals(older: Int, parts: Int, proposal_of_track: Int, track_of_prop
 def _may_be_one_class(tracks: TrackTable, older: Int, other: Int) -> Bool:
     """(k,) whether two tracks (other NONE: no track) may be of one class: background and cars are easily confused."""
     a, b = tracks.last_class[older], tracks.last_class[other]
-    one_class: Bool = (other == NONE) | ~tracks.final[other] | (a == b) | ~(_PERSON[a] | _PERSON[b])
+    one_class: Bool = (other == NONE) | (a == b) | ~(_PERSON[a] | _PERSON[b])
     return one_class
 
 

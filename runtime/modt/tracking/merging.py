@@ -59,7 +59,7 @@ class CarMerging:
     def _parts(self, tracks: TrackTable, frame: Associated) -> tuple[Int, Int, Int]:
         """Rows of cars, the proposal of each, and a further part of it; every part once."""
         matches, kdops = frame.matches, frame.observations.kdop
-        cars = (_classified_cars(tracks, matches.rows) & (tracks.hits[matches.rows] >= self.min_hits)).nonzero()[0]
+        cars = (_cars(tracks, matches.rows) & (tracks.hits[matches.rows] >= self.min_hits)).nonzero()[0]
         cars = cars[matches.rows[cars].argsort()]  # the oldest first: tracks are in the order of their birth
         rows, hosts = matches.rows[cars], matches.proposals[cars]
         if not len(rows):
@@ -82,15 +82,15 @@ class CarMerging:
         return rows[k], hosts[k], parts
 
 
-def _classified_cars(tracks: TrackTable, rows: Int) -> Bool:
+def _cars(tracks: TrackTable, rows: Int) -> Bool:
     """(k,) which rows are."""
-    cars: Bool = tracks.final[rows] & (tracks.last_class[rows] == ObjectClass.CAR.value)
+    cars: Bool = tracks.last_class[rows] == ObjectClass.CAR.value
     return cars
 
 
 def _may_take(tracks: TrackTable, rows: Int, owner: Int) -> Bool:
     """(k,) whether cars may take what the owners (NONE: no track) are matched with."""
-    person = tracks.final[owner] & _PERSON[tracks.last_class[owner]]
-    older_car = _classified_cars(tracks, owner) & (owner < rows)
+    person = _PERSON[tracks.last_class[owner]]
+    older_car = _cars(tracks, owner) & (owner < rows)
     free: Bool = (owner == NONE) | ~(person | older_car)
     return free
