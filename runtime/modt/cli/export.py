@@ -26,14 +26,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("export", help="write a recorded run in the formats of others")
     p.add_argument("directory", type=Path, metavar="RUN", help="directory of the run")
     form = p.add_mutually_exclusive_group(required=True)
-    form.add_argument("--mcap", type=Path, metavar="FILE", help="points, tracks and energy by Foxglove's schemas")
+    form.add_argument("--mcap", type=Path, metavar="FILE", help="Foxglove's schemas")
     form.add_argument("--kitti", type=Path, metavar="FILE", help="KITTI tracking results")
-    labels = "point labels by SemanticKITTI's numbers, with the tracks as instances (of replay --labels)"
+    labels = "point labels (of replay --labels)"
     form.add_argument("--semantickitti", type=Path, metavar="DIR", help=labels)
-    form.add_argument("--csv", type=Path, metavar="FILE", help="a table of tracks, a row a track and frame")
-    which = "frames from A to B - 1 (default: all)"
-    p.add_argument("--frames", type=options.frames, default=(0, None), metavar="A:B", help=which)
-    p.add_argument("--no-points", action="store_true", help="MCAP without the points; the source is not needed")
+    form.add_argument("--csv", type=Path, metavar="FILE", help="a row a track and frame")
+    options.add_frames_option(p)
+    p.add_argument("--no-points", action="store_true", help="MCAP without points: needs no source")
     options.add_capture_option(p)
     p.set_defaults(run=run)
 
