@@ -1,5 +1,6 @@
 """`modt export`, opened by the readers of others."""
 
+import base64
 import csv
 import json
 import shutil
@@ -54,22 +55,23 @@ def test_mcap_holds_points_tracks_and_energy_of_every_frame(recorded, tmp_path):
             content = decoded(channel.message_encoding, schema.name, schema.data, message.data)
             found.setdefault(channel.topic, []).append((message.log_time, content))
     lines = records(run)
-    assert {topic: len(messages) for topic, messages in found.items() if topic != "/energy"} == dict.fromkeys(
-        ("/tracks", "/points", "/stages"), len(lines)
-    )
+    (window,) = read_records(run / "ledger.jsonl", "modt.energy/1", {"modt.ledger/1"})
+    ((stamp_ns, energy),) = found.pop("/energy")
+    assert stamp_ns == round(1e9 * lines[-1]["stamp_s"])
+    assert energy["mJ_per_frame"] == pytest.approx(1e3 * window["energy_J"] / len(lines))
+    counts = {topic: len(messages) for topic, messages in found.items()}
+    assert counts == dict.fromkeys(("/tracks", "/points", "/stages"), len(lines))
     for (stamp_ns, update), (_, cloud), record in zip(found["/tracks"], found["/points"], lines, strict=True):
         assert stamp_ns == round(1e9 * record["stamp_s"])
         shown = objects(record)
         assert {int(entity["id"]) for entity in update.get("entities", [])} == set(shown)
         for entity in update.get("entities", []):
             (cube,) = entity["cubes"]
-            assert cube["size"] == {
-                "x": shown[int(entity["id"])]["box"]["l"],
-                "y": shown[int(entity["id"])]["box"]["w"],
-                "z": shown[int(entity["id"])]["box"]["h"],
-            }
-        scan = drive / "velodyne_points" / "data" / f"{record['frame']:010d}.bin"
-        assert len(cloud["data"]) == 4 * -(-scan.stat().st_size // 3)  # base 64
+            box = shown[int(entity["id"])]["box"]
+            assert cube["size"] == {"x": box["l"], "y": box["w"], "z": box["h"]}
+        scan = np.fromfile(drive / "velodyne_points" / "data" / f"{record['frame']:010d}.bin", np.float32)
+        points = np.frombuffer(base64.b64decode(cloud["data"]), np.float32)
+        assert (points.reshape(-1, 4)[:, :3] == scan.reshape(-1, 4)[:, :3]).all()
 
 
 def test_mcap_without_points_needs_no_source(recorded, tmp_path):
@@ -125,11 +127,8 @@ def test_csv_has_a_row_a_track_and_frame(recorded, tmp_path):
     for row, (record, track) in zip(rows, tracks, strict=True):
         assert None not in row
         assert (int(row["frame"]), float(row["stamp_s"])) == (record["frame"], record["stamp_s"])
-        assert (int(row["id"]), row["class"], row["viewed"]) == (
-            track["id"],
-            track["class"],
-            str(int(track["viewed"])),
-        )
+        said = (int(row["id"]), row["class"], row["viewed"])
+        assert said == (track["id"], track["class"], str(int(track["viewed"])))
         assert [float(row[f"p_{name}"]) for name in CLASS_NAMES] == track["posterior"]
         assert float(row["world_heading_rad"]) == track["world"]["heading"]
         if track["box"]:
@@ -166,6 +165,9 @@ def test_misuse_is_one_line_with_the_remedy(recorded, tmp_path, capsys):
         said = capsys.readouterr().err
         assert message in said
         assert said.count("\n") == 1
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(("out", "."))]
+    assert export(run, "--csv", run / "run.yaml" / "a.csv") == 1
+    assert "cannot be written" in capsys.readouterr().err
     assert export(run, "--csv", run) == 2
     assert "exists already" in capsys.readouterr().err
     assert export(run, "--csv", tmp_path / "none", "--frames", "100:") == 2
@@ -174,4 +176,5 @@ def test_misuse_is_one_line_with_the_remedy(recorded, tmp_path, capsys):
     assert (tmp_path / "live.txt").read_text().split()[6:10] == ["-1.00"] * 4
     pytest.importorskip("foxglove")
     assert export(live, "--mcap", tmp_path / "live.mcap") == 2
+    assert not (tmp_path / "live.mcap").exists()
     assert "give --no-points" in capsys.readouterr().err

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from modt.cli import options
@@ -51,9 +52,29 @@ def run(arguments: argparse.Namespace) -> int:
     export = Export(RunRecord.open(arguments.directory), arguments)
     if target.exists():
         raise MisuseError(target, "exists already", "remove it, or give another name")
-    FORMS[name](export, target)
+    with whole(target) as partial:
+        FORMS[name](export, partial)
     print(f"{export.n_frames} frames: {target}")
     return 0
+
+
+@contextmanager
+def whole(target: Path) -> Iterator[Path]:
+    """A path that takes the target's place once all is written; a failure leaves nothing.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    from modt.sinks.output import writing
+
+    with writing(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        folder = TemporaryDirectory(prefix=".export-", dir=target.parent)
+    with folder as name:
+        partial = Path(name) / target.name
+        yield partial
+        with writing(target):
+            partial.rename(target)
 
 
 class Export:
@@ -114,11 +135,11 @@ def _mcap(export: Export, target: Path) -> None:
     except ModuleNotFoundError as error:
         raise MisuseError("--mcap", f"needs {error.name}", "pip install 'modt[foxglove]'") from None
     results = _with_points(export) if export.points else export.results()
-    ledger = export.run.ledger()
+    lines = export.run.ledger_lines()
     with closing(McapFile(target, points=export.points)) as file:
         for result in results:
             file.write(result)
-            for line in ledger.get(result.frame.index, ()):
+            for line in lines.get(result.frame.index, ()):
                 file.ledger(line)
 
 

@@ -64,7 +64,7 @@ class RunRecord:
         if not number:
             raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
 
-    def ledger(self) -> dict[int, list[dict[str, Any]]]:
+    def ledger_lines(self) -> dict[int, list[dict[str, Any]]]:
         """The lines of the ledger by the frame after which each was written; none where no ledger was kept."""
         path, lines = self.path / LEDGER, defaultdict[int, list[dict[str, Any]]](list)
         if path.exists():
