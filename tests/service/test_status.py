@@ -25,7 +25,7 @@ def status(**loop):
             "failures": {'frame: "x"': 2},
             **loop,
         },
-        "power": {"watts": 6.25, "kind": "estimated", "frame_J": None},
+        "power": {"watts": 6.25, "kind": "estimated", "frame_J": None, "stages_J": {"tracking": 0.1}},
         "sensor": {"lost_messages": 4, "silent": False, "refused_messages": {"too short": 3}},
         "odometry": {"source": "none"},
         "sinks": {"udp://x": {"sent": 5, "failing": None}},
@@ -44,6 +44,7 @@ def test_metrics_are_valid_lines_with_one_type_each():
     assert len([line for line in lines if line.startswith("# TYPE modt_loop_lateness_ms ")]) == 1
     assert 'modt_loop_lateness_ms{quantile="p99"} 0.9' in lines
     assert 'modt_counts_visible{class="car"} 2' in lines
+    assert 'modt_power_stages_J{stage="tracking"} 0.1' in lines
     assert 'modt_sink_sent_total{sink="udp://x"} 5' in lines
     assert 'modt_sensor_refused_messages_total{reason="too short"} 3' in lines
     assert 'modt_loop_failures_total{kind="frame: \\"x\\""} 2' in lines
@@ -74,7 +75,10 @@ def test_counts_are_of_what_is_seen_and_the_rate_of_the_time_since_the_last_repo
 def test_power_is_that_of_the_last_window_and_unknown_without_a_meter():
     power = Power()
     window = {"energy_J": 12.0, "kind": "measured", "wall_ns": 2_000_000_000, "frames": [0, 19, 20]}
-    assert power.add(window) == pytest.approx(6.0)
+    window |= {"process_ns": 400, "stages": {"segmentation": {"cpu_ns": 300}, "tracking": {"cpu_ns": 100}}}
+    assert power.add(window, idle_W=2.0) == pytest.approx(6.0)
     assert power.report()["frame_J"] == pytest.approx(0.6)
-    assert power.add(window | {"energy_J": None, "kind": "unavailable"}) is None
-    assert (power.report()["watts"], power.unread) == (None, 1)
+    parts = {"idle": 0.2, "segmentation": 0.3, "tracking": 0.1, "unattributed": 0.0}
+    assert power.report()["stages_J"] == pytest.approx(parts)
+    assert power.add(window | {"energy_J": None, "kind": "unavailable"}, idle_W=2.0) is None
+    assert (power.report()["watts"], power.report()["stages_J"], power.unread) == (None, {}, 1)

@@ -17,16 +17,21 @@ CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
 
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
     """Stream, frames, profile and core."""
-    a, b = first_frames
-    which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
     stream = (
         "KITTI drive, folder of .bin, .pcd or .ply scans, PCAP file, ROS 2 recording (default: a synthetic stream)"
     )
     p.add_argument("path", nargs="?", type=Path, metavar="PATH", help=stream)
     add_capture_option(p)
-    p.add_argument("--frames", type=frames, default=first_frames, metavar="A:B", help=which)
+    add_frames_option(p, first_frames)
     add_profile_option(p)
     add_core_option(p)
+
+
+def add_frames_option(p: Parser, default: tuple[int, int | None] = (0, None)) -> None:
+    """Frames."""
+    a, b = default
+    which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
+    p.add_argument("--frames", type=frames, default=default, metavar="A:B", help=which)
 
 
 def add_core_option(p: Parser) -> None:

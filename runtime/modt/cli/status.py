@@ -15,10 +15,15 @@ from modt.errors import MisuseError
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("status", help="say what a running modt run is doing")
-    run_directory = "its run directory (default: %(default)s)"
-    p.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
+    add_directory(p)
     p.add_argument("--json", action="store_true", help="print JSON")
     p.set_defaults(run=run)
+
+
+def add_directory(p: argparse.ArgumentParser) -> None:
+    """That of the service."""
+    run_directory = "its run directory (default: %(default)s)"
+    p.add_argument("directory", nargs="?", type=Path, default=OUT, metavar="DIR", help=run_directory)
 
 
 def run(arguments: argparse.Namespace) -> int:

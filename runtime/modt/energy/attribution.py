@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from modt.energy.ledger import Line
 from modt.types import Float64
@@ -101,6 +100,8 @@ def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 100
     value, *_ = np.linalg.lstsq(X, y, rcond=None)
     residual = y - X @ value
     spread = _bootstrap(X, y, random, resamples) - value
+    from scipy import stats  # large, and a service only splits
+
     # Resampling few windows underestimates the spread: widen by the ratio of Student's t to the normal quantile.
     wider = np.sqrt(n / (n - p)) * stats.t.ppf(_TAILS[1], n - p) / stats.norm.ppf(_TAILS[1])
     low, high = value + wider * np.quantile(spread, _TAILS, axis=0)

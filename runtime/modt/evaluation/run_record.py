@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,16 +11,17 @@ from typing import Any
 import numpy as np
 
 from modt.classes import CLASS_NAMES
+from modt.energy import ledger, windows
 from modt.errors import MisuseError, ModtError
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.truth import Truth
 from modt.geometry import FieldOfView
 from modt.profile import from_yaml
 from modt.sinks.records import read_records
-from modt.sinks.run_directory import RUN, TRACKS
+from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.sources.scan_file import read_scan
-from modt.types import Float32, Float64, Int
+from modt.types import Float64, Int
 
 LABELS = "labels"
 
@@ -32,29 +34,51 @@ class RunRecord:
     stream: Path | None  # where its scans lay, None for the embedded stream
     fov: str  # camera or full
     sensor: str  # name of its profile
+    live: bool  # of a live source, which no one can open again
 
     @classmethod
     def open(cls, path: Path) -> RunRecord:
         """The run of a directory.
 
         Raises:
-            MisuseError: it is none, or was made without --labels.
+            MisuseError: it is none.
         """
         described = path / RUN
         try:
             facts = from_yaml(described.read_text(encoding="utf-8"), described)
             stream, fov, sensor = facts["stream"]["path"], facts["fov"], facts["recognition"]["used"]
+            live = bool(facts.get("service", False))
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        if not (path / LABELS).is_dir():
-            raise MisuseError(path, "holds no point labels of its own", "run it again with `modt replay --labels`")
-        return cls(path, Path(stream) if stream else None, fov, Path(sensor).stem)
+        return cls(path, Path(stream) if stream else None, fov, Path(sensor).stem, live)
+
+    def records(self) -> Iterator[tuple[str, dict[str, Any]]]:
+        """The record of every frame, and where it stands.
+
+        Raises:
+            MisuseError: the run is empty.
+        """
+        number = 0
+        for number, record in enumerate(read_records(self.path / TRACKS, SCHEMA), 1):
+            yield f"{self.path / TRACKS}:{number}", record
+        if not number:
+            raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
+
+    def ledger_lines(self) -> dict[int, list[dict[str, Any]]]:
+        """The lines of the ledger by the frame after which each was written; none where no ledger was kept."""
+        path, lines = self.path / LEDGER, defaultdict[int, list[dict[str, Any]]](list)
+        if path.exists():
+            for line in read_records(path, ledger.SCHEMA, {windows.SCHEMA}):
+                lines[line["frame"]].append(line)
+            for line in read_records(path, windows.SCHEMA, {ledger.SCHEMA}):
+                lines[line["frames"][1]].append(line)
+        return lines
 
     def frames(self, truth: Truth) -> Iterator[JudgedFrame]:
         """Every recorded frame beside its truth.
 
         Raises:
-            MisuseError: the run is of another recording or empty, or a record is broken.
+            MisuseError: the run is of another recording, empty or without labels, or a record is broken.
         """
         if truth.scans is None:
             raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
@@ -63,14 +87,12 @@ class RunRecord:
             raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
         fov = FieldOfView.of_camera(camera) if self.fov == "camera" and camera is not None else FieldOfView()
         scans = {scan.index: scan.path for scan in truth.scans.scans}
-        number = 0
-        for number, record in enumerate(read_records(self.path / TRACKS, SCHEMA), 1):
-            place = f"{self.path / TRACKS}:{number}"
+        for place, record in self.records():
             try:
                 index = int(record["frame"])
                 found = _found(record)
             except (KeyError, TypeError, ValueError, IndexError) as error:
-                raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
+                raise broken(place, error) from None
             labels, scan = truth.frames.get(index), scans.get(index)
             if labels is None or scan is None:
                 cause = f"frame {index} is not in the truth, which has {len(truth.frames)} frames"
@@ -79,22 +101,32 @@ class RunRecord:
                 points, _ = read_scan(scan)
             except ModtError as error:
                 raise MisuseError(scan, error.cause, "restore the scan") from None
-            yield JudgedFrame(index, points, self._proposals(index, points), *found, labels, fov)
-        if not number:
-            raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
+            proposals = self.proposals(index)
+            if len(proposals) != len(points):
+                cause = f"{len(proposals)} labels for a scan of {len(points)} points"
+                raise MisuseError(self._labels(index), cause, "give the truth of the run's own recording")
+            yield JudgedFrame(index, points, proposals, *found, labels, fov)
 
-    def _proposals(self, index: int, points: Float32) -> Int:
-        """(N,) proposal of each point."""
-        path = self.path / LABELS / f"{index:06d}.label"
+    def proposals(self, index: int) -> Int:
+        """(N,) proposal of each point of a frame, NONE where it belongs to none.
+
+        Raises:
+            MisuseError: the run was made without --labels.
+        """
+        path = self._labels(index)
         try:
-            labels = np.fromfile(path, np.uint32)
+            return (np.fromfile(path, np.uint32) >> 16).astype(np.int64) - 1
         except OSError as error:
             cause = f"cannot be read ({error.strerror})"
             raise MisuseError(path, cause, "run it again with `modt replay --labels`") from None
-        if len(labels) != len(points):
-            cause = f"{len(labels)} labels for a scan of {len(points)} points"
-            raise MisuseError(path, cause, "give the truth of the run's own recording")
-        return (labels >> 16).astype(np.int64) - 1
+
+    def _labels(self, index: int) -> Path:
+        return self.path / LABELS / f"{index:06d}.label"
+
+
+def broken(place: str, error: Exception) -> MisuseError:
+    """What is said of a record that lacks something."""
+    return MisuseError(place, f"no record of a frame ({error!r})", "run it again")
 
 
 def _found(record: dict[str, Any]) -> tuple[int, int, Int, Int, Int, Float64]:

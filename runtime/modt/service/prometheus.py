@@ -13,7 +13,13 @@ COUNTERS = re.compile(
     r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|sent|dropped)"
 )
 """Names of what only grows."""
-LABELS = {"visible": "class", "steps_entered": "step", "failures": "kind", "refused_messages": "reason"}
+LABELS = {
+    "visible": "class",
+    "steps_entered": "step",
+    "failures": "kind",
+    "refused_messages": "reason",
+    "stages_J": "stage",
+}
 """Tables, and what their keys are."""
 STEPS = ("all", "deferred", "reduced", "dropped")
 

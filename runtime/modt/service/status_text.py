@@ -17,6 +17,7 @@ def status_text(status: dict[str, Any], now_s: float) -> str:
     entered = ", ".join(f"{step} {n} times" for step, n in loop["steps_entered"].items())
     power = status["power"]
     energy = "" if power["frame_J"] is None else f"{1e3 * power['frame_J']:.0f} mJ a frame, {power['kind']}"
+    stages = ", ".join(f"{stage} {1e3 * joules:.1f}" for stage, joules in power.get("stages_J", {}).items() if joules)
     lines = [
         f"{status['source']}: {state}, mode {status['mode']}, profile {status['profile']}",
         f"  {one_line(status)}",
@@ -25,6 +26,7 @@ def status_text(status: dict[str, Any], now_s: float) -> str:
         f"  budget      {loop['budget_ms']:.1f} ms for classification, {loop['other_stages_ms']:.1f} ms for the rest",
         f"  load        {loop['step']}" + (f" ({entered})" if entered else ""),
         f"  energy      {energy or 'unavailable'}",
+        *([f"  by stage    {stages} mJ a frame, estimated"] if stages else []),
         f"  sensor      {_counts(sensor)}",
         f"  recording   {recording['failing'] or 'on'}, {recording['lines']} lines, {recording['lost_lines']} lost",
         *(f"  sink        {name}: {_counts(health)}" for name, health in status["sinks"].items()),

@@ -5,11 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from modt.classes import CLASSES
 from modt.sinks.output import Health, writing
-from modt.types import NONE, FrameResult
+from modt.types import NONE, FrameResult, Int, Tracks
 
 MAX_INSTANCE = 0xFFFF
+SEMANTIC = np.array([(*spec.semantic_kitti, 0)[0] for spec in CLASSES.values()])
+"""SemanticKITTI's label of each class, 0 (unlabelled) for the background."""
 
 
 class PointLabels:
@@ -29,9 +33,17 @@ class PointLabels:
         Raises:
             ModtError: the file cannot be written.
         """
-        path = self._folder / f"{result.frame.index:06d}.label"
+        self.write_labels(result.frame.index, encode(result))
+
+    def write_labels(self, index: int, labels: NDArray[np.uint32]) -> None:
+        """Write the file of a frame from its labels (N,).
+
+        Raises:
+            ModtError: the file cannot be written.
+        """
+        path = self._folder / f"{index:06d}.label"
         with writing(path):
-            path.write_bytes(encode(result).tobytes())
+            path.write_bytes(labels.tobytes())
         self._written += 1
 
     def health(self) -> Health:
@@ -50,3 +62,16 @@ def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
     out = np.zeros(len(result.frame.points), np.uint32)
     out[result.proposals.members] = np.repeat(code, result.proposals.count).astype(np.uint32)
     return out
+
+
+def semantic_labels(tracks: Tracks, proposals: Int) -> NDArray[np.uint32]:
+    """(N,) SemanticKITTI's label of each point by the track of its proposal (N,), NONE where it belongs to none.
+
+    Upper 16 bits: the track's id modulo 65535, plus one. Lower 16 bits: SemanticKITTI's label of its class. Points of
+    the background are 0.
+    """
+    code = np.zeros(max(proposals.max(initial=NONE), tracks.proposal.max(initial=NONE)) + 2, np.uint32)
+    seen = np.flatnonzero(tracks.proposal != NONE)
+    label, instance = SEMANTIC[tracks.object_class[seen]], tracks.id[seen] % MAX_INSTANCE + 1
+    code[tracks.proposal[seen]] = np.where(label > 0, instance << 16 | label, 0)
+    return code[proposals]  # the last one is that of NONE

@@ -1,0 +1,65 @@
+"""Recorded frames as the results that they were, for the sinks."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES
+from modt.geometry import wrap
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
+from modt.types import NONE, Float32, Float64, Frame, FrameResult, Proposals, Tracks
+
+NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
+
+
+def recorded_result(record: dict[str, Any]) -> FrameResult:
+    """The result that a line of tracks.jsonl is of.
+
+    Proposals have their boxes, no members, and none counts as truncated. The headings of the boxes in the world are
+    estimated from the positions of all tracks in view. Points, covariances and the views of the fusion stay blank.
+
+    Raises:
+        KeyError, TypeError, ValueError, IndexError: the record lacks something.
+    """
+    rows = record["tracks"]
+    names = tuple(sorted({row["state"] for row in rows}))
+    tracks = Tracks.blank(len(rows))
+    tracks.id[:] = [row["id"] for row in rows]
+    tracks.state[:] = [names.index(row["state"]) for row in rows]
+    tracks.object_class[:] = [CLASS_NAMES.index(row["class"]) for row in rows]
+    tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
+    tracks.key_points[:] = [row["viewed"] for row in rows]
+    tracks.final[:] = [row["final"] for row in rows]
+    tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]
+    for key, column in (("points", tracks.points), ("age", tracks.age), ("missed", tracks.missed)):
+        column[:] = [row[key] for row in rows]
+    tracks.x[:] = _table([row["world"] for row in rows], WORLD_KEYS)
+    seen = np.flatnonzero(tracks.proposal != NONE)
+    boxes = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
+    tracks.box[seen] = _in_the_world(boxes, tracks.x[seen])
+    n_proposals = int(record["proposals"])
+    proposals = _proposals(n_proposals)
+    proposals.box[tracks.proposal[seen]] = boxes
+    frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
+    return FrameResult(frame, proposals, tracks, names, int(record["classifications"]), int(record["deferred"]))
+
+
+def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:
+    return np.array([[row[key] for key in keys] for row in rows], np.float64).reshape(-1, len(keys))
+
+
+def _in_the_world(boxes: Float64, x: Float64) -> Float64:
+    """(n, 7) boxes as they lie in the world: the turn that takes their centres to the positions x of their tracks."""
+    if not len(boxes):
+        return boxes
+    here, there = boxes[:, 0] + 1j * boxes[:, 1], x[:, 0] + 1j * x[:, 1]
+    turn = np.angle(np.vdot(here - here.mean(), there - there.mean()))
+    return np.column_stack([x[:, :2], boxes[:, 2:6], wrap(boxes[:, 6] + turn)])
+
+
+def _proposals(n: int) -> Proposals:
+    none = np.zeros(0, np.int64)
+    offsets, coordinates = np.zeros(n + 1, np.int64), np.zeros((3, 0), np.float32)
+    return Proposals(none, offsets, coordinates, np.zeros((n, 3)), np.zeros((n, 7)), np.zeros(n, np.bool_))

@@ -1,0 +1,180 @@
+"""`modt export`, opened by the readers of others."""
+
+import base64
+import csv
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
+from modt.cli.main import main
+from modt.sinks.records import read_records
+from modt.sinks.tracks import SCHEMA
+
+DAY = "2020_01_01/2020_01_01_drive_0000_sync"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A run on a synthetic drive, and the drive."""
+    root = tmp_path_factory.mktemp("recorded")
+    drive, run = root / "drive", root / "run"
+    simulate = ("simulate", "--sensor", "vlp-16", "--seconds", "0.6", "--seed", "5", "--out", drive)
+    replay = ("replay", drive / DAY, "--profile", "vlp-16", "--labels", "--quiet", "--core", "none", "--out", run)
+    for command in (simulate, replay):
+        assert main([str(argument) for argument in command]) == 0
+    return run, drive / DAY
+
+
+def export(run, *arguments):
+    return main(["export", str(run), *map(str, arguments)])
+
+
+def records(run):
+    return list(read_records(run / "tracks.jsonl", SCHEMA))
+
+
+def objects(record):
+    return {t["id"]: t for t in record["tracks"] if t["proposal"] is not None and t["class"] != "background"}
+
+
+def test_mcap_holds_points_tracks_and_energy_of_every_frame(recorded, tmp_path):
+    pytest.importorskip("foxglove")
+    pytest.importorskip("mcap")
+    from mcap.reader import make_reader
+
+    from tests.sinks.foxglove_messages import decoded
+
+    run, drive = recorded
+    assert export(run, "--mcap", tmp_path / "a.mcap") == 0
+    with (tmp_path / "a.mcap").open("rb") as file:
+        found = {}
+        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+            content = decoded(channel.message_encoding, schema.name, schema.data, message.data)
+            found.setdefault(channel.topic, []).append((message.log_time, content))
+    lines = records(run)
+    (window,) = read_records(run / "ledger.jsonl", "modt.energy/1", {"modt.ledger/1"})
+    ((stamp_ns, energy),) = found.pop("/energy")
+    assert stamp_ns == round(1e9 * lines[-1]["stamp_s"])
+    assert energy["mJ_per_frame"] == pytest.approx(1e3 * window["energy_J"] / len(lines))
+    counts = {topic: len(messages) for topic, messages in found.items()}
+    assert counts == dict.fromkeys(("/tracks", "/points", "/stages"), len(lines))
+    for (stamp_ns, update), (_, cloud), record in zip(found["/tracks"], found["/points"], lines, strict=True):
+        assert stamp_ns == round(1e9 * record["stamp_s"])
+        shown = objects(record)
+        assert {int(entity["id"]) for entity in update.get("entities", [])} == set(shown)
+        for entity in update.get("entities", []):
+            (cube,) = entity["cubes"]
+            box = shown[int(entity["id"])]["box"]
+            assert cube["size"] == {"x": box["l"], "y": box["w"], "z": box["h"]}
+        scan = np.fromfile(drive / "velodyne_points" / "data" / f"{record['frame']:010d}.bin", np.float32)
+        points = np.frombuffer(base64.b64decode(cloud["data"]), np.float32)
+        assert (points.reshape(-1, 4)[:, :3] == scan.reshape(-1, 4)[:, :3]).all()
+
+
+def test_mcap_without_points_needs_no_source(recorded, tmp_path):
+    pytest.importorskip("foxglove")
+    reader = pytest.importorskip("mcap.reader")
+    run = moved(recorded[0], tmp_path)
+    assert export(run, "--mcap", tmp_path / "a.mcap", "--no-points", "--frames", "2:4") == 0
+    with (tmp_path / "a.mcap").open("rb") as file:
+        messages = [(c.topic, m.log_time) for _, c, m in reader.make_reader(file).iter_messages()]
+    stamps = [round(1e9 * record["stamp_s"]) for record in records(run)[2:4]]
+    assert [stamp for topic, stamp in messages if topic == "/tracks"] == stamps
+    assert "/points" not in dict(messages)
+
+
+def test_kitti_results_are_those_of_the_replay(recorded, tmp_path):
+    run, _ = recorded
+    assert export(run, "--kitti", tmp_path / "a.txt") == 0
+    own, found = (
+        [line.split() for line in path.read_text().splitlines()]
+        for path in (run / "kitti" / "0000.txt", tmp_path / "a.txt")
+    )
+    assert len(found) > 10
+    assert [row[:3] for row in found] == [row[:3] for row in own]
+    own, found = (np.array([row[10:] for row in rows], float) for rows in (own, found))
+    assert np.abs(found - own).max() < 3e-3  # what tracks.jsonl rounds
+
+
+def test_semantickitti_labels_every_point_with_class_and_track(recorded, tmp_path):
+    run, _ = recorded
+    assert export(run, "--semantickitti", tmp_path / "predictions") == 0
+    some = 0
+    for record in records(run):
+        name = f"{record['frame']:06d}.label"
+        proposal = (np.fromfile(run / "labels" / name, np.uint32) >> 16).astype(int) - 1
+        found = np.fromfile(tmp_path / "predictions" / name, np.uint32)
+        expected = np.zeros(len(proposal), np.uint32)
+        for id_, track in objects(record).items():
+            semantic = CLASSES[ObjectClass(CLASS_NAMES.index(track["class"]))].semantic_kitti[0]
+            expected[proposal == track["proposal"]] = (id_ + 1) << 16 | semantic
+        assert (found == expected).all()
+        some += np.count_nonzero(found)
+    assert some > 100
+
+
+def test_csv_has_a_row_a_track_and_frame(recorded, tmp_path):
+    run, _ = recorded
+    assert export(run, "--csv", tmp_path / "a.csv") == 0
+    with (tmp_path / "a.csv").open(newline="") as lines:
+        rows = list(csv.DictReader(lines))
+    tracks = [(record, track) for record in records(run) for track in record["tracks"]]
+    assert len(rows) == len(tracks)
+    assert {bool(row["box_x_m"]) for row in rows} == {False, True}
+    for row, (record, track) in zip(rows, tracks, strict=True):
+        assert None not in row
+        assert (int(row["frame"]), float(row["stamp_s"])) == (record["frame"], record["stamp_s"])
+        said = (int(row["id"]), row["class"], row["viewed"])
+        assert said == (track["id"], track["class"], str(int(track["viewed"])))
+        assert [float(row[f"p_{name}"]) for name in CLASS_NAMES] == track["posterior"]
+        assert float(row["world_heading_rad"]) == track["world"]["heading"]
+        if track["box"]:
+            assert float(row["box_yaw_rad"]) == track["box"]["yaw"]
+        else:
+            assert row["proposal"] == row["box_yaw_rad"] == ""
+
+
+def moved(run, folder):
+    """The run, whose source is gone."""
+    copy = shutil.copytree(run, folder / "moved")
+    text = (copy / "run.yaml").read_text()
+    (copy / "run.yaml").write_text(text.replace("drive_0000_sync\n", "drive_0000_gone\n"))
+    return copy
+
+
+def test_misuse_is_one_line_with_the_remedy(recorded, tmp_path, capsys):
+    run, _ = recorded
+    gone = moved(run, tmp_path)
+    bare, odd, live = (shutil.copytree(run, tmp_path / name) for name in ("bare", "odd", "live"))
+    shutil.rmtree(bare / "labels")
+    lines = (run / "tracks.jsonl").read_text().splitlines(keepends=True)
+    (odd / "tracks.jsonl").write_text(lines[0] + json.dumps({"schema": SCHEMA, "frame": 1, "tracks": [{}]}) + "\n")
+    (live / "run.yaml").write_text((live / "run.yaml").read_text() + "service: true\n")
+    cases = [
+        (bare, "--semantickitti", "modt replay --labels"),
+        (odd, "--csv", "tracks.jsonl:2: no record of a frame"),
+        (odd, "--semantickitti", "tracks.jsonl:2: no record of a frame"),
+        (gone, "--kitti", "no such file or directory"),
+        (tmp_path, "--csv", "describes no run"),
+    ]
+    for number, (path, form, message) in enumerate(cases):
+        assert export(path, form, tmp_path / f"out{number}") == 2
+        said = capsys.readouterr().err
+        assert message in said
+        assert said.count("\n") == 1
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(("out", "."))]
+    assert export(run, "--csv", run / "run.yaml" / "a.csv") == 1
+    assert "cannot be written" in capsys.readouterr().err
+    assert export(run, "--csv", run) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert export(run, "--csv", tmp_path / "none", "--frames", "100:") == 2
+    assert "holds none of these frames" in capsys.readouterr().err
+    assert export(live, "--kitti", tmp_path / "live.txt") == 0
+    assert (tmp_path / "live.txt").read_text().split()[6:10] == ["-1.00"] * 4
+    pytest.importorskip("foxglove")
+    assert export(live, "--mcap", tmp_path / "live.mcap") == 2
+    assert not (tmp_path / "live.mcap").exists()
+    assert "give --no-points" in capsys.readouterr().err
