@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import check, evaluate, profiles, replay, run, simulate, status, track
+from modt.cli import check, evaluate, profiles, replay, run, simulate, status, track, view
 from modt.cli.command import dispatch
 
-COMMANDS = (replay, run, status, check, evaluate, simulate, track, profiles)
+COMMANDS = (replay, run, status, check, evaluate, simulate, track, view, profiles)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
