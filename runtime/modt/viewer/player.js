@@ -421,7 +421,7 @@ document.onkeydown = (event) => {
 
 slider.max = last;
 slider.oninput = () => go(Number(slider.value));
-element("play").onclick = play;
+element("play").onclick = (event) => { event.currentTarget.blur(); play(); }; // or Space would press it, too
 onresize = () => { fit(); redraw(); };
 matchMedia("(prefers-color-scheme: dark)").onchange = () => { theme(); redraw(); };
 
