@@ -85,7 +85,7 @@ def test_the_page_opens_and_the_slider_moves(run, records):
     shown = opened(run / "view.html")
     assert (shown["frame"], shown["at"]) == (records[0]["frame"], 0)
     assert shown["pixels"] > 1000
-    assert f"{records[0]['classifications']} of 16" in shown["facts"]
+    assert f"{records[0]['classifications']}, {records[0]['deferred']} budget 16 calls" in shown["facts"]
     later = opened(run / "view.html", "slide:9")
     assert later["frame"] == records[9]["frame"]
     assert f"proposals {records[9]['proposals']} " in later["facts"]
@@ -125,7 +125,8 @@ def test_a_frame_as_a_picture(run, records):
     assert len(root.findall(f"{tag}polygon")) == len(records[9]["tracks"])
     assert len([c for c in root.findall(f"{tag}circle") if c.get("class") == "ring"]) == records[9]["classifications"]
     text = " ".join(node.text or "" for node in root.iter(f"{tag}text"))
-    assert f"{records[9]['classifications']} of 16 classified" in text
+    assert f"{records[9]['classifications']} classified, {records[9]['deferred']} deferred" in text
+    assert "budget 16 calls" in text
     assert "mJ (" in text
     (above,) = [p for p in root.findall(f"{tag}path") if p.get("class") == "above"]
     assert above.get("d").count("M") > 1000

@@ -9,7 +9,8 @@ from modt.viewer.track_rows import COLUMNS, frame_rows, track_table
 def track(id_, box, world, state="tracked", class_="car"):
     """A track of a line of tracks.jsonl."""
     return {
-        "id": id_, "state": state, "class": class_, "posterior": [0.1, 0.7, 0.15, 0.05], "viewed": True, "final": False,
+        "id": id_, "state": state, "class": class_, "posterior": [0.1, 0.7, 0.15, 0.05],
+        "viewed": True, "final": False,
         "proposal": None if box is None else 0, "points": 12, "age": 3, "missed": 0,
         "box": None if box is None else dict(zip(BOX_KEYS, box, strict=True)),
         "world": dict(zip(WORLD_KEYS, world, strict=True)),

@@ -76,5 +76,5 @@ def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream 
         return None
     if stream.info.name == facts["name"]:
         return stream
-    print(f"modt: without points: {facts['name']} is no recording", file=sys.stderr)
+    print(f"modt: without points: {facts['name']} cannot be read again", file=sys.stderr)
     return None

@@ -125,12 +125,10 @@ def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
 
 def _text(run: RecordedRun, at: int) -> str:
     """What the frame was and cost, and the legends."""
-    frame, budget = run.frames[at], run.calls_per_frame
-    of = "" if budget is None else f" of {budget}"
+    frame = run.frames[at]
     facts = [f"frame {frame['frame']}, {frame['stamp_s']:.2f} s, mode {run.facts['mode']}"]
-    facts.append(
-        f"{frame['proposals']} proposals, {frame['classifications']}{of} classified, {frame['deferred']} deferred"
-    )
+    facts.append(f"{frame['proposals']} proposals, budget {run.budget}")
+    facts.append(f"{frame['classifications']} classified, {frame['deferred']} deferred")
     if "cpu_ms" in frame:
         facts.append(f"{sum(frame['cpu_ms'].values()):.1f} ms of CPU time")
     if "energy_mJ" in frame:

@@ -19,7 +19,8 @@ let table, rowsAt = [], rangeOf = new Map(), sweep = null, pixels = null, palett
 // ---- data
 
 async function unpack(id) {
-  const bytes = Uint8Array.from(atob(element(id).textContent), (c) => c.charCodeAt(0));
+  const text = atob(element(id).textContent), bytes = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
@@ -27,10 +28,9 @@ async function unpack(id) {
 // Numbers whose differences lie in planes of bytes, the lowest first.
 function sums(bytes, begin, n, width) {
   const out = new Int32Array(n);
-  for (let k = 0, sum = 0; k < n; k++) {
-    for (let byte = 0; byte < width; byte++) sum += bytes[begin + byte * n + k] << (8 * byte);
-    out[k] = sum |= 0;
-  }
+  for (let byte = 0; byte < width; byte++)
+    for (let k = 0, at = begin + byte * n; k < n; k++) out[k] |= bytes[at + k] << (8 * byte);
+  for (let k = 1; k < n; k++) out[k] += out[k - 1];
   return out;
 }
 
@@ -226,15 +226,14 @@ const add = (parent, tag, text = "", more = {}) => {
 
 function showFrame() {
   const frame = run.frames[state.at], rows = rowsAt[state.at], list = element("frame");
-  const budget = run.calls_per_frame === null ? "" : ` of ${run.calls_per_frame}`;
   const cpu = Object.values(frame.cpu_ms || {}).reduce((a, b) => a + b, 0);
   const facts = [
     ["number", `${frame.frame}`],
     ["proposals", frame.proposals],
     ["tracks, lost among them", `${rows.length}, ${rows.filter((row) => !table.seen[row]).length}`],
     ["said to be objects", rows.filter((row) => table.class[row] && table.seen[row]).length],
-    ["classified, budget", `${frame.classifications}${budget}`],
-    ["deferred", frame.deferred],
+    ["classified, deferred", `${frame.classifications}, ${frame.deferred}`],
+    ["budget", run.budget],
     ["CPU time", cpu ? `${cpu.toFixed(1)} ms` : "not recorded"],
     ["energy", frame.energy_mJ === undefined ? "not recorded" : `${frame.energy_mJ.toFixed(0)} mJ, ${frame.kind}`],
   ];

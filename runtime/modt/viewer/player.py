@@ -58,7 +58,7 @@ def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any
         "classes": look.classes(),
         "states": look.states(run.states),
         "stages": look.stages(),
-        "calls_per_frame": run.calls_per_frame,
+        "budget": run.budget,
         "frames": [_rounded(frame | run.call_mJ(frame)) for frame in run.frames],
         "poses": run.poses.round(4).tolist(),
         "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},

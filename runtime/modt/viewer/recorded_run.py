@@ -77,9 +77,16 @@ class RecordedRun:
         return [recorded["frame"] for recorded in self.frames]
 
     @property
-    def calls_per_frame(self) -> int | None:
-        """Budget of classifications, None where every proposal is classified."""
-        return None if self.facts["mode"] == "conventional" else self.config.scheduler.calls_per_frame
+    def budget(self) -> str:
+        """What a frame may spend on classification, in words."""
+        scheduler = self.config.scheduler
+        limits = {
+            "calls": scheduler.calls_per_frame,
+            "ms": scheduler.cpu_ms_per_frame,
+            "mJ": scheduler.energy_mJ_per_frame,
+        }
+        found = [f"{limit:g} {unit}" for unit, limit in limits.items() if limit is not None]
+        return ", ".join(found) if found and self.facts["mode"] != "conventional" else "none"
 
     @property
     def sensor(self) -> str:
