@@ -21,8 +21,8 @@ REACH_M, SIDE_M = 45.0, 32.0
 """Half of what is shown ahead and behind, and to the left and right."""
 TRAIL = 30
 """Frames."""
-MOST_CELLS = 25_000
-"""Of a sweep, to keep the file below some megabytes."""
+MOST_CELLS = 50_000
+"""Of a sweep, to keep the file below a megabyte or so."""
 _LINE_M = 0.1
 _STYLE = """
 svg{background:var(--paper);font-family:system-ui,sans-serif}
