@@ -153,3 +153,14 @@ def test_misuse_is_one_line_with_the_remedy(run, tmp_path):
         assert done.returncode == 2
         assert message in done.stderr
         assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.kitti
+def test_a_drive_of_full_sweeps_fits_a_page(drive_0005, tmp_path):
+    for command in (("replay", drive_0005, "--quiet", "--out", "run"), ("view", "run")):
+        done = modt(*command, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run" / "view.html").stat().st_size < 25e6
+    assert [len(cell) > 40_000 for cell, _ in Page(tmp_path / "run" / "view.html").points] == [True] * 154
+    assert opened(tmp_path / "run" / "view.html", "slide:153")["frame"] == 153

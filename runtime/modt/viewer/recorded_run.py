@@ -54,7 +54,7 @@ class RecordedRun:
         try:
             facts = from_yaml(described.read_text(encoding="utf-8"), described)
             config = profile.parse(to_yaml(facts["profile"]), described)
-            facts["stream"]["path"], facts["mode"]
+            _ = facts["stream"]["path"], facts["stream"]["name"], facts["mode"]
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
         costs, states = _costs(run / LEDGER), list[str]()
