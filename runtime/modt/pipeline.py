@@ -128,4 +128,5 @@ class Pipeline:
             certain = run(FUSION, self.fusion.fuse, tracks, proposals, rows, likelihood)
         run(FUSION, self.decision.decide, tracks)
         final = run(TRACKING, self.tracker.conclude, rows, certain)
-        return FrameResult(frame, proposals, final, self.tracker.state_names, len(rows), chosen.deferred)
+        names, classified = self.tracker.state_names, final.id[rows]
+        return FrameResult(frame, proposals, final, names, len(rows), chosen.deferred, classified)

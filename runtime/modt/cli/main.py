@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import check, evaluate, export, profiles, replay, run, simulate, status, top, track
+from modt.cli import check, evaluate, export, profiles, replay, run, simulate, status, top, track, view
 from modt.cli.command import dispatch
 
-COMMANDS = (replay, run, status, top, check, evaluate, export, simulate, track, profiles)
+COMMANDS = (replay, run, status, top, check, view, evaluate, export, simulate, track, profiles)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -60,7 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
         summary = session.run(tick, supervisor)
     if show:
         print(summary_text(summary))
-        print(f"  results in {session.directory.path}")
+        path = session.directory.path
+        print(f"  results in {path}; to look at them: modt view {path}")
     stopped_by = session.stop.signal
     if stopped_by is not None:
         frames_done = f"after {summary['frames']} frames"

@@ -10,10 +10,13 @@ from modt.reporting.document import Cell, Document, Table
 from modt.reporting.quantity import LEGEND
 from modt.sinks.output import writing
 
-_COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a")
-_STYLE = """
+COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a")
+THEME = """
 :root{--ink:#1c2430;--soft:#5d6876;--line:#d8dde4;--paper:#fff;--panel:#f6f8fa}
 @media (prefers-color-scheme:dark){:root{--ink:#e4e8ee;--soft:#9aa6b5;--line:#38424f;--paper:#151a21;--panel:#1d242d}}
+"""
+"""Colours of pages, for light and dark screens."""
+_STYLE = """
 *{box-sizing:border-box}
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);margin:0 auto;
 max-width:1100px;padding:24px 20px}
@@ -57,12 +60,12 @@ def document_page(document: Document, drawn: Iterable[Plot]) -> str:
 def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
     """HTML of a page."""
     colours = "".join(
-        f".l{k}{{stroke:{c}}}.c{k},.a{k}{{fill:{c}}}.b{k}{{background:{c}}}" for k, c in enumerate(_COLOURS)
+        f".l{k}{{stroke:{c}}}.c{k},.a{k}{{fill:{c}}}.b{k}{{background:{c}}}" for k, c in enumerate(COLOURS)
     )
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{_STYLE}{colours}</style></head><body>"
+        f"<title>{escape(title)}</title><style>{THEME}{_STYLE}{colours}</style></head><body>"
         f'<h1>{escape(title)}</h1><p class="sub">{escape(subtitle)}</p>{"".join(blocks)}</body></html>\n'
     )
 

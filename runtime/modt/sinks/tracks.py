@@ -58,6 +58,7 @@ def _frame_fields(result: FrameResult) -> dict[str, Any]:
         "proposals": len(result.proposals),
         "classifications": result.n_classified,
         "deferred": result.n_deferred,
+        "classified": result.classified.tolist(),
     }
 
 

@@ -1,0 +1,39 @@
+"""Colours of pictures: of classes, of states and of stages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from modt.classes import CLASS_NAMES, CLASSES
+from modt.energy.ledger import STAGES
+from modt.reporting.page import COLOURS
+
+Entry = dict[str, str]
+"""`name` and `colour` of a line of a legend."""
+
+_GREY = COLOURS[5]
+_STATE_COLOURS = {
+    "unmatched": _GREY,
+    "lost_unmatched": _GREY,
+    "tracked": COLOURS[2],
+    "tracked_classified": COLOURS[2],
+    "tracked_unclassified": COLOURS[1],
+    "lost": COLOURS[3],
+    "lost_classified": COLOURS[3],
+    "lost_unclassified": COLOURS[6],
+}
+
+
+def classes() -> list[Entry]:
+    """Of the classes, in their order."""
+    return [{"name": name, "colour": spec.colour} for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)]
+
+
+def states(names: Iterable[str]) -> list[Entry]:
+    """Of states: waiting ones grey, final ones green, those in doubt orange, lost ones violet or ochre."""
+    return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
+
+
+def stages(names: Sequence[str] = STAGES) -> list[Entry]:
+    """Of the stages of a frame."""
+    return [{"name": name, "colour": COLOURS[k % len(COLOURS)]} for k, name in enumerate(names)]

@@ -1,0 +1,94 @@
+"""A run as one HTML page that plays it, from a file and without a network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from modt.reporting.page import THEME
+from modt.sinks.output import writing
+from modt.viewer import look
+from modt.viewer.packed import packed_cells, packed_table
+from modt.viewer.point_cells import SIDE, Cells
+from modt.viewer.recorded_run import RecordedRun
+from modt.viewer.track_rows import COLUMNS
+
+POINT_BYTES = 20_000_000
+"""Of the points of a page, about."""
+CELL_BYTES = 1.5
+"""Of a cell, compressed and in base64."""
+_ASSETS = Path(__file__).parent
+
+
+def most_cells(n_frames: int) -> int:
+    """Cells a sweep that a page of so many frames has room for."""
+    return int(POINT_BYTES / CELL_BYTES / n_frames)
+
+
+def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: Iterable[Cells] | None) -> None:
+    """Write the page of a run, which opens at a frame.
+
+    Args:
+        path: the file.
+        run: what is recorded.
+        start: index of the frame.
+        step_cm: width of a cell.
+        sweeps: cells of each frame, None without points.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    head, tail = _page(run, _content(run, start, None if sweeps is None else step_cm))
+    with writing(path), path.open("w", encoding="utf-8") as file:
+        file.write(head)
+        file.write(_data("tracks", packed_table(run.tracks)))
+        for at, cells in enumerate(sweeps or ()):
+            file.write(_data(f"points-{at}", packed_cells(cells)))
+        file.write(tail)
+
+
+def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any]:
+    """What the page knows beside the columns."""
+    return {
+        "schema": "modt.player/1",
+        "columns": COLUMNS,
+        "classes": look.classes(),
+        "states": look.states(run.states),
+        "stages": look.stages(),
+        "budget": run.budget,
+        "frames": [_rounded(frame | run.call_mJ(frame)) for frame in run.frames],
+        "poses": run.poses.round(4).tolist(),
+        "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},
+        "start": start,
+    }
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    return round(value, 3) if isinstance(value, float) else value
+
+
+def _page(run: RecordedRun, content: dict[str, Any]) -> tuple[str, str]:
+    """The page before its data and after them."""
+    css, body, script = ((_ASSETS / f"player.{kind}").read_text(encoding="utf-8") for kind in ("css", "html", "js"))
+    name = escape(run.facts["stream"]["name"])
+    about = f"mode {run.facts['mode']}, field of view {run.facts.get('fov', 'full')}, profile {run.sensor}"
+    if content["points"] is None:
+        about += "; the source of its points is not found"
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    head = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{name}</title><style>{THEME}{css}</style></head><body>\n"
+        f"<header><h1>{name}</h1><span>{escape(about)}</span></header>\n{body}"
+        f'<script type="application/json" id="run">{text}</script>\n'
+    )
+    return head, f"<script>\n{script}</script></body></html>\n"
+
+
+def _data(name: str, text: str) -> str:
+    return f'<script type="text/plain" id="{name}">{text}</script>\n'

@@ -1,0 +1,127 @@
+"""What a run has recorded of its frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modt import profile
+from modt.config import ProfileConfig
+from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
+from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
+from modt.errors import MisuseError
+from modt.pipeline import CLASSIFICATION
+from modt.profile import from_yaml
+from modt.profile.yaml_text import to_yaml
+from modt.sinks.records import read_records
+from modt.sinks.run_directory import LEDGER, RUN, TRACKS
+from modt.sinks.tracks import SCHEMA
+from modt.types import Float64, Int
+from modt.viewer.track_rows import frame_rows, track_table
+
+COUNTS = ("frame", "stamp_s", "proposals", "classifications", "deferred")
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedRun:
+    """The records of a run, read.
+
+    Attributes:
+        facts: content of run.yaml.
+        config: the profile that it ran with.
+        frames: of each frame COUNTS, `cpu_ms` by stage, `energy_mJ` with its `kind` where a window covers it.
+        states: names, in the order of the column `state`.
+        tracks: (R, COLUMNS) as `track_rows.COLUMNS`.
+        poses: (F, 3) of the sensor in the world: x, y [m], yaw [rad].
+    """
+
+    facts: dict[str, Any]
+    config: ProfileConfig
+    frames: list[dict[str, Any]]
+    states: list[str]
+    tracks: Int
+    poses: Float64
+
+    @classmethod
+    def read(cls, run: Path) -> RecordedRun:
+        """The run of a directory; it may still be going on.
+
+        Raises:
+            MisuseError: not the directory of a run, no frame so far, or a broken record.
+        """
+        described = run / RUN
+        try:
+            facts = from_yaml(described.read_text(encoding="utf-8"), described)
+            config = profile.parse(to_yaml(facts["profile"]), described)
+            _ = facts["stream"]["path"], facts["stream"]["name"], facts["mode"]
+        except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
+            raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
+        costs, states = _costs(run / LEDGER), list[str]()
+        frames, rows = list[dict[str, Any]](), list[list[list[float]]]()
+        for number, record in enumerate(read_records(run / TRACKS, SCHEMA)):
+            try:
+                counts = {name: record[name] for name in COUNTS}
+                rows.append(frame_rows(number, record, states))
+            except (KeyError, TypeError, ValueError) as error:
+                place = f"{run / TRACKS}:{number + 1}"
+                raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
+            frames.append({**counts, **costs.get(counts["frame"], {})})
+        if not frames:
+            raise MisuseError(run / TRACKS, "no frames are recorded", "give the directory of a longer run")
+        return cls(facts, config, frames, states, *track_table(rows))
+
+    @property
+    def numbers(self) -> list[int]:
+        """Of the frames."""
+        return [recorded["frame"] for recorded in self.frames]
+
+    @property
+    def budget(self) -> str:
+        """What a frame may spend on classification, in words."""
+        scheduler = self.config.scheduler
+        limits = {
+            "calls": scheduler.calls_per_frame,
+            "ms": scheduler.cpu_ms_per_frame,
+            "mJ": scheduler.energy_mJ_per_frame,
+        }
+        found = [f"{limit:g} {unit}" for unit, limit in limits.items() if limit is not None]
+        return ", ".join(found) if found and self.facts["mode"] != "conventional" else "none"
+
+    @property
+    def sensor(self) -> str:
+        """Name of its profile."""
+        return " + ".join(self.facts.get("profiles", ()))
+
+    def call_mJ(self, frame: dict[str, Any]) -> dict[str, float]:
+        """`call_mJ` of a frame: estimated energy of each classification in it, by its CPU time."""
+        cpu_ms, calls = frame.get("cpu_ms", {}).get(CLASSIFICATION), frame["classifications"]
+        net_W = self.config.energy.busy_W - self.config.energy.idle_W
+        return {"call_mJ": net_W * cpu_ms / calls} if calls and cpu_ms else {}
+
+    def position(self, frame: int) -> int:
+        """Index of a frame, by its number.
+
+        Raises:
+            MisuseError: it is not recorded.
+        """
+        numbers = self.numbers
+        if frame not in numbers:
+            remedy = f"give one from {numbers[0]} to {numbers[-1]}"
+            raise MisuseError(f"--frame {frame}", "is not recorded", remedy)
+        return numbers.index(frame)
+
+
+def _costs(ledger: Path) -> dict[int, dict[str, Any]]:
+    """CPU time and energy by number of frame."""
+    costs: dict[int, dict[str, Any]] = {}
+    for line in read_records(ledger, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA}):
+        costs[line["frame"]] = {"cpu_ms": {name: s["cpu_ns"] / 1e6 for name, s in line["stages"].items()}}
+    for window in read_records(ledger, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}):
+        first, last, n = window["frames"]
+        if n and window["energy_J"] is not None:
+            energy = {"energy_mJ": 1e3 * window["energy_J"] / n, "kind": window["kind"]}
+            for frame in range(first, last + 1):
+                if frame in costs:
+                    costs[frame] |= energy
+    return costs

@@ -1,0 +1,166 @@
+"""`modt view` from the outside."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from tests.viewer.pages import Page
+
+from .commands import modt
+
+OPEN_PAGE = Path(__file__).resolve().parents[1] / "viewer" / "open_page.mjs"
+FRAMES = 12
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A run on the synthetic street, and the page of it."""
+    path = tmp_path_factory.mktemp("runs") / "run"
+    for command in (("replay", "--frames", f"0:{FRAMES}", "--quiet", "--out", path), ("view", path)):
+        done = modt(*command, cwd=path.parent)
+        assert done.returncode == 0, done.stderr
+    return path
+
+
+@pytest.fixture(scope="module")
+def moved(run):
+    """The same where its source is not found any more."""
+    copy = shutil.copytree(run, run.with_name("moved"))
+    text = (copy / "run.yaml").read_text()
+    (copy / "run.yaml").write_text(re.sub(r"path: null", "path: /nowhere/at/all", text, count=1))
+    return copy
+
+
+@pytest.fixture(scope="module")
+def records(run):
+    return [json.loads(line) for line in (run / "tracks.jsonl").read_text().splitlines()]
+
+
+def opened(page, *actions):
+    """What a page shows after some actions."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed")
+    done = subprocess.run([node, OPEN_PAGE, page, *actions], capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    shown = json.loads(done.stdout)
+    assert shown["failures"] == []
+    return shown
+
+
+def test_the_page_holds_the_run(run, records):
+    page = Page(run / "view.html")
+    assert len(page.tracks) == sum(len(record["tracks"]) for record in records)
+    for at, (record, frame) in enumerate(zip(records, page.run["frames"], strict=True)):
+        assert {
+            key: frame[key] for key in ("frame", "proposals", "classifications", "deferred")
+        }.items() <= record.items()
+        rows = page.column("at") == at
+        tracks = sorted(record["tracks"], key=lambda track: track["id"])
+        assert page.column("id")[rows].tolist() == [track["id"] for track in tracks]
+        states = [page.run["states"][state]["name"] for state in page.column("state")[rows]]
+        assert states == [track["state"] for track in tracks]
+        assert sorted(page.column("id")[rows & (page.column("classified") > 0)]) == sorted(record["classified"])
+        assert len(record["classified"]) == record["classifications"]
+        seen = [(track["box"]["x"], track["box"]["yaw"]) for track in tracks if track["box"]]
+        drawn = np.stack([page.column("x") / 100, page.column("yaw") / 1000], axis=1)[
+            rows & (page.column("seen") > 0)
+        ]
+        np.testing.assert_allclose(drawn, seen, atol=0.0051)
+    assert [len(cell) > 1000 for cell, _ in page.points] == [True] * FRAMES
+
+
+def test_the_page_needs_nothing_from_outside(run):
+    text = (run / "view.html").read_text()
+    assert not re.search(r"https?:|<link|\bsrc=|\bimport\b|fetch\(", re.sub(r'<script type="text[^<]*', "", text))
+
+
+def test_the_page_opens_and_the_slider_moves(run, records):
+    shown = opened(run / "view.html")
+    assert (shown["frame"], shown["at"]) == (records[0]["frame"], 0)
+    assert shown["pixels"] > 1000
+    assert f"{records[0]['classifications']}, {records[0]['deferred']} budget 16 calls" in shown["facts"]
+    later = opened(run / "view.html", "slide:9")
+    assert later["frame"] == records[9]["frame"]
+    assert f"proposals {records[9]['proposals']} " in later["facts"]
+    cars = [track["id"] for track in records[9]["tracks"] if track["class"] == "car"]
+    assert cars
+    assert all(any(label.startswith(f"#{id_} car ") for label in later["labels"]) for id_ in cars)
+
+
+def test_pointing_at_a_track_tells_its_story(run, records):
+    track = next(t for t in records[9]["tracks"] if t["class"] == "car" and t["box"])
+    shown = opened(run / "view.html", "slide:9", f"hover:{track['box']['x']},{track['box']['y']}")
+    assert f"#{track['id']} car" in shown["story"]
+    times = sum(track["id"] in record["classified"] for record in records)
+    assert shown["story"].count("classified: ") == times > 0
+    assert f"{track['state']}, {track['points']} points" in shown["story"]
+
+
+def test_keys_step_and_hide(run, records):
+    shown = opened(run / "view.html", "key:ArrowRight", "key:ArrowRight", "key:p", "key:b", "theme:dark")
+    assert shown["at"] == 2
+    assert shown["pixels"] == 0
+    assert shown["boxes"] == 1 + sum(track["class"] != "background" for track in records[2]["tracks"])
+    assert opened(run / "view.html", "key:End")["at"] == FRAMES - 1
+
+
+def test_the_page_may_begin_at_a_frame(run, tmp_path):
+    done = modt("view", run, "--frame", 4, "--out", "page.html", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert Page(tmp_path / "page.html").run["start"] == 4
+
+
+def test_a_frame_as_a_picture(run, records):
+    done = modt("view", run, "--frame", 9, cwd=run)
+    assert done.returncode == 0, done.stderr
+    root = ElementTree.parse(run / "view-9.svg").getroot()
+    tag = "{http://www.w3.org/2000/svg}"
+    assert len(root.findall(f"{tag}polygon")) == len(records[9]["tracks"])
+    assert len([c for c in root.findall(f"{tag}circle") if c.get("class") == "ring"]) == records[9]["classifications"]
+    text = " ".join(node.text or "" for node in root.iter(f"{tag}text"))
+    assert f"{records[9]['classifications']} classified, {records[9]['deferred']} deferred" in text
+    assert "budget 16 calls" in text
+    assert "mJ (" in text
+    dots = {p.get("class"): p.get("d").count("M") for p in root.findall(f"{tag}path")}
+    assert min(dots["ground"], dots["above"]) > 1000
+
+
+def test_without_its_source_a_run_has_no_points(moved):
+    done = modt("view", moved, cwd=moved)
+    assert done.returncode == 0, done.stderr
+    assert "without points: /nowhere/at/all" in done.stderr
+    page = Page(moved / "view.html")
+    assert (page.points, page.run["points"]) == ([], None)
+    shown = opened(moved / "view.html")
+    assert (shown["pixels"], shown["at"]) == (0, 0)
+    assert shown["boxes"] > 1
+
+
+def test_misuse_is_one_line_with_the_remedy(run, tmp_path):
+    for arguments, message in (
+        ((tmp_path,), "describes no run"),
+        ((run, "--frame", 77), f"give one from 0 to {FRAMES - 1}"),
+        ((run, "--out", "view.gif"), "give a name that ends with .html or .svg"),
+    ):
+        done = modt("view", *arguments, cwd=tmp_path)
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.kitti
+def test_a_drive_of_full_sweeps_fits_a_page(drive_0005, tmp_path):
+    for command in (("replay", drive_0005, "--quiet", "--out", "run"), ("view", "run")):
+        done = modt(*command, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "run" / "view.html").stat().st_size < 25e6
+    assert [len(cell) > 40_000 for cell, _ in Page(tmp_path / "run" / "view.html").points] == [True] * 154
+    assert opened(tmp_path / "run" / "view.html", "slide:153")["frame"] == 153
