@@ -9,6 +9,7 @@ have left a reader is written to --out with its input; then the exit status is 1
 from __future__ import annotations
 
 import multiprocessing
+import shutil
 import sys
 import tempfile
 import time
@@ -55,7 +56,8 @@ def main() -> None:
     found = 0
     for name in arguments.targets or TARGETS:
         out = arguments.out / name
-        out.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(out, ignore_errors=True)
+        out.mkdir(parents=True)
         found += _supervise(Job(name, arguments.seconds, arguments.seed, out, coverage))
     sys.exit(1 if found else 0)
 

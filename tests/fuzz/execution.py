@@ -38,9 +38,7 @@ class Finding:
     trace: str
 
 
-def execute(
-    call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Exception], ...]
-) -> Finding | None:
+def execute(call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Exception], ...]) -> Finding | None:
     """Read an input; None where it was read or refused."""
     signal.setitimer(signal.ITIMER_REAL, DEADLINE_S)
     try:

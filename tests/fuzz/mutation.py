@@ -8,7 +8,21 @@ from collections.abc import Iterator, Sequence
 MOST_BYTES = 65_536
 EXTREMES = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 2**63 - 1, 2**64 - 1)
 WORDS = (
-    *(b"nan", b"inf", b"-inf", b"-1", b"0", b"1e999", b"-0.0", b"9" * 30, b"1" * 5000, b"null", b"true", b'""', b"[]"),
+    *(
+        b"nan",
+        b"inf",
+        b"-inf",
+        b"-1",
+        b"0",
+        b"1e999",
+        b"-0.0",
+        b"9" * 30,
+        b"1" * 5000,
+        b"null",
+        b"true",
+        b'""',
+        b"[]",
+    ),
     *(b"{}", b"\n", b"\0", b" ", b"\xff\xfe", b"[" * 5000, b"{a: " * 2000, b"<a>" * 2000, b"..", b"%s", b"\xc2\xb2"),
 )
 """Text that readers of numbers and of nested formats have trouble with."""
@@ -64,7 +78,7 @@ def _splice(raw: bytearray, seeds: Sequence[bytes], chance: random.Random) -> No
 def _word(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
     """In place of a word of the text, if it is one."""
     at = _place(raw, chance)
-    ends = [end for end in (raw.find(c, at, at + 64) for c in b" \n,:\"]}<") if end >= 0]
+    ends = [end for end in (raw.find(c, at, at + 64) for c in b' \n,:"]}<') if end >= 0]
     raw[at : chance.choice((at, min(ends, default=at)))] = chance.choice(WORDS)
 
 

@@ -26,13 +26,11 @@ from tests.reporting.test_run_report import write_run
 from tests.sources import layouts
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
-    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n" for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
 )
 """Nine to the ninth words."""
-SENSOR_BOMB = "sensor:\n  reflectance: &a [x, x, x, x, x, x, x, x, x]\n  name: " + "".join(
-    f"&{name} [{', '.join([f'*{before}'] * 9)}]\n  {key}: "
-    for before, name, key in zip("abcdefg", "bcdefgh", "uvwxyzq", strict=True)
-)
+SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.splitlines())}]}}\n"
 
 
 @target()
@@ -162,7 +160,10 @@ def service_status(folder: Path) -> Feed:
     seed = {
         **{"schema": SCHEMA, "time_s": 1.0, "up_s": 3.0, "source": "udp://", "mode": "accurate", "profile": "vlp-16"},
         **{"loop": loop, "sensor": {"received": 3}, "sinks": {"udp": {"sent": 3}}, "host": {"lacking": ["x"]}},
-        **{"power": {"frame_J": 0.1, "watts": 3.0, "kind": "measured"}, "recording": {"failing": "", "lines": 3, "lost_lines": 0}},
+        **{
+            "power": {"frame_J": 0.1, "watts": 3.0, "kind": "measured"},
+            "recording": {"failing": "", "lines": 3, "lost_lines": 0},
+        },
         **{"counts": {"rate_hz": 10.0, "tracks": 3, "visible": {"car": 1}}},
     }
 

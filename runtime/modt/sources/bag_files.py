@@ -16,6 +16,9 @@ from modt.errors import MisuseError, ModtError
 
 REMEDY = "give a recording by rosbag2 (.db3 or .mcap) that was closed, and not compressed as a whole"
 
+TOO_LARGE = (MemoryError, OverflowError)
+"""Raised where a length in a file is none."""
+
 
 class BagMessage(NamedTuple):
     """A recorded message."""
@@ -103,7 +106,7 @@ class McapFile:
         except ImportError:
             raise MisuseError(path, "needs the library mcap", "pip install mcap, or 'modt[ros2]'") from None
         # What the library and its decompressors raise where the bytes are no recording, or not all of one.
-        self.path, self._errors = path, (McapError, ZstdError, struct.error, ValueError, RuntimeError)
+        self.path, self._errors = path, (McapError, ZstdError, struct.error, ValueError, RuntimeError, *TOO_LARGE)
         self._indexed, self._sequential = SeekingReader, NonSeekingReader
 
     def topics(self) -> dict[str, BagTopic]:
