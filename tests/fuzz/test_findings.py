@@ -8,33 +8,46 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modt.ros2.odometry import write_odometry
+from modt.errors import ModtError
+from modt.ros2.cdr import CdrWriter
+from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from tests.fuzz.execution import limits
-from tests.fuzz.runs import BOMB, SENSOR_BOMB
+from tests.fuzz.runs import SENSOR_BOMB, network
 from tests.fuzz.targets import TARGETS
 from tests.reporting.test_run_report import ledger_line
+from tests.sources import bags
 from tests.sources.layouts import CAMERA
 
-QUATERNION_AT = 4 + 8 + 12 + 16 + 24
 R, T = f"R: {CAMERA['R']}", "T: 0 0 0"
 CALIBRATION = f"R_rect_00: {CAMERA['R']}\nP_rect_02: {CAMERA['P']}\n"
 CUBOID = "frame,track,label,x,y,z,l,w,h,yaw\n0,{id},Car,9,1,0.5,2,1,1.5,{yaw}\n"
 LABEL = "Car 0 0 -1.5 0 0 9 9 1.5 {width} 4.0 1.0 1.7 10.0 -1.5708\n"
+MODEL = network().SerializeToString()
 MAGIC = b"\x89MCAP0\r\n"
 HUGE = 10**30
 
 
 def odometry() -> bytes:
-    raw = bytearray(write_odometry(1.5, "odom", "base_link", np.eye(4)))
-    raw[-len(raw) + QUATERNION_AT :] = np.full((len(raw) - QUATERNION_AT) // 8, 1e300).tobytes()
-    return bytes(raw)
+    cdr = CdrWriter()
+    cdr.header(1.5, "odom")
+    cdr.text("base_link")
+    cdr.record(("7d",), 0, 0, 0, 1e300, 0, 0, 1e300)
+    return cdr.message()
+
+
+def chunk_of(size: int, folder: Path) -> bytes:
+    """A recording that was not closed, with the size of its first chunk when unpacked."""
+    whole = bytearray(bags.write_mcap(folder / "a", bags.clouds(2)).read_bytes())
+    begin = len(MAGIC) + 9 + int.from_bytes(whole[len(MAGIC) + 1 : len(MAGIC) + 9], "little")
+    whole[begin + 25 : begin + 33] = size.to_bytes(8, "little")
+    return bytes(whole[: begin + 9 + int.from_bytes(whole[begin + 1 : begin + 9], "little")])
 
 
 FOUND = {
     "a calibration that is not finite": ("calibration_of_sequence", f"P2: {CAMERA['P']}\nTr: {'inf ' * 12}"),
     "a size of one number": ("calibration_of_drive", f"S_rect_02: 9\n{CALIBRATION}---{R}\n{T}---{R}\n{T}"),
-    "a rotation that is not finite": ("calibration_of_drive", f"{CALIBRATION}---{'R: ' + 'nan ' * 9}\n{T}---{R}"),
+    "a rotation that is not finite": ("calibration_of_drive", f"{CALIBRATION}---{'R: ' + 'inf ' * 9}\n{T}---{R}"),
     "a place beyond the pole": ("oxts_records", "95 8.4 110 0 0 0"),
     "a label that is not finite": ("labels_of_frame", LABEL.format(width="inf")),
     "a frame that no drive reaches": ("truth_of_sequence", f"{HUGE} 4 {LABEL.format(width=2)}"),
@@ -42,17 +55,17 @@ FOUND = {
     "a cuboid that is not finite": ("cuboids", CUBOID.format(id=3, yaw="nan")),
     "a detection in a frame that no drive reaches": (
         "detections",
-        f"{HUGE},2,1,1,9,9,9.8,1.5,1.6,3.7,-2.9,1.8,13,-1,-1",
+        f"{HUGE},2,{'1,' * 12}1",
     ),
-    "a record of 2^63 bytes": ("mcap", MAGIC + b"\x01" + (2**63).to_bytes(8, "little")),
-    "a record of 2^62 bytes": ("mcap", MAGIC + b"\x01" + (2**62).to_bytes(8, "little")),
+    "a record of 3 GiB": ("mcap", MAGIC + b"\x01" + (3 * 2**30).to_bytes(8, "little") + bytes(100)),
     "a quaternion beyond the square root": ("odometry", odometry()),
-    "a profile of aliases": ("profiles", BOMB),
     "a value of aliases": ("profiles", SENSOR_BOMB),
     "a nested profile": ("profiles", "[" * 5000),
     "a profile of a megabyte": ("profiles", "# " + "x" * 2**20),
-    "a name in a model that is no text": ("models", b"\x08\x08:\x08\x12\x02\xff\xfeZ\x02\n\x00"),
-    "a run described by aliases": ("run_description", BOMB),
+    "a name in a model that is no text": (
+        "models",
+        network().SerializeToString().replace(b"points", b"p\xff\xfents"),
+    ),
     "a nested description of a run": ("run_description", "[" * 5000),
     "a run without its mode": ("run_description", "schema: modt.run/1\nprofile: {}\n"),
     "a run with a profile of text": ("run_description", "schema: modt.run/1\nprofile: {classification: {batch: x}}"),
@@ -77,3 +90,10 @@ def test_infinities_of_either_sign_are_no_return(tmp_path: Path) -> None:
     path = tmp_path / "a.bin"
     path.write_bytes(np.array([np.inf, -np.inf, 0, 0], np.float32).tobytes())
     assert read_scan(path)[0].tolist() == [[0, 0, 0, 0]]
+
+
+def test_a_chunk_of_2_to_the_63_bytes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(chunk_of(2**63, tmp_path))
+    with limits(), pytest.raises(ModtError, match="holds no message"):
+        open_stream(path)
