@@ -12,7 +12,7 @@ from tests.fuzz.target import Target
 from tests.fuzz.targets import TARGETS
 
 READERS = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
-FEW, MANY = 200, 5000
+FEW, MANY = 100, 2000
 
 
 def findings(target: Target, folder: Path, n: int, seed: int) -> list[Finding]:
