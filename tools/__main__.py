@@ -11,10 +11,11 @@ ROOT = Path(__file__).parent
 
 def commands() -> Iterator[tuple[str, str]]:
     """Module and first docstring line of each command, that is of each module with a `main`; imports none of them."""
-    for path in sorted(ROOT.glob("*/*.py")):
+    for path in sorted([*ROOT.glob("[!_]*.py"), *ROOT.glob("*/*.py")]):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         if any(isinstance(node, ast.FunctionDef) and node.name == "main" for node in tree.body):
-            yield f"tools.{path.parent.name}.{path.stem}", (ast.get_docstring(tree) or "").partition("\n")[0]
+            module = ".".join(path.relative_to(ROOT.parent).with_suffix("").parts)
+            yield module, (ast.get_docstring(tree) or "").partition("\n")[0]
 
 
 def main() -> None:

@@ -30,6 +30,7 @@ _MODEL_ERRORS = (
     ort_errors.ModelLoaded,
     ort_errors.NotImplemented,
     ort_errors.RuntimeException,
+    UnicodeDecodeError,  # of its names
 )
 CLASS_FREQUENCY_KEY = "class_frequency"
 """Key of the class frequency in the metadata of a model: (4,), background first."""
@@ -124,11 +125,13 @@ def _session(path: Path) -> ort.InferenceSession:
     options.add_session_config_entry("session.inter_op.allow_spinning", "0")
     options.log_severity_level = 4
     try:
-        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"], enable_fallback=0)
+        ends = [(end.name, tuple(end.shape)) for end in (*session.get_inputs(), *session.get_outputs())]
+        session.get_modelmeta()
     except _MODEL_ERRORS as error:
         cause = f"not an ONNX model ({str(error).splitlines()[0]})"
         raise MisuseError(path, cause, "use a model of tools/train/export_pointnet.py") from None
-    shapes = [tuple(end.shape) for end in (*session.get_inputs(), *session.get_outputs())]
+    shapes = [shape for _, shape in ends]
     if len(shapes) != 2 or not _fits(shapes[0], (None, None, 3)) or not _fits(shapes[1], (None, N_CLASSES)):
         cause = f"inputs and outputs of shape {' and '.join(map(str, shapes))}"
         raise MisuseError(path, cause, f"use a model of (batch, points, 3) to (batch, {N_CLASSES})")

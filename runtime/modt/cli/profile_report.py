@@ -23,10 +23,14 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.reporting.quantity import to_json
     from modt.reporting.run_report import run_tree
     from modt.reporting.run_view import run_document, run_plots
+    from modt.sinks.records import records_of
 
-    tree = run_tree(arguments.run_directory)
-    document = run_document(tree)
-    if arguments.html is not None:
-        save(arguments.html, document_page(document, run_plots(tree)))
-    print(json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else document.text())
+    with records_of(arguments.run_directory):
+        tree = run_tree(arguments.run_directory)
+        document = run_document(tree)
+        text = json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else document.text()
+        page = None if arguments.html is None else document_page(document, run_plots(tree))
+    if page is not None:
+        save(arguments.html, page)
+    print(text)
     return 0

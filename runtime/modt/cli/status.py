@@ -30,12 +30,16 @@ def run(arguments: argparse.Namespace) -> int:
     """Print the status; 0 while the service runs, else 1."""
     from modt.service.status import STALE_S
     from modt.service.status_text import status_text
+    from modt.sinks.records import records_of
     from modt.sinks.service_directory import STATUS
 
-    status = read(arguments.directory / STATUS)
-    now_s = time.time()
-    print(json.dumps(status, indent=1) if arguments.json else status_text(status, now_s))
-    return int(now_s - status["time_s"] >= STALE_S)
+    path, now_s = arguments.directory / STATUS, time.time()
+    status = read(path)
+    with records_of(path):
+        text = json.dumps(status, indent=1) if arguments.json else status_text(status, now_s)
+        stale = bool(now_s - status["time_s"] >= STALE_S)
+    print(text)
+    return int(stale)
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -48,7 +52,7 @@ def read(path: Path) -> dict[str, Any]:
 
     try:
         status = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise MisuseError(path, f"no status ({error})", "give the run directory of a modt run") from None
     if not isinstance(status, dict) or status.get("schema") != SCHEMA:
         raise MisuseError(path, "another schema", f"this version reads {SCHEMA}")

@@ -24,7 +24,7 @@ from modt.evaluation.truth import (
 )
 from modt.geometry import Camera
 from modt.sources.kitti_calibration import camera_of_sequence
-from modt.sources.kitti_labels import DONT_CARE, Label, read_labels, read_tracklets
+from modt.sources.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets
 from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_stream import ScanStream
@@ -137,6 +137,8 @@ def _rows(path: Path) -> Iterator[Label]:
                 try:
                     box = [float(next(row[name] for name in names if name in row)) for names in BOX_COLUMNS]
                     frame, track = int(row.get("frame", 0)), int(row.get("track", NONE))
+                    if abs(track) > MAX_ID or not np.isfinite(box).all():
+                        raise ValueError(box)
                 except (StopIteration, ValueError, TypeError):
                     remedy = "write x, y, z, l, w, h, yaw, frame and track as numbers"
                     raise MisuseError(f"{path}:{number}", "no cuboid", remedy) from None

@@ -12,7 +12,7 @@ from modt import assets
 from modt.config import ProfileConfig, StageConfig, ValueRangeError
 from modt.config.keys import keys, value_of
 from modt.errors import MisuseError
-from modt.profile.yaml_text import Written, nested, read, value_text
+from modt.profile.yaml_text import MAX_CHARACTERS, Written, nested, read, value_text
 
 DEFAULT = "hdl-64e"
 """Profile of the sensor where none is asked for."""
@@ -135,7 +135,8 @@ def _chain(written: Written, path: Path, within: tuple[Path, ...]) -> dict[Path,
 
 def _read(path: Path) -> Written:
     try:
-        return read(path.read_text(encoding="utf-8"), path)
+        with path.open(encoding="utf-8") as file:
+            return read(file.read(MAX_CHARACTERS + 1), path)
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(path, f"cannot be read ({error})", "make it a readable UTF-8 file") from None
 

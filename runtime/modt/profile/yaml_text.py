@@ -18,6 +18,20 @@ from modt.errors import MisuseError
 EXTENDS = "extends"
 """The key at a profile's head that names the profiles which it is based on."""
 
+MAX_CHARACTERS = 1_000_000
+"""In a text; the longest that is shipped has 2,000."""
+
+
+class _Loader(yaml.SafeLoader):
+    """Without aliases: a few lines of them stand for any number of values."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """A node."""
+        if self.check_event(yaml.AliasEvent):
+            parser: Any = self  # its stubs are incomplete
+            raise yaml.MarkedYAMLError(problem="an alias", problem_mark=parser.peek_event().start_mark)
+        return super().compose_node(parent, index)
+
 
 @dataclass(frozen=True, slots=True)
 class Written:
@@ -41,8 +55,8 @@ def read(text: str, origin: Path | str) -> Written:
         MisuseError: not YAML, an unknown key or a value out of range, with the line and the nearest valid key.
     """
     try:
-        root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as error:
+        root = yaml.compose(_bounded(text), Loader=_Loader)
+    except (yaml.YAMLError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         place = f"{origin}:{mark.line + 1}" if mark else str(origin)
         cause = str(getattr(error, "problem", None) or "unreadable")
@@ -67,8 +81,8 @@ def to_yaml(data: Mapping[str, Any]) -> str:
 def from_yaml(text: str, origin: Path | str) -> Any:
     """Plain data of a YAML text written by this package."""
     try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError:
+        return yaml.load(_bounded(text), Loader=_Loader)
+    except (yaml.YAMLError, ValueError, RecursionError):
         raise MisuseError(origin, "no YAML", "give the run directory of a whole run") from None
 
 
@@ -111,6 +125,12 @@ def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: i
     return settings
 
 
+def _bounded(text: str) -> str:
+    if len(text) > MAX_CHARACTERS:
+        raise yaml.MarkedYAMLError(problem=f"more than {MAX_CHARACTERS} characters")
+    return text
+
+
 def _names(plain: Any, place: str) -> tuple[str, ...]:
     names = plain if isinstance(plain, list) else [plain]
     if not all(isinstance(name, str) for name in names):
@@ -121,7 +141,7 @@ def _names(plain: Any, place: str) -> tuple[str, ...]:
 def _plain(node: yaml.Node, place: str) -> Any:
     try:
         return yaml.safe_load(yaml.serialize(node))
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError):
         raise MisuseError(place, "no plain value", "write a number, a name or a list") from None
 
 

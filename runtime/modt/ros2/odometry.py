@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,7 @@ def read_pose(cdr: CdrReader) -> Float64:
     numbers = cdr.doubles(7)
     if not np.isfinite(numbers).all():
         raise MessageError("non_finite", "the pose is not finite")
-    if not 0.9 < np.linalg.norm(numbers[3:]) < 1.1:
+    if not 0.9 < math.hypot(*numbers[3:]) < 1.1:
         raise MessageError("malformed", "the quaternion is no rotation")
     return se3(Rotation.from_quat(numbers[3:]).as_matrix(), numbers[:3])
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError
 
 log = logging.getLogger(__name__)
+
+MAX_QUOTED = 100
 
 
 def line(record: dict[str, Any]) -> str:
@@ -35,7 +38,7 @@ def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iter
             for number, text in enumerate(lines, 1):
                 try:
                     record = json.loads(text)
-                except json.JSONDecodeError:
+                except (ValueError, RecursionError):
                     if text.endswith("\n"):
                         raise MisuseError(f"{path}:{number}", "no JSON", "give a file that modt wrote") from None
                     log.warning("%s:%d: incomplete last line ignored", path, number)
@@ -49,3 +52,17 @@ def read_records(path: Path, schema: str, ignored: Collection[str] = ()) -> Iter
                 yield record
     except (OSError, UnicodeDecodeError) as error:
         raise MisuseError(path, f"cannot be read ({error})", "give the directory of a run") from None
+
+
+@contextmanager
+def records_of(path: Path) -> Iterator[None]:
+    """Where records are used: one that lacks a value, or has one of another kind, is an error of its file or folder.
+
+    Raises:
+        MisuseError: so it is.
+    """
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+        cause = f"holds a record that modt did not write ({type(error).__name__}: {str(error)[:MAX_QUOTED]!r})"
+        raise MisuseError(path, cause, "give what a run of this version wrote") from error

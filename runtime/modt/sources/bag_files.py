@@ -16,6 +16,11 @@ from modt.errors import MisuseError, ModtError
 
 REMEDY = "give a recording by rosbag2 (.db3 or .mcap) that was closed, and not compressed as a whole"
 
+MAX_RECORD_BYTES = 2**28
+"""Of an MCAP file: a chunk has a few megabytes."""
+TOO_LARGE = (MemoryError, OverflowError)
+"""Raised where a length in a file is none."""
+
 
 class BagMessage(NamedTuple):
     """A recorded message."""
@@ -103,7 +108,7 @@ class McapFile:
         except ImportError:
             raise MisuseError(path, "needs the library mcap", "pip install mcap, or 'modt[ros2]'") from None
         # What the library and its decompressors raise where the bytes are no recording, or not all of one.
-        self.path, self._errors = path, (McapError, ZstdError, struct.error, ValueError, RuntimeError)
+        self.path, self._errors = path, (McapError, ZstdError, struct.error, ValueError, RuntimeError, *TOO_LARGE)
         self._indexed, self._sequential = SeekingReader, NonSeekingReader
 
     def topics(self) -> dict[str, BagTopic]:
@@ -118,7 +123,9 @@ class McapFile:
         with self._open() as file:
             found: dict[int, Any] = {}
             with suppress(*self._errors):  # at its end
-                for schema, channel, _ in self._sequential(file).iter_messages(log_time_order=False):
+                for schema, channel, _ in self._sequential(file, record_size_limit=MAX_RECORD_BYTES).iter_messages(
+                    log_time_order=False
+                ):
                     found[channel.id] = schema, channel
                     counts[channel.id] += 1
         if not found:
@@ -130,14 +137,14 @@ class McapFile:
         with self._open() as file:
             indexed = self._summary(file) is not None
             file.seek(0)
-            reader = (self._indexed if indexed else self._sequential)(file)
+            reader = (self._indexed if indexed else self._sequential)(file, record_size_limit=MAX_RECORD_BYTES)
             for _, channel, message in reader.iter_messages(topics=list(topics), log_time_order=indexed):
                 yield BagMessage(channel.topic, 1e-9 * message.log_time, message.data)
 
     def _summary(self, file: BinaryIO) -> Any:
         """Index and counts, None where the recording was not closed."""
         with suppress(*self._errors, OSError):
-            summary = self._indexed(file).get_summary()
+            summary = self._indexed(file, record_size_limit=MAX_RECORD_BYTES).get_summary()
             return summary if summary is not None and summary.statistics is not None else None
         return None
 

@@ -19,6 +19,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import wrap
+from modt.sources.kitti_labels import MAX_FRAME
 from modt.sources.text_file import read_lines
 from modt.types import Bool, Float64, Int
 
@@ -146,8 +147,8 @@ def _row(line: str, location: str) -> list[float] | None:
         raise MisuseError(location, "is no detection", "write 15 comma-separated columns or a KITTI label") from None
     if numbers is None:
         return None
-    if len(numbers) != N_COLUMNS or not np.isfinite(numbers).all() or numbers[0] < 0:
-        raise MisuseError(location, f"has not {N_COLUMNS} finite numbers", "correct the line")
+    if len(numbers) != N_COLUMNS or not np.isfinite(numbers).all() or not 0 <= numbers[0] <= MAX_FRAME:
+        raise MisuseError(location, f"has not {N_COLUMNS} finite numbers, or no possible frame", "correct the line")
     return numbers if numbers[1] in range(1, len(DETECTED) + 1) else None
 
 

@@ -17,6 +17,8 @@ from modt.types import Float64
 IMAGE_PX = (1242.0, 375.0)
 """Size of the rectified image where the calibration has none."""
 REMEDY = "restore the calibration file"
+MAX_ELEMENT = 1e6
+"""Greatest number in a calibration [pixel or m]."""
 
 
 def read_table(path: Path) -> dict[str, Float64]:
@@ -32,12 +34,14 @@ def read_table(path: Path) -> dict[str, Float64]:
 
 
 def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys: str) -> Float64:
-    """Matrix of the first key found."""
+    """Matrix of the first key found, of numbers up to MAX_ELEMENT."""
     for key in keys:
         if key in table:
             if table[key].size != shape[0] * shape[1]:
                 cause = f"{key} holds {table[key].size} numbers, not {shape[0] * shape[1]}"
                 raise MisuseError(path, cause, REMEDY)
+            if not (np.abs(table[key]) <= MAX_ELEMENT).all():
+                raise MisuseError(path, f"{key} holds a number beyond {MAX_ELEMENT:g}", REMEDY)
             return table[key].reshape(shape)
     raise MisuseError(path, f"no {' or '.join(keys)}", REMEDY)
 
@@ -63,7 +67,7 @@ def camera(P: Float64, R_rect: Float64, T_camera_sensor: Float64, size_px: tuple
 def camera_of_raw(path: Path) -> Camera:
     """Left colour camera by calib_cam_to_cam.txt and the calib_velo_to_cam.txt in the same folder."""
     table = read_table(path)
-    size = table.get("S_rect_02", np.array(IMAGE_PX))
+    size = matrix({"S_rect_02": np.array(IMAGE_PX)} | table, path, (1, 2), "S_rect_02")[0]
     to_camera = path.with_name("calib_velo_to_cam.txt")
     return camera(
         matrix(table, path, (3, 4), "P_rect_02"),

@@ -15,6 +15,11 @@ from modt.types import NONE, Float64
 
 DONT_CARE = "DontCare"
 REMEDY = "restore the label file"
+MAX_FRAME = 100_000
+"""Greatest number of a frame."""
+MAX_ID = 2**31
+MAX_NUMBER = 1e5
+"""Greatest number that a label states, of either sign."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +51,7 @@ def read_tracklets(path: Path) -> list[Label]:
             for frame, pose in enumerate(item.iterfind("poses/item"), first):
                 x, y, foot, yaw = (float(pose.findtext(key, "")) for key in ("tx", "ty", "tz", "rz"))
                 box = np.array([x, y, foot + height / 2, length, width, height, yaw])
-                labels.append(Label(frame, number, type_, box))
+                labels.append(Label(_possible(frame, number, box), number, type_, box))
         except ValueError:
             raise MisuseError(path, f"item {number} is no tracklet", REMEDY) from None
     return labels
@@ -65,6 +70,7 @@ def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
         try:
             frame, id_ = (int(words.pop(0)), int(words.pop(0))) if tracking else (0, NONE)
             values = np.array(words[1:15], np.float64)
+            frame = _possible(frame, id_, values)
             height, width, length, *foot, turn = values[7:].tolist()
             x, y, z = transform(T_sensor_camera, np.array(foot)).tolist()
         except (ValueError, IndexError):
@@ -72,3 +78,14 @@ def read_labels(path: Path, camera: Camera, *, tracking: bool) -> list[Label]:
         box = np.array([x, y, z + height / 2, length, width, height, -turn - np.pi / 2])
         labels.append(Label(frame, id_, words[0], box, values[3:7]))
     return labels
+
+
+def _possible(frame: int, id_: int, values: Float64) -> int:
+    """The frame of a label that can be.
+
+    Raises:
+        ValueError: it cannot.
+    """
+    if frame > MAX_FRAME or abs(id_) > MAX_ID or not (np.abs(values) <= MAX_NUMBER).all():
+        raise ValueError(frame)
+    return frame

@@ -13,6 +13,8 @@ from modt.types import Float64
 
 EARTH_RADIUS_M = 6378137.0
 FIELDS = ("lat", "lon", "alt", "roll", "pitch", "yaw")
+MOST = (85.0, 360.0, 1e5, 7.0, 7.0, 7.0)
+"""Greatest value of each, of either sign; Mercator's projection has no poles."""
 REMEDY = "restore it, or remove it to run without ego-motion"
 
 
@@ -38,9 +40,13 @@ def read_records(path: Path) -> Float64:
     """(n, k) records of a file, FIELDS first: one of a raw drive, one a line of a tracking sequence.
 
     Raises:
-        MisuseError: missing or no records.
+        MisuseError: missing, no records, or values that no place on Earth has.
     """
     records = read_numbers(path, REMEDY)
     if records.shape[1] < len(FIELDS) or not np.isfinite(records[:, : len(FIELDS)]).all():
         raise MisuseError(path, f"OXTS record without {', '.join(FIELDS)}", REMEDY)
+    beyond = np.flatnonzero((np.abs(records[:, : len(FIELDS)]) > MOST).any(axis=0))
+    if len(beyond):
+        field, most = FIELDS[beyond[0]], MOST[beyond[0]]
+        raise MisuseError(path, f"OXTS record of {field} beyond {most:g}", REMEDY)
     return records

@@ -57,7 +57,9 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
     if _flawless(points):
         return points, flaws
     # One sum detects any NaN or infinity at a tenth of the cost of testing each value.
-    if not np.isfinite(points.sum(dtype=np.float64)):
+    with np.errstate(invalid="ignore"):  # of infinities of either sign
+        finite = np.isfinite(points.sum(dtype=np.float64))
+    if not finite:
         broken = np.flatnonzero(~np.isfinite(points[:, :3]).all(axis=1))
         points[broken] = 0.0
         lacking = np.flatnonzero(~np.isfinite(reflectance))

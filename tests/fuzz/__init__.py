@@ -1,0 +1,1 @@
+"""Readers of outside bytes, fed with broken ones."""

@@ -1,0 +1,76 @@
+"""One input read, within a time and a memory."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+
+DEADLINE_S = 10.0
+MEMORY_BYTES = 1 << 30
+"""Beyond what the process has when the reading begins."""
+
+
+class DeadlineError(BaseException):
+    """An input took too long; no reader catches it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """What left a reader that should not have.
+
+    Attributes:
+        error: its type and message.
+        place: the innermost line of the program that it came through; findings of one place are one.
+        raw: the input.
+        trace: how it came there.
+    """
+
+    error: str
+    place: str
+    raw: bytes
+    trace: str
+
+
+def execute(call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Exception], ...]) -> Finding | None:
+    """Read an input; None where it was read or refused."""
+    signal.setitimer(signal.ITIMER_REAL, DEADLINE_S)
+    try:
+        call(raw)
+    except refusals:
+        pass
+    except (Exception, DeadlineError) as error:
+        steps = traceback.extract_tb(error.__traceback__)
+        ours = next((s for s in reversed(steps) if "/modt/" in s.filename), steps[-1])
+        place = f"{Path(ours.filename).name}:{ours.lineno}"
+        said = f"{type(error).__name__}: {error}"[:200]
+        return Finding(said, place, raw, "".join(traceback.format_exception(error))[-4000:])
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+    return None
+
+
+@contextmanager
+def limits() -> Iterator[None]:
+    """The deadline and the memory limit; warnings are errors."""
+
+    def late(_: int, __: FrameType | None) -> None:
+        raise DeadlineError(f"longer than {DEADLINE_S:g} s")
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    handler = signal.signal(signal.SIGALRM, late)
+    try:
+        resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, hard))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+        signal.signal(signal.SIGALRM, handler)

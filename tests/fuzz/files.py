@@ -1,0 +1,170 @@
+"""Scans and KITTI's files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from modt.evaluation.truth_files import open_truth
+from modt.geometry import Camera
+from modt.sources import detections as boxes
+from modt.sources import kitti_calibration, oxts
+from modt.sources.kitti_labels import read_labels, read_tracklets
+from modt.sources.pose_file import read_poses
+from modt.sources.recognise import open_scans
+from modt.sources.scan_file import read_scan
+from tests.evaluation.test_truth_files import CUBOID, ITEM, LABEL, POSE
+from tests.fuzz.target import Feed, of_file, target
+from tests.sources import layouts, point_clouds
+
+TABLE = point_clouds.table(x="f4", y="f4", z="f4", intensity="u1")
+AB3DMOT = "0,2,296.0,160.7,452.1,288.4,9.8,1.5,1.6,3.7,-2.9,1.8,13.5,-1.6,-1.3\n"
+TRACKLETS = ITEM.format(type="Car", first=1, poses="".join(POSE.format(y=y) for y in (8, 9)))
+
+
+@target()
+def scan(folder: Path) -> Feed:
+    path = folder / "a.bin"
+    return of_file(path, lambda: read_scan(path), layouts.scan(0).tobytes())
+
+
+@target()
+def pcd(folder: Path) -> Feed:
+    path = folder / "a.pcd"
+    encodings = ("binary", "ascii", "binary_compressed")
+    return of_file(path, lambda: read_scan(path), *(point_clouds.pcd(TABLE, data) for data in encodings))
+
+
+@target()
+def ply(folder: Path) -> Feed:
+    path = folder / "a.ply"
+    encodings = ("binary_little_endian", "binary_big_endian", "ascii")
+    rows = point_clouds.table(x="f4", y="f4", z="f8", intensity="u1")
+    before = "element range_grid 0\nproperty float a\n"
+    seeds = (point_clouds.ply(rows, data, before) for data in encodings)
+    return of_file(path, lambda: read_scan(path), *seeds)
+
+
+@target()
+def calibration_of_sequence(folder: Path) -> Feed:
+    path = folder / "0003.txt"
+
+    def read() -> None:
+        kitti_calibration.camera_of_sequence(path)
+        kitti_calibration.T_imu_sensor_of_sequence(path)
+
+    layouts.tracking(folder)
+    return of_file(path, read, (folder / "training" / "calib" / "0003.txt").read_bytes())
+
+
+@target()
+def calibration_of_drive(folder: Path) -> Feed:
+    """All three files in one."""
+    drive = layouts.raw_drive(folder)
+    names = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt", "calib_imu_to_velo.txt")
+    paths = [drive.parent / name for name in names]
+    seeds = [path.read_bytes() for path in paths]
+
+    def call(raw: bytes) -> None:
+        for path, part in zip(paths, [*raw.split(b"---"), b"", b""], strict=False):
+            path.write_bytes(part)
+        kitti_calibration.camera_of_raw(paths[0])
+        kitti_calibration.T_imu_sensor_of_raw(drive.parent)
+
+    return [b"---".join(seeds)], call
+
+
+@target()
+def oxts_records(folder: Path) -> Feed:
+    path = folder / "0003.txt"
+    seed = "\n".join(layouts.oxts_line(2.0 * f) for f in range(3))
+    return of_file(path, lambda: oxts.poses(oxts.read_records(path)), seed)
+
+
+@target()
+def oxts_of_drive(folder: Path) -> Feed:
+    drive = layouts.raw_drive(folder)
+    path = drive / "oxts" / "data" / f"{1:010d}.txt"
+    return of_file(path, lambda: open_scans(drive), path.read_bytes())
+
+
+@target()
+def time_stamps(folder: Path) -> Feed:
+    """Those of the sweeps, of their begin and of their end alike."""
+    drive = layouts.raw_drive(folder)
+    points = drive / "velodyne_points"
+
+    def call(raw: bytes) -> None:
+        for name in ("timestamps.txt", "timestamps_start.txt", "timestamps_end.txt"):
+            (points / name).write_bytes(raw)
+        open_scans(drive)
+
+    return [(points / "timestamps.txt").read_bytes()], call
+
+
+@target()
+def times_of_sequence(folder: Path) -> Feed:
+    sequence = layouts.odometry(folder)
+    return of_file(sequence / "times.txt", lambda: list(open_scans(sequence)), "0.0\n0.104\n0.207\n")
+
+
+@target()
+def poses(folder: Path) -> Feed:
+    path = folder / "poses.txt"
+    return of_file(path, lambda: read_poses(path), "1 0 0 5 0 1 0 0 0 0 1 0\n" * 3)
+
+
+@target()
+def tracklets(folder: Path) -> Feed:
+    path = folder / "tracklet_labels.xml"
+    seed = f"<root><tracklets>{TRACKLETS * 2}</tracklets></root>"
+    return of_file(path, lambda: read_tracklets(path), seed)
+
+
+@target()
+def truth_of_drive(folder: Path) -> Feed:
+    drive = layouts.raw_drive(folder)
+    seed = f"<root><tracklets>{TRACKLETS}</tracklets></root>"
+    return of_file(drive / "tracklet_labels.xml", lambda: open_truth(drive), seed)
+
+
+@target()
+def labels_of_frame(folder: Path) -> Feed:
+    path, camera = folder / "labels.txt", Camera(np.eye(3, 4), np.eye(4), 1242.0, 375.0)
+    seed = LABEL.format(type="Car", edges="0 0 9 9") * 2
+    return of_file(path, lambda: read_labels(path, camera, tracking=False), seed)
+
+
+@target()
+def truth_of_sequence(folder: Path) -> Feed:
+    scans = layouts.tracking(folder)
+    path = scans.parents[1] / "label_02" / "0003.txt"
+    path.parent.mkdir()
+    parts = [LABEL.format(type=kind, edges="0 0 9 9") for kind in ("Car", "DontCare")]
+    return of_file(path, lambda: open_truth(path, scans), f"0 4 {parts[0]}0 -1 {parts[1]}2 4 {parts[0]}")
+
+
+@target()
+def cuboids(folder: Path) -> Feed:
+    (folder / "poses.txt").write_text("1 0 0 5 0 1 0 0 0 0 1 0\n" * 3)
+    seed = CUBOID + "0,3,Car,9,1,0.5,2,1,1.5,0.1\n2,3,Car,9,1,0.5,2,1,1.5,0.1\n"
+    return of_file(folder / "truth.csv", lambda: open_truth(folder), seed)
+
+
+@target()
+def detections(folder: Path) -> Feed:
+    path = folder / "0003.txt"
+    label = "0 -1 " + LABEL.format(type="Car", edges="0 0 9 9").strip() + " 0.9\n"
+
+    def read() -> None:
+        for sequence in boxes.read([path]):
+            list(sequence.frames())
+
+    return of_file(path, read, AB3DMOT * 2, label * 2)
+
+
+TARGETS = (
+    *(scan, pcd, ply, calibration_of_sequence, calibration_of_drive, oxts_records, oxts_of_drive, time_stamps),
+    *(times_of_sequence, poses, tracklets, truth_of_drive, labels_of_frame, truth_of_sequence, cuboids, detections),
+)

@@ -1,0 +1,85 @@
+"""Mutations of bytes: every one is one of a few kinds, at random places."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator, Sequence
+
+MOST_BYTES = 65_536
+EXTREMES = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 2**63 - 1, 2**64 - 1)
+WORDS = (
+    *(
+        b"nan",
+        b"inf",
+        b"-inf",
+        b"-1",
+        b"0",
+        b"1e999",
+        b"-0.0",
+        b"9" * 30,
+        b"1" * 5000,
+        b"null",
+        b"true",
+        b'""',
+        b"[]",
+    ),
+    *(b"[]", b"{}", b"\n", b"\0", b" ", b"\xff\xfe", b"[" * 5000, b"{a: " * 2000, b"<a>" * 2000, b"..", b"\xc2\xb2"),
+)
+"""Text that readers of numbers and of nested formats have trouble with."""
+
+
+def mutations(seeds: Sequence[bytes], n: int, seed: int) -> Iterator[bytes]:
+    """The seeds, and n inputs made of them; the same for the same arguments."""
+    chance = random.Random(seed)
+    yield from seeds
+    for _ in range(n):
+        raw = bytearray(chance.choice(seeds))
+        for _ in range(chance.choice((1, 1, 2, 4, 16))):
+            chance.choice(KINDS)(raw, seeds, chance)
+        yield bytes(raw[: max(MOST_BYTES, *map(len, seeds))])
+
+
+def _place(raw: bytearray, chance: random.Random) -> int:
+    """Headers come first and are short, so half of the places are near the begin."""
+    return chance.randrange(min(len(raw), chance.choice((128, len(raw) or 1))) or 1)
+
+
+def _flip(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
+    if raw:
+        raw[_place(raw, chance)] ^= 1 << chance.randrange(8)
+
+
+def _cut(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
+    del raw[_place(raw, chance) :]
+
+
+def _remove(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
+    at = _place(raw, chance)
+    del raw[at : at + chance.choice((1, 4, 16, 256))]
+
+
+def _extreme(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
+    size, order = chance.choice((1, 2, 4, 8)), chance.choice(("little", "big"))
+    at = _place(raw, chance)
+    raw[at : at + size] = (chance.choice(EXTREMES) & (256**size - 1)).to_bytes(size, order)
+
+
+def _repeat(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
+    at = _place(raw, chance)
+    raw[at:at] = raw[at : at + chance.choice((1, 8, 64, 1024))] * chance.choice((1, 2, 50))
+
+
+def _splice(raw: bytearray, seeds: Sequence[bytes], chance: random.Random) -> None:
+    other = chance.choice(seeds)
+    begin, at = chance.randrange(len(other) + 1), _place(raw, chance)
+    raw[at : at + chance.choice((0, 16, len(raw)))] = other[begin : begin + chance.choice((16, 256, len(other)))]
+
+
+def _word(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
+    """In place of a word of the text, if it is one."""
+    at = _place(raw, chance)
+    ends = [end for end in (raw.find(c, at, at + 64) for c in b' \n,:"]}<') if end >= 0]
+    raw[at : chance.choice((at, min(ends, default=at)))] = chance.choice(WORDS)
+
+
+KINDS = (_flip, _cut, _remove, _extreme, _repeat, _splice, _word)

@@ -1,0 +1,180 @@
+"""Profiles, models, and the directories of runs."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import onnx
+
+from modt import assets, profile
+from modt.classification.pointnet import PointNet
+from modt.cli import profile_report, status
+from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
+from modt.evaluation.run_record import RunRecord
+from modt.evaluation.truth_files import open_truth
+from modt.service.status import SCHEMA
+from modt.sinks.service_directory import STATUS
+from tests.evaluation.test_truth_files import tracklets
+from tests.fuzz.target import Feed, of_file, target
+from tests.reporting.test_run_report import write_run
+from tests.sources import layouts
+
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n"
+    for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+"""Nine to the ninth words."""
+SENSOR_BOMB = f"sensor: {{reflectance: [{', '.join(line[3:] for line in BOMB.splitlines())}]}}\n"
+
+
+@target()
+def profiles(folder: Path) -> Feed:
+    files = (assets.folder("profiles") / f"{name}.yaml" for name in ("hdl-64e", "vlp-16"))
+    dumped = profile.to_yaml(profile.dump(ProfileConfig()))
+    path = folder / "robot.yaml"
+    seeds = [file.read_bytes() for file in files]
+    return of_file(path, lambda: profile.load(path), *seeds, dumped, BOMB, SENSOR_BOMB)
+
+
+def network() -> onnx.ModelProto:
+    """A small model with the metadata of a shipped one."""
+    weight = onnx.numpy_helper.from_array(np.zeros((3, 4), np.float32), "w")
+    ends = [
+        onnx.helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, shape)
+        for name, shape in (("points", ["batch", "n", 3]), ("probability", ["batch", 4]))
+    ]
+    nodes = [
+        onnx.helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0),
+        onnx.helper.make_node("MatMul", ["pooled", "w"], ["probability"]),
+    ]
+    graph = onnx.helper.make_graph(nodes, "net", ends[:1], ends[1:], [weight])
+    return onnx.helper.make_model(graph, opset_imports=[onnx.helper.make_opsetid("", 13)], ir_version=8)
+
+
+def _loading(path: Path) -> Callable[[], object]:
+    return lambda: PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+
+
+@target()
+def models(folder: Path) -> Feed:
+    path = folder / "net.onnx"
+    return of_file(path, _loading(path), network().SerializeToString())
+
+
+@target()
+def model_metadata(folder: Path) -> Feed:
+    """The classifiers of boxes and of reflectance, and the class frequency, a line each."""
+    path = folder / "net.onnx"
+    load = _loading(path)
+    box = {"share": 0.5, "layers": [[[[0.1] * 4] * 7, [0.2] * 4]]}
+    reflectance = {"sensor": "hdl-64e", "share": 0.5, "weight": 0.3, "layers": [[[[0.1] * 4] * 12, [0.2] * 4]]}
+    entries = {"box_prior": box, "reflectance": reflectance, "class_frequency": [0.7, 0.1, 0.1, 0.1]}
+
+    def call(raw: bytes) -> None:
+        model = network()
+        for key, value in zip(entries, raw.split(b"\n"), strict=False):
+            model.metadata_props.add(key=key, value=value.decode("utf-8", "replace"))
+        path.write_bytes(model.SerializeToString())
+        load()
+
+    return ["\n".join(map(json.dumps, entries.values())).encode()], call
+
+
+def _report(run: Path) -> Callable[[], object]:
+    """The command, whose text goes nowhere."""
+
+    def read() -> None:
+        with redirect_stdout(StringIO()):
+            profile_report.run(Namespace(run_directory=run, html=None, json=False))
+
+    return read
+
+
+@target()
+def run_description(folder: Path) -> Feed:
+    path = write_run(folder / "run", frames=5) / "run.yaml"
+    return of_file(path, _report(path.parent), path.read_bytes(), BOMB)
+
+
+@target()
+def ledger(folder: Path) -> Feed:
+    path = write_run(folder / "run", frames=5) / "ledger.jsonl"
+    return of_file(path, _report(path.parent), path.read_bytes())
+
+
+@target()
+def tracks(folder: Path) -> Feed:
+    path = write_run(folder / "run", frames=2) / "tracks.jsonl"
+    return of_file(path, _report(path.parent), path.read_bytes())
+
+
+@target()
+def judged_run(folder: Path) -> Feed:
+    """What is judged by its description and its tracks, parted by a line `---`."""
+    truth = open_truth(tracklets(layouts.raw_drive(folder), ("Car", 1, [8, 9])))
+    run = folder / "run"
+    (run / "labels").mkdir(parents=True)
+    for index in range(4):
+        (run / "labels" / f"{index:06d}.label").write_bytes(np.full(50, 1 << 16, np.uint32).tobytes())
+    seen = {"id": 3, "proposal": 0, "class": "car", "posterior": [0.1, 0.7, 0.1, 0.1]}
+    record = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "tracks": [seen]}
+    lines = "".join(json.dumps({**record, "frame": index}) + "\n" for index in range(4))
+    described = "stream: {path: here}\nfov: camera\nrecognition: {used: vlp-16}\n"
+
+    def call(raw: bytes) -> None:
+        facts, _, found = raw.partition(b"---\n")
+        (run / "run.yaml").write_bytes(facts)
+        (run / "tracks.jsonl").write_bytes(found)
+        for _ in RunRecord.open(run).frames(truth):
+            pass
+
+    return [f"{described}---\n{lines}".encode()], call
+
+
+@target()
+def labels_of_points(folder: Path) -> Feed:
+    truth = open_truth(tracklets(layouts.raw_drive(folder), ("Car", 1, [8, 9])))
+    run = folder / "run"
+    (run / "labels").mkdir(parents=True)
+    (run / "run.yaml").write_text("stream: {path: here}\nfov: full\nrecognition: {used: vlp-16}\n")
+    record = {"schema": "modt.frame/3", "frame": 1, "proposals": 1, "classifications": 0, "tracks": []}
+    (run / "tracks.jsonl").write_text(json.dumps(record) + "\n")
+    seed = np.full(50, 1 << 16, np.uint32).tobytes()
+    return of_file(run / "labels" / "000001.label", lambda: list(RunRecord.open(run).frames(truth)), seed)
+
+
+@target()
+def service_status(folder: Path) -> Feed:
+    times = {"mean": 1.0, "p99": 2.0, "max": 3.0}
+    loop = {
+        **dict.fromkeys(("missed_deadlines", "frames", "shed_sweeps"), 3),
+        **dict.fromkeys(("lateness_ms", "execution_ms", "latency_ms"), times),
+        **{"budget_ms": 20.0, "other_stages_ms": 10.0, "step": "full", "steps_entered": {"full": 1}, "failures": {}},
+    }
+    seed = {
+        **{"schema": SCHEMA, "time_s": 1.0, "up_s": 3.0, "source": "udp://", "mode": "accurate", "profile": "vlp-16"},
+        **{"loop": loop, "sensor": {"received": 3}, "sinks": {"udp": {"sent": 3}}, "host": {"lacking": ["x"]}},
+        **{
+            "power": {"frame_J": 0.1, "watts": 3.0, "kind": "measured"},
+            "recording": {"failing": "", "lines": 3, "lost_lines": 0},
+        },
+        **{"counts": {"rate_hz": 10.0, "tracks": 3, "visible": {"car": 1}}},
+    }
+
+    def read() -> None:
+        with redirect_stdout(StringIO()):
+            status.run(Namespace(directory=folder, json=False))
+
+    return of_file(folder / STATUS, read, json.dumps(seed))
+
+
+TARGETS = (
+    *(profiles, models, model_metadata, run_description, ledger, tracks, judged_run, labels_of_points),
+    *(service_status,),
+)

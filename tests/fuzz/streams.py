@@ -1,0 +1,174 @@
+"""Captures, packets, recordings and messages of ROS 2, datagrams."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modt.ros2.cdr import MessageError
+from modt.ros2.odometry import read_odometry, write_odometry
+from modt.ros2.point_cloud2 import read_cloud, write_cloud
+from modt.ros2.static_transforms import StaticTransforms
+from modt.sources.live.sweep_reader import Reception
+from modt.sources.packets.capture import Capture
+from modt.sources.packets.open_capture import open_capture
+from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.pose_datagram import DatagramError, read_datagram
+from modt.sources.recognise import open_stream
+from tests.fuzz.target import Feed, of_file, target
+from tests.ros2 import messages
+from tests.sources import bags, layouts
+from tests.sources.packets.simulated import packets
+from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
+from tools.send.velodyne_packets import LAYOUTS, ideal_calibration
+
+LENGTH = struct.Struct("<Id")
+"""Before a packet in an input: its bytes, and when it was received."""
+
+
+@target()
+def pcap(folder: Path) -> Feed:
+    path = folder / "a.pcap"
+    write_capture(path, [(1.5, b"first"), (2.5, bytes(100))], 2368)
+    whole, datagram = path.read_bytes(), udp(bytes(64), 2368)
+    parts = [ipv4(datagram[at : at + 40], identity=7, offset=at, more=not at) for at in (0, 40)]
+    frames = [ethernet(part) for part in parts]
+    fragmented = whole[:24] + b"".join(struct.pack("<IIII", 1, 0, len(f), len(f)) + f for f in frames)
+    return of_file(path, lambda: list(Capture(path)), whole, fragmented)
+
+
+@target()
+def velodyne_capture(folder: Path) -> Feed:
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    path = folder / "a.pcap"
+    write_capture(path, packets("vlp-16", 3)[60:240], 2368)  # more than two turns
+    return of_file(path, lambda: list(open_capture(path, {})), path.read_bytes())
+
+
+@target()
+def velodyne_packets(folder: Path) -> Feed:
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    from modt.sources.packets.velodyne import VelodyneDecoder
+
+    return _of_packets(VelodyneDecoder("sensor"), _framed(packets("vlp-16", 3)[60:180]))
+
+
+@target()
+def velodyne_calibration(folder: Path) -> Feed:
+    pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
+    from modt.sources.packets.velodyne import VelodyneDecoder
+
+    path = folder / "ideal.yaml"
+    return of_file(path, lambda: VelodyneDecoder("sensor", None, path), ideal_calibration(LAYOUTS["vlp-16"]))
+
+
+@target()
+def ouster_packets(folder: Path) -> Feed:
+    sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
+    from modt.sources.packets.ouster import OusterDecoder
+
+    info = sdk.SensorInfo.from_default(sdk.LidarMode._512x10)
+    path = folder / "metadata.json"
+    path.write_text(info.to_json_string())
+    form, timed = sdk.PacketFormat(info), []
+    for index in range(2):
+        frame = sdk.LidarFrame(info)
+        frame.frame_id = index
+        frame.field("RANGE")[:] = 5000
+        frame.timestamp[:] = 1_000_000_000 + 100_000_000 * index + np.arange(512) * 195_000
+        frame.status[:] = 1
+        sent = sdk.frame_to_packets(frame, sdk.PacketFormat(info), 0, 0)
+        timed += [(1.0 + 0.1 * index, bytes(p.buf)) for p in sent if isinstance(p, sdk.LidarPacket)]
+    assert len(timed[0][1]) == form.lidar_packet_size
+    return _of_packets(OusterDecoder("sensor", path), _framed(timed))
+
+
+@target()
+def ouster_metadata(folder: Path) -> Feed:
+    sdk = pytest.importorskip("ouster.sdk.core", reason="needs the extra [ouster]")
+    from modt.sources.packets.ouster import OusterDecoder
+
+    path = folder / "metadata.json"
+    seed = sdk.SensorInfo.from_default(sdk.LidarMode._512x10).to_json_string()
+    return of_file(path, lambda: OusterDecoder("sensor", path), seed)
+
+
+@target()
+def database(folder: Path) -> Feed:
+    written = bags.write_rosbag2(folder / "bag", bags.by_time(bags.clouds(2), bags.poses()[:12]))
+    (path,) = written.glob("*.db3")
+    read = folder / "read.db3"
+    return of_file(read, lambda: list(open_stream(read)), path.read_bytes())
+
+
+@target()
+def mcap(folder: Path) -> Feed:
+    recorded = bags.by_time(bags.clouds(2), bags.poses()[:12])
+    whole = bags.write_mcap(folder / "whole", recorded, chunk_size=1000).read_bytes()
+    read = folder / "read.mcap"
+    return of_file(read, lambda: list(open_stream(read)), whole, whole[: 3 * len(whole) // 4])
+
+
+@target(MessageError)
+def point_cloud(folder: Path) -> Feed:
+    plain = write_cloud(1.5, "lidar", layouts.scan(0))
+    timed = np.zeros((2, 100), [("x", "f4"), ("y", "f4"), ("z", "f4"), ("intensity", "u2"), ("t", "u4")])
+    turn = np.linspace(3.1, -3.1, 200).reshape(2, 100)
+    timed["x"], timed["y"], timed["t"] = np.cos(turn), np.sin(turn), (turn.max() - turn) / 6.2 * 1e8
+    return [plain, messages.encode(messages.cloud(timed, padding=4))], read_cloud
+
+
+@target(MessageError)
+def odometry(folder: Path) -> Feed:
+    return [write_odometry(1.5, "odom", "base_link", np.eye(4))], read_odometry
+
+
+@target(MessageError)
+def transforms(folder: Path) -> Feed:
+    def call(raw: bytes) -> None:
+        found = StaticTransforms()
+        found.add(raw)
+        found.between("base_link", "lidar")
+
+    up = [0.0, 0.0, 0.0, 1.0]
+    edges = [("base_link", "mast", [0.0, 0.0, 1.0], up), ("mast", "lidar", [0.0, 0.0, 1.0], up)]
+    return [messages.encode(messages.transforms(*edges))], call
+
+
+@target(DatagramError)
+def pose_datagram(folder: Path) -> Feed:
+    matrix = [1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0]
+    return [
+        b'{"stamp": 1.5, "x": 1, "y": 2.5, "yaw": 0.1}',
+        f'{{"stamp": 1.5, "pose": {matrix}}}'.encode(),
+        f'{{"stamp": 1.5, "pose": {[*matrix, 0, 0, 0, 1]}}}'.encode(),
+    ], read_datagram
+
+
+def _framed(timed) -> bytes:
+    return b"".join(LENGTH.pack(len(payload), at_s) + payload for at_s, payload in timed)
+
+
+def _of_packets(decoder: PacketDecoder, seed: bytes) -> Feed:
+    """A sensor's packets with their lengths and times, by a decoder that has seen none."""
+
+    def call(raw: bytes) -> None:
+        fresh, reception, at = decoder.again(), Reception(), 0
+        while at + LENGTH.size <= len(raw):
+            length, received_s = LENGTH.unpack_from(raw, at)
+            at += LENGTH.size
+            received_s = received_s if abs(received_s) < 1e10 else 0.0  # of the host's clock, no outside bytes
+            fresh.decode(received_s, raw[at : at + min(length, 65_535)], reception)
+            at += length
+        fresh.finish(reception)
+
+    return [seed], call
+
+
+TARGETS = (
+    *(pcap, velodyne_capture, velodyne_packets, velodyne_calibration, ouster_packets, ouster_metadata, database),
+    *(mcap, point_cloud, odometry, transforms, pose_datagram),
+)

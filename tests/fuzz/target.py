@@ -1,0 +1,46 @@
+"""What is fuzzed: readers, the bytes that they are fed with, and how they may refuse them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from modt.errors import ModtError
+
+Feed = tuple[Sequence[bytes], Callable[[bytes], object]]
+"""Valid inputs, and a call that reads one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A reader.
+
+    Attributes:
+        name: of the target.
+        prepare: its seeds and call, which keeps its files in a folder; skips where an extra is missing.
+        refusals: the errors by which it may refuse an input.
+    """
+
+    name: str
+    prepare: Callable[[Path], Feed]
+    refusals: tuple[type[Exception], ...] = (ModtError,)
+
+
+def target(*refusals: type[Exception]) -> Callable[[Callable[[Path], Feed]], Target]:
+    """Make a target of a function that prepares it, named as the function."""
+
+    def made(prepare: Callable[[Path], Feed]) -> Target:
+        return Target(prepare.__name__, prepare, (ModtError, *refusals))
+
+    return made
+
+
+def of_file(path: Path, read: Callable[[], object], *seeds: bytes | str) -> Feed:
+    """Inputs that are the content of a file."""
+
+    def call(raw: bytes) -> None:
+        path.write_bytes(raw)
+        read()
+
+    return [seed.encode() if isinstance(seed, str) else seed for seed in seeds], call

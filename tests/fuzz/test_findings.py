@@ -1,0 +1,99 @@
+"""What fuzzing has found: inputs that once left a reader by another error than ours."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modt.errors import ModtError
+from modt.ros2.cdr import CdrWriter
+from modt.sources.recognise import open_stream
+from modt.sources.scan_file import read_scan
+from tests.fuzz.execution import limits
+from tests.fuzz.runs import SENSOR_BOMB, network
+from tests.fuzz.targets import TARGETS
+from tests.reporting.test_run_report import ledger_line
+from tests.sources import bags
+from tests.sources.layouts import CAMERA
+
+R, T = f"R: {CAMERA['R']}", "T: 0 0 0"
+CALIBRATION = f"R_rect_00: {CAMERA['R']}\nP_rect_02: {CAMERA['P']}\n"
+CUBOID = "frame,track,label,x,y,z,l,w,h,yaw\n0,{id},Car,9,1,0.5,2,1,1.5,{yaw}\n"
+LABEL = "Car 0 0 -1.5 0 0 9 9 1.5 {width} 4.0 1.0 1.7 10.0 -1.5708\n"
+MODEL = network().SerializeToString()
+MAGIC = b"\x89MCAP0\r\n"
+HUGE = 10**30
+
+
+def odometry() -> bytes:
+    cdr = CdrWriter()
+    cdr.header(1.5, "odom")
+    cdr.text("base_link")
+    cdr.record(("7d",), 0, 0, 0, 1e300, 0, 0, 1e300)
+    return cdr.message()
+
+
+def chunk_of(size: int, folder: Path) -> bytes:
+    """A recording that was not closed, with the size of its first chunk when unpacked."""
+    whole = bytearray(bags.write_mcap(folder / "a", bags.clouds(2)).read_bytes())
+    begin = len(MAGIC) + 9 + int.from_bytes(whole[len(MAGIC) + 1 : len(MAGIC) + 9], "little")
+    whole[begin + 25 : begin + 33] = size.to_bytes(8, "little")
+    return bytes(whole[: begin + 9 + int.from_bytes(whole[begin + 1 : begin + 9], "little")])
+
+
+FOUND = {
+    "a calibration that is not finite": ("calibration_of_sequence", f"P2: {CAMERA['P']}\nTr: {'inf ' * 12}"),
+    "a size of one number": ("calibration_of_drive", f"S_rect_02: 9\n{CALIBRATION}---{R}\n{T}---{R}\n{T}"),
+    "a rotation that is not finite": ("calibration_of_drive", f"{CALIBRATION}---{'R: ' + 'inf ' * 9}\n{T}---{R}"),
+    "a place beyond the pole": ("oxts_records", "95 8.4 110 0 0 0"),
+    "a label that is not finite": ("labels_of_frame", LABEL.format(width="inf")),
+    "a frame that no drive reaches": ("truth_of_sequence", f"{HUGE} 4 {LABEL.format(width=2)}"),
+    "an identity of 100 bits": ("cuboids", CUBOID.format(id=HUGE, yaw=0.1)),
+    "a cuboid that is not finite": ("cuboids", CUBOID.format(id=3, yaw="nan")),
+    "a detection in a frame that no drive reaches": (
+        "detections",
+        f"{HUGE},2,{'1,' * 12}1",
+    ),
+    "a record of 3 GiB": ("mcap", MAGIC + b"\x01" + (3 * 2**30).to_bytes(8, "little") + bytes(100)),
+    "a quaternion beyond the square root": ("odometry", odometry()),
+    "a value of aliases": ("profiles", SENSOR_BOMB),
+    "a nested profile": ("profiles", "[" * 5000),
+    "a profile of a megabyte": ("profiles", "# " + "x" * 2**20),
+    "a name in a model that is no text": (
+        "models",
+        network().SerializeToString().replace(b"points", b"p\xff\xfents"),
+    ),
+    "a nested description of a run": ("run_description", "[" * 5000),
+    "a run without its mode": ("run_description", "schema: modt.run/1\nprofile: {}\n"),
+    "a run with a profile of text": ("run_description", "schema: modt.run/1\nprofile: {classification: {batch: x}}"),
+    "a line without its stages": ("ledger", json.dumps({**ledger_line(0, 0), "stages": None}) + "\n"),
+    "a number of 5,000 digits": ("ledger", "9" * 5000 + "\n"),
+    "nested lines": ("ledger", "[" * 5000 + "\n"),
+    "a frame without its tracks": ("tracks", '{"schema": "modt.frame/3"}\n'),
+    "a status without its loop": ("service_status", '{"schema": "modt.status/1"}'),
+    "a nested status": ("service_status", "[" * 5000),
+}
+
+
+@pytest.mark.parametrize(("target", "raw"), FOUND.values(), ids=FOUND)
+def test_it_is_refused(target: str, raw: bytes | str, tmp_path: Path) -> None:
+    _, call = TARGETS[target].prepare(tmp_path)
+    content = raw.encode() if isinstance(raw, str) else raw
+    with limits(), pytest.raises(TARGETS[target].refusals):
+        call(content)
+
+
+def test_infinities_of_either_sign_are_no_return(tmp_path: Path) -> None:
+    path = tmp_path / "a.bin"
+    path.write_bytes(np.array([np.inf, -np.inf, 0, 0], np.float32).tobytes())
+    assert read_scan(path)[0].tolist() == [[0, 0, 0, 0]]
+
+
+def test_a_chunk_of_2_to_the_63_bytes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(chunk_of(2**63, tmp_path))
+    with limits(), pytest.raises(ModtError, match="holds no message"):
+        open_stream(path)
