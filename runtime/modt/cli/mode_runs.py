@@ -19,7 +19,7 @@ from modt.types import Budget, Frame
 BASELINE = "conventional"
 MODES = (BASELINE, "efficient", "accurate")
 VARIED = "varied"
-"""Tracking-by-detection with a random classification load: its costs are the unit costs of the prediction."""
+"""Tracking-by-detection with a random classification load: its costs are the unit costs of the reconciliation."""
 _LOADS = (0, 1, 2, 3, 5, 8, 12, 16, 20, 30, 45, 60)
 
 

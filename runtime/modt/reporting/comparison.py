@@ -14,6 +14,7 @@ from modt.energy.ledger import Ledger, Line
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
+from modt.reporting.histogram import Histogram
 from modt.types import NONE, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
 
 COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
@@ -49,7 +50,7 @@ class ModeRun:
     windows: Windows | None = None  # None where no meter is read
     lines: list[Line] = field(default_factory=list)  # of the ledger
     energy_lines: list[Line] = field(default_factory=list)
-    lives: list[int] = field(default_factory=list)  # frames with a proposal, of every track that ended
+    lives: Histogram = field(default_factory=Histogram)  # frames with a proposal, of every track that ended
     _counts: list[tuple[int, ...]] = field(default_factory=list)
     _life: dict[int, int] = field(default_factory=dict)
     _classified: set[int] = field(default_factory=set)
@@ -80,7 +81,7 @@ class ModeRun:
 
     def finish(self) -> None:
         """Count the lives of the tracks still alive at the end of the stream."""
-        self.lives += self._life.values()
+        self._end(self._life.keys())
 
     def counts(self) -> Int:
         """(frames, 8) counts of each frame, columns as COUNTS."""
@@ -89,6 +90,10 @@ class ModeRun:
     def cpu_s(self) -> Float64:
         """(frames, stages) CPU time of each stage of the pipeline [s]."""
         return cpu_seconds(self.lines)
+
+    def _end(self, ids: Iterable[int]) -> None:
+        for id_ in ids:
+            self.lives.add(self._life[id_])
 
     def _count(self, result: FrameResult, line: Line) -> None:
         tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
@@ -107,7 +112,7 @@ class ModeRun:
                 row.get("calls", 0),
             )
         )
-        self.lives += [life for id_, life in self._life.items() if id_ not in alive]
+        self._end(self._life.keys() - alive)
         self._life = {id_: self._life.get(id_, 0) + (id_ in seen) for id_ in alive}
         self._classified, self._seen = (self._classified | classified) & alive, seen
 
