@@ -12,7 +12,7 @@ _RIDGE = 1e-12
 
 
 def nonnegative_fit(gram: Float64, moment: Float64) -> Float64:
-    """(p,) coefficients of at least 0, by (p, p) X^T X and (p,) X^T y of the counts X; 0 of what was never counted."""
+    """(p,) coefficients of at least 0, by (p, p) X^T X and (p,) X^T y of counts X; 0 of what was never counted."""
     value = np.zeros(len(moment))
     counted = np.diag(gram) > 0
     if counted.any():

@@ -26,6 +26,8 @@ class Counts:
     reacquired: int  # classifications of a track that was lost in the frame before and classified earlier
     points: int  # processed by the network
     calls: int  # of the classifier
+    sweep_points: int = 0
+    alive: int = 0  # tracks, summed over the frames
 
     @property
     def n(self) -> float:

@@ -65,6 +65,7 @@ def compare_tree(
         "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
         "unit_costs": _costs(gamma.unit_costs(load_varied_run), baseline, board.active_W),
         "savings": savings,
+        "calibration": {name: _table(run) for name, run in (*runs.items(), (varied, load_varied_run))},
         "series_kind": Kind.MEASURED.value,
         "series": {mode: _series(runs[mode], repetitions[0][mode].lives) for mode in modes},
     }
@@ -158,6 +159,14 @@ def _costs(costs: UnitCosts, baseline: gamma.RunCosts, net_W: float) -> dict[str
         "class_item_cpu_us": estimate(1e6 * costs.class_item, "us"),
         "class_point_cpu_us": estimate(1e6 * costs.class_point, "us"),
         "a": estimate(e_class / costs.seg if costs.seg else None),
+    }
+
+
+def _table(run: gamma.RunCosts) -> dict[str, Any]:
+    """Counts and costs of every frame, for predictions of other streams."""
+    return {
+        "counts": {name: run.counts[:, k].tolist() for k, name in enumerate(COUNTS)},
+        "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
     }
 
 

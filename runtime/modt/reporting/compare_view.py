@@ -10,6 +10,7 @@ from modt.energy.meters.meter import Kind
 from modt.reporting import energy_plots, svg
 from modt.reporting.document import Document, Table
 from modt.reporting.page import Plot
+from modt.reporting.prediction_report import against_table
 
 
 def compare_document(tree: dict[str, Any]) -> Document:
@@ -27,8 +28,11 @@ def compare_document(tree: dict[str, Any]) -> Document:
         energy_plots.conditions_text(tree["conditions"]),
     ]
     terms = [energy_plots.gamma_terms(f"{mode}: from N_go to gamma", s) for mode, s in tree["savings"].items()]
+    blind = [against_table(tree["against"])] if "against" in tree else []
     costs = Table(["unit", "cost by the run of varied load"], [[*item] for item in tree["unit_costs"].items()])
-    return Document(f"Energy of {tree['stream']}", about, results, [_modes(tree), *terms, costs], tree["test"])
+    return Document(
+        f"Energy of {tree['stream']}", about, results, [*blind, _modes(tree), *terms, costs], tree["test"]
+    )
 
 
 def _modes(tree: dict[str, Any]) -> Table:

@@ -84,7 +84,7 @@ class ModeRun:
         self._end(self._life.keys())
 
     def counts(self) -> Int:
-        """(frames, 8) counts of each frame, columns as COUNTS."""
+        """(frames, columns) counts of each frame, columns as COUNTS."""
         return np.array(self._counts, np.int64).reshape(-1, len(COUNTS))
 
     def cpu_s(self) -> Float64:
@@ -110,6 +110,8 @@ class ModeRun:
                 len((classified & self._classified) - self._seen),
                 row.get("points", 0),
                 row.get("calls", 0),
+                len(result.frame.points),
+                len(tracks.id),
             )
         )
         self._end(self._life.keys() - alive)
@@ -145,5 +147,5 @@ def cpu_seconds(lines: Sequence[Line]) -> Float64:
 
 
 def total(counts: Int) -> Counts:
-    """Sums over the frames of (frames, 8) counts."""
+    """Sums over the frames of (frames, columns) counts."""
     return Counts(len(counts), **dict(zip(COUNTS, counts.sum(axis=0).tolist(), strict=True)))

@@ -31,7 +31,7 @@ Interval = tuple[float, float]
 class RunCosts:
     """Counts and costs of one mode on F frames."""
 
-    counts: Int  # (F, 8), columns as COUNTS
+    counts: Int  # (F, C), columns as COUNTS
     cost: Float64  # (F, S) of the pipeline's S stages [CPU s]
 
     @classmethod
@@ -90,7 +90,7 @@ def estimate_gamma(
 
     reconciliation, ratio = reconciled_and_measured(np.arange(n))
     gamma = reconciliation.model.gamma
-    resampled = [reconciled_and_measured(_blocks(n, random)) for _ in range(_RESAMPLES)]
+    resampled = [reconciled_and_measured(blocks(n, random)) for _ in range(_RESAMPLES)]
     gammas = np.array([found.model.gamma for found, _ in resampled])
     ratios = np.array([found for _, found in resampled])
     return GammaEstimate(
@@ -117,7 +117,7 @@ def reconciliation_tree(found: Reconciliation, gamma: float | None) -> dict[str,
 
 def interval(n: int, statistic: Callable[[Int], float], random: np.random.Generator) -> Interval:
     """95 % interval of a statistic over n resampled frames."""
-    return _interval(np.array([statistic(_blocks(n, random)) for _ in range(_RESAMPLES)]))
+    return _interval(np.array([statistic(blocks(n, random)) for _ in range(_RESAMPLES)]))
 
 
 def mean(values: Float64, unit: str, kind: Kind, random: np.random.Generator) -> Quantity:
@@ -132,7 +132,7 @@ def other_costs(run: RunCosts) -> OtherCosts:
     return OtherCosts(float(cost[TRACK].sum()), float(cost[SCHEDULE].sum()))
 
 
-def _blocks(n: int, random: np.random.Generator) -> Int:
+def blocks(n: int, random: np.random.Generator) -> Int:
     """(n,) frames drawn in circular blocks."""
     starts = random.integers(0, n, size=-(-n // _BLOCK))
     frames: Int = ((starts[:, None] + np.arange(_BLOCK)) % n).ravel()[:n]
