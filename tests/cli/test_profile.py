@@ -53,7 +53,7 @@ def test_compare_runs_every_mode(tmp_path):
 
 
 def test_a_prediction_is_compared_with_what_is_measured(tmp_path):
-    other = modt_profile("compare", "--frames", "0:6", "--repeat", 1, "--json", cwd=tmp_path)
+    other = modt_profile("compare", "--frames", "0:8", "--repeat", 1, "--json", cwd=tmp_path)
     assert other.returncode == 0, other.stderr
     (tmp_path / "other.json").write_text(other.stdout)
     itself = modt_profile("predict", "--calibration", "other.json", cwd=tmp_path)

@@ -24,6 +24,8 @@ Runs = dict[str, RunCosts]
 OBSERVED = ("sweep_points", "proposals", "alive", "tracks", "points")
 """Columns of what tracking alone sees of a frame; the last are the network's if it classified every proposal."""
 _RESAMPLES = 300
+_PARTS = 4
+"""Parts of the only stream of a calibration that are left out in turn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +62,13 @@ class Rates:
     def fit(cls, streams: Sequence[Runs]) -> Self:
         """Over all frames of the calibration's streams."""
         runs = {name: _joined([stream[name] for stream in streams]) for name in streams[0]}
-        *modes, varied = runs
+        *modes, _ = runs
         base, *others = modes
         every = _joined([*runs.values()])
         points = _column(every, "sweep_points")
         return cls(
             segmentation=float(every.cost[:, SEG].sum() / max(points.sum(), 1.0)),
-            classification=_fit(runs[varied], ("calls", "classified", "points"), [CLASS], constant=False),
+            classification=_fit(every, ("calls", "classified", "points"), [CLASS], constant=False),
             tracking={mode: _fit(runs[mode], ("proposals", "alive"), TRACK) for mode in modes},
             scheduling={mode: _fit(runs[mode], ("alive",), SCHEDULE) for mode in modes},
             views={mode: Views.of(runs[mode], runs[base]) for mode in others},
@@ -123,7 +125,7 @@ def forecast(streams: Sequence[Runs], observed: Int, frames: int, random: np.ran
     """Prediction for a stream of so many frames from (F, 5) OBSERVED of its first ones.
 
     The interval is over resampled frames of the calibration and of those seen, and over how far the calibration is
-    off on one of its streams when fitted to the others (on one half of its only stream, when fitted to the other).
+    off on one of its streams when fitted to the others (on a quarter of its only stream, when fitted to the rest).
     """
     expected = expect(Rates.fit(streams), observed, frames)
     errors = np.array([*_errors(streams)])
@@ -150,15 +152,11 @@ def observed_of(stream: Runs) -> Int:
 def _errors(streams: Sequence[Runs]) -> Iterator[Float64]:
     """Logarithmic errors of the values for streams left out."""
     if len(streams) == 1:
-        streams = [{name: run.take(half) for name, run in streams[0].items()} for half in _halves(streams[0])]
+        quarters = np.array_split(np.arange(len(observed_of(streams[0]))), _PARTS)
+        streams = [{name: run.take(part) for name, run in streams[0].items()} for part in quarters]
     for k, left_out in enumerate(streams):
         rates, seen = Rates.fit([*streams[:k], *streams[k + 1 :]]), observed_of(left_out)
         yield np.log(expect(rates, seen, len(seen)).values / measured(left_out))
-
-
-def _halves(stream: Runs) -> tuple[Int, Int]:
-    n = len(next(iter(stream.values())).counts)
-    return np.arange(n // 2), np.arange(n // 2, n)
 
 
 def _resampled(streams: Sequence[Runs], observed: Int, frames: int, random: np.random.Generator) -> Float64:

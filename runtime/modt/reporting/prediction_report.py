@@ -19,9 +19,11 @@ from modt.reporting.prediction import Forecast, Runs
 from modt.reporting.quantity import Quantity, estimate
 
 SCHEMA = "modt.prediction/1"
+_MIN_FRAMES = 8
+"""Of a comparison that is used as a calibration."""
 _OVER = (
     "The interval at 95 % is over resampled frames of the calibration and of those seen, and over the calibration's "
-    "own error on streams that it was not fitted to."
+    "own error on streams, or quarters of its only one, that it was not fitted to."
 )
 
 
@@ -37,6 +39,8 @@ def read_calibration(path: Path, stream: str, fov: str) -> tuple[str, Runs]:
         raise MisuseError(path, f"it was measured on {stream} itself", remedy)
     if tree["fov"] != fov:
         raise MisuseError(path, f"its field of view is {tree['fov']}, not {fov}", f"{remedy} with --fov {fov}")
+    if tree["frames"] < _MIN_FRAMES:
+        raise MisuseError(path, f"{tree['frames']} frames tell no unit costs", f"{remedy} of {_MIN_FRAMES} or more")
     return tree["stream"], {
         name: RunCosts(
             np.array([table["counts"][column] for column in COUNTS], np.int64).T,
