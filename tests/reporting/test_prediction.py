@@ -65,11 +65,20 @@ def covers(found, values: np.ndarray) -> np.ndarray:
 
 def test_unit_costs_are_found() -> None:
     found = Rates.fit(CALIBRATION)
-    assert found.segmentation == pytest.approx(SEG_S, rel=0.02)
+    assert found.segmentation @ [1.0, 60_000] == pytest.approx(60_000 * SEG_S, rel=0.02)
     # points and proposals vary together from frame to frame: their sum is what counts
     assert found.classification @ [1, 40, 4000] == pytest.approx(CLASS_S @ np.array([1, 40, 4000]), rel=0.02)
     assert found.tracking["efficient"] @ [1, 40, 42] == pytest.approx(TRACK_S @ np.array([1, 40, 42]), rel=0.02)
     assert found.views["accurate"].per_track == pytest.approx(3.0, rel=0.1)
+
+
+def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation() -> None:
+    streams = [stream(1, points=120_000), stream(2, points=30_000)]
+    for each in streams:
+        for mode in each.values():
+            mode.cost[:, STAGES.index("segmentation")] += 2e-3
+    np.testing.assert_allclose(Rates.fit(streams).segmentation, [2e-3, SEG_S], rtol=0.05)
+    assert Rates.fit(streams[:1]).segmentation[0] == 0.0
 
 
 @pytest.mark.parametrize("calibration", [CALIBRATION, CALIBRATION[:1]])

@@ -24,6 +24,8 @@ Runs = dict[str, RunCosts]
 OBSERVED = ("sweep_points", "proposals", "alive", "tracks", "points")
 """Columns of what tracking alone sees of a frame; the last are the network's if it classified every proposal."""
 _RESAMPLES = 300
+_VARIED = 0.2
+"""Relative spread of the points of sweeps above which segmentation has a constant beside its cost a point."""
 _PARTS = 4
 """Parts of the only stream of a calibration that are left out in turn."""
 
@@ -52,7 +54,7 @@ class Views:
 class Rates:
     """What units of work cost [CPU s], and how the modes select."""
 
-    segmentation: float  # a point of the sweep
+    segmentation: Float64  # (2,) a frame, a point of the sweep
     classification: Float64  # (3,) a call, a proposal, a point of the network
     tracking: dict[str, Float64]  # of each mode: (3,) a frame, a proposal, a track
     scheduling: dict[str, Float64]  # of each mode, with fusion: (2,) a frame, a track
@@ -66,8 +68,11 @@ class Rates:
         base, *others = modes
         every = _joined([*runs.values()])
         points = _column(every, "sweep_points")
+        segmentation = np.array([0.0, every.cost[:, SEG].sum() / max(points.sum(), 1.0)])
+        if points.std() > _VARIED * points.mean():
+            segmentation = _fit(every, ("sweep_points",), [SEG])
         return cls(
-            segmentation=float(every.cost[:, SEG].sum() / max(points.sum(), 1.0)),
+            segmentation=segmentation,
             classification=_fit(every, ("calls", "classified", "points"), [CLASS], constant=False),
             tracking={mode: _fit(runs[mode], ("proposals", "alive"), TRACK) for mode in modes},
             scheduling={mode: _fit(runs[mode], ("alive",), SCHEDULE) for mode in modes},
@@ -93,6 +98,7 @@ def expect(rates: Rates, observed: Int, frames: int) -> Expected:
     points, n, alive, _, all_points = observed.mean(axis=0).tolist()
     started = observed[:, OBSERVED.index("tracks")]
     tracks = (started[0] + (frames - 1) * float(started[1:].mean() if len(started) > 1 else 0.0)) / frames
+    e_seg = float(rates.segmentation @ [1.0, points])
     cost = {}
     for mode in rates.tracking:
         load = np.array([float(n > 0), n, all_points])
@@ -102,13 +108,13 @@ def expect(rates: Rates, observed: Int, frames: int) -> Expected:
             size = views.size * all_points / max(n, 1e-9)
             load = np.array([1.0 - np.exp(-views.calls * items), items, size * items])
         cost[mode] = float(
-            rates.segmentation * points
+            e_seg
             + rates.tracking[mode] @ [1.0, n, alive]
             + rates.scheduling[mode] @ [1.0, alive]
             + rates.classification @ load
         )
     e_class = float(rates.classification @ [1.0, n, all_points]) / max(n, 1e-9)
-    return Expected(cost, EnergyModel(rates.segmentation * points, e_class, n, n / tracks if tracks else 1.0))
+    return Expected(cost, EnergyModel(e_seg, e_class, n, n / tracks if tracks else 1.0))
 
 
 @dataclass(frozen=True, slots=True)
