@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     request = assemble.Request.of(arguments)
     stream = assemble.stream(request)
-    asked = {"stream": stream.info.name, "fov": request.fov, "asked": list(request.frames)}
+    asked = {**assemble.identity(request, stream), "fov": request.fov, "asked": list(request.frames)}
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info.profile).config
     board, info = loaded.energy, stream.info
@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
     basis = Basis(board, meters[0].facts, info.period_s)
     about: dict[str, Any] = {
-        "stream": info.name,
+        **assemble.identity(request, stream),
         "frames": frames,
         "fov": request.fov,
         "repeat": arguments.repeat,

@@ -42,7 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     request = assemble.Request.of(arguments)
     stream = assemble.stream(request)
     info = stream.info
-    calibration = [read_calibration(path, info.name, request.fov) for path in arguments.calibration]
+    itself = assemble.identity(request, stream)
+    calibration = [read_calibration(path, itself, request.fov) for path in arguments.calibration]
     loaded = choose(request.profile, next(iter(stream), None), info.profile).config
     share = 3 if arguments.observe == "third" and info.n_frames is not None else 1
     first = None if info.n_frames is None else -(-info.n_frames // share)
@@ -51,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(info.name, "no two usable frames", "give a stream that modt replay can work on")
     frames = info.n_frames or len(seen)
     about = {
-        "stream": info.name,
+        **itself,
         "fov": request.fov,
         "asked": list(request.frames),
         "frames": frames,

@@ -27,16 +27,16 @@ _OVER = (
 )
 
 
-def read_calibration(path: Path, stream: str, fov: str) -> tuple[str, Runs]:
-    """Stream and runs of a comparison that was saved as JSON.
+def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tuple[str, Runs]:
+    """Stream and runs of a comparison that was saved as JSON; not of the stream itself, by its name and path.
 
     Raises:
         MisuseError: no comparison, or one of the stream to be predicted, or of another field of view.
     """
     remedy = "give the output of modt-profile compare --json of another stream"
     tree = _read(path, COMPARE_SCHEMA, remedy)
-    if tree["stream"] == stream:
-        raise MisuseError(path, f"it was measured on {stream} itself", remedy)
+    if {key: tree[key] for key in itself} == itself:
+        raise MisuseError(path, f"it was measured on {itself['stream']} itself", remedy)
     if tree["fov"] != fov:
         raise MisuseError(path, f"its field of view is {tree['fov']}, not {fov}", f"{remedy} with --fov {fov}")
     if tree["frames"] < _MIN_FRAMES:
