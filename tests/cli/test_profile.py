@@ -52,6 +52,30 @@ def test_compare_runs_every_mode(tmp_path):
     assert len(re.findall("<svg", page)) == 8
 
 
+def test_a_prediction_is_compared_with_what_is_measured(tmp_path):
+    other = modt_profile("compare", "--frames", "0:8", "--repeat", 1, "--json", cwd=tmp_path)
+    assert other.returncode == 0, other.stderr
+    (tmp_path / "other.json").write_text(other.stdout)
+    itself = modt_profile("predict", "--calibration", "other.json", cwd=tmp_path)
+    assert itself.returncode == 2
+    assert "of another stream" in itself.stderr
+    calibration = json.loads(other.stdout) | {"stream": "elsewhere"}
+    (tmp_path / "other.json").write_text(json.dumps(calibration))
+    arguments = ("--frames", "6:12", "--calibration", "other.json", "--observe", "all", "--out", "blind.json")
+    done = modt_profile("predict", *arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "efficient: gamma predicted" in done.stdout
+    blind = json.loads((tmp_path / "blind.json").read_text())
+    assert (blind["seen"], blind["calibration"]) == (6, ["elsewhere"])
+    done = modt_profile("compare", "--frames", "6:12", "--repeat", 1, "--against", "blind.json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for name in ("predicted", "gamma = N_go", "Equation 3 bare", "the calibration's ratio"):
+        assert f"gamma, accurate: {name}" in done.stdout
+    done = modt_profile("compare", "--frames", "0:6", "--against", "blind.json", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "asked" in done.stderr
+
+
 def test_calibration_writes_a_profile_that_loads(tmp_path):
     short = ("--frames", "0:3", "--windows", 12, "--window-s", 0.12, "--burst-s", 0.02)
     done = modt_profile("calibrate", "--board", "bench", "--meter", "model", *short, cwd=tmp_path)

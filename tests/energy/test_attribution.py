@@ -89,7 +89,7 @@ def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: P
         assert result.windows + result.dropped == len(lines)
         for c in result.coefficients:
             hits[c.name] += c.low <= TRUE[c.name] <= c.high
-            assert c.low < c.value < c.high
+            assert 0.0 <= c.low <= c.value <= c.high
     assert min(hits.values()) >= 90
     assert wraps > 50
     assert lost > 100
@@ -114,6 +114,30 @@ def line_of(energy_J: float | None, frames: int, load: int = 0, **more: Any) -> 
 def test_loads_that_vary_together_are_refused() -> None:
     lines = [line_of(3.0 + n, n, 10 * n) for n in range(1, 20)]
     with pytest.raises(FitError, match="varied together"):
+        fit(lines, np.random.default_rng(0))
+
+
+def test_work_that_costs_nothing_is_bounded_at_zero() -> None:
+    random = np.random.default_rng(1)
+    bounded = 0
+    for _ in range(20):
+        loads = random.integers(1, 60, (24, 2)).tolist()
+        noisy = [line_of(3.0 + 0.2 * n + 0.05 * random.standard_normal(), n, m) for n, m in loads]
+        for line, points in zip(noisy, random.integers(100, 9000, 24).tolist(), strict=True):
+            line["stages"]["classification"]["points"] = points
+        result = fit(noisy, random)
+        assert all(0.0 <= c.low <= c.value <= c.high for c in result.coefficients)
+        assert result["class_J"].low == 0.0
+        bounded += result["class_J"].value == 0.0
+    assert 0 < bounded < 20
+
+
+def test_readings_that_fall_with_the_load_are_refused() -> None:
+    loads = np.random.default_rng(0).integers(1, 60, (24, 3)).tolist()
+    lines = [line_of(9.0 + 0.2 * n - 0.1 * m, n, m) for n, m, _ in loads]
+    for line, (_, _, points) in zip(lines, loads, strict=True):
+        line["stages"]["classification"]["points"] = points
+    with pytest.raises(FitError, match=r"class_J is -0\.1 .* gives no energy back"):
         fit(lines, np.random.default_rng(0))
 
 

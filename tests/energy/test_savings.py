@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.energy.equations import EnergyModel
 from modt.energy.instrumentation import CountingClassifier
 from modt.energy.ledger import Ledger
-from modt.energy.prediction import EnergyModel
-from modt.energy.savings import Counts, OtherCosts, UnitCosts, predict
+from modt.energy.savings import Counts, OtherCosts, UnitCosts, reconcile
 from modt.types import Float32, Float64, Int, Proposals
 
 COSTS = UnitCosts(seg=5e-3, track=1e-3, class_call=1e-4, class_item=2e-4, class_point=1e-6)
@@ -28,7 +28,7 @@ def efficient(tracks: int = 200, reached: int = 200, classified: int = 200, reac
 def test_neutral_parameters_are_the_papers_equation(seg: float, item: float, n: int, tracks: int) -> None:
     base = replace(baseline(n=n), points=0)
     run = replace(base, tracks=tracks, classified_tracks=tracks, classified=tracks)
-    found = predict(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0), NOTHING, NOTHING)
+    found = reconcile(base, run, UnitCosts(seg, 0.0, 0.0, item, 0.0), NOTHING, NOTHING)
     paper = EnergyModel(seg, item, n, run.n_go)
     assert found.model.gamma == pytest.approx(paper.gamma)
     assert found.paper.gamma == pytest.approx(paper.gamma)
@@ -46,7 +46,9 @@ counts = st.builds(
 
 @given(counts, st.floats(1e-6, 1e-2), st.floats(0, 1e-2), st.floats(0, 100))
 def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: float, measured: float) -> None:
-    found = predict(baseline(), run, replace(COSTS, seg=seg), OtherCosts(1e-3, choose), OtherCosts(2e-3, 2 * choose))
+    found = reconcile(
+        baseline(), run, replace(COSTS, seg=seg), OtherCosts(1e-3, choose), OtherCosts(2e-3, 2 * choose)
+    )
     assert found.paper.n_go + sum(t.change for t in found.terms) == pytest.approx(found.model.gamma, abs=1e-6)
     explained = found.explain(measured)
     assert found.paper.n_go + sum(t.change for t in explained) == pytest.approx(measured, abs=1e-6)
@@ -56,7 +58,7 @@ def test_the_terms_add_up_to_the_deviation(run: Counts, seg: float, choose: floa
 @given(counts)
 def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
     base = baseline()
-    found = predict(base, run, COSTS, OtherCosts(2e-3, 1e-4), OtherCosts(3e-3, 3e-4))
+    found = reconcile(base, run, COSTS, OtherCosts(2e-3, 1e-4), OtherCosts(3e-3, 3e-4))
     assert found.model.e1 == pytest.approx(COSTS.seg + 2e-3 + 1e-4 + COSTS.classification(base) / base.frames)
     if run.classified:
         assert found.model.e2 == pytest.approx(COSTS.seg + 3e-3 + 3e-4 + COSTS.classification(run) / run.frames)
@@ -64,9 +66,9 @@ def test_energy_of_the_model_is_counts_times_costs(run: Counts) -> None:
 
 
 def test_more_views_save_less() -> None:
-    once = predict(baseline(), efficient(), COSTS, SAME, SAME)
-    often = predict(baseline(), efficient(classified=900), COSTS, SAME, SAME)
-    again = predict(baseline(), efficient(classified=900, reacquired=300), COSTS, SAME, SAME)
+    once = reconcile(baseline(), efficient(), COSTS, SAME, SAME)
+    often = reconcile(baseline(), efficient(classified=900), COSTS, SAME, SAME)
+    again = reconcile(baseline(), efficient(classified=900, reacquired=300), COSTS, SAME, SAME)
     assert often.model.gamma < once.model.gamma
     assert often.model.gamma == pytest.approx(again.model.gamma)
     assert again.terms[3].name == "views after a track was lost"
@@ -75,7 +77,7 @@ def test_more_views_save_less() -> None:
 
 def test_empty_runs_save_nothing() -> None:
     nothing = Counts(0, 0, 0, 0, 0, 0, 0, 0, 0)
-    found = predict(nothing, nothing, COSTS, SAME, SAME)
+    found = reconcile(nothing, nothing, COSTS, SAME, SAME)
     assert found.model.gamma == pytest.approx(1.0)
     assert (nothing.beta, nothing.n_go, nothing.n, nothing.n_obj) == (1.0, 1.0, 0.0, 0.0)
     assert EnergyModel(0, 0, 0, 1).gamma == 1.0

@@ -137,7 +137,7 @@ def test_measured_energy_is_that_of_the_meter(measured, mode):
 
 
 @pytest.mark.parametrize("mode", MODES[1:])
-def test_known_costs_are_predicted(estimated, mode):
+def test_known_costs_are_reconciled(estimated, mode):
     saving = estimated["savings"][mode]
     assert saving["gamma_measured_cpu"].value == pytest.approx(MEAN_MS["conventional"] / MEAN_MS[mode])
     assert saving["deviation"].value == pytest.approx(0.0, abs=1e-6)
@@ -168,7 +168,7 @@ def test_report_states_what_it_tests(estimated, measured):
     assert "not the physics" not in said(measured)
     assert "against the meter" in said(measured)
     assert "against the meter" not in said(estimated)
-    assert said(estimated).count("prediction holds") == 2
+    assert said(estimated).count("reconciliation closes within 5 %") == 2
 
 
 def test_every_figure_carries_its_kind(measured):

@@ -75,10 +75,10 @@ def test_counts_of_first_further_and_reacquired_views(one):
 
 
 def test_lives_are_frames_with_a_proposal(one):
-    assert sorted(one.lives) == [1, 1, 2, 3]
+    assert one.lives.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}
     counts = total(one.counts())
-    assert counts.tracks == len(one.lives)
-    assert counts.n_go == pytest.approx(sum(one.lives) / len(one.lives))
+    assert counts.tracks == one.lives.count
+    assert counts.n_go == pytest.approx(one.lives.mean)
 
 
 def test_cpu_time_has_a_column_a_stage(one):

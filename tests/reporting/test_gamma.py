@@ -49,18 +49,18 @@ def test_unit_costs_are_found_from_varied_load() -> None:
         assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
 
 
-def test_prediction_equals_measurement_at_constant_unit_costs() -> None:
+def test_reconciliation_equals_measurement_at_constant_unit_costs() -> None:
     found = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
-    assert found.predicted.value == pytest.approx(found.measured.value)
+    assert found.reconciled.value == pytest.approx(found.measured.value)
     assert found.deviation.value == pytest.approx(0.0, abs=1e-9)
-    assert found.prediction.explain(found.measured.value)[-1].change == pytest.approx(0.0, abs=1e-6)
+    assert found.reconciliation.explain(found.measured.value)[-1].change == pytest.approx(0.0, abs=1e-6)
 
 
 def test_intervals_cover_the_truth_with_noise() -> None:
     truth = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured.value
     found = estimate_gamma(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
     assert found.measured.low < truth < found.measured.high
-    assert found.predicted.low < truth < found.predicted.high
+    assert found.reconciled.low < truth < found.reconciled.high
     assert found.deviation.low < 0 < found.deviation.high
 
 
@@ -68,10 +68,41 @@ def test_uncounted_cost_is_unexplained() -> None:
     dear = run(FEW)
     dear.cost[:, STAGES.index("segmentation")] *= 2
     found = estimate_gamma(run(EVERY), dear, varied(), np.random.default_rng(0))
-    terms = found.prediction.explain(found.measured.value)
-    assert terms[-1].change == pytest.approx(found.measured.value - found.predicted.value)
+    terms = found.reconciliation.explain(found.measured.value)
+    assert terms[-1].change == pytest.approx(found.measured.value - found.reconciled.value)
     assert terms[-1].change < -0.1
     assert found.deviation.value > 0.05
+
+
+class Repeated:
+    """A pass whose budget of CPU time pays for more or less."""
+
+    def __init__(self, classified: int, slower: float = 1.0) -> None:
+        self._run = run(np.full(FRAMES, classified))
+        self._slower = slower
+
+    def counts(self) -> np.ndarray:
+        return self._run.counts
+
+    def cpu_s(self) -> np.ndarray:
+        return self._slower * self._run.cost
+
+
+def test_counts_and_costs_are_of_the_same_repetition() -> None:
+    passes = [Repeated(40), Repeated(3), Repeated(8)]
+    middle = RunCosts.median(passes)
+    np.testing.assert_array_equal(middle.counts, passes[2].counts())
+    np.testing.assert_array_equal(middle.cost, passes[2].cpu_s())
+    disturbed = RunCosts.median([Repeated(3), Repeated(3, slower=9.0), Repeated(3, slower=1.1)])
+    np.testing.assert_allclose(disturbed.cost, 1.1 * passes[1].cpu_s())
+
+
+def test_unit_costs_are_never_negative() -> None:
+    load = varied()
+    load.cost[:, STAGES.index("classification")] = 5e-3 - 1e-4 * load.counts[:, COUNTS.index("classified")]
+    found = unit_costs(load)
+    assert min(found.class_call, found.class_item, found.class_point) == 0.0
+    assert found.class_call > 0.0
 
 
 def test_nothing_classified_costs_nothing_to_classify() -> None:

@@ -1,4 +1,5 @@
 import json
+import pickle
 import re
 import xml.etree.ElementTree as ElementTree
 
@@ -11,6 +12,7 @@ from modt.errors import MisuseError
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
 from modt.reporting.run_report import run_tree
+from modt.reporting.run_sums import FrameSums
 from modt.reporting.run_view import run_document, run_plots
 
 
@@ -155,7 +157,29 @@ def test_counts_and_terms(run):
     assert saved["beta"].value == pytest.approx(2 / 20)
     changes = sum(t["change"].value for t in saved["terms"])
     assert saved["gamma_short"].value + changes == pytest.approx(saved["gamma_of_this_run"].value)
-    assert saved["gamma_predicted"].value == pytest.approx(saved["gamma_of_this_run"].value, rel=0.01)
+    assert saved["gamma_reconciled"].value == pytest.approx(saved["gamma_of_this_run"].value, rel=0.01)
+
+
+def test_a_report_of_a_long_run_holds_no_more_than_one_of_a_short_run(tmp_path):
+    """Tracks begin and end all the time; what is held after 1,500 frames is what is held after 3,000."""
+
+    def held(frames):
+        sums = FrameSums(400, 8)
+        for k in range(frames):
+            tracks = [track(id_, id_ - k, named=True) for id_ in range(k, k + 20)]
+            record = {"proposals": 20, "classifications": 1, "deferred": 0, "tracks": tracks}
+            sums.add(ledger_line(k, 1), record)
+        assert sums.counts().tracks == sums.counts().classified_tracks == frames + 19
+        assert sums.counts().proposals == 20 * frames
+        return len(pickle.dumps(sums))
+
+    assert held(3000) < 1.02 * held(1500)
+
+
+def test_text_says_what_it_is_computed_from(run):
+    text = " ".join(run_text(run_tree(run)).split())
+    assert "computed from this run" in text
+    assert "predict" not in text + run_page(run_tree(run))
 
 
 def test_unfinished_run_is_reported_so_far(run):

@@ -73,6 +73,12 @@ def stream(request: Request) -> Stream:
     return cut
 
 
+def identity(request: Request, stream: Described) -> dict[str, str | None]:
+    """Name and place of a stream: names of drives repeat."""
+    path = None if request.path is None else str(request.path.resolve())
+    return {"stream": stream.info.name, "path": path}
+
+
 def odometry(request: Request, stream: Described, config: OdometryConfig) -> PoseSource:
     """Where the poses of a stream's frames come from.
 

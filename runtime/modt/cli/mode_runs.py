@@ -11,15 +11,17 @@ import numpy as np
 from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
-from modt.energy.ledger import Ledger
+from modt.energy.instrumentation import padded_points
+from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter
 from modt.reporting.comparison import ModeRun, RecordingClassifier, Repetition, interleave
-from modt.types import Budget, Frame
+from modt.reporting.prediction import OBSERVED
+from modt.types import Budget, Frame, Int
 
 BASELINE = "conventional"
 MODES = (BASELINE, "efficient", "accurate")
 VARIED = "varied"
-"""Tracking-by-detection with a random classification load: its costs are the unit costs of the prediction."""
+"""Tracking-by-detection with a random classification load: its costs are the unit costs of the reconciliation."""
 _LOADS = (0, 1, 2, 3, 5, 8, 12, 16, 20, 30, 45, 60)
 
 
@@ -66,6 +68,21 @@ class Comparison:
             budget=varied_load(seed) if name == VARIED else lambda _frame: budget,
             windows=metering.windows(self.meters, self.core, window) if self.meters else None,
         )
+
+
+def observe(request: assemble.Request, profile: ProfileConfig, frames: int | None) -> Int:
+    """(F, 5) prediction.OBSERVED of the first so many frames, tracked without a classification."""
+    fov = assemble.field_of_view(request, assemble.stream(request))
+    pipeline = assembly.pipeline(assembly.MODES[BASELINE], profile, fov, NullLedger())
+    limits, rows = profile.classification, []
+    alive: set[int] = set()
+    for frame in islice(assemble.stream(request), frames):
+        result = pipeline.step(frame, Budget(calls=0))
+        before, alive = alive, set(result.tracks.id.tolist())
+        count = result.proposals.count
+        points = padded_points(count, limits.max_points, limits.batch)
+        rows.append((len(frame.points), len(count), len(alive), len(alive - before), points))
+    return np.array(rows, np.int64).reshape(-1, len(OBSERVED))
 
 
 def _warm_up(mode_run: ModeRun, frame: Frame) -> None:

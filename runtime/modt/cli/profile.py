@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import profile_calibrate, profile_compare, profile_meters, profile_report
+from modt.cli import profile_calibrate, profile_compare, profile_meters, profile_predict, profile_report
 from modt.cli.command import dispatch
 
-COMMANDS = (profile_meters, profile_calibrate, profile_report, profile_compare)
+COMMANDS = (profile_meters, profile_calibrate, profile_report, profile_compare, profile_predict)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from pathlib import Path
 from typing import Any
 
 from modt import host
@@ -23,6 +24,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--repeat", type=count, default=3, metavar="K", help="repetitions (default: %(default)s)")
     turn = "consecutive frames of one mode (default: 1, with a meter all)"
     p.add_argument("--turn", type=count, metavar="N", help=turn)
+    against = "measure how far this file of modt-profile predict was off"
+    p.add_argument("--against", type=Path, metavar="PREDICTION", help=against)
     p.set_defaults(run=run)
 
 
@@ -38,10 +41,13 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.reporting.compare_report import Basis, compare_tree
     from modt.reporting.compare_view import compare_document, compare_plots
     from modt.reporting.page import document_page, save
+    from modt.reporting.prediction_report import against, read_prediction
     from modt.reporting.quantity import to_json
 
     request = assemble.Request.of(arguments)
     stream = assemble.stream(request)
+    asked = {**assemble.identity(request, stream), "fov": request.fov, "asked": list(request.frames)}
+    prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info.profile).config
     board, info = loaded.energy, stream.info
     meters = metering.discovery(board).choose(arguments.meter).meters
@@ -57,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
     basis = Basis(board, meters[0].facts, info.period_s)
     about: dict[str, Any] = {
-        "stream": info.name,
+        **assemble.identity(request, stream),
         "frames": frames,
         "fov": request.fov,
         "repeat": arguments.repeat,
@@ -68,6 +74,8 @@ def run(arguments: argparse.Namespace) -> int:
         "host": host.description(),
     }
     tree = compare_tree(repetitions, MODES, VARIED, basis, about)
+    if prediction is not None:
+        tree["against"] = against(prediction, tree["modes"], tree["savings"])
     document = compare_document(tree)
     if arguments.html is not None:
         save(arguments.html, document_page(document, compare_plots(tree)))

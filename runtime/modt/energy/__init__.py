@@ -1,1 +1,1 @@
-"""Energy accounting: ledger, meters, attribution, prediction."""
+"""Energy accounting: ledger, meters, attribution, reconciliation."""

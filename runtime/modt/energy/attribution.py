@@ -1,4 +1,4 @@
-"""Attribution of the energy of windows to work: least squares over counts, with bootstrap intervals.
+"""Attribution of the energy of windows to work: non-negative least squares over counts, with bootstrap intervals.
 
 E_window = P_idle T + e_seg N_seg + e_class N_class + e_point N_point, over windows whose load was varied on purpose.
 """
@@ -78,10 +78,10 @@ def usable_windows(lines: Iterable[Line]) -> list[Line]:
 
 
 def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 1000) -> Fit:
-    """Coefficients of REGRESSORS over "modt.energy/1" lines.
+    """Coefficients of REGRESSORS over "modt.energy/1" lines, each at least 0.
 
     Raises:
-        FitError: too few windows, or collinear regressors.
+        FitError: too few windows, collinear regressors, or a coefficient whose whole interval is negative.
     """
     good = usable_windows(lines)
     n, p = len(good), len(REGRESSORS)
@@ -97,14 +97,23 @@ def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 100
     condition = float(np.linalg.cond(X))
     if condition > _MAX_CONDITION:
         raise FitError("the counts always varied together; vary rate and classification load independently")
-    value, *_ = np.linalg.lstsq(X, y, rcond=None)
-    residual = y - X @ value
-    spread = _bootstrap(X, y, random, resamples) - value
-    from scipy import stats  # large, and a service only splits
+    free, *_ = np.linalg.lstsq(X, y, rcond=None)
+    spread = _bootstrap(X, y, random, resamples) - free
+    from scipy import optimize, stats  # large, and a service only splits
 
     # Resampling few windows underestimates the spread: widen by the ratio of Student's t to the normal quantile.
     wider = np.sqrt(n / (n - p)) * stats.t.ppf(_TAILS[1], n - p) / stats.norm.ppf(_TAILS[1])
-    low, high = value + wider * np.quantile(spread, _TAILS, axis=0)
+    margin = wider * np.quantile(spread, _TAILS, axis=0)
+    negative = ", ".join(
+        f"{r.name} is {v:.3g} ({a:.3g} to {b:.3g})"
+        for r, v, a, b in zip(REGRESSORS, free / scale, *((free + margin) / scale), strict=True)
+        if b < 0
+    )
+    if negative:
+        raise FitError(f"{negative}, but work gives no energy back: the readings do not follow the load")
+    value = optimize.nnls(X, y)[0]
+    residual = y - X @ value
+    low, high = np.maximum(value + margin, 0.0)
     variance = float(np.sum((y - y.mean()) ** 2))
     return Fit(
         coefficients=tuple(

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from modt.energy.prediction import EnergyModel
+from modt.energy.equations import EnergyModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +26,8 @@ class Counts:
     reacquired: int  # classifications of a track that was lost in the frame before and classified earlier
     points: int  # processed by the network
     calls: int  # of the classifier
+    sweep_points: int = 0
+    alive: int = 0  # tracks, summed over the frames
 
     @property
     def n(self) -> float:
@@ -85,8 +87,11 @@ class GammaTerm:
 
 
 @dataclass(frozen=True, slots=True)
-class Prediction:
-    """Gamma predicted for a pair of runs."""
+class Reconciliation:
+    """Gamma of a pair of runs, from their own counts and costs.
+
+    It predicts nothing: N_go cancels against the count of tracks, and tracking and scheduling are those of the runs.
+    """
 
     model: EnergyModel  # with all costs
     paper: EnergyModel  # Equation 3, at the same a, n and N_go
@@ -94,11 +99,13 @@ class Prediction:
 
     def explain(self, measured: float) -> tuple[GammaTerm, ...]:
         """The terms, and the remainder up to the measured ratio."""
-        remainder = GammaTerm("not explained (measured - predicted)", measured - self.model.gamma, measured)
+        remainder = GammaTerm("not explained (measured - reconciled)", measured - self.model.gamma, measured)
         return (*self.terms, remainder)
 
 
-def predict(baseline: Counts, run: Counts, costs: UnitCosts, other1: OtherCosts, other2: OtherCosts) -> Prediction:
+def reconcile(
+    baseline: Counts, run: Counts, costs: UnitCosts, other1: OtherCosts, other2: OtherCosts
+) -> Reconciliation:
     """Gamma of a run over tracking-by-detection on the same stream, from the counts of both and unit costs.
 
     The unit costs are measured on neither of the two; other1 are further costs of the baseline, other2 of the run.
@@ -122,4 +129,4 @@ def predict(baseline: Counts, run: Counts, costs: UnitCosts, other1: OtherCosts,
     for name, change in steps.items():
         before, model = model.gamma, replace(model, **change)
         terms.append(GammaTerm(name, model.gamma - before, model.gamma))
-    return Prediction(model, paper, tuple(terms))
+    return Reconciliation(model, paper, tuple(terms))

@@ -1,4 +1,4 @@
-"""A comparison of the modes as a tree of quantities: energy, time, counts, gamma predicted and measured."""
+"""A comparison of the modes as a tree of quantities: energy, time, counts, gamma measured and reconciled."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ import numpy as np
 from modt.config import EnergyConfig
 from modt.energy.attribution import usable_windows
 from modt.energy.meters.meter import Facts, Kind
-from modt.energy.savings import OtherCosts, UnitCosts, predict
+from modt.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt.pipeline import STAGES
 from modt.reporting import gamma
 from modt.reporting.comparison import COUNTS, Repetition, total
+from modt.reporting.histogram import Histogram
 from modt.reporting.quantity import Quantity, estimate, quantity
 from modt.types import Float64
 
-SCHEMA = "modt.compare/1"
-_COUNTING = "Energy is assumed power times CPU time: this tests counts and unit costs, not the physics."
-_PHYSICS = "Energy is the meter's: this tests the prediction as a whole."
+SCHEMA = "modt.compare/2"
+_COUNTING = "Energy is assumed power times CPU time: the reconciliation tests counts and unit costs, not the physics."
+_PHYSICS = "Energy is the meter's: the reconciliation is with the meter as a whole."
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,7 @@ def compare_tree(
         "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
         "unit_costs": _costs(gamma.unit_costs(load_varied_run), baseline, board.active_W),
         "savings": savings,
+        "calibration": {name: _table(run) for name, run in (*runs.items(), (varied, load_varied_run))},
         "series_kind": Kind.MEASURED.value,
         "series": {mode: _series(runs[mode], repetitions[0][mode].lives) for mode in modes},
     }
@@ -118,14 +120,14 @@ def _saving(found: gamma.GammaEstimate, energy1: dict[str, Quantity], energy2: d
     net, gross = ((energy1[key].value, energy2[key].value) for key in ("net_J", "gross_J"))
     gamma_net, gamma_gross = (a / b if a is not None and b else None for a, b in (net, gross))
     saved_J = None if net[0] is None or net[1] is None else net[0] - net[1]
-    kind, prediction = energy1["net_J"].kind, found.prediction
-    return gamma.prediction_tree(prediction, found.measured.value) | {
-        "short_form_error": estimate(prediction.paper.short_form_error),
-        "gamma_predicted": found.predicted,
+    kind, reconciled = energy1["net_J"].kind, found.reconciliation
+    return gamma.reconciliation_tree(reconciled, found.measured.value) | {
+        "short_form_error": estimate(reconciled.paper.short_form_error),
+        "gamma_reconciled": found.reconciled,
         "gamma_measured_cpu": found.measured,
         "gamma_net": quantity(gamma_net, "", kind),
         "gamma_gross": quantity(gamma_gross, "", energy1["gross_J"].kind),
-        "deviation_net": estimate(prediction.model.gamma / gamma_net - 1.0 if gamma_net else None),
+        "deviation_net": estimate(reconciled.model.gamma / gamma_net - 1.0 if gamma_net else None),
         "deviation": found.deviation,
         "saved_J": quantity(saved_J, "J", kind),
     }
@@ -141,7 +143,7 @@ def _calibrated(baseline: gamma.RunCosts, run: gamma.RunCosts, basis: Basis) -> 
         OtherCosts(net_W * c.track, net_W * c.schedule) for c in map(gamma.other_costs, (baseline, run))
     )
     costs = UnitCosts(seg_J, other1.track, 0.0, class_J, point_J)
-    return predict(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
+    return reconcile(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
 
 
 def _costs(costs: UnitCosts, baseline: gamma.RunCosts, net_W: float) -> dict[str, Quantity]:
@@ -160,10 +162,18 @@ def _costs(costs: UnitCosts, baseline: gamma.RunCosts, net_W: float) -> dict[str
     }
 
 
-def _series(run: gamma.RunCosts, lives: list[int]) -> dict[str, Any]:
+def _table(run: gamma.RunCosts) -> dict[str, Any]:
+    """Counts and costs of every frame, for predictions of other streams."""
+    return {
+        "counts": {name: run.counts[:, k].tolist() for k, name in enumerate(COUNTS)},
+        "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
+    }
+
+
+def _series(run: gamma.RunCosts, lives: Histogram) -> dict[str, Any]:
     return {
         "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
         "proposals": run.counts[:, COUNTS.index("proposals")].tolist(),
         "classified": run.counts[:, COUNTS.index("classified")].tolist(),
-        "lives": sorted(lives),
+        "lives": lives.occurrences(),
     }

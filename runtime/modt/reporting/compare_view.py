@@ -10,10 +10,11 @@ from modt.energy.meters.meter import Kind
 from modt.reporting import energy_plots, svg
 from modt.reporting.document import Document, Table
 from modt.reporting.page import Plot
+from modt.reporting.prediction_report import against_table
 
 
 def compare_document(tree: dict[str, Any]) -> Document:
-    """The energy saved, whether the prediction holds, and the distribution of the energy."""
+    """The energy saved, whether the counts explain it, and the distribution of the energy."""
     meter, results = tree["meter"], []
     for mode, s in tree["savings"].items():
         energy = f"gamma {s['gamma_net'].marked()} without idling, {s['gamma_gross'].marked()} with idling"
@@ -27,8 +28,11 @@ def compare_document(tree: dict[str, Any]) -> Document:
         energy_plots.conditions_text(tree["conditions"]),
     ]
     terms = [energy_plots.gamma_terms(f"{mode}: from N_go to gamma", s) for mode, s in tree["savings"].items()]
+    blind = [against_table(tree["against"])] if "against" in tree else []
     costs = Table(["unit", "cost by the run of varied load"], [[*item] for item in tree["unit_costs"].items()])
-    return Document(f"Energy of {tree['stream']}", about, results, [_modes(tree), *terms, costs], tree["test"])
+    return Document(
+        f"Energy of {tree['stream']}", about, results, [*blind, _modes(tree), *terms, costs], tree["test"]
+    )
 
 
 def _modes(tree: dict[str, Any]) -> Table:
@@ -50,13 +54,13 @@ def _modes(tree: dict[str, Any]) -> Table:
 
 
 def _verdict(saving: dict[str, Any]) -> str:
-    """Whether the prediction holds, with its deviation and interval."""
+    """Whether counts and unit costs explain the ratio, with the deviation and its interval."""
     deviation, short = saving["deviation"], saving["short_form_error"]
-    holds = "holds within 5 %" if abs(deviation.value) <= 0.05 else "does NOT hold within 5 %"
+    closes = "closes within 5 %" if abs(deviation.value) <= 0.05 else "does NOT close within 5 %"
     interval = f"{100 * deviation.low:+.1f} to {100 * deviation.high:+.1f}"
     return (
-        f"predicted {saving['gamma_predicted'].text()}; "
-        f"the prediction {holds}: deviation ~{100 * deviation.value:+.1f} % ({interval}); "
+        f"reconciled {saving['gamma_reconciled'].text()}; "
+        f"the reconciliation {closes}: deviation ~{100 * deviation.value:+.1f} % ({interval}, over frames); "
         f"at a = {saving['a'].marked()} the error of gamma = N_go is ~{100 * short.value:+.0f} %"
     )
 
@@ -66,7 +70,7 @@ def _against_meter(saving: dict[str, Any]) -> str:
     text = "" if calibrated.value is None else f"; gamma by calibrated joules is {calibrated.marked()}"
     if saving["gamma_net"].kind is Kind.ESTIMATED or deviation is None:
         return text
-    return f"{text}; deviation of the prediction {100 * deviation:+.1f} % against the meter"
+    return f"{text}; deviation of the reconciliation {100 * deviation:+.1f} % against the meter"
 
 
 def compare_plots(tree: dict[str, Any]) -> list[Plot]:
@@ -80,9 +84,11 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
     frames = np.arange(tree["frames"], dtype=float)
     classified = [svg.Trace(mode, frames, np.array(series[mode]["classified"], float)) for mode in series]
     return [
-        energy_plots.cumulative_energy(sums_mJ, f"E1: {base}; estimated from CPU time, without idling"),
+        energy_plots.cumulative_energy(
+            sums_mJ, np.ones(len(frames)), f"E1: {base}; estimated from CPU time, without idling"
+        ),
         energy_plots.gamma_curve(tree["unit_costs"]["a"], modes[base]["proposals"], points, "dots: measured"),
-        *(energy_plots.stage_energy(f"{mode}: energy by stage", parts) for mode, parts in energy_mJ.items()),
+        *(energy_plots.stage_energy(f"{mode}: energy by stage", parts, frames) for mode, parts in energy_mJ.items()),
         *(energy_plots.life_histogram(f"{mode}: life of tracks", series[mode]["lives"]) for mode in others),
         ("Classifications a frame", svg.lines(classified, "frame", "classified"), "measured"),
     ]

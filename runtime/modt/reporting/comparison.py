@@ -14,6 +14,7 @@ from modt.energy.ledger import Ledger, Line
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
+from modt.reporting.histogram import Histogram
 from modt.types import NONE, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
 
 COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
@@ -49,7 +50,7 @@ class ModeRun:
     windows: Windows | None = None  # None where no meter is read
     lines: list[Line] = field(default_factory=list)  # of the ledger
     energy_lines: list[Line] = field(default_factory=list)
-    lives: list[int] = field(default_factory=list)  # frames with a proposal, of every track that ended
+    lives: Histogram = field(default_factory=Histogram)  # frames with a proposal, of every track that ended
     _counts: list[tuple[int, ...]] = field(default_factory=list)
     _life: dict[int, int] = field(default_factory=dict)
     _classified: set[int] = field(default_factory=set)
@@ -80,15 +81,19 @@ class ModeRun:
 
     def finish(self) -> None:
         """Count the lives of the tracks still alive at the end of the stream."""
-        self.lives += self._life.values()
+        self._end(self._life.keys())
 
     def counts(self) -> Int:
-        """(frames, 8) counts of each frame, columns as COUNTS."""
+        """(frames, columns) counts of each frame, columns as COUNTS."""
         return np.array(self._counts, np.int64).reshape(-1, len(COUNTS))
 
     def cpu_s(self) -> Float64:
         """(frames, stages) CPU time of each stage of the pipeline [s]."""
         return cpu_seconds(self.lines)
+
+    def _end(self, ids: Iterable[int]) -> None:
+        for id_ in ids:
+            self.lives.add(self._life[id_])
 
     def _count(self, result: FrameResult, line: Line) -> None:
         tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
@@ -105,9 +110,11 @@ class ModeRun:
                 len((classified & self._classified) - self._seen),
                 row.get("points", 0),
                 row.get("calls", 0),
+                len(result.frame.points),
+                len(tracks.id),
             )
         )
-        self.lives += [life for id_, life in self._life.items() if id_ not in alive]
+        self._end(self._life.keys() - alive)
         self._life = {id_: self._life.get(id_, 0) + (id_ in seen) for id_ in alive}
         self._classified, self._seen = (self._classified | classified) & alive, seen
 
@@ -140,5 +147,5 @@ def cpu_seconds(lines: Sequence[Line]) -> Float64:
 
 
 def total(counts: Int) -> Counts:
-    """Sums over the frames of (frames, 8) counts."""
+    """Sums over the frames of (frames, columns) counts."""
     return Counts(len(counts), **dict(zip(COUNTS, counts.sum(axis=0).tolist(), strict=True)))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.energy.prediction import EnergyModel
+from modt.energy.equations import EnergyModel
 from modt.reporting import svg
 from modt.reporting.document import Table
 from modt.reporting.page import Plot
@@ -14,7 +14,7 @@ from modt.reporting.quantity import Quantity
 from modt.types import Float64
 
 _MAX_LIFE = 1000.0
-"""Upper end of the N_go axis of the predicted curve [frames]."""
+"""Upper end of the N_go axis of the curve of Equation 3 [frames]."""
 
 
 def stage_energy_mJ(series: dict[str, Any], net_W: float) -> dict[str, Float64]:
@@ -22,27 +22,26 @@ def stage_energy_mJ(series: dict[str, Any], net_W: float) -> dict[str, Float64]:
     return {stage: net_W * np.array(cpu_ms, float) for stage, cpu_ms in series["cpu_ms"].items()}
 
 
-def stage_energy(title: str, energy_mJ: dict[str, Float64]) -> Plot:
-    """Stacked energy of the stages over frames."""
-    frames = np.arange(len(next(iter(energy_mJ.values()))), dtype=float)
+def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64) -> Plot:
+    """Stacked energy of the stages over (points,) frames."""
     note = "estimated from CPU time, without idling"
     return (title, svg.areas(frames, energy_mJ, "frame", "mJ a frame"), note)
 
 
-def cumulative_energy(energy_mJ: dict[str, Float64], note: str, dashed: str = "") -> Plot:
-    """Energy summed over frames, a line a run; the one named is dashed."""
+def cumulative_energy(energy_mJ: dict[str, Float64], each: Float64, note: str, dashed: str = "") -> Plot:
+    """Energy a frame summed over points of so many frames each, a line a run; the one named is dashed."""
     traces = [
-        svg.Trace(name, np.arange(len(mJ), dtype=float), 1e-3 * np.cumsum(mJ), dashed=name == dashed)
+        svg.Trace(name, np.cumsum(each), 1e-3 * np.cumsum(each * mJ), dashed=name == dashed)
         for name, mJ in energy_mJ.items()
     ]
     return ("Cumulative energy, E1 against E2", svg.lines(traces, "frame", "J"), note)
 
 
-def life_histogram(title: str, lives: list[int]) -> Plot:
-    """Histogram of the lives of tracks [frames]."""
-    life = np.array(lives, float)
+def life_histogram(title: str, lives: dict[str, list[int]]) -> Plot:
+    """Histogram of the lives of tracks [frames], by the occurrences of each life."""
+    life = np.array(lives["values"], float)
     edges = np.linspace(0.5, max(life.max(initial=1.0), 1.0) + 0.5, 31)
-    heights = np.histogram(life, edges)[0].astype(float)
+    heights = np.histogram(life, edges, weights=np.array(lives["counts"], float))[0]
     return (title, svg.bars(edges, heights, "frames seen", "tracks"), "measured")
 
 

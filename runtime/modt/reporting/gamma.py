@@ -1,4 +1,4 @@
-"""Gamma predicted and measured, from the counts and costs of the modes on the same frames."""
+"""Gamma measured, and reconciled from the counts and costs of the modes on the same frames."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import Any, Self
 import numpy as np
 
 from modt.energy.meters.meter import Kind
-from modt.energy.savings import OtherCosts, Prediction, UnitCosts, predict
+from modt.energy.nonnegative import nonnegative_fit
+from modt.energy.savings import OtherCosts, Reconciliation, UnitCosts, reconcile
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
 from modt.reporting.comparison import COUNTS, ModeRun, total
 from modt.reporting.quantity import Quantity, estimate, quantity
@@ -30,14 +31,19 @@ Interval = tuple[float, float]
 class RunCosts:
     """Counts and costs of one mode on F frames."""
 
-    counts: Int  # (F, 8), columns as COUNTS
+    counts: Int  # (F, C), columns as COUNTS
     cost: Float64  # (F, S) of the pipeline's S stages [CPU s]
 
     @classmethod
     def median(cls, runs: Sequence[ModeRun]) -> Self:
-        """Repetitions of the same work: its counts, and the median of the costs."""
-        cost: Float64 = np.median([run.cpu_s() for run in runs], axis=0)
-        return cls(runs[0].counts(), cost)
+        """Of every frame the repetition of median cost: its counts with its costs.
+
+        Under a budget of CPU time the work of a frame may differ between repetitions.
+        """
+        counts, cost = np.stack([run.counts() for run in runs]), np.stack([run.cpu_s() for run in runs])
+        middle = np.argsort(cost.sum(axis=2), axis=0, kind="stable")[(len(runs) - 1) // 2]
+        frames = np.arange(len(middle))
+        return cls(counts[middle, frames], cost[middle, frames])
 
     @classmethod
     def concatenated(cls, runs: Sequence[ModeRun]) -> Self:
@@ -51,60 +57,57 @@ class RunCosts:
 
 @dataclass(frozen=True, slots=True)
 class GammaEstimate:
-    """Gamma of one mode over tracking-by-detection, with intervals at 95 % over resampled frames."""
+    """Gamma of one mode over tracking-by-detection, with intervals at 95 % over frames resampled in blocks."""
 
-    prediction: Prediction
-    predicted: Quantity  # by the full model
+    reconciliation: Reconciliation
+    reconciled: Quantity  # by the full model
     measured: Quantity  # ratio of the costs of the two runs
-    deviation: Quantity  # predicted / measured - 1
+    deviation: Quantity  # reconciled / measured - 1
 
 
 def unit_costs(load_varied_run: RunCosts) -> UnitCosts:
     """Costs of units of work, from a run whose classification load varied from frame to frame."""
-    cost = load_varied_run.cost
-    X = load_varied_run.counts[:, _LOAD].astype(float)
-    busy = X[:, 0] > 0
-    scale = np.maximum(np.linalg.norm(X, axis=0), 1e-12)
-    solved = np.linalg.lstsq(X[busy] / scale, cost[busy, CLASS], rcond=None)[0] / scale if busy.any() else np.zeros(3)
+    cost, load = load_varied_run.cost, load_varied_run.counts[:, _LOAD].astype(float)
+    solved = nonnegative_fit(load.T @ load, load.T @ cost[:, CLASS])
     return UnitCosts(float(cost[:, SEG].mean()), float(cost[:, TRACK].sum(axis=1).mean()), *solved.tolist())
 
 
 def estimate_gamma(
     baseline: RunCosts, run: RunCosts, load_varied_run: RunCosts, random: np.random.Generator
 ) -> GammaEstimate:
-    """Predicted and measured gamma of a run on the F frames of tracking-by-detection.
+    """Reconciled and measured gamma of a run on the F frames of tracking-by-detection.
 
     The unit costs come from a third run, over the same frames once or several times, whose load was varied.
     """
     n = len(baseline.counts)
     passes = len(load_varied_run.counts) // n
 
-    def predicted_and_measured(frames: Int) -> tuple[Prediction, float]:
+    def reconciled_and_measured(frames: Int) -> tuple[Reconciliation, float]:
         a, b = baseline.take(frames), run.take(frames)
         costs = unit_costs(load_varied_run.take((frames + n * np.arange(passes)[:, None]).ravel()))
-        prediction = predict(total(a.counts), total(b.counts), costs, other_costs(a), other_costs(b))
-        return prediction, float(a.cost.sum() / b.cost.sum())
+        reconciled = reconcile(total(a.counts), total(b.counts), costs, other_costs(a), other_costs(b))
+        return reconciled, float(a.cost.sum() / b.cost.sum())
 
-    prediction, ratio = predicted_and_measured(np.arange(n))
-    gamma = prediction.model.gamma
-    resampled = [predicted_and_measured(_blocks(n, random)) for _ in range(_RESAMPLES)]
+    reconciliation, ratio = reconciled_and_measured(np.arange(n))
+    gamma = reconciliation.model.gamma
+    resampled = [reconciled_and_measured(blocks(n, random)) for _ in range(_RESAMPLES)]
     gammas = np.array([found.model.gamma for found, _ in resampled])
     ratios = np.array([found for _, found in resampled])
     return GammaEstimate(
-        prediction,
-        predicted=estimate(gamma, "", _interval(gammas)),
+        reconciliation,
+        reconciled=estimate(gamma, "", _interval(gammas)),
         measured=quantity(ratio, "", Kind.MEASURED, _interval(ratios)),
         deviation=estimate(gamma / ratio - 1.0, "", _interval(gammas / ratios - 1.0)),
     )
 
 
-def prediction_tree(found: Prediction, gamma: float | None) -> dict[str, Any]:
-    """The paper's figures, the predicted gamma, and the terms from N_go to the gamma of the runs."""
+def reconciliation_tree(found: Reconciliation, gamma: float | None) -> dict[str, Any]:
+    """The paper's figures, the reconciled gamma, and the terms from N_go to the gamma of the runs."""
     return {
         "a": estimate(found.paper.a),
         "gamma_short": estimate(found.paper.n_go),
         "gamma_equation_3": estimate(found.paper.gamma),
-        "gamma_predicted": estimate(found.model.gamma),
+        "gamma_reconciled": estimate(found.model.gamma),
         "terms": [
             {"name": term.name, "change": estimate(term.change), "gamma": estimate(term.gamma)}
             for term in found.explain(1.0 if gamma is None else gamma)
@@ -114,7 +117,7 @@ def prediction_tree(found: Prediction, gamma: float | None) -> dict[str, Any]:
 
 def interval(n: int, statistic: Callable[[Int], float], random: np.random.Generator) -> Interval:
     """95 % interval of a statistic over n resampled frames."""
-    return _interval(np.array([statistic(_blocks(n, random)) for _ in range(_RESAMPLES)]))
+    return _interval(np.array([statistic(blocks(n, random)) for _ in range(_RESAMPLES)]))
 
 
 def mean(values: Float64, unit: str, kind: Kind, random: np.random.Generator) -> Quantity:
@@ -129,7 +132,7 @@ def other_costs(run: RunCosts) -> OtherCosts:
     return OtherCosts(float(cost[TRACK].sum()), float(cost[SCHEDULE].sum()))
 
 
-def _blocks(n: int, random: np.random.Generator) -> Int:
+def blocks(n: int, random: np.random.Generator) -> Int:
     """(n,) frames drawn in circular blocks."""
     starts = random.integers(0, n, size=-(-n // _BLOCK))
     frames: Int = ((starts[:, None] + np.arange(_BLOCK)) % n).ravel()[:n]

@@ -42,6 +42,11 @@ class Histogram:
             for each, occurrences in exact.items():
                 self._occurrences[bucket_middle(each)] += occurrences
 
+    def occurrences(self) -> dict[str, list[int]]:
+        """The distinct values held, in order, and how often each occurred."""
+        values = sorted(self._occurrences)
+        return {"values": values, "counts": [self._occurrences[value] for value in values]}
+
     @property
     def mean(self) -> float:
         """Mean of all values."""

@@ -38,8 +38,13 @@ class Quantity:
 
     def text(self) -> str:
         """As marked, with the interval if its ends differ in the digits shown."""
+        interval = self.interval()
+        return self.marked() + (f" ({interval})" if interval else "")
+
+    def interval(self) -> str:
+        """Its ends; empty if they do not differ in the digits shown."""
         low, high = format_number(self.low), format_number(self.high)
-        return self.marked() + (f" ({low} to {high})" if low != high else "")
+        return f"{low} to {high}" if low != high else ""
 
     def with_kind(self) -> str:
         """Value, unit and kind in brackets."""

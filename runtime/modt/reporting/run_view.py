@@ -13,7 +13,7 @@ from modt.reporting.quantity import Quantity
 
 
 def run_document(tree: dict[str, Any]) -> Document:
-    """Energy a frame and power, their distribution, the energy saved, and the prediction."""
+    """Energy a frame and power, their distribution, the energy saved, and what gamma is made of."""
     saved, meter, ledger = tree["saved"], tree["meter"], tree["ledger"]
     net_mJ = tree["net_J"].scaled(1e3, "mJ")
     of_e1 = "E1 is computed from this run's own costs; modt-profile compare measures it"
@@ -21,8 +21,8 @@ def run_document(tree: dict[str, Any]) -> Document:
         of_e1 = "this is tracking-by-detection itself: nothing was saved; run the other modes, or compare"
     said = {key: value.marked() for key, value in saved.items() if isinstance(value, Quantity)}
     gross = f"{net_mJ.marked()} without idling; power {tree['power_W'].marked()}"
-    predicted = (
-        f"predicted {said['gamma_predicted']} in full, {said['gamma_equation_3']} by Equation 3, "
+    computed = (
+        f"computed from this run: {said['gamma_reconciled']} in full, {said['gamma_equation_3']} by Equation 3, "
         f"{said['gamma_short']} by N_go alone; a = {said['a']}"
     )
     counts = f"{said['proposals']} proposals a frame, N_go {said['N_go']}, {said['views']} classifications a track"
@@ -30,7 +30,7 @@ def run_document(tree: dict[str, Any]) -> Document:
     results = [
         ("energy a frame", tree["gross_J"].scaled(1e3, "mJ"), gross),
         ("saved a frame", saved["saved_J"].scaled(1e3, "mJ"), of_e1),
-        ("gamma", saved["gamma_of_this_run"], predicted),
+        ("gamma", saved["gamma_of_this_run"], computed),
         ("beta", saved["beta"].scaled(100, "%"), counts),
         ("overhead of the ledger a frame", ledger["overhead_us"], share),
     ]
@@ -64,11 +64,12 @@ def _stages(tree: dict[str, Any]) -> Table:
 def run_plots(tree: dict[str, Any]) -> list[Plot]:
     """Plots over frames, over N_go and over the life of tracks."""
     series, saved = tree["series"], tree["saved"]
-    frames = np.arange(tree["frames"], dtype=float)
+    each = np.array(series["frames"], float)
+    frames = np.cumsum(each) - each
     parts_mJ = energy_plots.stage_energy_mJ(series, series["net_W"])
     baseline = "E1, tracking-by-detection (computed)"
     energy_mJ = {
-        baseline: series["net_W"] * np.array(series["predicted_cpu_ms"], float),
+        baseline: series["net_W"] * np.array(series["e1_cpu_ms"], float),
         "E2, this run": np.sum([*parts_mJ.values()], axis=0),
     }
     budget = [svg.Trace(key, frames, np.array(series[key], float)) for key in ("classified", "deferred")]
@@ -76,8 +77,8 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
         budget.append(svg.Trace("budget", frames[[0, -1]], np.full(2, float(series["budget"])), dashed=True))
     point = {tree["mode"]: (saved["N_go"], saved["gamma_of_this_run"])}
     return [
-        energy_plots.stage_energy("Energy by stage", parts_mJ),
-        energy_plots.cumulative_energy(energy_mJ, "estimated", dashed=baseline),
+        energy_plots.stage_energy("Energy by stage", parts_mJ, frames),
+        energy_plots.cumulative_energy(energy_mJ, each, "estimated", dashed=baseline),
         energy_plots.gamma_curve(saved["a"], saved["proposals"], point, "dot: this run"),
         energy_plots.life_histogram("Life of tracks", series["lives"]),
         ("Use of the budget", svg.lines(budget, "frame", "proposals"), "measured"),

@@ -1,0 +1,189 @@
+"""Energy of the modes on a stream before any of them has run on it.
+
+What a unit of work costs, and how often a track is classified, comes from other streams; from the stream itself comes
+what tracking alone sees. Unlike the reconciliation (modt.energy.savings) it can be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from scipy import stats
+
+from modt.energy.equations import EnergyModel
+from modt.energy.nonnegative import nonnegative_fit
+from modt.reporting.comparison import COUNTS
+from modt.reporting.gamma import CLASS, SCHEDULE, SEG, TRACK, RunCosts, blocks
+from modt.types import Float64, Int
+
+Runs = dict[str, RunCosts]
+"""A stream's runs: tracking-by-detection first, the run of varied load last, the modes between."""
+OBSERVED = ("sweep_points", "proposals", "alive", "tracks", "points")
+"""Columns of what tracking alone sees of a frame; the last are the network's if it classified every proposal."""
+_RESAMPLES = 300
+_VARIED = 0.2
+"""Relative spread of the points of sweeps above which segmentation has a constant beside its cost a point."""
+_PARTS = 4
+"""Parts of the only stream of a calibration that are left out in turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class Views:
+    """How a mode selects what it classifies."""
+
+    per_track: float  # classifications
+    size: float  # network's points of a selected proposal over those of any proposal
+    calls: float  # rate of calls over the rate of classifications; below 1 where these come together
+
+    @classmethod
+    def of(cls, run: RunCosts, base: RunCosts) -> Self:
+        """Of a mode's run, against tracking-by-detection on the same frames."""
+        each = _column(run, "classified").mean()
+        if not each:
+            return cls(0.0, 1.0, 1.0)
+        frames_with_calls = min(_column(run, "calls").mean(), 1.0 - 0.5 / len(run.counts))
+        every = _column(base, "points").sum() / max(_column(base, "classified").sum(), 1.0)
+        size = _column(run, "points").sum() / _column(run, "classified").sum() / max(every, 1e-9)
+        return cls(each / max(_column(run, "tracks").mean(), 1e-9), size, -np.log1p(-frames_with_calls) / each)
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """What units of work cost [CPU s], and how the modes select."""
+
+    segmentation: Float64  # (2,) a frame, a point of the sweep
+    classification: Float64  # (3,) a call, a proposal, a point of the network
+    tracking: dict[str, Float64]  # of each mode: (3,) a frame, a proposal, a track
+    scheduling: dict[str, Float64]  # of each mode, with fusion: (2,) a frame, a track
+    views: dict[str, Views]  # of the modes but tracking-by-detection
+
+    @classmethod
+    def fit(cls, streams: Sequence[Runs]) -> Self:
+        """Over all frames of the calibration's streams."""
+        runs = {name: _joined([stream[name] for stream in streams]) for name in streams[0]}
+        *modes, _ = runs
+        base, *others = modes
+        every = _joined([*runs.values()])
+        points = _column(every, "sweep_points")
+        segmentation = np.array([0.0, every.cost[:, SEG].sum() / max(points.sum(), 1.0)])
+        if points.std() > _VARIED * points.mean():
+            segmentation = _fit(every, ("sweep_points",), [SEG])
+        return cls(
+            segmentation=segmentation,
+            classification=_fit(every, ("calls", "classified", "points"), [CLASS], constant=False),
+            tracking={mode: _fit(runs[mode], ("proposals", "alive"), TRACK) for mode in modes},
+            scheduling={mode: _fit(runs[mode], ("alive",), SCHEDULE) for mode in modes},
+            views={mode: Views.of(runs[mode], runs[base]) for mode in others},
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Expected:
+    """Expectation for one stream."""
+
+    cost: dict[str, float]  # of each mode, a frame [CPU s]; tracking-by-detection first
+    equation: EnergyModel  # Equation 3 bare, with N_go
+
+    @property
+    def values(self) -> Float64:
+        """(2 M - 1,) the costs of the M modes, then gamma of each but the first."""
+        return _with_gamma([*self.cost.values()])
+
+
+def expect(rates: Rates, observed: Int, frames: int) -> Expected:
+    """Costs of a stream of so many frames, of which (F, 5) OBSERVED were seen, the first among them."""
+    points, n, alive, _, all_points = observed.mean(axis=0).tolist()
+    started = observed[:, OBSERVED.index("tracks")]
+    tracks = (started[0] + (frames - 1) * float(started[1:].mean() if len(started) > 1 else 0.0)) / frames
+    e_seg = float(rates.segmentation @ [1.0, points])
+    cost = {}
+    for mode in rates.tracking:
+        load = np.array([float(n > 0), n, all_points])
+        if mode in rates.views:
+            views = rates.views[mode]
+            items = min(views.per_track * tracks, n)
+            size = views.size * all_points / max(n, 1e-9)
+            load = np.array([1.0 - np.exp(-views.calls * items), items, size * items])
+        cost[mode] = float(
+            e_seg
+            + rates.tracking[mode] @ [1.0, n, alive]
+            + rates.scheduling[mode] @ [1.0, alive]
+            + rates.classification @ load
+        )
+    e_class = float(rates.classification @ [1.0, n, all_points]) / max(n, 1e-9)
+    return Expected(cost, EnergyModel(e_seg, e_class, n, n / tracks if tracks else 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """A prediction with its interval at 95 %; arrays as Expected.values."""
+
+    expected: Expected
+    low: Float64
+    high: Float64
+    copied: Float64  # the calibration's own, geometric mean over its streams
+
+
+def forecast(streams: Sequence[Runs], observed: Int, frames: int, random: np.random.Generator) -> Forecast:
+    """Prediction for a stream of so many frames from (F, 5) OBSERVED of its first ones.
+
+    The interval is over resampled frames of the calibration and of those seen, and over how far the calibration is
+    off on one of its streams when fitted to the others (on a quarter of its only stream, when fitted to the rest).
+    """
+    expected = expect(Rates.fit(streams), observed, frames)
+    errors = np.array([*_errors(streams)])
+    spread = np.sqrt((errors**2).mean(axis=0)) * np.sqrt(1.0 + 1.0 / len(errors))
+    draws = np.array([np.log(_resampled(streams, observed, frames, random)) for _ in range(_RESAMPLES)])
+    margin = np.hypot(spread, draws.std(axis=0)) * stats.t.ppf(0.975, len(errors))
+    copied = np.exp(np.mean([np.log(measured(stream)) for stream in streams], axis=0))
+    return Forecast(expected, expected.values * np.exp(-margin), expected.values * np.exp(margin), copied)
+
+
+def measured(stream: Runs) -> Float64:
+    """The same values as of Expected, by the runs themselves."""
+    *modes, _ = stream.values()
+    return _with_gamma([float(run.cost.sum(axis=1).mean()) for run in modes])
+
+
+def observed_of(stream: Runs) -> Int:
+    """(F, 5) OBSERVED of a stream on which the modes did run."""
+    base = next(iter(stream.values()))
+    seen: Int = base.counts[:, [COUNTS.index(name) for name in OBSERVED]]
+    return seen
+
+
+def _errors(streams: Sequence[Runs]) -> Iterator[Float64]:
+    """Logarithmic errors of the values for streams left out."""
+    if len(streams) == 1:
+        quarters = np.array_split(np.arange(len(observed_of(streams[0]))), _PARTS)
+        streams = [{name: run.take(part) for name, run in streams[0].items()} for part in quarters]
+    for k, left_out in enumerate(streams):
+        rates, seen = Rates.fit([*streams[:k], *streams[k + 1 :]]), observed_of(left_out)
+        yield np.log(expect(rates, seen, len(seen)).values / measured(left_out))
+
+
+def _resampled(streams: Sequence[Runs], observed: Int, frames: int, random: np.random.Generator) -> Float64:
+    drawn = [{name: run.take(blocks(len(run.counts), random)) for name, run in stream.items()} for stream in streams]
+    seen = np.concatenate([observed[:1], observed[1:][blocks(len(observed) - 1, random)]])
+    return expect(Rates.fit(drawn), seen, frames).values
+
+
+def _with_gamma(cost: Sequence[float]) -> Float64:
+    return np.array([*cost, *(cost[0] / each for each in cost[1:])])
+
+
+def _joined(runs: Sequence[RunCosts]) -> RunCosts:
+    return RunCosts(np.concatenate([run.counts for run in runs]), np.concatenate([run.cost for run in runs]))
+
+
+def _column(run: RunCosts, name: str) -> Float64:
+    return run.counts[:, COUNTS.index(name)].astype(float)
+
+
+def _fit(run: RunCosts, names: Sequence[str], stages: list[int], *, constant: bool = True) -> Float64:
+    columns = [_column(run, name) for name in names]
+    X = np.stack([np.ones(len(run.counts)), *columns] if constant else columns, axis=1)
+    return nonnegative_fit(X.T @ X, X.T @ run.cost[:, stages].sum(axis=1))

@@ -1,0 +1,162 @@
+"""Predictions and calibrations as files, and how far a comparison is from what was predicted."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt.pipeline import STAGES
+from modt.reporting.compare_report import SCHEMA as COMPARE_SCHEMA
+from modt.reporting.comparison import COUNTS
+from modt.reporting.document import Document, Table
+from modt.reporting.gamma import RunCosts
+from modt.reporting.prediction import Forecast, Runs
+from modt.reporting.quantity import Quantity, estimate
+
+SCHEMA = "modt.prediction/1"
+_MIN_FRAMES = 8
+"""Of a comparison that is used as a calibration."""
+_OVER = (
+    "The interval at 95 % is over resampled frames of the calibration and of those seen, and over the calibration's "
+    "own error on streams, or quarters of its only one, that it was not fitted to."
+)
+
+
+def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tuple[str, Runs]:
+    """Stream and runs of a comparison that was saved as JSON; not of the stream itself, by its name and path.
+
+    Raises:
+        MisuseError: no comparison, or one of the stream to be predicted, or of another field of view.
+    """
+    remedy = "give the output of modt-profile compare --json of another stream"
+    tree = _read(path, COMPARE_SCHEMA, remedy)
+    if {key: tree[key] for key in itself} == itself:
+        raise MisuseError(path, f"it was measured on {itself['stream']} itself", remedy)
+    if tree["fov"] != fov:
+        raise MisuseError(path, f"its field of view is {tree['fov']}, not {fov}", f"{remedy} with --fov {fov}")
+    if tree["frames"] < _MIN_FRAMES:
+        raise MisuseError(path, f"{tree['frames']} frames tell no unit costs", f"{remedy} of {_MIN_FRAMES} or more")
+    return tree["stream"], {
+        name: RunCosts(
+            np.array([table["counts"][column] for column in COUNTS], np.int64).T,
+            1e-3 * np.array([table["cpu_ms"][stage] for stage in STAGES], float).T,
+        )
+        for name, table in tree["calibration"].items()
+    }
+
+
+def prediction_tree(found: Forecast, net_W: float, about: dict[str, Any]) -> dict[str, Any]:
+    """A prediction with its interval, its rivals and what it is about (stream, frames, field of view)."""
+    expected, values = found.expected, found.expected.values.tolist()
+    bounds = list(zip(found.low.tolist(), found.high.tolist(), strict=True))
+    modes = [*expected.cost]
+    costs = dict(zip(modes, zip(values, bounds, strict=True), strict=False))
+    gammas = zip(modes[1:], values[len(modes) :], bounds[len(modes) :], found.copied[len(modes) :], strict=True)
+    return {
+        "schema": SCHEMA,
+        **about,
+        "n": estimate(expected.equation.n),
+        "N_go": estimate(expected.equation.n_go, "frames"),
+        "cpu_ms": {mode: estimate(value, "s", bound).scaled(1e3, "ms") for mode, (value, bound) in costs.items()},
+        "net_J": {mode: estimate(value, "s", bound).scaled(net_W, "J") for mode, (value, bound) in costs.items()},
+        "gamma": {
+            mode: {
+                "predicted": estimate(value, "", bound),
+                "gamma = N_go": estimate(expected.equation.n_go),
+                "Equation 3 bare": estimate(expected.equation.gamma),
+                "the calibration's ratio": estimate(float(copied)),
+            }
+            for mode, value, bound, copied in gammas
+        },
+    }
+
+
+def prediction_document(tree: dict[str, Any]) -> Document:
+    """A prediction for people."""
+    results = [
+        (f"{mode}: gamma predicted", row["predicted"], f"saves {_saved(tree, mode)} a frame")
+        for mode, row in tree["gamma"].items()
+    ]
+    about = [
+        f"{tree['frames']} frames, field of view {tree['fov']}; {tree['seen']} tracked without classifying",
+        f"calibrated on {', '.join(tree['calibration'])}",
+        f"n {tree['n'].marked()}, N_go {tree['N_go'].marked()}",
+    ]
+    energy = [[f"E ({mode})", tree["net_J"][mode].scaled(1e3, "mJ"), cpu] for mode, cpu in tree["cpu_ms"].items()]
+    rivals = [[name, *(row[name] for row in tree["gamma"].values())] for name in next(iter(tree["gamma"].values()))]
+    tables = [
+        Table(["a frame, above idling", "energy", "cpu time"], energy),
+        Table(["gamma", *tree["gamma"]], rivals),
+    ]
+    return Document(f"Prediction for {tree['stream']}", about, results, tables, _OVER)
+
+
+def read_prediction(path: Path, about: dict[str, Any]) -> dict[str, Any]:
+    """A prediction of a stream.
+
+    Raises:
+        MisuseError: no prediction, or one of another stream, frames or field of view than in about.
+    """
+    tree = _read(path, SCHEMA, "give a file written by modt-profile predict")
+    for key, value in about.items():
+        if tree[key] != value:
+            raise MisuseError(path, f"its {key} is {tree[key]!r}, not {value!r}", "compare what was predicted")
+    return tree
+
+
+def against(prediction: dict[str, Any], modes: dict[str, Any], savings: dict[str, Any]) -> list[dict[str, Any]]:
+    """Of each figure predicted, and of each rival of gamma: the figure, the measured one, and how far it is off."""
+    rows = [
+        _row(f"cpu time, {mode}", value, modes[mode]["cpu_ms"], "ms") for mode, value in prediction["cpu_ms"].items()
+    ]
+    for mode, row in prediction["gamma"].items():
+        gamma = savings[mode]["gamma_measured_cpu"]
+        rows += [_row(f"gamma, {mode}: {name}", value, gamma) for name, value in row.items()]
+    return rows
+
+
+def against_table(rows: Sequence[dict[str, Any]]) -> Table:
+    """Table of the differences."""
+    return Table(
+        ["blind prediction", "predicted", "95 %", "measured", "off by", "within"],
+        [
+            [
+                row["name"],
+                row["predicted"],
+                row["predicted"].interval() or "-",
+                row["measured"],
+                row["off"].scaled(100, "%"),
+                {True: "yes", False: "NO", None: "-"}[row["within"]],
+            ]
+            for row in rows
+        ],
+    )
+
+
+def _row(name: str, plain: dict[str, Any], measured: Quantity, unit: str = "") -> dict[str, Any]:
+    low, high = plain.get("low"), plain.get("high")
+    bounds = None if low is None or high is None else (low, high)
+    predicted, true = estimate(plain["value"], unit, bounds), measured.value
+    off = None if predicted.value is None or not true else predicted.value / true - 1.0
+    within = None if bounds is None or true is None else bounds[0] <= true <= bounds[1]
+    return {"name": name, "predicted": predicted, "measured": measured, "off": estimate(off), "within": within}
+
+
+def _saved(tree: dict[str, Any], mode: str) -> str:
+    e1, e2 = next(iter(tree["net_J"].values())).value, tree["net_J"][mode].value
+    return estimate(1e3 * (e1 - e2), "mJ").marked()
+
+
+def _read(path: Path, schema: str, remedy: str) -> dict[str, Any]:
+    try:
+        tree = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise MisuseError(path, f"cannot be read ({error})", remedy) from None
+    if not isinstance(tree, dict) or tree.get("schema") != schema:
+        raise MisuseError(path, f"it is no {schema}", remedy)
+    return tree

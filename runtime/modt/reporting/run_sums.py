@@ -1,0 +1,152 @@
+"""What a report needs of a run's records, summed while they are read: bounded memory at any length of the run."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES, ObjectClass
+from modt.energy.attribution import split_by_coefficients, split_by_cpu_time, usable_windows
+from modt.energy.instrumentation import padded_points
+from modt.energy.meters.meter import Kind
+from modt.energy.meters.model import model_name
+from modt.energy.savings import Counts
+from modt.pipeline import CLASSIFICATION, STAGES
+from modt.reporting.frame_series import FrameSeries
+from modt.reporting.histogram import Histogram
+
+_BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
+COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")
+"""Of the series: CPU time of the stages [s], counts, and points if all proposals were classified."""
+
+
+class EnergySums:
+    """Energy of windows, or of frames by the model, and its distribution."""
+
+    def __init__(self, board: dict[str, Any]) -> None:
+        self._board = board
+        self.count = self.frames = self.wall_ns = self.dropped = 0
+        self.gross_J = self.error2_J2 = 0.0
+        self.parts_J: Counter[str] = Counter()
+        self.kind, self.meter = Kind.ESTIMATED, ""
+        self.conditions: dict[str, Any] = {}  # of the last window
+        self.marks: set[str] = set()
+
+    def add_window(self, window: dict[str, Any]) -> None:
+        """Add a line of modt.energy; one without a reading or with a rejected mark is counted as dropped."""
+        self.conditions = window["conditions"]
+        self.marks.update(window["marks"])
+        if not usable_windows([window]):
+            self.dropped += 1
+        elif window["frames"][2]:
+            self._add(window)
+
+    def add_modelled(self, line: dict[str, Any]) -> None:
+        """Add a frame of the ledger by the board's model."""
+        idle_W, busy_W = self._board["idle_W"], self._board["busy_W"]
+        self._add(
+            line
+            | {
+                "frames": [line["frame"], line["frame"], 1],
+                "process_ns": line["cpu_ns"],
+                "energy_J": 1e-9 * (idle_W * line["wall_ns"] + (busy_W - idle_W) * line["cpu_ns"]),
+                "kind": Kind.ESTIMATED.value,
+                "resolution_J": 0.0,
+                "meters": [{"name": model_name(idle_W, busy_W)}],
+            }
+        )
+
+    def _add(self, window: dict[str, Any]) -> None:
+        if not self.count:
+            self.kind, self.meter = Kind(window["kind"]), window["meters"][0]["name"]
+        self.count += 1
+        self.frames += window["frames"][2]
+        self.wall_ns += window["wall_ns"]
+        self.gross_J += window["energy_J"]
+        self.error2_J2 += window["resolution_J"] ** 2
+        coefficients = {name: self._board[name] for name in ("idle_W", "seg_J", "class_J", "point_J")}
+        calibrated = self.kind is not Kind.ESTIMATED and None not in coefficients.values()
+        idle_W = self._board["idle_W"]
+        parts_J = split_by_coefficients(window, coefficients) if calibrated else split_by_cpu_time(window, idle_W)
+        self.parts_J.update(parts_J)
+
+
+class FrameSums:
+    """Counts and costs over the lines of ledger.jsonl and tracks.jsonl.
+
+    Of the tracks only those alive are held.
+    """
+
+    def __init__(self, max_points: int, batch: int) -> None:
+        self._max_points, self._batch = max_points, batch  # as in the classifier's configuration
+        self.series = FrameSeries(len(COLUMNS))
+        self.stages: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger's columns
+        self.overhead_ns = self.cpu_ns = 0
+        self.marks: set[str] = set()
+        self.lives = Histogram()  # frames with a proposal, of the tracks that ended
+        self.foreground = self.tracks = self.classified_tracks = 0
+        self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)  # of calls, items, points and CPU s
+        self._life: dict[int, int] = {}  # of the tracks alive
+        self._viewed: set[int] = set()
+
+    def add(self, line: dict[str, Any], record: dict[str, Any]) -> None:
+        """Add a frame by its two lines."""
+        for stage, row in line["stages"].items():
+            self.stages[stage].update(row)
+        self.overhead_ns += line["overhead_ns"]
+        self.cpu_ns += line["cpu_ns"]
+        self.marks.update(line["marks"])
+        cpu_s = {stage: 1e-9 * line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES}
+        row = line["stages"].get(CLASSIFICATION, {})
+        load = np.array([row.get("calls", 0), record["classifications"], row.get("points", 0)], float)
+        self.load_gram += np.outer(load, load)
+        self.load_moment += load * cpu_s[CLASSIFICATION]
+        all_points = self._add_tracks(record["tracks"])
+        counts = (record["classifications"], record["deferred"], record["proposals"], all_points)
+        self.series.add([*cpu_s.values(), *counts])
+
+    def finish(self) -> None:
+        """Count the lives of the tracks still alive."""
+        self._end(self._life.keys())
+
+    def column(self, name: str) -> float:
+        """Sum of a column of the series over all frames."""
+        return float(self.series.total[COLUMNS.index(name)])
+
+    def counts(self) -> Counts:
+        """The work of the run."""
+        row = self.stages[CLASSIFICATION]
+        return Counts(
+            frames=self.series.count,
+            proposals=int(self.column("proposals")),
+            foreground=self.foreground,
+            tracks=self.tracks,
+            classified_tracks=self.classified_tracks,
+            classified=int(self.column("classified")),
+            reacquired=0,
+            points=row["points"],
+            calls=row["calls"],
+        )
+
+    def _add_tracks(self, tracks: list[dict[str, Any]]) -> int:
+        """Points of all proposals as the network would process them, padding included."""
+        alive = {track["id"] for track in tracks}
+        self._end(self._life.keys() - alive)
+        seen = [track for track in tracks if track["proposal"] is not None]
+        self.foreground += sum(track["class"] != _BACKGROUND for track in seen)
+        for track in seen:
+            life = self._life.get(track["id"], 0)
+            self.tracks += not life
+            self._life[track["id"]] = life + 1
+        viewed = {track["id"] for track in tracks if track["viewed"]}
+        self.classified_tracks += len(viewed - self._viewed)
+        self._viewed = (self._viewed | viewed) & alive
+        sizes = np.array([track["points"] for track in seen], np.int64)
+        return padded_points(sizes, self._max_points, self._batch)
+
+    def _end(self, ids: Iterable[int]) -> None:
+        for id_ in tuple(ids):
+            self.lives.add(self._life.pop(id_))
