@@ -66,8 +66,6 @@ def test_the_ledger_counts_what_each_stage_made(runs, mode):
     frames = tracks(root / mode)
     assert [b["tracking"]["items"] for b in booked] == [len(f["tracks"]) for f in frames]
     found = [b["segmentation"]["items"] for b in booked]
-    if mode == "conventional":  # parts what touches, and joins nothing: no class is ever settled
-        assert all(n <= f["proposals"] for n, f in zip(found, frames, strict=True))
     in_conventional = [json.loads(line) for line in (root / "conventional/ledger.jsonl").read_text().splitlines()]
     assert found == [line["stages"]["segmentation"]["items"] for line in in_conventional if "frame" in line]
 

@@ -71,7 +71,7 @@ class PointNet:
             self.boxes = box_classifier.from_metadata(metadata)
             self.reflectance = reflectance_classifier.from_metadata(metadata, sensor)
             self.class_frequency = _class_frequency(metadata)
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, RecursionError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
             raise MisuseError(self.path, cause, "export the model again") from None
 

@@ -70,6 +70,7 @@ def _end(number: int, _frame: object) -> None:
 
 
 _HANDLERS: dict[int, Callable[[int, object], None] | signal.Handlers] = {
+    signal.SIGINT: signal.default_int_handler,
     signal.SIGTERM: _end,
     signal.SIGTSTP: signal.SIG_IGN,
 }

@@ -47,10 +47,11 @@ class RunRecord:
         try:
             facts = from_yaml(described.read_text(encoding="utf-8"), described)
             stream, fov, sensor = facts["stream"]["path"], facts["fov"], facts["recognition"]["used"]
+            stream, sensor = Path(stream) if stream else None, Path(sensor).stem
             live = bool(facts.get("service", False))
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        return cls(path, Path(stream) if stream else None, fov, Path(sensor).stem, live)
+        return cls(path, stream, fov, sensor, live)
 
     def records(self) -> Iterator[tuple[str, dict[str, Any]]]:
         """The record of every frame, and where it stands.
