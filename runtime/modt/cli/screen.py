@@ -69,8 +69,12 @@ def _end(number: int, _frame: object) -> None:
     sys.exit(128 + number)
 
 
+def _interrupt(number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
 _HANDLERS: dict[int, Callable[[int, object], None] | signal.Handlers] = {
-    signal.SIGINT: signal.default_int_handler,
+    signal.SIGINT: _interrupt,
     signal.SIGTERM: _end,
     signal.SIGTSTP: signal.SIG_IGN,
 }
