@@ -1,6 +1,7 @@
 """models/ and profiles/ are found from a checkout, an editable install and a wheel alike."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -23,15 +24,22 @@ assert len(pipeline.step([[5.0, 0.0, 0.0, 0.0]], 0.0)) == 0
 """
 
 
-def probe(python: str, *, path: Path | None = None, cwd: Path) -> tuple[str, str]:
+def probe(python: str, *, path: Path | None = None, cwd: Path, kernels: str = "auto") -> tuple[str, str]:
     """Where modt is imported from, and the files it finds."""
-    env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | {"MODT_KERNELS": kernels}
     if path is not None:
         env["PYTHONPATH"] = str(path)
     done = subprocess.run([python, "-c", PROBE], check=False, capture_output=True, text=True, env=env, cwd=cwd)
     assert done.returncode == 0, done.stderr
     package, files = done.stdout.splitlines()
     return package, files
+
+
+def built(folder: Path, **variables: str) -> Path:
+    """A wheel of the checkout."""
+    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(CHECKOUT)]
+    subprocess.run(build, check=True, capture_output=True, env=os.environ | variables)
+    return next(folder.glob("*.whl"))
 
 
 @pytest.fixture(scope="module")
@@ -65,12 +73,22 @@ def install(environment: Path, *what: str) -> None:
 
 @pytest.mark.install
 def test_from_a_wheel(expected, environment, tmp_path):
-    build = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(tmp_path), str(CHECKOUT)]
-    subprocess.run(build, check=True, capture_output=True)
-    install(environment, str(next(tmp_path.glob("*.whl"))))
-    package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path)
+    wheel = built(tmp_path)
+    compiled = "py3-none-any" not in wheel.name
+    assert compiled == (shutil.which("cc") is not None)
+    install(environment, str(wheel))
+    kernels = "native" if compiled else "numpy"
+    package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path, kernels=kernels)
     assert package.startswith(str(environment))
     assert files == expected
+
+
+@pytest.mark.install
+def test_from_a_wheel_made_without_a_compiler(expected, environment, tmp_path):
+    wheel = built(tmp_path, CC="no-such-compiler")
+    assert wheel.name.endswith("py3-none-any.whl")
+    install(environment, str(wheel))
+    assert probe(str(environment / "bin" / "python"), cwd=tmp_path)[1] == expected
 
 
 @pytest.mark.install

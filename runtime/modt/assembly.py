@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from modt import host
+from modt import host, kernel_choice
 from modt.classification.decision import Decision
 from modt.classification.fusion import EveryFrame, KeyViews, OneView
 from modt.classification.instrumentation import TimedClassifier, warm_up
@@ -67,6 +67,10 @@ class SightedSegmenter:
     segmenter: SegmenterStage
     sectors: BlindSectors
 
+    def facts(self) -> dict[str, str]:
+        """Which kernels it runs on."""
+        return self.segmenter.facts()
+
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points."""
         kept = points.copy()
@@ -75,7 +79,8 @@ class SightedSegmenter:
 
 
 def _segmenter(profile: ProfileConfig, fov: FieldOfView) -> SegmenterStage:
-    sensor, segmenter = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov)
+    kernels = kernel_choice.choose(profile.segmentation.kernels)
+    sensor, segmenter = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
     if sensor.blind_sectors_deg is None:
         return segmenter
     return SightedSegmenter(segmenter, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))

@@ -44,6 +44,9 @@ class Segmenter(Protocol):
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points."""
 
+    def facts(self) -> dict[str, str]:
+        """Which kernels it runs on, for the record of a run."""
+
 
 class Odometry(Protocol):
     """Proposals to the world."""

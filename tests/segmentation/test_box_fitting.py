@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig
 from modt.geometry import upright_boxes
-from modt.segmentation.box_fitting import HEADINGS, fit_headings
+from modt.segmentation.box_fitting import HEADINGS, best_headings
 from modt.segmentation.groups import Groups
 from tests.segmentation import reference
 
@@ -41,7 +41,7 @@ def l_shape(length, width, yaw, centre, n=60):
 def test_headings_equal_those_of_each_cluster_alone(seed, sizes):
     x, y = np.random.default_rng(seed).normal(0, 2, (2, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    found = fit_headings(x, y, groups, NOISE_M)
+    found = HEADINGS[best_headings(x, y, groups, 1000, NOISE_M)]
     for i, (start, end) in enumerate(zip(groups.offsets[:-1], groups.offsets[1:], strict=True)):
         closeness = reference.closeness(x[start:end].astype(float), y[start:end].astype(float), NOISE_M)
         chosen = np.argmin(np.abs(HEADINGS - found[i]))
@@ -52,7 +52,7 @@ def test_headings_equal_those_of_each_cluster_alone(seed, sizes):
 def test_a_box_contains_its_points_and_touches_them_on_every_side(seed, sizes):
     x, y, z = np.random.default_rng(seed).normal(0, 2, (3, sum(sizes))).astype(np.float32)
     groups = groups_of(sizes)
-    box = upright_boxes(np.stack([x, y, z]), groups.offsets, fit_headings(x, y, groups, NOISE_M))
+    box = upright_boxes(np.stack([x, y, z]), groups.offsets, HEADINGS[best_headings(x, y, groups, 1000, NOISE_M)])
     assert (box[:, 3] >= box[:, 4]).all()
     own = np.repeat(box, sizes, axis=0)
     c, s = np.cos(own[:, 6]), np.sin(own[:, 6])
@@ -80,7 +80,9 @@ def test_heading_and_size_of_an_l_of_points(yaw_deg):
     x, y = xy.T.astype(np.float32)
     groups = groups_of([120])
     box = upright_boxes(
-        np.stack([x, y, np.zeros(120, np.float32)]), groups.offsets, fit_headings(x, y, groups, NOISE_M)
+        np.stack([x, y, np.zeros(120, np.float32)]),
+        groups.offsets,
+        HEADINGS[best_headings(x, y, groups, 1000, NOISE_M)],
     )[0]
     error = (box[6] - np.deg2rad(yaw_deg) + np.pi / 2) % np.pi - np.pi / 2
     assert abs(error) < np.deg2rad(2.6)

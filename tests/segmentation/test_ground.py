@@ -153,7 +153,7 @@ def test_cells_of_the_polar_grid_are_inside_it():
 def test_the_sensor_height_is_estimated(true_m):
     points, _ = scans.scan([(6.0, 3.0, 4.0, 1.8, 0.0, 1.5), (0.0, -8.0, 30.0, 0.5, 0.0, 3.0)], true_m, step_deg=1.0)
     height = HeightEstimator(SensorConfig(height_m=None, min_range_m=0.5), CONFIG)
-    assert height.height_m(PointColumns.from_array(points)) == pytest.approx(true_m, abs=0.05)
+    assert height.height_m(points) == pytest.approx(true_m, abs=0.05)
 
 
 def test_walls_alone_give_the_default_height():
@@ -163,7 +163,7 @@ def test_walls_alone_give_the_default_height():
     points, on = scans.scan(walls, 0.8, scans.VLP_16, step_deg=0.2)
     assert (on > 0).all()
     sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
-    assert HeightEstimator(sensor, CONFIG).height_m(PointColumns.from_array(points)) == CONFIG.sensor_height.default_m
+    assert HeightEstimator(sensor, CONFIG).height_m(points) == CONFIG.sensor_height.default_m
 
 
 def test_a_floor_mostly_hidden_by_walls_is_found():
@@ -173,10 +173,10 @@ def test_a_floor_mostly_hidden_by_walls_is_found():
     points, on = scans.scan(walls, 0.36, scans.VLP_16, step_deg=0.2)
     assert 0.05 < (on == 0).mean() < 0.2
     sensor = SensorConfig(height_m=None, min_range_m=0.4, elevation_step_deg=2.0)
-    assert HeightEstimator(sensor, CONFIG).height_m(PointColumns.from_array(points)) == pytest.approx(0.36, abs=0.03)
+    assert HeightEstimator(sensor, CONFIG).height_m(points) == pytest.approx(0.36, abs=0.03)
 
 
 def test_no_floor_gives_the_default_height():
     height = HeightEstimator(SensorConfig(height_m=None), CONFIG)
-    assert height.height_m(NO_POINTS) == CONFIG.sensor_height.default_m
-    assert height.height_m(PointColumns.from_array(np.float32([[5, 0, -1, 0]]))) == CONFIG.sensor_height.default_m
+    assert height.height_m(np.zeros((0, 4), np.float32)) == CONFIG.sensor_height.default_m
+    assert height.height_m(np.float32([[5, 0, -1, 0]])) == CONFIG.sensor_height.default_m

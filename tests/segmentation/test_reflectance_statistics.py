@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.reflectance_statistics import BRIGHT, DARK, has_reflectance, reflectance_statistics
+from modt.segmentation.reflectance_statistics import (
+    BRIGHT,
+    DARK,
+    has_reflectance,
+    reflectance_statistics,
+    reflectance_sums,
+)
 from modt.segmentation.segmenter import Segmenter
 from modt.types import N_REFLECTANCE, UNRECORDED
 from tests.segmentation import scans
@@ -19,11 +25,17 @@ VALUES = st.lists(st.lists(ONE, min_size=1, max_size=9), min_size=1, max_size=6)
 SOME = st.lists(st.lists(ONE | st.just(UNRECORDED), min_size=1, max_size=9), min_size=1, max_size=6)
 
 
+def statistics(values, offsets):
+    points = np.zeros((len(values), 4), np.float32)
+    points[:, 3] = values
+    return reflectance_statistics(*reflectance_sums(points, np.arange(len(values)), offsets))
+
+
 @given(VALUES)
 def test_statistics_of_each_group(groups: list[list[float]]) -> None:
     values = np.array([v for group in groups for v in group], np.float32)
     offsets = np.append(0, np.cumsum([len(group) for group in groups]))
-    found = reflectance_statistics(values, offsets)
+    found = statistics(values, offsets)
     assert found.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(found, groups, strict=True):
         own = np.array(group, np.float32)
@@ -34,13 +46,13 @@ def test_statistics_of_each_group(groups: list[list[float]]) -> None:
 @given(SOME)
 def test_returns_without_reflectance_are_ignored(groups: list[list[float]]) -> None:
     values = np.array([v for group in groups for v in group], np.float32)
-    found = reflectance_statistics(values, np.append(0, np.cumsum([len(group) for group in groups])))
+    found = statistics(values, np.append(0, np.cumsum([len(group) for group in groups])))
     assert found.shape == (len(groups), N_REFLECTANCE)
     for row, group in zip(found, groups, strict=True):
         own = np.array([v for v in group if v != UNRECORDED], np.float32)
         expected = np.full(N_REFLECTANCE, np.nan)
         if len(own):
-            expected = reflectance_statistics(own, np.array([0, len(own)]))[0]
+            expected = statistics(own, np.array([0, len(own)]))[0]
         np.testing.assert_allclose(row, expected, atol=1e-6)
 
 

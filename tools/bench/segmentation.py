@@ -29,7 +29,6 @@ from scipy.spatial import cKDTree
 
 from modt import host, profile
 from modt.geometry import FieldOfView
-from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import Float32
@@ -82,9 +81,7 @@ def tree_components(xyz: Float32) -> object:
 
 def above_ground(stage: Segmenter, points: Float32) -> Float32:
     """(n, 3) points above ground that the stage clusters."""
-    sweep = PointColumns.from_array(points)
-    height = stage.ground.height_above(sweep, stage.sensor_height_m(sweep))
-    return points[stage.above_ground(sweep, height), :3]
+    return points[stage.above_ground(points)[0], :3]
 
 
 def cpu_ms(work: Contender, points: Float32) -> float:

@@ -8,7 +8,7 @@ from modt.classification.box_classifier import box_features
 from modt.classification.crops import Crops
 from modt.config.segmentation import BoxConfig
 from modt.geometry import upright_boxes
-from modt.segmentation.box_fitting import fit_headings
+from modt.segmentation.box_fitting import HEADINGS, best_headings
 from modt.segmentation.groups import Groups
 from modt.types import Float64, Int
 from tools.train.dataset import Dataset, Sensors
@@ -21,7 +21,8 @@ def crop_features(crops: Crops, sensors: Sensors) -> Float64:
     """(R, 7) features of the boxes fitted to crops."""
     x, y, z = crops.xyz.astype(np.float32).T
     groups = Groups(np.arange(len(x)), crops.offsets)
-    box = upright_boxes(np.stack([x, y, z]), groups.offsets, fit_headings(x, y, groups, BoxConfig().noise_m))
+    heading = best_headings(x, y, groups, len(x), BoxConfig().noise_m)
+    box = upright_boxes(np.stack([x, y, z]), groups.offsets, HEADINGS[heading])
     return box_features(crops.count, box, sensors.ground_z_m, sensors.beam_sr)
 
 

@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt import profile
+    from modt import kernel_choice, profile
     from modt.classification.pointnet import PointNet
     from modt.cli import metering
     from modt.cli.live_source import open_source
@@ -39,6 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
         checks.governor(pinned),
         *checks.permissions(),
         checks.meters(metering.discovery(config.energy)),
+        checks.kernels(lambda: kernel_choice.choose(config.segmentation.kernels).name),
         checks.model(limits, lambda: PointNet(limits, config.sensor).facts()),
         checks.disk(arguments.out, config),
         checks.clock(),

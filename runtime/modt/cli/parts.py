@@ -64,6 +64,7 @@ class Parts:
             "fov": self.request.fov,
             "core": core,
             "versions": host.versions(),
+            "segmentation": self.pipeline.segmenter.facts(),
             "model": self.pipeline.classifier.facts(),
             "host": host.description(),
             "recognition": {

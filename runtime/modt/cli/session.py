@@ -111,6 +111,7 @@ class Session:
                 "mode": self.request.mode,
                 "fov": self.request.fov,
                 "profile": self.parts.name,
+                **self.parts.pipeline.segmenter.facts(),
                 "elapsed_s": elapsed_s,
                 "frames_per_s": frames / elapsed_s,
                 "real_time_factor": frames * self.stream.info.period_s / elapsed_s,

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modt.config.base import StageConfig, mechanism, number
+from modt.config.base import StageConfig, choice, mechanism, number
+
+KERNELS = AUTO, NATIVE, NUMPY = "auto", "native", "numpy"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -119,6 +121,9 @@ class SegmentationConfig(StageConfig):
     min_points: int = number(5, 1, 1000, "", "of a proposal")
     max_extent_m: float = number(9.0, 0.5, 50.0, "m", "longest side of a proposal")
     min_height_m: float = number(0.2, 0.0, 3.0, "m", "lowest proposal")
+    kernels: str = choice(
+        "auto", KERNELS, "passes over points: compiled where they can be, or NumPy; the variable MODT_KERNELS wins"
+    )
     sensor_height: SensorHeightConfig = mechanism(SensorHeightConfig)
     ground: GroundConfig = mechanism(GroundConfig)
     clusters: ClusterConfig = mechanism(ClusterConfig)

@@ -21,13 +21,15 @@ class Cells:
     column: Int32  # (C,) of the grid
     low: Float32  # (C,) least height of the points above ground [m]
     high: Float32  # (C,) greatest height of the points above ground [m]
+    entries: Int  # (C,) points, or cells of a finer grid, in each
 
     def __len__(self) -> int:
         return len(self.row)
 
     def take(self, rows: Int) -> Cells:
         """Cells by index."""
-        return Cells(self.row[rows], self.column[rows], self.low[rows], self.high[rows])
+        bounds = self.low.take(rows), self.high.take(rows)
+        return Cells(self.row.take(rows), self.column.take(rows), *bounds, self.entries.take(rows))
 
 
 def occupied_cells(
@@ -35,8 +37,9 @@ def occupied_cells(
 ) -> tuple[Cells, Int, Int]:
     """Cells of (K,) entries (points, or cells of a finer grid), (C,) last entry of each, (K,) cell of each entry."""
     sample, cell = grid.occupied(grid.flat_index(row, column))
-    bounds = label_min(low, cell, len(sample)), label_max(high, cell, len(sample))
-    return Cells(row[sample], column[sample], *bounds), sample, cell
+    n = len(sample)
+    bounds = label_min(low, cell, n), label_max(high, cell, n)
+    return Cells(row[sample], column[sample], *bounds, np.bincount(cell, minlength=n)), sample, cell
 
 
 def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:

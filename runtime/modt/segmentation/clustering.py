@@ -8,12 +8,13 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.car_merging import StripMerger
-from modt.segmentation.cells import Cells, connect, occupied_cells
+from modt.segmentation.cells import Cells
 from modt.segmentation.clusters import Clusters, ClusterSizes
 from modt.segmentation.grids import SqrtRangeGrid
 from modt.segmentation.groups import consecutive
+from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.point_columns import PointColumns
-from modt.types import Bool, Float32, Int
+from modt.types import NONE, Bool, Float32, Int
 
 
 class Clusterer:
@@ -26,9 +27,11 @@ class Clusterer:
     Args:
         sensor: range and beam spacing.
         config: clustering distance, sizes of objects, and the keys of `clusters`.
+        kernels: passes over points and cells.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig, kernels: Kernels = NUMPY) -> None:
+        self.kernels = kernels
         step = config.cell_m / np.sqrt(10.0)
         self.config, self.beams = config, sensor.beams
         self.gap_m = np.float32(config.clusters.max_gap_m)
@@ -41,23 +44,24 @@ class Clusterer:
 
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
-        row, column = self.fine.row_column(points)
-        cells, sample, cell = occupied_cells(self.fine, row, column, height, height)
-        cluster, sizes = self._connect(cells, points.take(sample), np.bincount(cell))
+        row, column = self.kernels.row_column(self.fine, points)
+        cells, sample, cell = self.kernels.occupied_cells(self.fine, row, column, height, height)
+        cluster, sizes = self._connect(cells, points.take(sample))
         clusters = Clusters(points, height, cell, cells, sample, cluster, len(sizes))
         target = self.merger.merge(clusters, sizes, self._valid(sizes) | ~sizes.is_part)
         valid = self._valid(sizes.merged(target))
         return replace(clusters, of_cell=consecutive(valid)[target][cluster], n=int(valid.sum()))
 
-    def _connect(self, cells: Cells, points: PointColumns, count: Int) -> tuple[Int, ClusterSizes]:
-        """(C,) cluster of each cell, given one point of each and (C,) its number of points; sizes of the clusters."""
+    def _connect(self, cells: Cells, points: PointColumns) -> tuple[Int, ClusterSizes]:
+        """(C,) cluster of each cell, given one point of each; sizes of the clusters."""
         beam_m = self._beam_m(points)
         cluster = self._connect_coarse(cells, beam_m)
-        coarse = ClusterSizes.of_cells(cells, points, count, beam_m, cluster)
+        coarse = self._sizes(cells, points, beam_m, cluster)
         oversized = coarse.extent_m >= self.config.max_extent_m
         rows = np.flatnonzero((oversized | self._may_hold_person(coarse))[cluster])
-        part = self._components(self.fine, cells.take(rows), beam_m[rows])
-        parts = ClusterSizes.of_cells(cells.take(rows), points.take(rows), count[rows], beam_m[rows], part)
+        inside, beam_m = cells.take(rows), beam_m[rows]
+        part = self._components(self.fine, inside, beam_m)
+        parts = self._sizes(inside, points.take(rows), beam_m, part)
         owner = np.zeros(len(parts), np.int64)
         owner[part] = cluster[rows]
         of_oversized = oversized[owner]
@@ -69,6 +73,11 @@ class Clusterer:
             replace(parts, points=parts.points * split, is_part=of_oversized),
         )
         return cluster, coarse.followed_by(parts)
+
+    def _sizes(self, cells: Cells, points: PointColumns, beam_m: Float32, cluster: Int) -> ClusterSizes:
+        """Sizes of the clusters of (C,) cells, given a point of each and the distance of beams there [m]."""
+        bounds = self.kernels.cluster_bounds(cells, points, cluster, int(cluster.max(initial=NONE)) + 1)
+        return ClusterSizes.of_bounds(bounds, points, beam_m)
 
     def _may_hold_person(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters that may hold a person and more, near enough for the fine grid to hold an object together."""
@@ -93,12 +102,12 @@ class Clusterer:
     def _connect_coarse(self, fine: Cells, beam_m: Float32) -> Int:
         """(C,) cluster of each fine cell: that of the coarse cell of which it is a quarter."""
         row, column = fine.row >> 1, fine.column >> 1
-        cells, sample, coarse = occupied_cells(self.coarse, row, column, fine.low, fine.high)
+        cells, sample, coarse = self.kernels.occupied_cells(self.coarse, row, column, fine.low, fine.high)
         return self._components(self.coarse, cells, beam_m[sample])[coarse]
 
     def _components(self, grid: SqrtRangeGrid, cells: Cells, beam_m: Float32) -> Int:
         """(C,) connected component of each cell."""
-        return connect(grid, cells, self.gap_m + self.gap_beams * beam_m)
+        return self.kernels.connect(grid, cells, self.gap_m + self.gap_beams * beam_m)
 
     def _valid(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""

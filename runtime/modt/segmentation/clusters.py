@@ -8,9 +8,23 @@ from typing import Self
 import numpy as np
 
 from modt.segmentation.cells import Cells
-from modt.segmentation.groups import consecutive, label_max, label_min
+from modt.segmentation.groups import Groups, consecutive, label_max, label_min
 from modt.segmentation.point_columns import PointColumns
 from modt.types import NONE, Bool, Float32, Int
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterBounds:
+    """Bounds of n clusters of cells: of one point of each cell from above, of all points in height above ground."""
+
+    min_x: Float32  # (n,) [m, sensor frame]
+    max_x: Float32
+    min_y: Float32
+    max_y: Float32
+    bottom: Float32  # (n,) [m]
+    top: Float32
+    points: Int  # (n,) number of points
+    cell: Int  # (n,) last cell
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,7 +32,7 @@ class ClusterSizes:
     """Sizes of G clusters, some of them empty."""
 
     points: Int  # (G,) number of points
-    extent_m: Float32  # (G,) diagonal of the axis-parallel rectangle [m], infinite where empty
+    extent_m: Float32  # (G,) diagonal of the axis-parallel rectangle [m]
     bottom_m: Float32  # (G,) least height above ground [m]
     top_m: Float32  # (G,) greatest height above ground [m]
     sqrt_range: Float32  # (G,) square root of the range of one cell [sqrt(m)]
@@ -29,28 +43,16 @@ class ClusterSizes:
         return len(self.points)
 
     @classmethod
-    def of_cells(cls, cells: Cells, points: PointColumns, count: Int, beam_m: Float32, cluster: Int) -> Self:
-        """Sizes of the clusters of (C,) cells.
-
-        Args:
-            cells: of all clusters.
-            points: (C,) one of each cell.
-            count: (C,) points of each cell.
-            beam_m: (C,) vertical distance of neighbouring beams there [m].
-            cluster: (C,) cluster of each cell.
-        """
-        extent_m = diagonals(points.x, points.y, cluster)
-        n = len(extent_m)
-        one_cell = np.zeros(n, np.int64)
-        one_cell[cluster] = np.arange(len(cluster))
+    def of_bounds(cls, bounds: ClusterBounds, points: PointColumns, beam_m: Float32) -> Self:
+        """Sizes of clusters, given (C,) a point of each cell and the vertical distance of beams there [m]."""
         return cls(
-            points=np.bincount(cluster, count, n).astype(np.int64),
-            extent_m=extent_m,
-            bottom_m=label_min(cells.low, cluster, n),
-            top_m=label_max(cells.high, cluster, n),
-            sqrt_range=points.sqrt_range.take(one_cell),
-            beam_m=beam_m.take(one_cell),
-            is_part=np.zeros(n, np.bool_),
+            points=bounds.points,
+            extent_m=np.hypot(bounds.max_x - bounds.min_x, bounds.max_y - bounds.min_y),
+            bottom_m=bounds.bottom,
+            top_m=bounds.top,
+            sqrt_range=points.sqrt_range.take(bounds.cell),
+            beam_m=beam_m.take(bounds.cell),
+            is_part=np.zeros(len(bounds.cell), np.bool_),
         )
 
     def followed_by(self, other: Self) -> Self:
@@ -89,8 +91,33 @@ class Clusters:
         return replace(self, of_cell=number[self.of_cell], n=int(keep.sum()))
 
 
-def diagonals(x: Float32, y: Float32, labels: Int) -> Float32:
-    """(G,) diagonal of the axis-parallel rectangle around the points of each label, infinite without any [m]."""
-    n = int(labels.max(initial=NONE)) + 1
-    diagonal: Float32 = np.hypot(*(label_max(v, labels, n) - label_min(v, labels, n) for v in (x, y)))
-    return diagonal
+def cluster_bounds(cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
+    """Bounds of n clusters of (C,) cells, given a point of each cell."""
+    cell = np.zeros(n, np.int64)
+    cell[cluster] = np.arange(len(cluster))
+    return ClusterBounds(
+        min_x=label_min(points.x, cluster, n),
+        max_x=label_max(points.x, cluster, n),
+        min_y=label_min(points.y, cluster, n),
+        max_y=label_max(points.y, cluster, n),
+        bottom=label_min(cells.low, cluster, n),
+        top=label_max(cells.high, cluster, n),
+        points=np.bincount(cluster, cells.entries, n).astype(np.int64),
+        cell=cell,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Members:
+    """M points by cluster, in the order of the sweep within a cluster."""
+
+    offsets: Int  # (n + 1,) cluster i owns the points from offsets[i] to offsets[i + 1]
+    index: Int  # (M,) rows of the sweep
+    columns: Float32  # (4, M) x, y, z, and z of the ground beneath [m, sensor frame]
+
+
+def members_of(clusters: Clusters, index: Int) -> Members:
+    """Points of each cluster, given (K,) the row of each point in the sweep."""
+    groups, points = Groups.from_labels(clusters.of_cell.take(clusters.cell), clusters.n), clusters.points
+    x, y, z, height = (v.take(groups.rows) for v in (points.x, points.y, points.z, clusters.height))
+    return Members(groups.offsets, index.take(groups.rows), np.stack([x, y, z, z - height]))

@@ -69,7 +69,7 @@ class SqrtRangeGrid:
         self.step = step
         self.centre = 2 * (int(np.sqrt(max_range_m) / (2 * step)) + 2)
         self.side = 2 * self.centre
-        self._number: Int32 = np.full(self.side * self.side, NONE, np.int32)  # NONE throughout between calls
+        self.number: Int32 = np.full(self.side * self.side, NONE, np.int32)  # NONE throughout between calls
 
     def row_column(self, points: PointColumns) -> tuple[Int32, Int32]:
         """(K,) row and (K,) column of each point."""
@@ -88,19 +88,19 @@ class SqrtRangeGrid:
         Neither sort nor search: each point writes its number into its cell; the numbers left are the last points.
         """
         number = np.arange(len(index), dtype=np.int32)
-        self._number[index] = number
-        sample = np.flatnonzero(self._number.take(index) == number)
+        self.number[index] = number
+        sample = np.flatnonzero(self.number.take(index) == number)
         taken = index[sample]
-        self._number[taken] = number[: len(sample)]
-        cell = self._number.take(index).astype(np.int64)
-        self._number[taken] = NONE
+        self.number[taken] = number[: len(sample)]
+        cell = self.number.take(index).astype(np.int64)
+        self.number[taken] = NONE
         return sample, cell
 
     def neighbour_pairs(self, index: Int) -> tuple[Int, Int32]:
         """Pairs (i, j) of the cells at (C,) flat indices that share a side or a corner, each once, sorted by i."""
-        self._number[index] = np.arange(len(index), dtype=np.int32)
+        self.number[index] = np.arange(len(index), dtype=np.int32)
         ahead = np.array([1, self.side - 1, self.side, self.side + 1])
-        found = self._number.take((index[:, None] + ahead).ravel())
-        self._number[index] = NONE
+        found = self.number.take((index[:, None] + ahead).ravel())
+        self.number[index] = NONE
         pair = np.flatnonzero(found != NONE)
         return pair >> 2, found.take(pair)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.types import N_REFLECTANCE, Float32, Float64, Int
+from modt.types import Float32, Float64, Int
 
 BRIGHT = 0.8
 """Exceeded by number plates, lamps and signs only. Models are trained with this value and the next."""
@@ -21,27 +21,26 @@ def has_reflectance(reflectance: Float32) -> bool:
     return len(sample) > 0 and bool(sample.min() != sample.max())
 
 
-def reflectance_statistics(reflectance: Float32, offsets: Int) -> Float64:
+def reflectance_sums(points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
+    """(5, G) number, sum, sum of squares, bright and dark ones of the measured values of each group, (G,) greatest.
+
+    Group i has the (N, 4) points index[offsets[i]:offsets[i + 1]].
+    """
+    reflectance = points[index, 3]
+    starts, measured = offsets[:-1], reflectance >= 0.0
+    own = np.where(measured, reflectance, np.float32(0.0))
+    rows = (measured, own, own * own, own > BRIGHT, measured & (own < DARK))
+    greatest: Float32 = np.maximum.reduceat(np.where(measured, reflectance, np.float32(-np.inf)), starts)
+    return np.stack([np.add.reduceat(row, starts, dtype=np.float64) for row in rows]), greatest
+
+
+def reflectance_statistics(sums: Float64, greatest: Float32) -> Float64:
     """(G, 5) mean, standard deviation, maximum, share of bright and share of dark returns of each group.
 
-    Returns without a measurement are ignored; a group without any is NaN.
-
-    Args:
-        reflectance: (K,) returns sorted by group [0, 1], negative where not measured.
-        offsets: (G + 1,) group i owns reflectance[offsets[i]:offsets[i + 1]]; none is empty.
+    Returns without a measurement are ignored; a group without any is NaN. Given are the reflectance_sums.
     """
-    if reflectance.min(initial=0.0) < 0.0:
-        known = reflectance >= 0.0
-        count = np.add.reduceat(known, offsets[:-1], dtype=np.int64)
-        some = np.full((len(count), N_REFLECTANCE), np.nan)
-        own = np.append(0, np.cumsum(count[count > 0]))
-        some[count > 0] = reflectance_statistics(reflectance[known], own)
-        return some
-    starts, count = offsets[:-1], np.diff(offsets)
-    bright, dark = (mask.astype(np.float32) for mask in (reflectance > BRIGHT, reflectance < DARK))
-    summed = (reflectance, reflectance * reflectance, bright, dark)
-    mean, square, bright_share, dark_share = (np.add.reduceat(v, starts) / count for v in summed)
+    count = np.where(sums[0] > 0, sums[0], np.nan)
+    mean, square, bright, dark = sums[1:] / count
     deviation = np.sqrt(np.maximum(square - mean * mean, 0.0))
-    maximum = np.maximum.reduceat(reflectance, starts)
-    statistics: Float64 = np.stack([mean, deviation, maximum, bright_share, dark_share], axis=1)
-    return statistics
+    maximum = np.where(sums[0] > 0, greatest, np.nan)
+    return np.stack([mean, deviation, maximum, bright, dark], axis=1)

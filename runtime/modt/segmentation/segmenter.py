@@ -6,11 +6,11 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView, upright_boxes
-from modt.segmentation.box_fitting import fit_headings
+from modt.segmentation.box_fitting import HEADINGS
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.ground import GroundEstimator
-from modt.segmentation.groups import Groups
+from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.reflectance_statistics import has_reflectance, reflectance_statistics
 from modt.segmentation.sensor_height import HeightEstimator
@@ -24,71 +24,73 @@ class Segmenter:
         config: of the stage.
         sensor: mount, range and resolution.
         fov: part of space to segment.
+        kernels: passes over points, cells and groups.
     """
 
-    def __init__(self, config: SegmentationConfig, sensor: SensorConfig, fov: FieldOfView) -> None:
-        self.config, self.sensor, self.fov = config, sensor, fov
+    def __init__(
+        self, config: SegmentationConfig, sensor: SensorConfig, fov: FieldOfView, kernels: Kernels = NUMPY
+    ) -> None:
+        self.config, self.sensor, self.fov, self.kernels = config, sensor, fov, kernels
         self.margin_m = config.view_margin.margin_m
         self.truncated_m = config.view_margin.truncation_m - self.margin_m
-        self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
-        self.max_sqrt_range = np.float32(np.sqrt(sensor.max_range_m))
+        ranges = np.sqrt([sensor.min_range_m, sensor.max_range_m])
+        self.bounds: Float32 = np.array([config.clearance_m, config.max_height_m, *ranges], np.float32)
         self.height_estimator = HeightEstimator(sensor, config)
         self.ground = GroundEstimator(sensor, config)
-        self.clusterer = Clusterer(sensor, config)
+        self.clusterer = Clusterer(sensor, config, kernels)
+
+    def facts(self) -> dict[str, str]:
+        """Which kernels it runs on."""
+        return {"kernels": self.kernels.name}
 
     def segment(self, points: Float32) -> Proposals:
         """Proposals of (N, 4) points; none in an empty sweep."""
         region = None if self.fov.full else np.flatnonzero(self.fov.depth(points) > -self.margin_m)
-        sweep = PointColumns.from_array(points if region is None else points[region])
-        sensor_height_m = self.sensor_height_m(sweep)
-        height = self.ground.height_above(sweep, sensor_height_m)
-        rows = np.flatnonzero(self.above_ground(sweep, height))
+        rows, above, height = self.above_ground(points if region is None else points[region])
         if not len(rows):
             return Proposals.empty()
-        index = rows if region is None else region[rows]
-        measured = self.sensor.reflectance != "none" and has_reflectance(points[:, 3])
-        reflectance = points[index, 3] if measured else None
-        return self._proposals(sweep.take(rows), height[rows], index, reflectance)
+        clusters = self.clusterer.cluster(above, height)
+        return self._proposals(clusters, rows if region is None else region[rows], points)
 
-    def sensor_height_m(self, sweep: PointColumns) -> float:
+    def sensor_height_m(self, points: Float32) -> float:
         """Height of the sensor [m]: of the profile, or estimated where the profile has none."""
         known = self.sensor.height_m
-        return self.height_estimator.height_m(sweep) if known is None else known
+        return self.height_estimator.height_m(points) if known is None else known
 
-    def above_ground(self, sweep: PointColumns, height: Float32) -> Bool:
-        """(N,) points within range, and between `clearance_m` and `max_height_m` above ground."""
-        mask: Bool = (height > self.config.clearance_m) & (height < self.config.max_height_m)
-        mask &= (sweep.sqrt_range > self.min_sqrt_range) & (sweep.sqrt_range < self.max_sqrt_range)
-        return mask
+    def above_ground(self, points: Float32) -> tuple[Int, PointColumns, Float32]:
+        """(K,) rows of the points within range and between `clearance_m` and `max_height_m` above ground.
 
-    def _proposals(self, points: PointColumns, height: Float32, index: Int, reflectance: Float32 | None) -> Proposals:
-        """Clusters of the points above ground, with their boxes."""
-        clusters = self.clusterer.cluster(points, height)
-        cells = points.take(clusters.sample)
+        With them come those points and their (K,) heights above ground [m].
+        """
+        return self.kernels.above_ground(self.ground, points, self.sensor_height_m(points), self.bounds)
+
+    def _proposals(self, clusters: Clusters, index: Int, sweep: Float32) -> Proposals:
+        """The clusters in view with their boxes, given (K,) the row of each point in the (N, 4) sweep."""
+        cells, kernels = clusters.points.take(clusters.sample), self.kernels
         depth = None if self.fov.full else self.fov.depth(cells.xyz())
         if depth is not None:
             clusters = clusters.select(self._in_view(clusters, depth))
         if not clusters.n:
             return Proposals.empty()
-        by_cell = Groups.from_labels(clusters.of_cell, clusters.n)
-        few = by_cell.subsample(self.config.boxes.max_cells)
-        yaw = fit_headings(cells.x[few.rows], cells.y[few.rows], few, self.config.boxes.noise_m)
-        groups = Groups.from_labels(clusters.of_cell.take(clusters.cell), clusters.n)
-        own = np.stack([column.take(groups.rows) for column in (points.x, points.y, points.z)])
-        ground_z = own[2] - height.take(groups.rows)
-        truncated, statistics, offsets = np.zeros(clusters.n, np.bool_), None, groups.offsets
+        by_cell = kernels.group(clusters.of_cell, clusters.n)
+        boxes = self.config.boxes
+        heading = kernels.best_headings(cells.x, cells.y, by_cell, boxes.max_cells, boxes.noise_m)
+        members = kernels.members_of(clusters, index)
+        offsets, own = members.offsets, members.columns[:3]
+        mean = kernels.group_sums(members.columns, offsets) / np.diff(offsets)
+        truncated, statistics = np.zeros(clusters.n, np.bool_), None
         if depth is not None:
             truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m
-        if reflectance is not None:
-            statistics = reflectance_statistics(reflectance.take(groups.rows), offsets)
+        if self.sensor.reflectance != "none" and has_reflectance(sweep[:, 3]):
+            statistics = reflectance_statistics(*kernels.reflectance_sums(sweep, members.index, offsets))
         return Proposals(
-            members=index.take(groups.rows),
+            members=members.index,
             offsets=offsets,
             coordinates=own,
-            centroid=np.stack([groups.mean(v) for v in own], axis=1),
-            box=upright_boxes(own, offsets, yaw),
+            centroid=np.ascontiguousarray(mean[:3].T),
+            box=upright_boxes(own, offsets, HEADINGS[heading], kernels.bounds_along),
             truncated=truncated,
-            ground_z_m=groups.mean(ground_z),
+            ground_z_m=mean[3],
             reflectance=statistics,
         )
 

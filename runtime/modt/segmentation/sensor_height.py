@@ -8,6 +8,7 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.grids import SECTORS, PolarGrid
 from modt.segmentation.groups import label_max, label_min
 from modt.segmentation.point_columns import PointColumns
+from modt.types import Float32
 
 
 class HeightEstimator:
@@ -30,16 +31,16 @@ class HeightEstimator:
         self.horizon_m = c.horizon_beams * float(sensor.beams.step_rad(np.zeros(1, np.float32)).item()) * range_m
         self.estimates_m: list[float] = []
 
-    def height_m(self, points: PointColumns) -> float:
-        """Median of the estimates of the first sweeps, including this one; the default before any [m]."""
+    def height_m(self, points: Float32) -> float:
+        """Median of the estimates of the first sweeps, this (N, 4) one included; the default before any [m]."""
         if len(self.estimates_m) < self.config.sweeps:
-            estimate = self._estimate(points)
+            estimate = self._estimate(PointColumns.from_array(points))
             if estimate is not None:
                 self.estimates_m.append(estimate)
         return float(np.median(self.estimates_m)) if self.estimates_m else self.config.default_m
 
     def _estimate(self, points: PointColumns) -> float | None:
-        around = points.take((points.sqrt_range > self.near) & (points.sqrt_range < self.far))
+        around = points.take(np.flatnonzero((points.sqrt_range > self.near) & (points.sqrt_range < self.far)))
         cell, bin_m = self.grid.cell(around), self.config.bin_m
         lowest, highest = (reduce(around.z, cell, self.grid.size) for reduce in (label_min, label_max))
         flat = (highest - lowest < self.flat_m) & (-lowest > self.horizon_m)

@@ -8,7 +8,6 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry.blind_sectors import BlindSectors
-from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.sensor_height import HeightEstimator
 from modt.types import Float32, Float64
 
@@ -28,7 +27,7 @@ def ground_height_m(sweeps: Sequence[Float32], sensor: SensorConfig, config: Seg
     for points in sweeps:
         kept = points[~sectors.contain(points)] if len(sectors.bounds_deg) else points
         estimator = HeightEstimator(sensor, config)
-        mode_m = estimator.height_m(PointColumns.from_array(kept))
+        mode_m = estimator.height_m(kept)
         if estimator.estimates_m:
             heights_m.append(_plane_height_m(kept, mode_m, sensor.min_range_m))
     return float(np.median(heights_m)) if heights_m else None

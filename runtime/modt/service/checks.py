@@ -21,6 +21,7 @@ from modt.sources.live.live_stream import LiveStream
 OK, WARN, FAIL = "ok", "warn", "fail"
 REACH_S = 2.0
 """Time in which a sensor is heard of."""
+COMPILE = "install modt from a wheel for this machine, or where a C compiler is"
 _TIME_ERROR = 5  # adjtimex(2)
 _SANE_YEAR = 2024
 
@@ -74,6 +75,17 @@ def meters(found: Discovery) -> Finding:
     known = "no meter" if denied is None else f"{denied.name}: {denied.why_not}"
     remedy = "state idle_W and busy_W of the board" if denied is None else denied.remedy
     return Finding(WARN, "meters", f"energy is estimated ({known})", remedy)
+
+
+def kernels(choose: Callable[[], str]) -> Finding:
+    """Whether segmentation runs on compiled kernels."""
+    try:
+        name = choose()
+    except ModtError as error:
+        return Finding(FAIL, error.subject, error.cause, error.remedy)
+    if name == "numpy":
+        return Finding(WARN, "kernels", "NumPy: segmentation takes about twice the time", COMPILE)
+    return Finding(OK, "kernels", name)
 
 
 def model(config: ClassificationConfig, load: Callable[[], dict[str, str]]) -> Finding:

@@ -55,7 +55,7 @@ class Grid:
     def cells(self, points: Float32) -> Cells:
         """Cells of (N, 4) points; those beyond the range of the sensor count as none."""
         sweep = PointColumns.from_array(points)
-        height = self._segmenter.ground.height_above(sweep, self._segmenter.sensor_height_m(sweep))
+        height = self._segmenter.ground.height_above(sweep, self._segmenter.sensor_height_m(points))
         sweep_range = sweep.sqrt_range**2
         used = (sweep_range > 0) & (sweep_range < self._range_m)
         column, row = (

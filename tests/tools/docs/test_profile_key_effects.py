@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 import yaml
 
-from modt import assembly, profile
+from modt import assembly, kernel_choice, profile
 from modt.classification import pointnet
 from modt.cli import assemble
 from modt.cli.live_stages import within
@@ -32,7 +32,6 @@ from modt.energy.ledger import Ledger
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
 from modt.reporting.run_report import run_tree
-from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.sensor_height import HeightEstimator
 from modt.service.ladder import Ladder
 from modt.sinks.recording import Recording
@@ -96,7 +95,7 @@ def unknown_height(config: ProfileConfig, _folder: Path) -> str:
 def heights(config: ProfileConfig, _folder: Path) -> str:
     """Estimates of the sensor's height, frame by frame."""
     estimator = HeightEstimator(config.sensor, config.segmentation)
-    return str([estimator.height_m(PointColumns.from_array(frame.points)) for frame in frames(3, 1.0)])
+    return str([estimator.height_m(frame.points) for frame in frames(3, 1.0)])
 
 
 def no_ground(config: ProfileConfig, _folder: Path) -> str:
@@ -242,6 +241,15 @@ def recorded(config: ProfileConfig, folder: Path) -> str:
     return str(sorted((str(p.relative_to(folder)), p.stat().st_size) for p in folder.rglob("*") if p.is_file()))
 
 
+def kernels(config: ProfileConfig, _folder: Path) -> str:
+    """Which kernels are used where compiled ones are at hand."""
+    with (
+        mock.patch.dict("os.environ", {kernel_choice.VARIABLE: ""}),
+        mock.patch.object(kernel_choice, "load", return_value=(mock.MagicMock(), "baseline")),
+    ):
+        return kernel_choice.choose(config.segmentation.kernels).name
+
+
 SCENARIOS: dict[str, Scenario] = {
     "": street,
     "sensor.height_m: null": unknown_height,
@@ -274,6 +282,7 @@ RARE: dict[str, Scenario] = {
     "recording.": recorded,
     "sensor.blind_sectors_deg": far_blind,
     "segmentation.ground.start_m": long_street,
+    "segmentation.kernels": kernels,
     "segmentation.sensor_height.sweeps": heights,
     "segmentation.person_splitting.min_gap_columns": long_street,
     "segmentation.car_merging.min_person_top_m": long_street,

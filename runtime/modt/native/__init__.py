@@ -1,0 +1,1 @@
+"""Passes of segmentation in C99: sources, their compilation, and the library in a process."""

@@ -1,0 +1,90 @@
+"""Compilation of the C sources beside this file; used before modt is installed, so of the standard library alone."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+FOLDER = Path(__file__).parent
+BASELINE, X86_64_V3 = "baseline", "x86-64-v3"
+"""Instruction sets: that of every machine of its kind, and that of most x86-64 since 2014, AVX2."""
+TIMEOUT_S = 300.0
+TARGETS = {
+    "x86_64": "x86_64-linux-gnu.2.17",
+    "aarch64": "aarch64-linux-gnu.2.17",
+}
+"""Machines for which `ziglang` compiles on any other. Nothing is linked, so glibc and musl are alike."""
+FLAGS = (
+    "-std=c99", "-O3", "-fPIC", "-shared", "-nostdlib", "-fvisibility=hidden", "-fno-math-errno",
+    "-fno-trapping-math", "-ffp-contract=off", "-Wall", "-Wextra",
+)  # fmt: skip
+CHECKED = ("-std=c99", "-O1", "-g", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-DMODT_CHECKED")
+SANITIZERS = ("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined", "-fno-omit-frame-pointer")
+
+
+class NoCompilerError(Exception):
+    """There is none, or it fails; the message says which and why."""
+
+
+def source_hash() -> str:
+    """Of the C sources: a library knows which it is made of."""
+    content = b"".join(path.read_bytes() for path in sorted(FOLDER.glob("*.[ch]")))
+    return hashlib.sha256(content).hexdigest()[:16]
+
+
+def library_name(instructions: str) -> str:
+    """File of the library for a set of instructions."""
+    return f"kernels-{instructions}.so"
+
+
+def compiler(target: str | None) -> list[str]:
+    """Command of a C compiler for a machine of TARGETS, for this one if none is given.
+
+    Raises:
+        NoCompilerError: there is none.
+    """
+    if target is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target]]
+    named = os.environ.get("CC", "").split()
+    for command in [named] if named else [["cc"], ["gcc"], ["clang"]]:
+        if shutil.which(command[0]):
+            return command
+    raise NoCompilerError(f"no C compiler ({' '.join(named) or 'cc, gcc or clang'})")
+
+
+def compile_library(out: Path, instructions: str, target: str | None = None, flags: tuple[str, ...] = FLAGS) -> None:
+    """Write a shared library.
+
+    Raises:
+        NoCompilerError: there is no compiler, or it does not accept the sources.
+    """
+    command = [*compiler(target), *flags, f'-DMODT_SOURCES="{source_hash()}"']
+    if instructions == X86_64_V3:
+        command.append("-march=x86-64-v3" if target is None else "-mcpu=x86_64_v3")
+    sources = [path.name for path in sorted(FOLDER.glob("*.c"))]
+    try:
+        command += ["-o", str(out.resolve()), *sources]
+        done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=FOLDER, timeout=TIMEOUT_S)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise NoCompilerError(f"{command[0]}: {error}") from None
+    if done.returncode:
+        raise NoCompilerError(f"{command[0]} fails: {done.stderr.strip()[-2000:]}")
+
+
+def compile_all(folder: Path, target: str | None = None) -> list[Path]:
+    """Libraries of every set of instructions that a machine can have.
+
+    Raises:
+        NoCompilerError: there is no compiler, or it does not accept the sources.
+    """
+    machine = target or platform.machine()
+    kinds = [BASELINE, X86_64_V3] if machine == "x86_64" else [BASELINE]
+    files = [folder / library_name(kind) for kind in kinds]
+    for kind, path in zip(kinds, files, strict=True):
+        compile_library(path, kind, target)
+    return files

@@ -1,0 +1,125 @@
+/* Cells of a grid: which are occupied, which hang together, and the bounds of what hangs together. */
+#include "kernels.h"
+
+/* SqrtRangeGrid.row_column */
+EXPORT void modt_row_column(const float *x, const float *y, const float *sqrt_range, i64 n, float scale, i32 centre,
+                            i32 *row, i32 *column)
+{
+    for (i64 i = 0; i < n; i++) {
+        float here = scale / sqrt_range[i];
+        row[i] = (i32)(x[i] * here + (float)centre);
+        column[i] = (i32)(y[i] * here + (float)centre);
+    }
+}
+
+typedef struct {
+    i32 *row, *column;
+    float *low, *high;
+    i64 *entries;
+} Cells;
+
+/* occupied_cells: cells in the order of their last entries. `number` is a table of side * side, NONE throughout
+ * before and after. Returns how many; they are the last of the n places of `sample` and of `cells`. */
+EXPORT i64 modt_occupied_cells(const i32 *row, const i32 *column, const float *low, const float *high, i64 n, i32 side,
+                               i32 *number, i64 *sample, i64 *cell, Cells *cells)
+{
+    i32 first = (i32)n;
+    for (i64 i = n - 1; i >= 0; i--) { /* backwards: the last entry of a cell comes first */
+        PROVEN(row[i] >= 0 && row[i] < side && column[i] >= 0 && column[i] < side);
+        i32 *here = &number[row[i] * side + column[i]], c = *here;
+        if (c == NONE) {
+            c = *here = --first;
+            sample[c] = i;
+            cells->row[c] = row[i];
+            cells->column[c] = column[i];
+            cells->low[c] = low[i];
+            cells->high[c] = high[i];
+            cells->entries[c] = 1;
+        } else {
+            cells->low[c] = least(low[i], cells->low[c]);
+            cells->high[c] = most(high[i], cells->high[c]);
+            cells->entries[c]++;
+        }
+        cell[i] = c;
+    }
+    for (i64 i = 0; i < n; i++)
+        cell[i] -= first;
+    for (i64 c = first; c < n; c++)
+        number[cells->row[c] * side + cells->column[c]] = NONE;
+    return n - first;
+}
+
+/* Rem's union: a parent is never greater than its child, so a root is the least of its component. */
+static void join(i32 *parent, i32 a, i32 b)
+{
+    while (parent[a] != parent[b]) {
+        if (parent[a] < parent[b]) {
+            i32 c = a;
+            a = b;
+            b = c;
+        }
+        i32 above = parent[a];
+        parent[a] = parent[b];
+        if (above == a)
+            return;
+        a = above;
+    }
+}
+
+/* connect: component of each of n cells, in the order of their first cells; returns how many. */
+EXPORT i64 modt_connect(const Cells *cells, const float *max_gap_m, i64 n, i32 side, i32 *number, i32 *parent,
+                        i64 *component)
+{
+    const i32 ahead[4] = {1, side - 1, side, side + 1};
+    for (i64 i = 0; i < n; i++) {
+        PROVEN(cells->row[i] >= 0 && cells->row[i] < side - 1);
+        PROVEN(cells->column[i] > 0 && cells->column[i] < side - 1);
+        number[cells->row[i] * side + cells->column[i]] = parent[i] = (i32)i;
+    }
+    for (i32 i = 0; i < n; i++) {
+        const i32 *here = &number[cells->row[i] * side + cells->column[i]];
+        i32 near[4], pairs = 0;
+        for (int k = 0; k < 4; k++) { /* without branches, which would be mispredicted */
+            i32 found = here[ahead[k]], j = found == NONE ? i : found;
+            float gap_m = most(cells->low[i], cells->low[j]) - least(cells->high[i], cells->high[j]);
+            near[pairs] = j;
+            pairs += (j != i) & (gap_m < max_gap_m[i]);
+        }
+        for (int k = 0; k < pairs; k++)
+            join(parent, i, near[k]);
+    }
+    i64 count = 0;
+    for (i32 i = 0; i < n; i++) {
+        number[cells->row[i] * side + cells->column[i]] = NONE;
+        component[i] = parent[i] == i ? count++ : component[parent[i]];
+    }
+    return count;
+}
+
+typedef struct {
+    float *min_x, *max_x, *min_y, *max_y, *bottom, *top;
+    i64 *points, *cell;
+} Bounds;
+
+/* cluster_bounds: bounds of n clusters of C cells, sums of their points, and
+ * the last cell of each. */
+EXPORT void modt_cluster_bounds(const Cells *cells, const float *x, const float *y, const i64 *cluster, i64 n_cells, i64 n, Bounds *bounds)
+{
+    for (i64 g = 0; g < n; g++) {
+        bounds->min_x[g] = bounds->min_y[g] = bounds->bottom[g] = INFINITY;
+        bounds->max_x[g] = bounds->max_y[g] = bounds->top[g] = -INFINITY;
+        bounds->points[g] = bounds->cell[g] = 0;
+    }
+    for (i64 i = 0; i < n_cells; i++) {
+        i64 g = cluster[i];
+        PROVEN(g >= 0 && g < n);
+        bounds->min_x[g] = least(x[i], bounds->min_x[g]);
+        bounds->max_x[g] = most(x[i], bounds->max_x[g]);
+        bounds->min_y[g] = least(y[i], bounds->min_y[g]);
+        bounds->max_y[g] = most(y[i], bounds->max_y[g]);
+        bounds->bottom[g] = least(cells->low[i], bounds->bottom[g]);
+        bounds->top[g] = most(cells->high[i], bounds->top[g]);
+        bounds->points[g] += cells->entries[i];
+        bounds->cell[g] = i;
+    }
+}

@@ -1,0 +1,200 @@
+/* Points above the ground: GroundEstimator, with the columns and cells that it starts from. */
+#include "kernels.h"
+
+typedef struct {
+    i32 rings, sectors, sector_bits, flank_sectors;
+    float far_m, ring_scale, sector_scale;
+    float min_sqrt_range, max_slope, max_bend, start_bend, slope_gain, noise_m, max_gap_m, flank_m;
+} Ground;
+
+/* Scratch of the caller: rings * sectors each, then one a point. */
+typedef struct {
+    float *lowest, *surface, *other;
+    uint8_t *stands, *is_ground;
+    float *z, *sqrt_range;
+    i32 *cell;
+} Scratch;
+
+enum { BLOCK = 512 }; /* points that stay in the first-level cache */
+
+/* PointColumns.from_array and PolarGrid.cell, of up to BLOCK points; those that are not finite, or as far as far_m,
+ * are taken to the sensor. */
+static ALWAYS_INLINE void place_points(const Ground *g, const float *points, i64 n, i64 width, float *z, float *sqrt_range, i32 *cell)
+{
+    float x[BLOCK], y[BLOCK];
+    float last = (float)(g->rings - 1);
+    i32 bits = g->sector_bits, mask = (1 << bits) - 1;
+    for (i64 i = 0; i < n; i++) {
+        x[i] = points[i * width];
+        y[i] = points[i * width + 1];
+        z[i] = points[i * width + 2];
+    }
+    for (i64 i = 0; i < n; i++) {
+        int near = (__builtin_fabsf(x[i]) < g->far_m) & (__builtin_fabsf(y[i]) < g->far_m) & (__builtin_fabsf(z[i]) < g->far_m); /* not for NaN */
+        float here_x = near ? x[i] : 0.0f, here_y = near ? y[i] : 0.0f;
+        z[i] = near ? z[i] : 0.0f;
+        sqrt_range[i] = __builtin_sqrtf(__builtin_sqrtf(here_x * here_x + here_y * here_y));
+        i32 ring = (i32)least(sqrt_range[i] * g->ring_scale, last);
+        float turn = here_y / most(__builtin_fabsf(here_x) + __builtin_fabsf(here_y), 1e-6f);
+        turn = (here_x < 0.0f ? 2.0f - turn : turn) + 1.0f;
+        cell[i] = (ring << bits) + ((i32)(turn * g->sector_scale) & mask);
+    }
+}
+
+/* GroundEstimator._lowest, of up to BLOCK points. Neighbours share cells: the lowest of a run is kept at hand. */
+static void find_lowest(const Ground *g, float height_m, const float *z, const float *sqrt_range, const i32 *cell,
+                        i64 n, float *lowest)
+{
+    float candidate[BLOCK];
+    for (i64 i = 0; i < n; i++) {
+        float reach = sqrt_range[i] * sqrt_range[i] * g->max_slope + g->noise_m;
+        int plausible = (__builtin_fabsf(z[i] + height_m) < reach) & (sqrt_range[i] > g->min_sqrt_range);
+        candidate[i] = plausible ? z[i] : INFINITY;
+    }
+    for (i64 i = 0; i < n;) {
+        i32 here = cell[i];
+        float low = lowest[here];
+        PROVEN(here >= 0 && here < g->rings * g->sectors);
+        for (; i < n && cell[i] == here; i++)
+            low = least(candidate[i], low);
+        lowest[here] = low;
+    }
+}
+
+/* GroundEstimator._stands; flat_m by ring */
+static void find_stands(const Ground *g, const float *flat_m, i64 n, Scratch *s)
+{
+    float *flat = s->other;
+    for (i32 ring = 0; ring < g->rings; ring++)
+        for (i32 k = ring * g->sectors; k < (ring + 1) * g->sectors; k++)
+            flat[k] = s->lowest[k] + flat_m[ring];
+    for (i32 k = 0; k < g->rings * g->sectors; k++)
+        s->stands[k] = 0;
+    for (i64 i = 0; i < n; i++)
+        if (s->z[i] > flat[s->cell[i]])
+            s->stands[s->cell[i]] = 1;
+}
+
+/* GroundEstimator.trace; `ray` holds height, range, slope and bend of the last ground cell of each ray */
+static void trace(const Ground *g, float height_m, const float *range_m, Scratch *s, float *ray)
+{
+    i32 sectors = g->sectors;
+    float *height = ray, *at = ray + sectors, *slope = ray + 2 * sectors, *bend = ray + 3 * sectors;
+    for (i32 k = 0; k < sectors; k++) {
+        height[k] = -height_m;
+        at[k] = slope[k] = 0.0f;
+        bend[k] = g->start_bend;
+    }
+    for (i32 ring = 0; ring < g->rings; ring++) {
+        const float *lowest = s->lowest + ring * sectors;
+        const uint8_t *stands = s->stands + ring * sectors;
+        uint8_t *is_ground = s->is_ground + ring * sectors;
+        for (i32 k = 0; k < sectors; k++) {
+            float gap = range_m[ring] - at[k], reach = least(gap, g->max_gap_m);
+            float rise = lowest[k] - height[k], off = rise - slope[k] * reach;
+            float flat = stands[k] ? 0.0f : 1.0f;
+            int found = (off < reach * bend[k] * flat + g->noise_m) & (off > -(gap * bend[k] + g->noise_m));
+            float newest = slope[k] + g->slope_gain * (rise / gap - slope[k]);
+            newest = least(most(newest, -g->max_slope), g->max_slope);
+            is_ground[k] = (uint8_t)found;
+            height[k] = found ? lowest[k] : height[k];
+            at[k] = found ? range_m[ring] : at[k];
+            slope[k] = found ? newest : slope[k];
+            bend[k] = found ? g->max_bend : bend[k];
+        }
+    }
+}
+
+/* GroundEstimator._interpolate: linear from the ground cell before each cell to the one after it */
+static void interpolate(const Ground *g, float height_m, const float *range_m, Scratch *s, float *ray)
+{
+    i32 sectors = g->sectors;
+    float *value = ray, *at = ray + sectors, *low = s->surface, *near = s->other;
+    for (i32 k = 0; k < sectors; k++) {
+        value[k] = -height_m;
+        at[k] = range_m[0];
+    }
+    for (i32 ring = 0; ring < g->rings; ring++)
+        for (i32 k = 0; k < sectors; k++) {
+            i32 i = ring * sectors + k;
+            low[i] = value[k] = s->is_ground[i] ? s->lowest[i] : value[k];
+            near[i] = at[k] = s->is_ground[i] ? range_m[ring] : at[k];
+        }
+    for (i32 k = 0; k < sectors; k++)
+        at[k] = -1.0f; /* nothing beyond */
+    for (i32 ring = g->rings - 1; ring >= 0; ring--)
+        for (i32 k = 0; k < sectors; k++) {
+            i32 i = ring * sectors + k, first = ring == 0;
+            value[k] = s->is_ground[i] || first ? low[i] : value[k];
+            at[k] = s->is_ground[i] || first ? range_m[ring] : at[k];
+            float high = at[k] < 0.0f ? low[i] : value[k], far = at[k] < 0.0f ? near[i] : at[k];
+            float share = (range_m[ring] - near[i]) / most(far - near[i], 1e-3f);
+            s->surface[i] = low[i] + (high - low[i]) * share;
+        }
+}
+
+/* _median_across, in a row of cells */
+static void median_across(i32 sectors, i32 step, const float *row, float *median)
+{
+    i32 mask = sectors - 1;
+    for (i32 k = 0; k < sectors; k++) {
+        float left = row[(k - step) & mask], right = row[(k + step) & mask];
+        median[k] = most(least(left, row[k]), least(most(left, row[k]), right));
+    }
+}
+
+/* NumpyKernels.above_ground: of n points in rows of `width`, those within bounds of height and of square root of
+ * range; returns how many. Their rows are written, and x, y, z, square root of range, and height. `range_m` and
+ * `flat_m` are by ring; a ray has 4 * sectors floats. */
+EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float *flat_m, float height_m,
+                             const float *points, i64 n, i64 width, Scratch *s, float *ray, const float bounds[4],
+                             i64 *rows, float *kept[5])
+{
+    for (i32 i = 0; i < g->rings * g->sectors; i++)
+        s->lowest[i] = INFINITY;
+    for (i64 i = 0; i < n; i += BLOCK) {
+        i64 m = n - i < BLOCK ? n - i : BLOCK;
+        float *z = s->z + i, *sqrt_range = s->sqrt_range + i;
+        if (width == 4)
+            place_points(g, points + i * 4, m, 4, z, sqrt_range, s->cell + i); /* inlined for this width, and vectorised */
+        else
+            place_points(g, points + i * width, m, width, z, sqrt_range, s->cell + i);
+        find_lowest(g, height_m, z, sqrt_range, s->cell + i, m, s->lowest);
+    }
+    find_stands(g, flat_m, n, s);
+    trace(g, height_m, range_m, s, ray);
+    interpolate(g, height_m, range_m, s, ray);
+    for (i32 ring = 0; ring < g->rings; ring++) {
+        float *row = s->surface + ring * g->sectors;
+        median_across(g->sectors, 1, row, ray);
+        median_across(g->sectors, g->flank_sectors, ray, ray + g->sectors);
+        for (i32 k = 0; k < g->sectors; k++)
+            row[k] = ray[k] - ray[g->sectors + k] > g->flank_m ? ray[g->sectors + k] : ray[k];
+    }
+    float low = bounds[0], high = bounds[1], near = bounds[2], far = bounds[3];
+    i64 count = 0;
+    for (i64 start = 0; start < n; start += BLOCK) {
+        float height[BLOCK];
+        i32 kept_here[BLOCK];
+        i64 m = n - start < BLOCK ? n - start : BLOCK;
+        for (i64 i = 0; i < m; i++)
+            height[i] = s->z[start + i] - s->surface[s->cell[start + i]];
+        for (i64 i = 0; i < m; i++) {
+            float sqrt_range = s->sqrt_range[start + i];
+            kept_here[i] = (height[i] > low) & (height[i] < high) & (sqrt_range > near) & (sqrt_range < far);
+        }
+        for (i64 i = 0; i < m; i++) {
+            rows[count] = start + i; /* overwritten by the next, unless it stays */
+            kept[4][count] = height[i];
+            count += kept_here[i];
+        }
+    }
+    for (i64 k = 0; k < count; k++) {
+        const float *point = points + rows[k] * width;
+        kept[0][k] = point[0];
+        kept[1][k] = point[1];
+        kept[2][k] = point[2];
+        kept[3][k] = s->sqrt_range[rows[k]];
+    }
+    return count;
+}

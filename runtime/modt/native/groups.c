@@ -1,0 +1,160 @@
+/* Points and cells by cluster: grouping, sums, headings and boxes. A group i has the rows from offsets[i] to
+ * offsets[i + 1]; none is empty. */
+#include "kernels.h"
+
+/* Hash of the sources that this library is made of. */
+EXPORT const char *modt_sources(void) { return MODT_SOURCES; }
+
+/* Groups.from_labels: n groups of the rows labelled 0 to n - 1; returns how many rows that is. */
+EXPORT i64 modt_group(const i64 *labels, i64 n_rows, i64 n, i64 *rows, i64 *offsets)
+{
+    for (i64 g = 0; g <= n; g++)
+        offsets[g] = 0;
+    for (i64 i = 0; i < n_rows; i++) {
+        PROVEN(labels[i] >= NONE && labels[i] < n);
+        if (labels[i] != NONE)
+            offsets[labels[i] + 1]++;
+    }
+    for (i64 g = 0; g < n; g++)
+        offsets[g + 1] += offsets[g];
+    i64 total = offsets[n];
+    for (i64 i = 0; i < n_rows; i++)
+        if (labels[i] != NONE)
+            rows[offsets[labels[i]]++] = i;
+    for (i64 g = n; g > 0; g--)
+        offsets[g] = offsets[g - 1];
+    offsets[0] = 0;
+    return total;
+}
+
+typedef struct {
+    const float *x, *y, *z, *height;
+    const i64 *index;
+} Points;
+
+typedef struct {
+    i64 *offsets, *index;
+    float *x, *y, *z, *ground_z;
+} Members;
+
+/* members_of: points by cluster, in input order within a cluster, given the cell of each point and the cluster of
+ * each of C cells. */
+EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, const i64 *cluster, const i64 *entries,
+                         i64 n_cells, i64 n, Members *members)
+{
+    i64 *next = members->offsets + 1; /* of each cluster, the place of its next point; its end, when all are placed */
+    for (i64 g = 0; g <= n; g++)
+        members->offsets[g] = 0;
+    for (i64 c = 0; c < n_cells; c++)
+        if (cluster[c] != NONE && cluster[c] + 1 < n)
+            next[cluster[c] + 1] += entries[c];
+    for (i64 g = 1; g < n; g++)
+        next[g] += next[g - 1];
+    for (i64 i = 0; i < n_points; i++) {
+        PROVEN(cell[i] >= 0 && cell[i] < n_cells && cluster[cell[i]] >= NONE && cluster[cell[i]] < n);
+        i64 g = cluster[cell[i]];
+        if (g == NONE)
+            continue;
+        i64 at = next[g]++;
+        members->index[at] = points->index[i];
+        members->x[at] = points->x[i];
+        members->y[at] = points->y[i];
+        members->z[at] = points->z[i];
+        members->ground_z[at] = points->z[i] - points->height[i];
+    }
+}
+
+/* group_sums of one row of values */
+EXPORT void modt_group_sums(const float *values, const i64 *offsets, i64 n, double *sum)
+{
+    for (i64 g = 0; g < n; g++) {
+        double total = 0.0;
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i++)
+            total += values[i];
+        sum[g] = total;
+    }
+}
+
+/* best_headings: index of the best of `headings` directions for at most `limit` of the points at `rows`; cosines and sines are those of the directions, then of
+ * the ones across them. */
+EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, const i64 *offsets, i64 n, i64 limit,
+                               const float *cosines, const float *sines, i32 headings, float noise_m, i64 *best)
+{
+    enum { MOST = 64 };
+    float low[MOST], high[MOST];
+    double closeness[MOST / 2];
+    i32 axes = 2 * headings;
+    PROVEN(axes <= MOST);
+    for (i64 g = 0; g < n; g++) {
+        for (i32 a = 0; a < axes; a++) {
+            low[a] = INFINITY;
+            high[a] = -INFINITY;
+            closeness[a / 2] = 0.0;
+        }
+        i64 stride = (offsets[g + 1] - offsets[g] + limit - 1) / limit;
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride)
+            for (i32 a = 0; a < axes; a++) {
+                float across = cosines[a] * x[rows[i]] + sines[a] * y[rows[i]];
+                low[a] = least(across, low[a]);
+                high[a] = most(across, high[a]);
+            }
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i += stride)
+            for (i32 a = 0; a < headings; a++) {
+                i32 b = a + headings;
+                float here_x = x[rows[i]], here_y = y[rows[i]];
+                float u = cosines[a] * here_x + sines[a] * here_y, v = cosines[b] * here_x + sines[b] * here_y;
+                float nearest = least(least(u - low[a], high[a] - u), least(v - low[b], high[b] - v));
+                closeness[a] += 1.0f / most(nearest, noise_m);
+            }
+        best[g] = 0;
+        for (i32 a = 1; a < headings; a++)
+            if (closeness[a] > closeness[best[g]])
+                best[g] = a;
+    }
+}
+
+/* bounds_along: bounds of each group along its axes, three low and three high rows of n. */
+EXPORT void modt_bounds_along(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
+                            const float *cosine, const float *sine, float *low, float *high)
+{
+    for (i64 g = 0; g < n; g++) {
+        float c = cosine[g], s = sine[g];
+        float min_u = INFINITY, min_v = min_u, min_z = min_u, max_u = -min_u, max_v = -min_u, max_z = -min_u;
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
+            float u = x[i] * c + y[i] * s, v = y[i] * c - x[i] * s;
+            min_u = least(u, min_u);
+            max_u = most(u, max_u);
+            min_v = least(v, min_v);
+            max_v = most(v, max_v);
+            min_z = least(z[i], min_z);
+            max_z = most(z[i], max_z);
+        }
+        low[g] = min_u, low[n + g] = min_v, low[2 * n + g] = min_z;
+        high[g] = max_u, high[n + g] = max_v, high[2 * n + g] = max_z;
+    }
+}
+
+/* reflectance_sums: number, sum, sum of squares, bright and dark ones of the measured reflectances of each group, five
+ * rows of n, and the greatest; points are rows of `width`. */
+EXPORT void modt_reflectance_sums(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
+                                  float bright, float dark, double *sums, float *greatest)
+{
+    for (i64 g = 0; g < n; g++) {
+        double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0;
+        float high = -INFINITY;
+        for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
+            float r = points[index[i] * width + 3];
+            if (r < 0.0f)
+                continue;
+            number += 1.0;
+            total += r;
+            squares += r * r;
+            brights += r > bright;
+            darks += r < dark;
+            high = most(r, high);
+        }
+        sums[g] = number, sums[n + g] = total, sums[2 * n + g] = squares, sums[3 * n + g] = brights;
+        sums[4 * n + g] = darks;
+        greatest[g] = high;
+    }
+}

@@ -1,0 +1,30 @@
+/* Passes over points, cells and groups of segmentation.
+ *
+ * Each function does what the NumPy function named beside it does, to the byte: single precision throughout, no
+ * contraction, sums in double precision. Arrays are contiguous and do not overlap, but where said; lengths and
+ * indices are proven by the caller, and asserted in a build with -DMODT_CHECKED.
+ */
+#ifndef MODT_KERNELS_H
+#define MODT_KERNELS_H
+
+#include <stdint.h>
+
+#ifdef MODT_CHECKED
+#include <assert.h>
+#define PROVEN(condition) assert(condition)
+#else
+#define PROVEN(condition) ((void)0)
+#endif
+
+#define EXPORT __attribute__((visibility("default")))
+#define ALWAYS_INLINE inline __attribute__((always_inline))
+#define NONE (-1)
+#define INFINITY __builtin_inff()
+
+typedef int32_t i32;
+typedef int64_t i64;
+
+static inline float least(float a, float b) { return a < b ? a : b; }
+static inline float most(float a, float b) { return a > b ? a : b; }
+
+#endif

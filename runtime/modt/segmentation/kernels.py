@@ -1,0 +1,108 @@
+"""The passes over points, cells and groups that segmentation consists of, as one interface."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from modt.geometry.boxes import bounds_along
+from modt.segmentation.box_fitting import best_headings
+from modt.segmentation.cells import Cells, connect, occupied_cells
+from modt.segmentation.clusters import ClusterBounds, Clusters, Members, cluster_bounds, members_of
+from modt.segmentation.grids import Int32, SqrtRangeGrid
+from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.groups import Groups
+from modt.segmentation.point_columns import PointColumns
+from modt.segmentation.reflectance_statistics import reflectance_sums
+from modt.types import Float32, Float64, Int
+
+
+class Kernels(Protocol):
+    """The passes; every implementation gives the same bytes for the same input.
+
+    Sums alone may differ in their last bit, since NumPy adds in another order: in double precision the sum of single
+    precision numbers is exact in any order, unless one of them is 2^29 times smaller than another.
+    """
+
+    @property
+    def name(self) -> str:
+        """For the record of a run."""
+
+    def above_ground(
+        self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
+    ) -> tuple[Int, PointColumns, Float32]:
+        """(K,) rows of (N, 3) or wider points within bounds, those points, and their (K,) heights above ground [m].
+
+        Bounds are the least and greatest height [m], and the least and greatest square root of range, exclusively.
+        """
+
+    def row_column(self, grid: SqrtRangeGrid, points: PointColumns) -> tuple[Int32, Int32]:
+        """(K,) row and (K,) column of each point."""
+
+    def occupied_cells(
+        self, grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32
+    ) -> tuple[Cells, Int, Int]:
+        """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
+
+    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
+        """(C,) connected component of each cell, numbered in the order of their first cells."""
+
+    def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
+        """Bounds of n clusters of (C,) cells, given a point of each cell."""
+
+    def group(self, labels: Int, n: int) -> Groups:
+        """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
+
+    def members_of(self, clusters: Clusters, index: Int) -> Members:
+        """Points of each cluster, given (K,) the row of each point in the sweep."""
+
+    def group_sums(self, values: Float32, offsets: Int) -> Float64:
+        """(V, G) sum of the values of each group, given (V, K) in their order."""
+
+    def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
+        """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
+
+    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
+        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
+
+    def reflectance_sums(self, points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
+        """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
+
+
+class NumpyKernels:
+    """The passes in NumPy: the reference."""
+
+    name = "numpy"
+    occupied_cells = staticmethod(occupied_cells)
+    connect = staticmethod(connect)
+    cluster_bounds = staticmethod(cluster_bounds)
+    group = staticmethod(Groups.from_labels)
+    members_of = staticmethod(members_of)
+    best_headings = staticmethod(best_headings)
+    bounds_along = staticmethod(bounds_along)
+    reflectance_sums = staticmethod(reflectance_sums)
+
+    def above_ground(
+        self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
+    ) -> tuple[Int, PointColumns, Float32]:
+        """(K,) rows of the points within bounds, those points, and their (K,) heights above ground [m]."""
+        sweep = PointColumns.from_array(points)
+        height = ground.height_above(sweep, sensor_height_m)
+        low, high, near, far = bounds
+        mask = (height > low) & (height < high)
+        mask &= (sweep.sqrt_range > near) & (sweep.sqrt_range < far)
+        rows = np.flatnonzero(mask)
+        return rows, sweep.take(rows), height[rows]
+
+    def row_column(self, grid: SqrtRangeGrid, points: PointColumns) -> tuple[Int32, Int32]:
+        """(K,) row and (K,) column of each point."""
+        return grid.row_column(points)
+
+    def group_sums(self, values: Float32, offsets: Int) -> Float64:
+        """(V, G) sum of the values of each group, given (V, K) in their order."""
+        total: Float64 = np.add.reduceat(values, offsets[:-1], axis=1, dtype=np.float64)
+        return total
+
+
+NUMPY = NumpyKernels()

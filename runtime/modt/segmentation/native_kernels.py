@@ -1,0 +1,226 @@
+"""The passes of segmentation in C (`modt.native`)."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from modt.segmentation.box_fitting import AXES, HEADINGS
+from modt.segmentation.cells import Cells
+from modt.segmentation.clusters import ClusterBounds, Clusters, Members
+from modt.segmentation.grids import RING_STEP, SECTORS, Int32, SqrtRangeGrid
+from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.groups import Groups
+from modt.segmentation.point_columns import FAR_M, PointColumns
+from modt.segmentation.reflectance_statistics import BRIGHT, DARK
+from modt.types import NONE, Float32, Float64, Int
+
+_F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
+_SIGNATURES: dict[str, tuple[Any, Sequence[Any]]] = {
+    "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
+    "modt_row_column": (None, (_P, _P, _P, _L, _F, _I, _P, _P)),
+    "modt_occupied_cells": (_L, (_P, _P, _P, _P, _L, _I, _P, _P, _P, _P)),
+    "modt_connect": (_L, (_P, _P, _L, _I, _P, _P, _P)),
+    "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
+    "modt_group": (_L, (_P, _L, _L, _P, _P)),
+    "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
+    "modt_group_sums": (None, (_P, _P, _L, _P)),
+    "modt_best_headings": (None, (_P, _P, _P, _P, _L, _L, _P, _P, _I, _F, _P)),
+    "modt_bounds_along": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
+    "modt_reflectance_sums": (None, (_P, _L, _P, _P, _L, _F, _F, _P, _P)),
+}
+"""Result and arguments of every function."""
+
+
+def _at(array: NDArray[Any], kind: DTypeLike = np.float32) -> int:
+    """Address of a contiguous array of this kind."""
+    if array.dtype != kind or not array.flags.c_contiguous:
+        raise TypeError(f"a contiguous array of {np.dtype(kind)} is needed, not of {array.dtype}")
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
+def _pointers(*arrays: NDArray[Any]) -> Any:
+    """A C structure of pointers to arrays of any kind."""
+    return (_P * len(arrays))(*(array.__array_interface__["data"][0] for array in arrays))
+
+
+class _Ground(ctypes.Structure):
+    """Ground of ground.c."""
+
+    _fields_ = (
+        *((name, _I) for name in ("rings", "sectors", "sector_bits", "flank_sectors")),
+        *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope", "max_bend")),
+        *((name, _F) for name in ("start_bend", "slope_gain", "noise_m", "max_gap_m", "flank_m")),
+    )
+
+
+class _GroundBuffers:
+    """What ground.c needs for one estimator: its constants, and scratch."""
+
+    def __init__(self, ground: GroundEstimator) -> None:
+        grid, c = ground.grid, ground.config
+        start_bend, scales = np.tan(np.deg2rad(c.start_bend_deg)), (FAR_M, 1 / RING_STEP, SECTORS / 4)
+        slopes = ground.min_sqrt_range, ground.max_slope, ground.max_bend, start_bend
+        self.constants = _Ground(
+            grid.rings,
+            SECTORS,
+            SECTORS.bit_length() - 1,
+            c.flank_sectors,
+            *scales,
+            *slopes,
+            c.slope_gain,
+            c.noise_m,
+            c.max_gap_m,
+            c.flank_m,
+        )
+        self.flat_m = np.ascontiguousarray(ground.flat_m.ravel())
+        self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
+        self.points = np.empty((3, 0), np.float32)
+        self.rays = np.empty((4, SECTORS), np.float32)
+
+    def scratch(self, n: int) -> Any:
+        """Scratch of ground.c, for n points."""
+        if n > self.points.shape[1]:
+            self.points = np.empty((3, n), np.float32)
+        return _pointers(*self.cells[0], *self.cells[1], *self.points)
+
+
+class NativeKernels:
+    """The passes in C.
+
+    Args:
+        library: that of `modt.native.library`.
+        instructions: the set that it is compiled for.
+    """
+
+    def __init__(self, library: ctypes.CDLL, instructions: str) -> None:
+        self.name = f"native ({instructions})"
+        for name, (result, arguments) in _SIGNATURES.items():
+            function = getattr(library, name)
+            function.restype, function.argtypes = result, arguments
+        self._library = library
+        self._ground: dict[GroundEstimator, _GroundBuffers] = {}
+
+    def above_ground(
+        self, ground: GroundEstimator, points: Float32, sensor_height_m: float, bounds: Float32
+    ) -> tuple[Int, PointColumns, Float32]:
+        """(K,) rows of the points within bounds, those points, and their (K,) heights above ground [m]."""
+        buffers = self._ground.get(ground) or self._ground.setdefault(ground, _GroundBuffers(ground))
+        points = np.ascontiguousarray(points, np.float32)
+        n, width = points.shape
+        rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
+        scratch, out = buffers.scratch(n), _pointers(*kept)
+        k = self._library.modt_above_ground(
+            ctypes.addressof(buffers.constants), _at(ground.grid.range_m), _at(buffers.flat_m), sensor_height_m,
+            _at(points), n, width, ctypes.addressof(scratch), _at(buffers.rays), _at(bounds), _at(rows, np.int64),
+            ctypes.addressof(out),
+        )  # fmt: skip
+        x, y, z, sqrt_range, height = kept[:, :k]
+        return rows[:k], PointColumns(x, y, z, sqrt_range), height
+
+    def row_column(self, grid: SqrtRangeGrid, points: PointColumns) -> tuple[Int32, Int32]:
+        """(K,) row and (K,) column of each point."""
+        row, column = np.empty((2, len(points)), np.int32)
+        at = _at(points.x), _at(points.y), _at(points.sqrt_range), len(points)
+        self._library.modt_row_column(*at, 1 / grid.step, grid.centre, _at(row, np.int32), _at(column, np.int32))
+        return row, column
+
+    def occupied_cells(
+        self, grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32
+    ) -> tuple[Cells, Int, Int]:
+        """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
+        k = len(row)
+        places, heights, entries = np.empty((2, k), np.int32), np.empty((2, k), np.float32), np.empty(k, np.int64)
+        sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
+        out = _pointers(*places, *heights, entries)
+        n = self._library.modt_occupied_cells(
+            _at(row, np.int32), _at(column, np.int32), _at(low), _at(high), k, grid.side, _at(grid.number, np.int32),
+            _at(sample, np.int64), _at(cell, np.int64), ctypes.addressof(out),
+        )  # fmt: skip
+        (row, column), (low, high) = places[:, k - n :], heights[:, k - n :]
+        return Cells(row, column, low, high, entries[k - n :]), sample[k - n :], cell
+
+    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
+        """(C,) connected component of each cell, numbered in the order of their first cells."""
+        n = len(cells)
+        gap_m = np.ascontiguousarray(np.broadcast_to(max_gap_m, n))
+        parent, component, pointers = np.empty(n, np.int32), np.empty(n, np.int64), self._cells(cells)
+        self._library.modt_connect(
+            ctypes.addressof(pointers), _at(gap_m), n, grid.side, _at(grid.number, np.int32), _at(parent, np.int32),
+            _at(component, np.int64),
+        )  # fmt: skip
+        return component
+
+    def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
+        """Bounds of n clusters of (C,) cells, given a point of each cell."""
+        bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
+        own, out = self._cells(cells), _pointers(*bounds, *counts)
+        self._library.modt_cluster_bounds(
+            ctypes.addressof(own), _at(points.x), _at(points.y), _at(cluster, np.int64), len(cells), n,
+            ctypes.addressof(out),
+        )  # fmt: skip
+        return ClusterBounds(*bounds, *counts)
+
+    def group(self, labels: Int, n: int) -> Groups:
+        """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
+        rows, offsets = np.empty(len(labels), np.int64), np.empty(n + 1, np.int64)
+        at = _at(labels, np.int64), len(labels), n, _at(rows, np.int64), _at(offsets, np.int64)
+        return Groups(rows[: self._library.modt_group(*at)], offsets)
+
+    def members_of(self, clusters: Clusters, index: Int) -> Members:
+        """Points of each cluster, given (K,) the row of each point in the sweep."""
+        points, cells, of_cell = clusters.points, clusters.cells, clusters.of_cell
+        m = int(cells.entries.sum(where=of_cell != NONE))
+        offsets, rows, own = np.empty(clusters.n + 1, np.int64), np.empty(m, np.int64), np.empty((4, m), np.float32)
+        columns = [_at(column) for column in (points.x, points.y, points.z, clusters.height)]
+        given, out = (_P * 5)(*columns, _at(index, np.int64)), _pointers(offsets, rows, *own)
+        self._library.modt_members(
+            ctypes.addressof(given), _at(clusters.cell, np.int64), len(index), _at(of_cell, np.int64),
+            _at(cells.entries, np.int64), len(cells), clusters.n, ctypes.addressof(out),
+        )  # fmt: skip
+        return Members(offsets, rows, own)
+
+    def group_sums(self, values: Float32, offsets: Int) -> Float64:
+        """(V, G) sum of the values of each group, given (V, K) in their order."""
+        n = len(offsets) - 1
+        sums, at = np.empty((len(values), n), np.float64), _at(offsets, np.int64)
+        for row, out in zip(values, sums, strict=True):
+            self._library.modt_group_sums(_at(row), at, n, _at(out, np.float64))
+        return sums
+
+    def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
+        """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
+        best = np.empty(len(groups), np.int64)
+        self._library.modt_best_headings(
+            _at(x), _at(y), _at(groups.rows, np.int64), _at(groups.offsets, np.int64), len(groups), limit,
+            _at(AXES[0]), _at(AXES[1]), len(HEADINGS), noise_m, _at(best, np.int64),
+        )  # fmt: skip
+        return best
+
+    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
+        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
+        low, high = np.empty((2, 3, len(cosine)), np.float32)
+        at = *map(_at, xyz), _at(offsets, np.int64), len(cosine), _at(cosine), _at(sine), _at(low), _at(high)
+        self._library.modt_bounds_along(*at)
+        return low, high
+
+    def reflectance_sums(self, points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
+        """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
+        points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
+        sums, greatest = np.empty((5, n), np.float64), np.empty(n, np.float32)
+        self._library.modt_reflectance_sums(
+            _at(points), points.shape[1], _at(index, np.int64), _at(offsets, np.int64), n, BRIGHT, DARK,
+            _at(sums, np.float64), _at(greatest),
+        )  # fmt: skip
+        return sums, greatest
+
+    @staticmethod
+    def _cells(cells: Cells) -> Any:
+        for column, kind in ((cells.row, np.int32), (cells.low, np.float32), (cells.entries, np.int64)):
+            _at(column, kind)
+        return _pointers(cells.row, cells.column, cells.low, cells.high, cells.entries)

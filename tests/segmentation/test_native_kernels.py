@@ -1,0 +1,179 @@
+"""The compiled kernels give the bytes of NumPy's, on any input, but for the last bit of a sum."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import os
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modt import profile
+from modt.config import SegmentationConfig, SensorConfig
+from modt.geometry import FieldOfView
+from modt.native import build
+from modt.segmentation.grids import SqrtRangeGrid
+from modt.segmentation.groups import Groups
+from modt.segmentation.kernels import NUMPY
+from modt.segmentation.native_kernels import NativeKernels
+from modt.segmentation.point_columns import FAR_M, PointColumns
+from modt.segmentation.segmenter import Segmenter
+from modt.sources.synthetic_stream import SyntheticStream
+from modt.types import NONE, UNRECORDED
+from tests.segmentation.test_clusters import cloud
+
+SANITIZED = "MODT_SANITIZED" in os.environ
+"""Set by `python -m tools.sanitize`."""
+FRONT = FieldOfView(np.array([[0.0, 1.0, 0.0, 0.0]]))
+HOSTILE = [np.nan, np.inf, -np.inf, 1e-45, -1e-40, 3e38, -3e38, FAR_M, 999.0, 0.0, -0.0]
+
+
+@pytest.fixture(scope="module")
+def kernels(tmp_path_factory):
+    path = tmp_path_factory.mktemp("native") / "kernels.so"
+    try:
+        flags = (*build.CHECKED, *build.SANITIZERS) if SANITIZED else (*build.FLAGS, "-Werror")
+        build.compile_library(path, build.BASELINE, flags=flags)
+    except build.NoCompilerError as error:
+        if "no C compiler" not in str(error):
+            raise
+        pytest.skip(str(error))
+    return NativeKernels(ctypes.CDLL(str(path)), build.BASELINE)
+
+
+def same(one, other):
+    """Whether two results are equal: to the byte, signs of zeros apart, but to a part in 10^13 for sums."""
+    if dataclasses.is_dataclass(one):
+        return all(same(getattr(one, f.name), getattr(other, f.name)) for f in dataclasses.fields(one))
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, np.ndarray):
+        if one.dtype == np.float64 and one.shape == other.shape:
+            return np.allclose(one, other, rtol=1e-13, atol=1e-13, equal_nan=True)
+        return np.array_equal(one, other, equal_nan=one.dtype.kind == "f")
+    return one == other
+
+
+def stages(kernels, sensor, fov=None, config=None):
+    return [Segmenter(config or SegmentationConfig(), sensor, fov or FieldOfView(), k) for k in (NUMPY, kernels)]
+
+
+def both(kernels, points, sensor=None, fov=None, config=None):
+    """Proposals of the two, which must be the same."""
+    numpy, native = stages(kernels, sensor or SensorConfig(), fov, config)
+    expected, found = numpy.segment(points.copy()), native.segment(points.copy())
+    assert same(expected, found)
+    return expected
+
+
+def street(seed, n):
+    """(n, 4) points of ground, walls and things that stand on it."""
+    rng = np.random.default_rng(seed)
+    points = rng.normal(0, 20, (n, 4)).astype(np.float32)
+    points[:, 2] = rng.normal(-1.7, 0.05, n)
+    for _ in range(12):
+        own, centre = rng.random(n) < 0.05, rng.uniform(-30, 30, 2)
+        points[own, :2] = centre + rng.uniform(-1, 1, (int(own.sum()), 2)) * rng.uniform(0.2, 3.0, 2)
+        points[own, 2] = rng.uniform(-1.7, 0.3, int(own.sum()))
+    points[:, 3] = rng.choice([UNRECORDED, 0.0, 0.3, 0.9], n)
+    return points
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 3000), front=st.booleans())
+@settings(max_examples=80, deadline=None)
+def test_random_sweeps(kernels, seed, n, front):
+    sensor = SensorConfig(reflectance="hdl-64e", height_m=(None, 1.73)[seed % 2])
+    both(kernels, street(seed, n), sensor, FRONT if front else None)
+
+
+@given(seed=st.integers(0, 10_000), share=st.floats(0, 1))
+@settings(max_examples=80, deadline=None)
+def test_hostile_sweeps(kernels, seed, share):
+    rng, points = np.random.default_rng(seed), street(seed, 500)
+    values = np.array(HOSTILE, np.float32)[rng.integers(0, len(HOSTILE), points.shape)]
+    with np.errstate(all="ignore"):
+        both(kernels, np.where(rng.random(points.shape) < share, values, points))
+
+
+@pytest.mark.parametrize("name", ["vlp-16", "hdl-64e", "mid-360"])
+@pytest.mark.parametrize("front", [False, True])
+def test_simulated_sweeps(kernels, name, front):
+    config = profile.load(name)
+    for frame in SyntheticStream("street", name, 0.3, 4):
+        found = both(kernels, frame.points, config.sensor, FRONT if front else None, config.segmentation)
+        assert len(found) > 3
+
+
+@pytest.mark.kitti
+def test_real_sweeps(kernels, kitti_root):
+    config = profile.load("hdl-64e")
+    for path in sorted((kitti_root / "odometry" / "00" / "velodyne").glob("*.bin"))[:4]:
+        points = np.fromfile(path, np.float32).reshape(-1, 4)
+        assert len(both(kernels, points, config.sensor, None, config.segmentation)) > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [0, 1, 2, 3_000_000])
+def test_any_number_of_points(kernels, n):
+    both(kernels, street(1, n))
+
+
+@pytest.mark.parametrize("points", [np.zeros((5, 4), np.float32), np.zeros((5, 4), np.float32)[::2]])
+def test_all_points_at_the_sensor(kernels, points):
+    assert len(both(kernels, points)) == 0
+
+
+def test_rows_of_any_width_and_order(kernels):
+    points = street(3, 2000)
+    wide = np.concatenate([points, points], axis=1)
+    assert same(*(stage.segment(p) for stage, p in zip(stages(kernels, SensorConfig()), (points, wide), strict=True)))
+    assert same(*(s.segment(p) for s, p in zip(stages(kernels, SensorConfig()), (points, wide[:, :4]), strict=True)))
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 400), sigma=st.floats(0.05, 3.0))
+@settings(max_examples=60, deadline=None)
+def test_cells_and_components(kernels, seed, n, sigma):
+    points = PointColumns.from_array(cloud(seed, n, sigma))
+    if not len(points):
+        return
+    grid, height = SqrtRangeGrid(0.03, 80.0), points.z + 1.7
+    place = NUMPY.row_column(grid, points)
+    assert same(place, kernels.row_column(grid, points))
+    expected, found = (k.occupied_cells(grid, *place, height, height) for k in (NUMPY, kernels))
+    assert same(expected, found)
+    cells, sample, _ = expected
+    gap_m = np.random.default_rng(seed).uniform(0, 1, len(cells)).astype(np.float32)
+    component = NUMPY.connect(grid, cells, gap_m)
+    assert same(component, kernels.connect(grid, cells, gap_m))
+    assert (grid.number == NONE).all(), "the grid is empty again"
+    bounds = (k.cluster_bounds(cells, points.take(sample), component, component.max() + 1) for k in (NUMPY, kernels))
+    assert same(*bounds)
+
+
+@given(
+    seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 60), min_size=1, max_size=8), extra=st.integers(0, 9)
+)
+@settings(max_examples=60, deadline=None)
+def test_groups(kernels, seed, sizes, extra):
+    rng = np.random.default_rng(seed)
+    labels = rng.permutation(np.repeat(np.append(np.arange(len(sizes)), NONE), [*sizes, extra]))
+    groups = Groups.from_labels(labels, len(sizes))
+    assert same(groups, kernels.group(labels, len(sizes)))
+    x, y = rng.normal(0, 2, (2, len(labels))).astype(np.float32)
+    assert same(*(k.best_headings(x, y, groups, 20, 0.1) for k in (NUMPY, kernels)))
+    xyz, (c, s) = rng.normal(0, 9, (3, len(groups.rows))).astype(np.float32), rng.normal(0, 1, (2, len(sizes)))
+    axes = c.astype(np.float32), s.astype(np.float32)
+    assert same(*(k.bounds_along(xyz, groups.offsets, *axes) for k in (NUMPY, kernels)))
+    assert same(*(k.group_sums(xyz, groups.offsets) for k in (NUMPY, kernels)))
+    points = rng.choice([UNRECORDED, 0.0, 0.001, 0.5, 0.85], (len(labels), 4)).astype(np.float32)
+    assert same(*(k.reflectance_sums(points, groups.rows, groups.offsets) for k in (NUMPY, kernels)))
+
+
+def test_another_kind_of_array_is_refused(kernels):
+    with pytest.raises(TypeError, match="contiguous array of float32"):
+        kernels.group_sums(np.zeros((1, 4)), np.array([0, 4]))
+    with pytest.raises(TypeError, match="contiguous"):
+        kernels.group(np.zeros(8, np.int64)[::2], 1)
