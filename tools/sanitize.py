@@ -1,0 +1,32 @@
+"""The tests of the compiled kernels under AddressSanitizer and UndefinedBehaviorSanitizer.
+
+    python -m tools.sanitize [PYTEST-OPTION ...]
+
+Needs gcc. The kernels are built with their assertions, and any finding ends the tests.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+TESTS = "tests/segmentation/test_native_kernels.py"
+
+
+def main() -> int:
+    command = ["gcc", "-print-file-name=libasan.so"]
+    runtime = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    environment = os.environ | {
+        "MODT_SANITIZED": "1",
+        "CC": "gcc",
+        "LD_PRELOAD": runtime,
+        "ASAN_OPTIONS": "detect_leaks=0",  # Python's own
+        "UBSAN_OPTIONS": "print_stacktrace=1",
+    }
+    tests = [sys.executable, "-m", "pytest", TESTS, *sys.argv[1:]]
+    return subprocess.run(tests, check=False, env=environment).returncode
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
