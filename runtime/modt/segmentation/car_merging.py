@@ -10,6 +10,7 @@ import numpy as np
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.clusters import Clusters, ClusterSizes
 from modt.segmentation.groups import Groups, consecutive
+from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.view_bounds import DIRECTION, ELEVATION, HEIGHT, RANGE, ViewBounds
 from modt.types import Bool, Float32, Int
 
@@ -22,9 +23,11 @@ class StripMerger:
     Args:
         sensor: beam spacing.
         config: `max_extent_m` and the keys of `car_merging`.
+        kernels: passes over cells.
     """
 
-    def __init__(self, sensor: SensorConfig, config: SegmentationConfig) -> None:
+    def __init__(self, sensor: SensorConfig, config: SegmentationConfig, kernels: Kernels = NUMPY) -> None:
+        self.kernels = kernels
         self.config = c = config.car_merging
         self.beams = sensor.beams
         self.max_diagonal_m = min(c.max_diagonal_m, config.max_extent_m)
@@ -34,11 +37,10 @@ class StripMerger:
         target, candidate = np.arange(clusters.n), mergeable & self.candidates(sizes)
         rows = np.flatnonzero(candidate)
         if len(rows):
-            groups = Groups.from_labels(consecutive(candidate)[clusters.of_cell], len(rows))
-            sample = clusters.sample[groups.rows]
-            points, low, high = clusters.points.take(sample), clusters.cells.low, clusters.cells.high
-            ground = points.z - clusters.height[sample]
-            bounds = ViewBounds.of_cells(points, ground, low[groups.rows], high[groups.rows], groups)
+            groups = self.kernels.group(consecutive(candidate).take(clusters.of_cell), len(rows))
+            points, low, high = clusters.sampled.take(groups.rows), clusters.cells.low, clusters.cells.high
+            ground = points.z - clusters.height.take(clusters.sample.take(groups.rows))
+            bounds = ViewBounds.of_cells(points, ground, low.take(groups.rows), high.take(groups.rows), groups)
             target[rows] = rows[self.targets(bounds)]
         return target
 

@@ -38,7 +38,7 @@ class Clusterer:
         self.gap_beams = np.float32(config.clusters.max_gap_beams)
         self.coarse = SqrtRangeGrid(step, sensor.max_range_m)
         self.fine = SqrtRangeGrid(step / 2, sensor.max_range_m)
-        self.merger = StripMerger(sensor, config)
+        self.merger = StripMerger(sensor, config, kernels)
         spacing = config.person_splitting.min_cell_returns * np.deg2rad(sensor.azimuth_step_deg)
         self.max_split_sqrt_range = np.float32(self.fine.step / spacing)  # a cell is as wide as step * sqrt(range)
 
@@ -46,8 +46,9 @@ class Clusterer:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
         row, column = self.kernels.row_column(self.fine, points)
         cells, sample, cell = self.kernels.occupied_cells(self.fine, row, column, height, height)
-        cluster, sizes = self._connect(cells, points.take(sample))
-        clusters = Clusters(points, height, cell, cells, sample, cluster, len(sizes))
+        sampled = points.take(sample)
+        cluster, sizes = self._connect(cells, sampled)
+        clusters = Clusters(points, height, cell, cells, sample, sampled, cluster, len(sizes))
         target = self.merger.merge(clusters, sizes, self._valid(sizes) | ~sizes.is_part)
         valid = self._valid(sizes.merged(target))
         return replace(clusters, of_cell=consecutive(valid)[target][cluster], n=int(valid.sum()))

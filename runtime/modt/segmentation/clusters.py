@@ -80,6 +80,7 @@ class Clusters:
     cell: Int  # (K,) cell of each point
     cells: Cells
     sample: Int  # (C,) last point of each cell
+    sampled: PointColumns  # (C,) that point
     of_cell: Int  # (C,) cluster of each cell, NONE where it cannot be an object
     n: int
 

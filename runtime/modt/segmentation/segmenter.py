@@ -66,7 +66,7 @@ class Segmenter:
 
     def _proposals(self, clusters: Clusters, index: Int, sweep: Float32) -> Proposals:
         """The clusters in view with their boxes, given (K,) the row of each point in the (N, 4) sweep."""
-        cells, kernels = clusters.points.take(clusters.sample), self.kernels
+        cells, kernels = clusters.sampled, self.kernels
         depth = None if self.fov.full else self.fov.depth(cells.xyz())
         if depth is not None:
             clusters = clusters.select(self._in_view(clusters, depth))
