@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -46,7 +46,7 @@ def _at(array: NDArray[Any], kind: DTypeLike = np.float32) -> int:
 def _address(array: NDArray[Any]) -> int:
     """Address of a contiguous array; `from_buffer` is twenty times faster than what NumPy offers for it."""
     try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+        return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))
     except (TypeError, ValueError):  # read-only, or empty
         address: int = array.__array_interface__["data"][0]
         return address
@@ -158,8 +158,8 @@ class NativeKernels:
         n = len(cells)
         parent, component, pointers = np.empty(n, np.int32), np.empty(n, np.int64), self._cells(cells)
         self._library.modt_connect(
-            ctypes.addressof(pointers), _at(max_gap_m), n, grid.side, _at(grid.number, np.int32), _at(parent, np.int32),
-            _at(component, np.int64),
+            ctypes.addressof(pointers), _at(max_gap_m), n, grid.side, _at(grid.number, np.int32),
+            _at(parent, np.int32), _at(component, np.int64),
         )  # fmt: skip
         return component
 
