@@ -66,32 +66,74 @@ static void join(i32 *parent, i32 a, i32 b)
     }
 }
 
-/* connect: component of each of n cells, in the order of their first cells; returns how many. */
-EXPORT i64 modt_connect(const Cells *cells, const float *max_gap_m, i64 n, i32 side, i32 *number, i32 *parent,
-                        i64 *component)
+/* One stable pass of a radix sort: n rows in the order of their digits below `base`. */
+static void sort_by(const i32 *digit, i32 base, const i32 *rows, i64 n, i32 *next, i32 *sorted)
 {
-    const i32 ahead[4] = {1, side - 1, side, side + 1};
+    i32 total = 0;
+    for (i32 d = 0; d < base; d++)
+        next[d] = 0;
+    for (i64 i = 0; i < n; i++)
+        next[digit[i]]++;
+    for (i32 d = 0; d < base; d++) {
+        i32 count = next[d];
+        next[d] = total;
+        total += count;
+    }
+    for (i64 k = 0; k < n; k++)
+        sorted[next[digit[rows[k]]]++] = rows[k];
+}
+
+typedef struct {
+    i32 place;
+    float low, high, max_gap_m;
+} Span;
+
+static inline int near(const Span *before, const Span *after)
+{
+    return most(before->low, after->low) - least(before->high, after->high) < before->max_gap_m;
+}
+
+/* connect: component of each of n cells, in the order of their first cells; returns how many. In the order of the
+ * grid the neighbours of a cell are the one before it and up to three of the row before. Scratch: `next` of side,
+ * the others of n. */
+EXPORT i64 modt_connect(const Cells *cells, const float *max_gap_m, i64 n, i32 side, i32 *next, i32 *order,
+                        i32 *parent, i32 *root, Span *span, i64 *component)
+{
     for (i64 i = 0; i < n; i++) {
-        PROVEN(cells->row[i] >= 0 && cells->row[i] < side - 1);
-        PROVEN(cells->column[i] > 0 && cells->column[i] < side - 1);
-        number[cells->row[i] * side + cells->column[i]] = parent[i] = (i32)i;
+        PROVEN(cells->row[i] >= 0 && cells->row[i] < side && cells->column[i] > 0 && cells->column[i] < side - 1);
+        root[i] = (i32)i;
     }
-    for (i32 i = 0; i < n; i++) {
-        const i32 *here = &number[cells->row[i] * side + cells->column[i]];
-        i32 near[4], pairs = 0;
-        for (int k = 0; k < 4; k++) { /* without branches, which would be mispredicted */
-            i32 found = here[ahead[k]], j = found == NONE ? i : found;
-            float gap_m = most(cells->low[i], cells->low[j]) - least(cells->high[i], cells->high[j]);
-            near[pairs] = j;
-            pairs += (j != i) & (gap_m < max_gap_m[i]);
-        }
-        for (int k = 0; k < pairs; k++)
-            join(parent, i, near[k]);
+    sort_by(cells->column, side, root, n, next, parent);
+    sort_by(cells->row, side, parent, n, next, order);
+    for (i64 k = 0; k < n; k++) {
+        i32 i = order[k];
+        Span own = {cells->row[i] * side + cells->column[i], cells->low[i], cells->high[i], max_gap_m[i]};
+        span[k] = own;
+        parent[k] = (i32)k;
     }
+    i32 above = 0;
+    for (i32 k = 0; k < n; k++) {
+        i32 place = span[k].place;
+        if (k && span[k - 1].place == place - 1 && near(&span[k - 1], &span[k]))
+            join(parent, k - 1, k);
+        while (span[above].place < place - side - 1)
+            above++;
+        for (i32 a = above; span[a].place <= place - side + 1; a++) /* ends at k */
+            if (near(&span[a], &span[k]))
+                join(parent, a, k);
+    }
+    for (i64 k = 0; k < n; k++) {
+        parent[k] = parent[parent[k]];
+        root[order[k]] = parent[k];
+    }
+    i32 *number = order; /* of the component of each root */
     i64 count = 0;
-    for (i32 i = 0; i < n; i++) {
-        number[cells->row[i] * side + cells->column[i]] = NONE;
-        component[i] = parent[i] == i ? count++ : component[parent[i]];
+    for (i64 k = 0; k < n; k++)
+        number[k] = NONE;
+    for (i64 i = 0; i < n; i++) {
+        if (number[root[i]] == NONE)
+            number[root[i]] = (i32)count++;
+        component[i] = number[root[i]];
     }
     return count;
 }

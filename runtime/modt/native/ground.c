@@ -41,7 +41,7 @@ static ALWAYS_INLINE void place_points(const Ground *g, const float *points, i64
     }
 }
 
-/* GroundEstimator._lowest, of up to BLOCK points. Neighbours share cells: the lowest of a run is kept at hand. */
+/* GroundEstimator._lowest, of up to BLOCK points */
 static void find_lowest(const Ground *g, float height_m, const float *z, const float *sqrt_range, const i32 *cell,
                         i64 n, float *lowest)
 {
@@ -51,13 +51,9 @@ static void find_lowest(const Ground *g, float height_m, const float *z, const f
         int plausible = (__builtin_fabsf(z[i] + height_m) < reach) & (sqrt_range[i] > g->min_sqrt_range);
         candidate[i] = plausible ? z[i] : INFINITY;
     }
-    for (i64 i = 0; i < n;) {
-        i32 here = cell[i];
-        float low = lowest[here];
-        PROVEN(here >= 0 && here < g->rings * g->sectors);
-        for (; i < n && cell[i] == here; i++)
-            low = least(candidate[i], low);
-        lowest[here] = low;
+    for (i64 i = 0; i < n; i++) {
+        PROVEN(cell[i] >= 0 && cell[i] < g->rings * g->sectors);
+        lowest[cell[i]] = least(candidate[i], lowest[cell[i]]);
     }
 }
 

@@ -24,7 +24,7 @@ _SIGNATURES: dict[str, tuple[Any, Sequence[Any]]] = {
     "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
     "modt_row_column": (None, (_P, _P, _P, _L, _F, _I, _P, _P)),
     "modt_occupied_cells": (_L, (_P, _P, _P, _P, _L, _I, _P, _P, _P, _P)),
-    "modt_connect": (_L, (_P, _P, _L, _I, _P, _P, _P)),
+    "modt_connect": (_L, (_P, _P, _L, _I, _P, _P, _P, _P, _P, _P)),
     "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
     "modt_group": (_L, (_P, _L, _L, _P, _P)),
     "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
@@ -156,10 +156,11 @@ class NativeKernels:
     def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
         """(C,) connected component of each cell, numbered in the order of their first cells."""
         n = len(cells)
-        parent, component, pointers = np.empty(n, np.int32), np.empty(n, np.int64), self._cells(cells)
+        next_, scratch, spans = np.empty(grid.side, np.int32), np.empty((3, n), np.int32), np.empty((4, n), np.int32)
+        component, pointers = np.empty(n, np.int64), self._cells(cells)
         self._library.modt_connect(
-            ctypes.addressof(pointers), _at(max_gap_m), n, grid.side, _at(grid.number, np.int32),
-            _at(parent, np.int32), _at(component, np.int64),
+            ctypes.addressof(pointers), _at(max_gap_m), n, grid.side, _address(next_), *map(_address, scratch),
+            _address(spans), _at(component, np.int64),
         )  # fmt: skip
         return component
 
