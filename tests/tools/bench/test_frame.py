@@ -1,0 +1,44 @@
+"""Benchmark of a frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from modt.types import Frame
+from tools.bench import frame
+
+
+def times(**ms):
+    return {frame.YARDSTICK: np.full(20, 4.0), **{name: np.full(20, v) for name, v in ms.items()}}
+
+
+def test_ratios_are_of_medians_with_intervals_that_hold_them():
+    rng = np.random.default_rng(0)
+    found, low, high = frame.ratio(rng.normal(2.0, 0.1, 200), rng.normal(4.0, 0.2, 200))
+    assert found == pytest.approx(0.5, abs=0.02)
+    assert low < found < high < low + 0.05
+
+
+def test_a_regression_is_more_of_the_yardsticks_time():
+    earlier = frame.summary(times(accurate=8.0, efficient=6.0))
+    later = frame.summary({name: 3 * ms for name, ms in times(accurate=8.0, efficient=9.0).items()})
+    assert frame.regressions(later, earlier, 0.2) == ["efficient: +50% of the yardstick's time"]
+    assert frame.regressions(later, earlier, 0.6) == []
+
+
+def test_the_first_frames_are_left_out_and_all_run_on_each():
+    seen = []
+
+    def work(name):
+        return lambda sweep: seen.append((name, sweep.index)) or float(sweep.index)
+
+    sweeps = [Frame(i, 0.1 * i, np.zeros((0, 4), np.float32), None) for i in range(frame.FIRST + 2)]
+    found = frame.measure(sweeps, {"one": work("one"), "other": work("other")})
+    assert found["one"].tolist() == [frame.FIRST, frame.FIRST + 1]
+    assert seen[:4] == [("one", 0), ("other", 0), ("one", 1), ("other", 1)]
+
+
+def test_the_table_has_a_row_each():
+    rows = frame.summary(times(accurate=8.0) | {frame.BASELINE: np.full(20, 16.0)})
+    assert "| accurate | 8.00 ms | 0.50 (0.50, 0.50) |" in frame.table(rows).splitlines()

@@ -1,0 +1,149 @@
+"""CPU time of a whole frame and of its segmentation, on both kernels, beside a published ground filter.
+
+    python -m tools.bench.frame DRIVE [--frames N] [--write] [--against FILE]
+
+All run alternately in one thread, frame by frame, on the full circle: the pipelines on compiled kernels and on NumPy,
+Patchwork++ (ground only; extra "bench") and the yardstick, sorting 100,000 numbers. Ratios are of medians, with
+95 % intervals from resampled frames. --write puts the table into docs/segmentation.md. --against compares the ratios
+to the yardstick with those of an earlier output and fails where one is larger by more than --tolerance: what a busy
+machine slows, it slows alike.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from modt import assembly, host, profile
+from modt.config.segmentation import NATIVE
+from modt.config.segmentation import NUMPY as NUMPY_KERNELS
+from modt.energy.ledger import Ledger
+from modt.geometry import FieldOfView
+from modt.pipeline import SEGMENTATION
+from modt.sources.recognise import open_stream
+from modt.types import Float64, Frame
+from tools.bench.segmentation import optional
+from tools.docs.sections import replace_section
+from tools.options import parser
+
+FIRST = 10
+"""Frames left out, while tracks begin."""
+MODES = ("accurate", "efficient")
+BASELINE, YARDSTICK = "Patchwork++: ground alone", "sorting 100,000 numbers"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "segmentation.md"
+_NUMBERS = np.random.default_rng(0).random(100_000)
+
+Work = Callable[[Frame], float]
+"""CPU time of its work on a frame [ms]."""
+Rows = dict[str, dict[str, float]]
+
+
+def timed(work: Callable[[Frame], object], frame: Frame) -> float:
+    """CPU time of the call [ms]."""
+    start = time.thread_time_ns()
+    work(frame)
+    return (time.thread_time_ns() - start) / 1e6
+
+
+def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
+    """CPU time of the stage in the last frame [ms]."""
+    return float(ledger.close_frame(frame.index)["stages"][SEGMENTATION]["cpu_ns"]) / 1e6
+
+
+def contenders() -> dict[str, Work]:
+    """What is timed, in the order in which it runs on each frame."""
+    found: dict[str, Work] = {YARDSTICK: partial(timed, lambda _: np.sort(_NUMBERS))}
+    patchwork = optional("pypatchworkpp")
+    if patchwork is not None:
+        parameters = patchwork.Parameters()
+        parameters.verbose = False
+        ground = patchwork.patchworkpp(parameters).estimateGround
+        found[BASELINE] = partial(timed, lambda frame: ground(frame.points))
+    shipped = profile.load("hdl-64e")
+    for kernels in (NATIVE, NUMPY_KERNELS):
+        config = replace(shipped, segmentation=replace(shipped.segmentation, kernels=kernels))
+        for mode in MODES:
+            ledger = Ledger()
+            pipeline = assembly.pipeline(assembly.MODES[mode], config, FieldOfView(), ledger)
+            budget = assembly.MODES[mode].budget(config)
+            found[f"{mode}, {kernels}"] = partial(timed, partial(pipeline.step, budget=budget))
+            found[f"segmentation in it ({mode}, {kernels})"] = partial(segmentation_ms, ledger)
+    return found
+
+
+def measure(frames: list[Frame], work: dict[str, Work]) -> dict[str, Float64]:
+    """CPU times of all on every frame but the first ones [ms]."""
+    times: dict[str, list[float]] = {name: [] for name in work}
+    for frame in frames:
+        for name, run in work.items():
+            times[name].append(run(frame))
+    return {name: np.array(ms[FIRST:]) for name, ms in times.items()}
+
+
+def ratio(of: Float64, to: Float64) -> tuple[float, float, float]:
+    """Ratio of medians, and its 95 % interval from resampled frames."""
+    rows = np.random.default_rng(0).integers(0, len(of), (1000, len(of)))
+    low, high = np.quantile(np.median(of[rows], axis=1) / np.median(to[rows], axis=1), [0.025, 0.975])
+    return float(np.median(of) / np.median(to)), float(low), float(high)
+
+
+def summary(times: dict[str, Float64]) -> Rows:
+    """Median [ms], and ratios to the baseline and to the yardstick."""
+    rows: Rows = {}
+    for name, ms in times.items():
+        rows[name] = {"median_ms": float(np.median(ms)), "to_yardstick": ratio(ms, times[YARDSTICK])[0]}
+        if BASELINE in times:
+            low_high = zip(("to_patchwork", "low", "high"), ratio(ms, times[BASELINE]), strict=True)
+            rows[name] |= dict(low_high)
+    return rows
+
+
+def table(rows: Rows) -> str:
+    """The rows as Markdown."""
+    lines = ["| CPU time a frame | median | of Patchwork++'s |", "|---|---|---|"]
+    for name, row in rows.items():
+        share = f"{row['to_patchwork']:.2f} ({row['low']:.2f}, {row['high']:.2f})" if "low" in row else ""
+        lines.append(f"| {name} | {row['median_ms']:.2f} ms | {share} |")
+    return "\n".join(lines)
+
+
+def regressions(rows: Rows, earlier: Rows, tolerance: float) -> list[str]:
+    """What takes longer than before, by more than the tolerance."""
+    found = []
+    for name in rows.keys() & earlier.keys():
+        change = rows[name]["to_yardstick"] / earlier[name]["to_yardstick"] - 1
+        if change > tolerance:
+            found.append(f"{name}: {change:+.0%} of the yardstick's time")
+    return sorted(found)
+
+
+def main() -> int:
+    options = parser(__doc__)
+    options.add_argument("drive", type=Path)
+    options.add_argument("--frames", type=int, default=60)
+    options.add_argument("--write", action="store_true", help="put the table into docs/segmentation.md")
+    options.add_argument("--against", type=Path, metavar="FILE", help="an earlier output")
+    options.add_argument("--tolerance", type=float, default=0.2, help="default: %(default)s")
+    arguments = options.parse_args()
+    host.keep_freed_pages()
+    frames = [frame for frame, _ in zip(open_stream(arguments.drive), range(arguments.frames), strict=False)]
+    rows = summary(measure(frames, contenders()))
+    print(json.dumps(rows, indent=2))
+    if arguments.write:
+        PAGE.write_text(replace_section(PAGE.read_text(), "cost of a frame", table(rows)))
+    if arguments.against is None:
+        return 0
+    slower = regressions(rows, json.loads(arguments.against.read_text()), arguments.tolerance)
+    for line in slower:
+        print(line)
+    return int(bool(slower))
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
