@@ -136,7 +136,7 @@ def test_near_clusters_are_not_merged():
     size, points = np.ones(3, np.float32), np.full(3, 50.0)
     range_m = np.array([10.0, 24.0, 27.0], np.float32)
     beam_m = range_m * np.float32(BEAM)
-    sizes = ClusterSizes(points, size, 0 * size, size, np.sqrt(range_m), beam_m, np.zeros(3, np.bool_))
+    sizes = ClusterSizes(points, size, 0 * size, size, np.sqrt(range_m), np.arange(3), beam_m, np.zeros(3, np.bool_))
     assert stage.candidates(sizes).tolist() == [False, False, True]
 
 

@@ -36,7 +36,8 @@ def cells_of(grid, points, height):
 
 def components(grid, cells, beam_m):
     gap = SegmentationConfig().clusters
-    return connect(grid, cells, np.float32(gap.max_gap_m) + np.float32(gap.max_gap_beams) * beam_m)
+    gap_m = np.float32(gap.max_gap_m) + np.float32(gap.max_gap_beams) * beam_m
+    return connect(grid, cells, gap_m, np.ones(len(cells), np.bool_))
 
 
 @given(seed=st.integers(0, 10_000), n=st.integers(1, 250), sigma=st.floats(0.05, 3.0))

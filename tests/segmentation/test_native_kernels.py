@@ -149,9 +149,14 @@ def test_cells_and_components(kernels, seed, n, sigma):
     expected, found = (k.occupied_cells(grid, *place, height, height) for k in (NUMPY, kernels))
     assert same(expected, found)
     cells, sample, _ = expected
-    gap_m = np.random.default_rng(seed).uniform(0, 1, len(cells)).astype(np.float32)
-    component = NUMPY.connect(grid, cells, gap_m)
-    assert same(component, kernels.connect(grid, cells, gap_m))
+    rng = np.random.default_rng(seed)
+    gap_m, use = (
+        rng.uniform(0, 1, len(cells)).astype(np.float32),
+        rng.random(len(cells)) < rng.choice([0.0, 0.7, 1.0]),
+    )
+    component = NUMPY.connect(grid, cells, gap_m, use)
+    assert same(component, kernels.connect(grid, cells, gap_m, use))
+    assert ((component == NONE) == ~use).all()
     assert (grid.number == NONE).all(), "the grid is empty again"
     bounds = (k.cluster_bounds(cells, points.take(sample), component, component.max() + 1) for k in (NUMPY, kernels))
     assert same(*bounds)

@@ -72,8 +72,8 @@ static void sort_by(const i32 *digit, i32 base, const i32 *rows, i64 n, i32 *nex
     i32 total = 0;
     for (i32 d = 0; d < base; d++)
         next[d] = 0;
-    for (i64 i = 0; i < n; i++)
-        next[digit[i]]++;
+    for (i64 k = 0; k < n; k++)
+        next[digit[rows[k]]]++;
     for (i32 d = 0; d < base; d++) {
         i32 count = next[d];
         next[d] = total;
@@ -93,15 +93,17 @@ static inline int near(const Span *before, const Span *after)
     return most(before->low, after->low) - least(before->high, after->high) < before->max_gap_m;
 }
 
-/* connect: component of each of n cells, in the order of their first cells; returns how many. In the order of the
- * grid the neighbours of a cell are the one before it and up to three of the row before. Scratch: `next` of side,
- * the others of n. */
-EXPORT i64 modt_connect(const Cells *cells, const float *max_gap_m, i64 n, i32 side, i32 *next, i32 *order,
-                        i32 *parent, i32 *root, Span *span, i64 *component)
+/* connect: component of each cell used of n_cells, in the order of their first cells. In the order of the grid the
+ * neighbours of a cell are the one before it and up to three of the row before. Scratch: `next` of side, the others
+ * of n_cells. */
+EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, i32 side,
+                         i32 *next, i32 *order, i32 *parent, i32 *root, Span *span, i64 *component)
 {
-    for (i64 i = 0; i < n; i++) {
+    i64 n = 0;
+    for (i64 i = 0; i < n_cells; i++) {
         PROVEN(cells->row[i] >= 0 && cells->row[i] < side && cells->column[i] > 0 && cells->column[i] < side - 1);
-        root[i] = (i32)i;
+        root[n] = (i32)i;
+        n += use[i];
     }
     sort_by(cells->column, side, root, n, next, parent);
     sort_by(cells->row, side, parent, n, next, order);
@@ -130,12 +132,14 @@ EXPORT i64 modt_connect(const Cells *cells, const float *max_gap_m, i64 n, i32 s
     i64 count = 0;
     for (i64 k = 0; k < n; k++)
         number[k] = NONE;
-    for (i64 i = 0; i < n; i++) {
+    for (i64 i = 0; i < n_cells; i++) {
+        component[i] = NONE;
+        if (!use[i])
+            continue;
         if (number[root[i]] == NONE)
             number[root[i]] = (i32)count++;
         component[i] = number[root[i]];
     }
-    return count;
 }
 
 typedef struct {
@@ -143,7 +147,7 @@ typedef struct {
     i64 *points, *cell;
 } Bounds;
 
-/* cluster_bounds: bounds of n clusters of C cells, sums of their points, and
+/* cluster_bounds: bounds of n clusters of cells, some of them of none, sums of their points, and
  * the last cell of each. */
 EXPORT void modt_cluster_bounds(const Cells *cells, const float *x, const float *y, const i64 *cluster, i64 n_cells, i64 n, Bounds *bounds)
 {
@@ -154,7 +158,9 @@ EXPORT void modt_cluster_bounds(const Cells *cells, const float *x, const float 
     }
     for (i64 i = 0; i < n_cells; i++) {
         i64 g = cluster[i];
-        PROVEN(g >= 0 && g < n);
+        PROVEN(g >= NONE && g < n);
+        if (g == NONE)
+            continue;
         bounds->min_x[g] = least(x[i], bounds->min_x[g]);
         bounds->max_x[g] = most(x[i], bounds->max_x[g]);
         bounds->min_y[g] = least(y[i], bounds->min_y[g]);

@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from modt.segmentation.grids import Int32, SqrtRangeGrid
 from modt.segmentation.groups import label_max, label_min
-from modt.types import Float32, Int
+from modt.types import NONE, Bool, Float32, Int
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +26,6 @@ class Cells:
     def __len__(self) -> int:
         return len(self.row)
 
-    def take(self, rows: Int) -> Cells:
-        """Cells by index."""
-        bounds = self.low.take(rows), self.high.take(rows)
-        return Cells(self.row.take(rows), self.column.take(rows), *bounds, self.entries.take(rows))
-
 
 def occupied_cells(
     grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32
@@ -42,14 +37,21 @@ def occupied_cells(
     return Cells(row[sample], column[sample], *bounds, np.bincount(cell, minlength=n)), sample, cell
 
 
-def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
-    """(C,) connected component of each cell: neighbours with a vertical gap below (C,) max_gap_m are connected."""
-    one, other = grid.neighbour_pairs(grid.flat_index(cells.row, cells.column))
-    gap = np.maximum(cells.low.take(one), cells.low.take(other))
-    gap -= np.minimum(cells.high.take(one), cells.high.take(other))
-    near = np.flatnonzero(gap < max_gap_m.take(one))
-    ends = np.zeros(len(cells) + 1, np.int32)
-    np.cumsum(np.bincount(one.take(near), minlength=len(cells)), out=ends[1:])
-    graph = csr_array((np.ones(len(near)), other.take(near), ends), shape=(len(cells), len(cells)))
-    component: Int = connected_components(graph, directed=False)[1].astype(np.int64)
+def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
+    """(C,) connected component of each cell of the (C,) used ones, NONE for the others.
+
+    Neighbours with a vertical gap below (C,) max_gap_m are connected. Components are numbered in the order of their
+    first cells.
+    """
+    rows = np.flatnonzero(use)
+    low, high, gap_m = cells.low.take(rows), cells.high.take(rows), max_gap_m.take(rows)
+    one, other = grid.neighbour_pairs(grid.flat_index(cells.row.take(rows), cells.column.take(rows)))
+    gap = np.maximum(low.take(one), low.take(other))
+    gap -= np.minimum(high.take(one), high.take(other))
+    near = np.flatnonzero(gap < gap_m.take(one))
+    ends = np.zeros(len(rows) + 1, np.int32)
+    np.cumsum(np.bincount(one.take(near), minlength=len(rows)), out=ends[1:])
+    graph = csr_array((np.ones(len(near)), other.take(near), ends), shape=(len(rows), len(rows)))
+    component = np.full(len(cells), NONE)
+    component[rows] = connected_components(graph, directed=False)[1]
     return component

@@ -59,15 +59,14 @@ class Clusterer:
         cluster = self._connect_coarse(cells, beam_m)
         coarse = self._sizes(cells, points, beam_m, cluster)
         oversized = coarse.extent_m >= self.config.max_extent_m
-        rows = np.flatnonzero((oversized | self._may_hold_person(coarse))[cluster])
-        inside, beam_m = cells.take(rows), beam_m[rows]
-        part = self._components(self.fine, inside, beam_m)
-        parts = self._sizes(inside, points.take(rows), beam_m, part)
-        owner = np.zeros(len(parts), np.int64)
-        owner[part] = cluster[rows]
-        of_oversized = oversized[owner]
+        part = self._components(self.fine, cells, beam_m, (oversized | self._may_hold_person(coarse)).take(cluster))
+        parts = self._sizes(cells, points, beam_m, part)
+        owner = cluster.take(parts.cell)
+        of_oversized = oversized.take(owner)
         split = of_oversized | self._may_be_person(parts)
-        cluster[rows] = np.where(split[part], part + len(coarse), cluster[rows])
+        cluster = np.where(
+            np.append(split, False).take(part), part + len(coarse), cluster
+        )  # the last is that of NONE
         whole = np.bincount(owner, parts.points * split, len(coarse))
         coarse, parts = (
             replace(coarse, points=coarse.points - whole.astype(np.int64)),
@@ -76,7 +75,7 @@ class Clusterer:
         return cluster, coarse.followed_by(parts)
 
     def _sizes(self, cells: Cells, points: PointColumns, beam_m: Float32, cluster: Int) -> ClusterSizes:
-        """Sizes of the clusters of (C,) cells, given a point of each and the distance of beams there [m]."""
+        """Sizes of the clusters of (C,) cells, NONE of them, given a point of each and the distance of beams [m]."""
         bounds = self.kernels.cluster_bounds(cells, points, cluster, int(cluster.max(initial=NONE)) + 1)
         return ClusterSizes.of_bounds(bounds, points, beam_m)
 
@@ -104,11 +103,12 @@ class Clusterer:
         """(C,) cluster of each fine cell: that of the coarse cell of which it is a quarter."""
         row, column = fine.row >> 1, fine.column >> 1
         cells, sample, coarse = self.kernels.occupied_cells(self.coarse, row, column, fine.low, fine.high)
-        return self._components(self.coarse, cells, beam_m[sample])[coarse]
+        component = self._components(self.coarse, cells, beam_m.take(sample), np.ones(len(cells), np.bool_))
+        return component.take(coarse)
 
-    def _components(self, grid: SqrtRangeGrid, cells: Cells, beam_m: Float32) -> Int:
-        """(C,) connected component of each cell."""
-        return self.kernels.connect(grid, cells, self.gap_m + self.gap_beams * beam_m)
+    def _components(self, grid: SqrtRangeGrid, cells: Cells, beam_m: Float32, use: Bool) -> Int:
+        """(C,) connected component of each cell used, NONE for the others."""
+        return self.kernels.connect(grid, cells, self.gap_m + self.gap_beams * beam_m, use)
 
     def _valid(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""

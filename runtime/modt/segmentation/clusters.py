@@ -36,7 +36,8 @@ class ClusterSizes:
     bottom_m: Float32  # (G,) least height above ground [m]
     top_m: Float32  # (G,) greatest height above ground [m]
     sqrt_range: Float32  # (G,) square root of the range of one cell [sqrt(m)]
-    beam_m: Float32  # (G,) vertical distance of neighbouring beams at that cell [m]
+    cell: Int  # (G,) that cell
+    beam_m: Float32  # (G,) vertical distance of neighbouring beams there [m]
     is_part: Bool  # (G,) part of an oversized cluster
 
     def __len__(self) -> int:
@@ -51,6 +52,7 @@ class ClusterSizes:
             bottom_m=bounds.bottom,
             top_m=bounds.top,
             sqrt_range=points.sqrt_range.take(bounds.cell),
+            cell=bounds.cell,
             beam_m=beam_m.take(bounds.cell),
             is_part=np.zeros(len(bounds.cell), np.bool_),
         )
@@ -93,17 +95,19 @@ class Clusters:
 
 
 def cluster_bounds(cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
-    """Bounds of n clusters of (C,) cells, given a point of each cell."""
-    cell = np.zeros(n, np.int64)
-    cell[cluster] = np.arange(len(cluster))
+    """Bounds of n clusters, given (C,) the cluster of each cell, NONE where it has none, and a point of each cell."""
+    rows, cell = np.flatnonzero(cluster != NONE), np.zeros(n, np.int64)
+    label = cluster.take(rows)
+    cell[label] = rows
+    x, y = points.x.take(rows), points.y.take(rows)
     return ClusterBounds(
-        min_x=label_min(points.x, cluster, n),
-        max_x=label_max(points.x, cluster, n),
-        min_y=label_min(points.y, cluster, n),
-        max_y=label_max(points.y, cluster, n),
-        bottom=label_min(cells.low, cluster, n),
-        top=label_max(cells.high, cluster, n),
-        points=np.bincount(cluster, cells.entries, n).astype(np.int64),
+        min_x=label_min(x, label, n),
+        max_x=label_max(x, label, n),
+        min_y=label_min(y, label, n),
+        max_y=label_max(y, label, n),
+        bottom=label_min(cells.low.take(rows), label, n),
+        top=label_max(cells.high.take(rows), label, n),
+        points=np.bincount(label, cells.entries.take(rows), n).astype(np.int64),
         cell=cell,
     )
 

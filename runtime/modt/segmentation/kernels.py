@@ -15,7 +15,7 @@ from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups
 from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.reflectance_statistics import reflectance_sums
-from modt.types import Float32, Float64, Int
+from modt.types import Bool, Float32, Float64, Int
 
 
 class Kernels(Protocol):
@@ -45,11 +45,11 @@ class Kernels(Protocol):
     ) -> tuple[Cells, Int, Int]:
         """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
 
-    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
-        """(C,) connected component of each cell, numbered in the order of their first cells."""
+    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
+        """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
 
     def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
-        """Bounds of n clusters of (C,) cells, given a point of each cell."""
+        """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
 
     def group(self, labels: Int, n: int) -> Groups:
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""

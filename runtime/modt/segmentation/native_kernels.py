@@ -17,14 +17,14 @@ from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups
 from modt.segmentation.point_columns import FAR_M, PointColumns
 from modt.segmentation.reflectance_statistics import BRIGHT, DARK
-from modt.types import NONE, Float32, Float64, Int
+from modt.types import NONE, Bool, Float32, Float64, Int
 
 _F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: dict[str, tuple[Any, Sequence[Any]]] = {
     "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
     "modt_row_column": (None, (_P, _P, _P, _L, _F, _I, _P, _P)),
     "modt_occupied_cells": (_L, (_P, _P, _P, _P, _L, _I, _P, _P, _P, _P)),
-    "modt_connect": (_L, (_P, _P, _L, _I, _P, _P, _P, _P, _P, _P)),
+    "modt_connect": (None, (_P, _P, _P, _L, _I, _P, _P, _P, _P, _P, _P)),
     "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
     "modt_group": (_L, (_P, _L, _L, _P, _P)),
     "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
@@ -153,19 +153,19 @@ class NativeKernels:
         (row, column), (low, high) = places[:, k - n :], heights[:, k - n :]
         return Cells(row, column, low, high, entries[k - n :]), sample[k - n :], cell
 
-    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
-        """(C,) connected component of each cell, numbered in the order of their first cells."""
+    def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
+        """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
         n = len(cells)
         next_, scratch, spans = np.empty(grid.side, np.int32), np.empty((3, n), np.int32), np.empty((4, n), np.int32)
         component, pointers = np.empty(n, np.int64), self._cells(cells)
         self._library.modt_connect(
-            ctypes.addressof(pointers), _at(max_gap_m), n, grid.side, _address(next_), *map(_address, scratch),
-            _address(spans), _at(component, np.int64),
+            ctypes.addressof(pointers), _at(max_gap_m), _at(use, np.bool_), n, grid.side, _address(next_),
+            *map(_address, scratch), _address(spans), _at(component, np.int64),
         )  # fmt: skip
         return component
 
     def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
-        """Bounds of n clusters of (C,) cells, given a point of each cell."""
+        """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
         bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
         own, out = self._cells(cells), _pointers(*bounds, *counts)
         self._library.modt_cluster_bounds(
