@@ -94,11 +94,12 @@ static inline int near(const Span *before, const Span *after)
 }
 
 /* connect: component of each cell used of n_cells, in the order of their first cells. In the order of the grid the
- * neighbours of a cell are the one before it and up to three of the row before. Scratch: `next` of side, the others
- * of n_cells. */
+ * neighbours of a cell are the one before it and up to three of the row before. Scratch: `next` of side, `scratch` of
+ * 3 n_cells, `span` of n_cells. */
 EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, i32 side,
-                         i32 *next, i32 *order, i32 *parent, i32 *root, Span *span, i64 *component)
+                         i32 *next, i32 *scratch, Span *span, i64 *component)
 {
+    i32 *order = scratch, *parent = scratch + n_cells, *root = scratch + 2 * n_cells;
     i64 n = 0;
     for (i64 i = 0; i < n_cells; i++) {
         PROVEN(cells->row[i] >= 0 && cells->row[i] < side && cells->column[i] > 0 && cells->column[i] < side - 1);

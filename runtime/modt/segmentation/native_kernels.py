@@ -24,7 +24,7 @@ _SIGNATURES: dict[str, tuple[Any, Sequence[Any]]] = {
     "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
     "modt_row_column": (None, (_P, _P, _P, _L, _F, _I, _P, _P)),
     "modt_occupied_cells": (_L, (_P, _P, _P, _P, _L, _I, _P, _P, _P, _P)),
-    "modt_connect": (None, (_P, _P, _P, _L, _I, _P, _P, _P, _P, _P, _P)),
+    "modt_connect": (None, (_P, _P, _P, _L, _I, _P, _P, _P, _P)),
     "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
     "modt_group": (_L, (_P, _L, _L, _P, _P)),
     "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
@@ -53,8 +53,12 @@ def _address(array: NDArray[Any]) -> int:
 
 
 def _pointers(*arrays: NDArray[Any]) -> Any:
-    """A C structure of pointers to arrays of any kind."""
-    return (_P * len(arrays))(*map(_address, arrays))
+    """A C structure of pointers to contiguous arrays, and to each row of those of two dimensions."""
+    addresses: list[int] = []
+    for array in arrays:
+        first, rows = _address(array), 1 if array.ndim == 1 else len(array)
+        addresses += (first + i * array.strides[0] for i in range(rows))
+    return (_P * len(addresses))(*addresses)
 
 
 class _Ground(ctypes.Structure):
@@ -90,12 +94,14 @@ class _GroundBuffers:
         self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
         self.points = np.empty((3, 0), np.float32)
         self.rays = np.empty((4, SECTORS), np.float32)
+        self._scratch = _pointers(*self.cells, self.points)
 
     def scratch(self, n: int) -> Any:
         """Scratch of ground.c, for n points."""
         if n > self.points.shape[1]:
             self.points = np.empty((3, n), np.float32)
-        return _pointers(*self.cells[0], *self.cells[1], *self.points)
+            self._scratch = _pointers(*self.cells, self.points)
+        return self._scratch
 
 
 class NativeKernels:
@@ -122,7 +128,7 @@ class NativeKernels:
         points = np.ascontiguousarray(points, np.float32)
         n, width = points.shape
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
-        scratch, out = buffers.scratch(n), _pointers(*kept)
+        scratch, out = buffers.scratch(n), _pointers(kept)
         k = self._library.modt_above_ground(
             ctypes.addressof(buffers.constants), _at(ground.grid.range_m), _at(buffers.flat_m), sensor_height_m,
             _at(points), n, width, ctypes.addressof(scratch), _at(buffers.rays), _at(bounds), _at(rows, np.int64),
@@ -145,7 +151,7 @@ class NativeKernels:
         k = len(row)
         places, heights, entries = np.empty((2, k), np.int32), np.empty((2, k), np.float32), np.empty(k, np.int64)
         sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
-        out = _pointers(*places, *heights, entries)
+        out = _pointers(places, heights, entries)
         n = self._library.modt_occupied_cells(
             _at(row, np.int32), _at(column, np.int32), _at(low), _at(high), k, grid.side, _at(grid.number, np.int32),
             _at(sample, np.int64), _at(cell, np.int64), ctypes.addressof(out),
@@ -156,18 +162,18 @@ class NativeKernels:
     def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
         """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
         n = len(cells)
-        next_, scratch, spans = np.empty(grid.side, np.int32), np.empty((3, n), np.int32), np.empty((4, n), np.int32)
+        next_, scratch, spans = np.empty(grid.side, np.int32), np.empty(3 * n, np.int32), np.empty(4 * n, np.int32)
         component, pointers = np.empty(n, np.int64), self._cells(cells)
         self._library.modt_connect(
             ctypes.addressof(pointers), _at(max_gap_m), _at(use, np.bool_), n, grid.side, _address(next_),
-            *map(_address, scratch), _address(spans), _at(component, np.int64),
+            _address(scratch), _address(spans), _at(component, np.int64),
         )  # fmt: skip
         return component
 
     def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
         """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
         bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
-        own, out = self._cells(cells), _pointers(*bounds, *counts)
+        own, out = self._cells(cells), _pointers(bounds, counts)
         self._library.modt_cluster_bounds(
             ctypes.addressof(own), _at(points.x), _at(points.y), _at(cluster, np.int64), len(cells), n,
             ctypes.addressof(out),
@@ -186,7 +192,7 @@ class NativeKernels:
         m = int(cells.entries.sum(where=of_cell != NONE))
         offsets, rows, own = np.empty(clusters.n + 1, np.int64), np.empty(m, np.int64), np.empty((4, m), np.float32)
         columns = [_at(column) for column in (points.x, points.y, points.z, clusters.height)]
-        given, out = (_P * 5)(*columns, _at(index, np.int64)), _pointers(offsets, rows, *own)
+        given, out = (_P * 5)(*columns, _at(index, np.int64)), _pointers(offsets, rows, own)
         self._library.modt_members(
             ctypes.addressof(given), _at(clusters.cell, np.int64), len(index), _at(of_cell, np.int64),
             _at(cells.entries, np.int64), len(cells), clusters.n, ctypes.addressof(out),
