@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-import os
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from modt import host
 from modt.errors import ScanError
 from modt.sources.live.sweep_reader import Sweep, SweepReader
 from modt.sources.scan_file import sanitised
@@ -132,9 +131,9 @@ class LiveStream:
             self._thread.join(2 * READ_S)
 
     def _receive(self) -> None:
-        if self._cores:
-            with suppress(OSError):  # a core that is not allowed: stay where the process is
-                os.sched_setaffinity(0, self._cores)
+        lacking = host.serve_loop(self._cores)
+        if lacking:
+            log.warning("%s: %s", self.info.name, lacking)
         while not self._ended:
             try:
                 sweeps = self.reader.read(READ_S)
