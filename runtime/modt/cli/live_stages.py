@@ -71,7 +71,11 @@ class LiveStages:
         unlike = self._watch.unlike(frame.points)
         if not self._seen:
             self._seen = True
-            self._exchange(self._made(self._chosen(frame)))
+            chosen = self._chosen(frame)
+            if chosen.config == self.parts.config:
+                self.parts = replace(self.parts, chosen=chosen)
+            else:
+                self._exchange(self._made(chosen))
         elif unlike:  # it takes longer than a frame
             self.looking = Thread(target=self._look_again, args=(frame,), name="recognition", daemon=True)
             self.looking.start()
