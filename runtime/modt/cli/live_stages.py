@@ -125,7 +125,7 @@ class LiveStages:
             self._found.append(self._chosen(frame))
 
     def _chosen(self, first: Frame | None) -> ChosenProfile:
-        return choose(self._request.profile, first, self._stream.profile)
+        return choose(self._request.profile, first, replace(self._stream.info, profile=self._stream.profile))
 
     def _made(self, chosen: ChosenProfile) -> Parts:
         pipeline = pipeline_of(self._request, self._stream, chosen.config, self._ledger)
