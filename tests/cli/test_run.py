@@ -98,6 +98,10 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
     report = modt("report", tmp_path / "run", cwd=tmp_path, module="modt.cli.profile")
     assert report.returncode == 0, report.stderr
+    pytest.importorskip("foxglove")
+    exported = modt("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap", cwd=tmp_path)
+    assert exported.returncode == 0, exported.stderr
+    assert (tmp_path / "run.mcap").stat().st_size > 15 * 100_000  # with the points
 
 
 def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):

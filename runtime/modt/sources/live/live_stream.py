@@ -162,7 +162,8 @@ class LiveStream:
         if self._silent:
             log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
         self._silent, self._last_s = False, arrived_s
-        index, self._index = self._index, self._index + 1
+        index = self._index if sweep.index is None else sweep.index
+        self._index = index + 1
         doubt = self._doubt(sweep.stamp_s, arrived_s)
         flaws = (doubt,) if doubt else arrival.flaws
         used = arrival.usable and not doubt

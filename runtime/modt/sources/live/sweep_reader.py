@@ -20,12 +20,14 @@ class Sweep:
     Attributes:
         stamp_s, points, turn_s: as in modt.types.Frame; points may hold values that are not finite.
         complete: no message of the turn is known to be missing.
+        index: of the frame in the recording that it comes from; None: count them.
     """
 
     stamp_s: float
     points: Float32
     turn_s: float = 0.0
     complete: bool = True
+    index: int | None = None
 
 
 @dataclass(slots=True)
