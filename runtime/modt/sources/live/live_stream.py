@@ -121,6 +121,7 @@ class LiveStream:
             "silences": self.silences,
             "time_steps": self.time_steps,
             "silent": self._silent,
+            "frame_id": reception.frame_id,
         }
 
     def close(self) -> None:

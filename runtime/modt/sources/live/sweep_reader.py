@@ -37,6 +37,7 @@ class Reception:
     messages: int = 0  # taken from the network or file
     lost: int = 0  # missing by their sequence numbers, stamps or angles
     refused: dict[str, int] = field(default_factory=dict)  # messages that cannot be used, by reason
+    frame_id: str = ""  # of the points, where messages name it; taken for the sensor's
 
     def refuse(self, reason: str) -> bool:
         """Count a refused message; whether it is the first for this reason."""
