@@ -81,7 +81,7 @@ class LiveLoop:
     Attributes:
         ladder, timing, failures, rest: what is known of the frames so far.
         changes: number of times that each step of the ladder was entered.
-        shed: sweeps left out by the last step, or because the first one took long.
+        shed: sweeps left out by the last step, or that came during the first frame.
         budget_ms: of the last frame, for classification.
         reloads, refused_reloads: counts.
     """
@@ -157,7 +157,7 @@ class LiveLoop:
         if self.frames > 1:
             share = self.timing.add(received.arrived_s, start_s, finish_s, period_s)
             self._changed(self.ladder.frame(finish_s, share))
-        elif finish_s > received.arrived_s + period_s:  # it chose the profile, and what came meanwhile is late
+        else:  # it takes long, choosing the profile: what came meanwhile would be late
             self._fresh_s = finish_s
 
     def _frame(self, received: Received, deadline_s: float) -> None:
