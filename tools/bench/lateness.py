@@ -74,8 +74,9 @@ def figures(status: dict[str, Any]) -> str:
     """What is missed and lost, and the times."""
     loop, sensor = status["loop"], status["sensor"]
     lost = f"{sensor['lost_messages']} messages lost, {sensor['dropped_sweeps']} sweeps dropped"
-    times = (f"{name} {loop[f'{name}_ms']}" for name in ("lateness", "execution", "latency"))
-    return "\n".join((f"{loop['missed_deadlines']} of {loop['frames']} deadlines missed, {lost} [ms]", *times))
+    missed = f"{loop['missed_deadlines']} of {loop['frames']} deadlines missed"
+    times = (f"{name} {loop[f'{name}_ms']} ms" for name in ("lateness", "execution", "latency"))
+    return "\n".join((f"{missed}, {lost}; {status['host']['resident_mb']:.0f} MB resident", *times))
 
 
 if __name__ == "__main__":
