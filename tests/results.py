@@ -40,7 +40,7 @@ def result(
         tracks.object_class[tracks.id == id_] = np.argmax(posterior)
     points = np.arange(n_points * 4, dtype=np.float32).reshape(-1, 4)
     frame = Frame(index, index / 10, points)
-    return FrameResult(frame, proposals(counts), tracks, STATES, classified, 0)
+    return FrameResult(frame, proposals(counts), tracks, STATES, 0, np.arange(classified))
 
 
 CAR = [0.1, 0.7, 0.1, 0.1]

@@ -48,3 +48,24 @@ def test_what_is_not_permitted_has_a_remedy(monkeypatch):
     lacking = host.be_punctual()
     assert len(lacking) == 2
     assert all("; " in what for what in lacking)
+
+
+@pytest.mark.parametrize(("loop", "asked"), [(10, [9]), (1, [1]), (None, [])])
+def test_a_thread_that_serves_the_loop_is_real_time_below_it(monkeypatch, loop, asked):
+    given = []
+    policy = os.SCHED_OTHER if loop is None else os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
+    monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: policy)
+    monkeypatch.setattr(host.os, "sched_getparam", lambda _: os.sched_param(loop))
+    monkeypatch.setattr(host.os, "sched_setscheduler", lambda _, __, p: given.append(p.sched_priority))
+    assert host.serve_loop(None) == ""
+    assert given == asked
+
+
+def test_a_receiver_without_permission_has_a_remedy(monkeypatch):
+    def refuse(*_):
+        raise PermissionError(1, "Operation not permitted")
+
+    monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: os.SCHED_FIFO)
+    monkeypatch.setattr(host.os, "sched_getparam", lambda _: os.sched_param(10))
+    monkeypatch.setattr(host.os, "sched_setscheduler", refuse)
+    assert "LimitRTPRIO=9" in host.serve_loop(None)

@@ -95,7 +95,7 @@ def test_the_stages_run_once_and_in_order():
         ("decide",),
         ("conclude", [0, 2], [True, False]),
     ]
-    assert (result.n_classified, result.n_deferred) == (2, 0)
+    assert (len(result.classified), result.n_deferred) == (2, 0)
     assert result.proposals.count.tolist() == [4, 3]
     assert result.state_names == STATES
     assert set(pipe.ledger.close_frame(7)["stages"]) == set(STAGES)
@@ -109,7 +109,7 @@ def test_without_a_selection_nothing_is_classified():
         "segment", "locate", "static_tracks", "follow", "asks", "select", "decide", "conclude"
     ]  # fmt: skip
     assert stages.calls[-1] == ("conclude", [], [])
-    assert (result.n_classified, result.n_deferred) == (0, 2)
+    assert (len(result.classified), result.n_deferred) == (0, 2)
     assert CLASSIFICATION not in pipe.ledger.close_frame(7)["stages"]
 
 

@@ -98,6 +98,26 @@ def be_punctual(priority: int = 10) -> list[str]:
     return lacking
 
 
+def serve_loop(cores: frozenset[int] | None) -> str:
+    """Let this thread serve the loop: on these cores, and before ordinary ones if the loop is; what is not permitted.
+
+    An ordinary thread that is put aside while it has the interpreter keeps the loop waiting, on its own core as well.
+    """
+    if cores:
+        with suppress(OSError):  # not allowed any more: it stays where the process is
+            os.sched_setaffinity(0, cores)
+    loop = os.getpid()
+    if os.sched_getscheduler(loop) & ~os.SCHED_RESET_ON_FORK != os.SCHED_FIFO:
+        return ""
+    priority = max(os.sched_getparam(loop).sched_priority - 1, 1)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
+    except OSError as error:
+        remedy = f"set LimitRTPRIO={priority} in the unit, or ulimit -r"
+        return f"ordinary priority of the receiving thread: SCHED_FIFO is not permitted ({error.strerror}); {remedy}"
+    return ""
+
+
 def _lock_memory() -> str:
     """Keep all pages in memory once they are used; the reason where that is not permitted."""
     if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:

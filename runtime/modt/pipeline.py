@@ -132,4 +132,4 @@ class Pipeline:
         run(FUSION, self.decision.decide, tracks)
         final = run(TRACKING, self.tracker.conclude, rows, certain)
         names, classified = self.tracker.state_names, final.id[rows]
-        return FrameResult(frame, proposals, final, names, len(rows), chosen.deferred, classified)
+        return FrameResult(frame, proposals, final, names, chosen.deferred, classified)

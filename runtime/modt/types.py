@@ -241,6 +241,5 @@ class FrameResult:
     proposals: Proposals
     tracks: Tracks  # a copy of those alive after the frame
     state_names: tuple[str, ...]  # of each value of tracks.state
-    n_classified: int  # proposals classified in this frame
     n_deferred: int  # tracks whose request for a class waits for the next frame's budget
-    classified: Int = field(default_factory=lambda: np.zeros(0, np.int64))  # (n_classified,) identities of the tracks
+    classified: Int = field(default_factory=lambda: np.zeros(0, np.int64))  # identities of the tracks

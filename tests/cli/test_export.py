@@ -7,6 +7,7 @@ import shutil
 
 import numpy as np
 import pytest
+import yaml
 
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.cli.main import main
@@ -152,7 +153,9 @@ def test_misuse_is_one_line_with_the_remedy(recorded, tmp_path, capsys):
     shutil.rmtree(bare / "labels")
     lines = (run / "tracks.jsonl").read_text().splitlines(keepends=True)
     (odd / "tracks.jsonl").write_text(lines[0] + json.dumps({"schema": SCHEMA, "frame": 1, "tracks": [{}]}) + "\n")
-    (live / "run.yaml").write_text((live / "run.yaml").read_text() + "service: true\n")
+    described = yaml.safe_load((live / "run.yaml").read_text())
+    described["stream"]["path"], described["service"] = None, True
+    (live / "run.yaml").write_text(yaml.safe_dump(described))
     cases = [
         (bare, "--semantickitti", "modt replay --labels"),
         (odd, "--csv", "tracks.jsonl:2: no record of a frame"),

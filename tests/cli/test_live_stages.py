@@ -123,6 +123,13 @@ def test_without_a_profile_the_first_sweep_decides(caplog):
     assert stages.parts.config.sensor != profile.load().sensor
 
 
+def test_a_profile_that_fits_keeps_its_stages():
+    stages = stages_of()
+    made = stages.parts.pipeline
+    stages.step(frames()[0], UNLIMITED, reduced=False)
+    assert stages.parts.pipeline is made
+
+
 def test_a_profile_that_the_source_names_is_the_base_of_what_is_found():
     stages = LiveStages(Request(), Source())
     stages._stream = type("Named", (Source,), {"profile": "vlp-16"})()

@@ -98,6 +98,10 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
     report = modt("report", tmp_path / "run", cwd=tmp_path, module="modt.cli.profile")
     assert report.returncode == 0, report.stderr
+    pytest.importorskip("foxglove")
+    exported = modt("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap", cwd=tmp_path)
+    assert exported.returncode == 0, exported.stderr
+    assert (tmp_path / "run.mcap").stat().st_size > 15 * 100_000  # with the points
 
 
 def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):
@@ -172,6 +176,9 @@ def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path)
     service.hear("READY=1")
     while not (service.out / "status.json").exists():
         service.hear("STATUS=")
+    second = modt("run", scans, "--out", service.out, cwd=tmp_path)
+    assert second.returncode == 1
+    assert "another modt run records into it; end it" in second.stderr
     running = modt("status", service.out, cwd=tmp_path)
     assert running.returncode == 0, running.stderr
     assert "running for" in running.stdout

@@ -59,7 +59,7 @@ def summary(result: FrameResult) -> dict[str, Any]:
     return {
         "frame": result.frame.index,
         "proposals": len(result.proposals),
-        "classifications": result.n_classified,
+        "classifications": len(result.classified),
         "deferred": result.n_deferred,
         "born": int(np.count_nonzero(tracks.age == 1)),
         "id": tracks.id[rows].tolist(),

@@ -37,10 +37,12 @@ def test_a_governor_that_saves_power_is_warned_of(tmp_path, name, level):
 
 
 @pytest.mark.parametrize(
-    ("lacking", "levels"), [([], ["ok"]), (["a is not permitted; set b", "c; set d"], ["warn", "warn"])]
+    ("loop", "receiver", "levels"),
+    [([], "", ["ok"]), (["a is not permitted; set b", "c; set d"], "", ["warn"] * 2), ([], "e; set f", ["warn"])],
 )
-def test_each_missing_permission_has_its_line(monkeypatch, lacking, levels):
-    monkeypatch.setattr(checks.host, "be_punctual", lambda: lacking)
+def test_each_missing_permission_has_its_line(monkeypatch, loop, receiver, levels):
+    monkeypatch.setattr(checks.host, "be_punctual", lambda: [*loop])
+    monkeypatch.setattr(checks.host, "serve_loop", lambda cores: receiver)
     found = checks.permissions()
     assert [f.level for f in found] == levels
     assert all(f.remedy for f in found if f.level != "ok")

@@ -67,6 +67,11 @@ def test_a_second_of_ample_slack_gives_everything_back():
     assert frames.changes[-1][0] - 0.5 <= 1.0
 
 
+def test_slack_that_becomes_ample_gives_everything_back_as_soon():
+    frames = Frames().run(0.3, 1.2).run(0.2, 0.75).run(CALM_S + 0.1, 0.3)
+    assert [step for _, step in frames.changes[3:]] == [Step.REDUCED, Step.ALL]
+
+
 def test_little_slack_is_tried_step_by_step():
     frames = Frames().run(0.3, 1.2).run(5.0, 0.7)
     assert [step for _, step in frames.changes[3:]] == [Step.REDUCED, Step.DEFERRED, Step.ALL]

@@ -187,6 +187,14 @@ def test_a_slow_loop_takes_the_newest_sweep_and_counts_what_it_misses():
     assert loop.timing.missed == len(seen) - 1  # all but the first one, which warms up
 
 
+def test_after_a_long_first_frame_the_loop_begins_afresh():
+    loop, sensor, stages, *_ = loop_of(3.0, lambda t: 0.25 if t < 0.2 else 0.02)
+    loop.run()
+    assert [index for index, *_ in stages.steps[:3]] == [1, 4, 5]
+    assert sensor.dropped == loop.shed == 1
+    assert loop.timing.report()["lateness_ms"]["max"] == 0.0
+
+
 class Failing(Stages):
     """Fails at some frames."""
 

@@ -29,6 +29,13 @@ class Slow:
         self.closed.set()
 
 
+class Counting(Slow):
+    """A writer that counts something itself."""
+
+    def health(self):
+        return {"unsent": 2, "written": 100}
+
+
 class Records(Slow):
     """A writer that takes lines of the ledger too."""
 
@@ -63,6 +70,12 @@ def test_items_are_written_in_their_order_and_the_writer_is_closed(slow):
     assert slow.items == [0, 1, 2, 3, 4]
     assert slow.closed.wait(LIMIT_S)
     assert background.health() == {"written": 5, "dropped": 0, "failed": 0, "waiting": 0, "state": "ok"}
+
+
+def test_what_the_writer_counts_is_told_too():
+    background = Background("test", Counting(), 10)
+    assert background.health() == {"unsent": 2, "written": 0, "dropped": 0, "failed": 0, "waiting": 0, "state": "ok"}
+    background.close()
 
 
 def test_a_full_queue_drops_its_oldest(slow):

@@ -93,7 +93,7 @@ def test_a_frame_is_published_to_whom_has_subscribed(loopback):
     sink.write(FRAMES[1])
     assert [m.data for m in seen[ros2_detections.TYPE].take(20.0)] == [ros2_detections.encode(FRAMES[1], "velodyne")]
     assert [m.data for m in seen[ros2_markers.TYPE].take(20.0)] == [ros2_markers.encode(FRAMES[1], "velodyne")]
-    assert sink.unsent == 0
+    assert sink.health() == {"unsent": 0}
     sink.close()
     sink.write(FRAMES[0])
 

@@ -88,3 +88,19 @@ def test_a_directory_that_cannot_be_made_is_an_error_of_the_disk(tmp_path):
     directory = ServiceDirectory(tmp_path / "file" / "run")
     with pytest.raises(ModtError, match="cannot be written"):
         directory.begin(OURS, 1e9)
+
+
+def test_two_services_do_not_share_a_directory(tmp_path):
+    out = tmp_path / "state" / "run"
+    with ServiceDirectory(out).locked():
+        second = ServiceDirectory(out).locked()
+        with pytest.raises(ModtError, match="another modt run records into it"):
+            second.__enter__()
+    with ServiceDirectory(out).locked(), ServiceDirectory(tmp_path / "other").locked():
+        pass
+
+
+def test_where_no_lock_can_be_written_the_service_goes_on(tmp_path):
+    (tmp_path / "file").write_text("")
+    with ServiceDirectory(tmp_path / "file" / "run").locked():
+        pass

@@ -31,6 +31,8 @@ while True:
 """
 HOG_PRIORITY = 20
 """Above that of the loop, where that has one."""
+FULL_DISK = "full disk"
+"""The one fault that may cost records."""
 Sweeps = Sequence[Sweep]
 
 
@@ -168,7 +170,7 @@ FAULTS = (
     Fault("other sensor", 3.0, lambda s: s.stages.misfits, _other_sensor),
     Fault("lying stamps", 2.0, lambda s: s.source.faults.skipped, _lie),
     Fault("clock set back", 0.2, lambda s: s.source.time_steps, switch=_set_back),
-    Fault("full disk", 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
+    Fault(FULL_DISK, 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
     Fault("meter lost", 3.0, lambda s: s.power.unread, switch=_switch("meter_lost")),
     Fault("failing stage", 1.0, lambda s: s.loop.failures.counts.total(), switch=_switch("stage_broken")),
     Fault("hog", 4.0, lambda s: s.loop.timing.missed + s.loop.changes.total(), switch=World.set_hogs),

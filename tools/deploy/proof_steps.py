@@ -43,7 +43,7 @@ tries = {
 }
 print(json.dumps({name: tried(what) for name, what in tries.items()}))
 """
-ALLOWED = "write its state"
+ALLOWED, REFUSED = "write its state", "not permitted to this copy of the system"
 
 
 class Report:
@@ -121,9 +121,13 @@ def steps(folder: Path) -> None:
     fields = dict(line.split(":\t", 1) for line in status.splitlines() if ":\t" in line)
     report.say("runs as a user of its own", not fields["Uid"].startswith("0\t"), fields["Uid"])
     report.say("runs with a filter of system calls", fields["Seccomp"] == "2")
-    report.say("runs at real-time priority", os.sched_getscheduler(int(pid)) & 7 == os.SCHED_FIFO)
+    threads = os.listdir(f"/proc/{pid}/task")
+    prompt = sum(os.sched_getscheduler(int(thread)) & 7 == os.SCHED_FIFO for thread in threads)
+    permitted = resource.getrlimit(resource.RLIMIT_RTPRIO)[1] > 0
+    receiver = "the receiver too" if prompt == 2 else "the receiver not" if permitted else f"the receiver {REFUSED}"
+    report.say("runs at real-time priority", prompt == 1 + permitted, receiver)
     permitted = resource.getrlimit(resource.RLIMIT_MEMLOCK)[1] == resource.RLIM_INFINITY
-    locked = fields["VmLck"].strip() if permitted else "not permitted to this copy of the system"
+    locked = fields["VmLck"].strip() if permitted else REFUSED
     report.say("keeps its memory", locked != "0 kB", locked)
     said = reload(profile + "\nscheduler: {calls_per_frame: 3}\n")
     report.say("reloads a profile", "'reloads': 1" in said and shown("MainPID") == pid)

@@ -2,8 +2,10 @@
 
     python -m tools.deploy.soak DRIVE --minutes 30 --seed 1
 
-Every fault must be told by its counter and be recovered from; between faults no deadline may be missed; memory stays
-flat. The exit status is 0 if all this holds. `--fifo` takes the priority of a service, and gives hogs a higher one.
+Every fault must be told by its counter and be recovered from within a second: the next result is there, and nothing
+is given up for it; no record is lost but on a full disk; between faults at most one deadline in 1,000 is missed, as
+the machine may do other work; memory stays flat. The exit status is 0 if all this holds. `--fifo` takes the priority
+of a service, and gives hogs a higher one.
 """
 
 from __future__ import annotations
@@ -31,12 +33,12 @@ from modt.sources.live.played_reader import PlayedReader
 from modt.sources.live.sweep_reader import StreamEndedError, Sweep
 from modt.supervisor import NoSupervisor
 from modt.types import FrameResult
-from tools.deploy.faults import FAULTS, Fault, World
+from tools.deploy.faults import FAULTS, FULL_DISK, Fault, World
 from tools.options import parser
 
 WARM_UP_S, REST_S, SETTLE_S = 15.0, 4.0, 2.5
 """Before the first fault; between two; after one, until misses count as not of its making."""
-MAX_RECOVERY_S, MAX_GROWTH = 2.0, 0.05
+MAX_RECOVERY_S, MAX_MISSED, MAX_GROWTH = 1.0, 0.001, 0.05
 
 
 @dataclass(slots=True)
@@ -134,7 +136,7 @@ class FaultyReader:
     def _turn_off(self, now_s: float) -> None:
         if self._now is not None:
             self._now.fault.switch(self._world, False)
-            self._now.end_s = now_s
+            self._now.end_s = time.monotonic()  # a hog is gone
             self._now, self._rest_s = None, now_s + REST_S + float(self._rng.uniform(0, 2))
 
 
@@ -159,7 +161,9 @@ def judge(witness: Witness, episodes: list[Episode], session: LiveSession) -> li
     clear = np.ones(len(times_s), np.bool_)
     for e in episodes:
         clear &= (times_s < e.begin_s) | (times_s > e.end_s + SETTLE_S)
-    missed = np.diff(witness.missed, prepend=0)[clear].sum()
+    missed = int(np.diff(witness.missed, prepend=0)[clear].sum())
+    recording = session.recording.health()
+    lost = recording["lost_lines"] - sum(e.told - e.before for e in episodes if e.fault.name == FULL_DISK)
     memory = np.array(witness.resident_mb)
     third = max(len(memory) // 3, 1)
     growth = float(np.median(memory[-third:]) / np.median(memory[third : 2 * third]) - 1) if len(memory) > 2 else 0.0
@@ -167,12 +171,13 @@ def judge(witness: Witness, episodes: list[Episode], session: LiveSession) -> li
     for gap_s in np.diff(times_s).tolist():
         gaps.add(gap_s)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
-    print(f"deadlines missed between faults: {missed}; {session.loop.timing.report()}")
-    print(
-        f"memory {memory.max():.0f} MB at most, growth {100 * growth:.1f} %; recording {session.recording.health()}"
-    )
-    if missed:
+    share = missed / max(int(clear.sum()), 1)
+    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.loop.timing.report()}")
+    print(f"memory {memory.max():.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
+    if share > MAX_MISSED:
         wrong.append(f"{missed} deadlines missed between faults")
+    if lost:
+        wrong.append(f"{lost} records lost but on a full disk")
     if growth > MAX_GROWTH:
         wrong.append(f"memory grew by {100 * growth:.1f} %")
     return wrong

@@ -114,7 +114,7 @@ def run(drive: Drive, mode_name: str, switch: Switch | None = None) -> Float64:
         )
         offsets = [errors(life)[0] for life in lives(drive.stream, seen)]
         error = 100 * np.sqrt((np.concatenate(offsets) ** 2).sum(axis=1).mean()) if offsets else np.nan
-    calls = sum(result.n_classified for result in results) / len(results)
+    calls = sum(len(result.classified) for result in results) / len(results)
     return np.array([*quality(evaluation), calls, error, cpu_ns / 1e6 / len(results)])
 
 

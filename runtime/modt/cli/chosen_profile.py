@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from modt import profile
 from modt.config import ProfileConfig
 from modt.sensor_fit.recognition import Recognition, recognise
+from modt.sources.stream import StreamInfo
 from modt.types import Frame
 
 log = logging.getLogger(__name__)
@@ -33,22 +34,29 @@ class ChosenProfile:
     recognition: Recognition
 
 
-def choose(asked_for: profile.Names, first: Frame | None, named: str | None = None) -> ChosenProfile:
+def choose(asked_for: profile.Names, first: Frame | None, info: StreamInfo) -> ChosenProfile:
     """The profile of a stream by its first frame; what differs is warned of.
 
     What is found takes the place of the default profile, and of that which the source has named, never of one of a
-    sensor that was asked for.
+    sensor that was asked for; beams that the source knows are better than found ones.
 
     Raises:
         MisuseError: a profile that cannot be used.
     """
     asked = profile.resolve(asked_for)
-    base = named or profile.DEFAULT
-    config = asked.config if asked.sensor else asked.over(profile.load(base))
+    base = info.profile or profile.DEFAULT
+    config = asked.config if asked.sensor else _with_beams(asked.over(profile.load(base)), info)
     recognition = Recognition((), None, config) if first is None else recognise(first.points, config)
     if recognition.differences:
         log.warning("%s", recognition.warning(asked.sensor or base, replaced=asked.sensor is None))
     if asked.sensor:
         return ChosenProfile(config, asked.sensor, asked.used(""), recognition)
     sensor = FOUND if recognition.differences else base
-    return ChosenProfile(asked.over(recognition.fitted), sensor, asked.used(sensor), recognition)
+    config = _with_beams(asked.over(recognition.fitted), info)
+    return ChosenProfile(config, sensor, asked.used(sensor), recognition)
+
+
+def _with_beams(config: ProfileConfig, info: StreamInfo) -> ProfileConfig:
+    if info.elevations_deg is None:
+        return config
+    return replace(config, sensor=replace(config.sensor, elevations_deg=info.elevations_deg))

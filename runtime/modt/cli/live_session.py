@@ -80,8 +80,12 @@ class LiveSession:
         """Until a signal or the end of the source; returns the last status.
 
         Raises:
-            ModtError: a failure that repeats.
+            ModtError: a failure that repeats, or another service that records into the same directory.
         """
+        with self.directory.locked():
+            return self._run(supervisor)
+
+    def _run(self, supervisor: Supervisor) -> dict[str, Any]:
         self._followed = self.stages.parts
         config = self._followed.config
         with host.elsewhere(self._cores):

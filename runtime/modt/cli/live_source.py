@@ -24,10 +24,22 @@ def open_source(text: str, cores: frozenset[int] | None) -> LiveStream:
 
         live: LiveStream = open_live(text, cores)
         return live
+    path, loop = _recording(text)
+    stream = assemble.stream(assemble.Request(path=path))
+    return LiveStream(stream.info, PlayedReader(stream, loop=loop), cores=cores)
+
+
+def recorded_path(text: str) -> Path | None:
+    """Where the frames of a source can be read again by their numbers; None where they cannot."""
+    path, loop = (None, False) if "://" in text else _recording(text)
+    return None if loop else path
+
+
+def _recording(text: str) -> tuple[Path | None, bool]:
+    """Path, None of the synthetic stream, and whether it is played for ever."""
     path, _, query = text.partition("?")
     options = dict(parse_qsl(query, keep_blank_values=True))
     loop = options.pop("loop", "no")
     if options or loop not in ("yes", "no"):
         raise MisuseError(text, f"option {query!r} is unknown", "write PATH or PATH?loop=yes")
-    stream = assemble.stream(assemble.Request(path=Path(path) if path else None))
-    return LiveStream(stream.info, PlayedReader(stream, loop=loop == "yes"), cores=cores)
+    return Path(path) if path else None, loop == "yes"

@@ -71,7 +71,11 @@ class LiveStages:
         unlike = self._watch.unlike(frame.points)
         if not self._seen:
             self._seen = True
-            self._exchange(self._made(self._chosen(frame)))
+            chosen = self._chosen(frame)
+            if chosen.config == self.parts.config:
+                self.parts = replace(self.parts, chosen=chosen)
+            else:
+                self._exchange(self._made(chosen))
         elif unlike:  # it takes longer than a frame
             self.looking = Thread(target=self._look_again, args=(frame,), name="recognition", daemon=True)
             self.looking.start()
@@ -121,7 +125,7 @@ class LiveStages:
             self._found.append(self._chosen(frame))
 
     def _chosen(self, first: Frame | None) -> ChosenProfile:
-        return choose(self._request.profile, first, self._stream.profile)
+        return choose(self._request.profile, first, replace(self._stream.info, profile=self._stream.profile))
 
     def _made(self, chosen: ChosenProfile) -> Parts:
         pipeline = pipeline_of(self._request, self._stream, chosen.config, self._ledger)

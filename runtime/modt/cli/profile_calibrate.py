@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     scans = list(stream)
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")
-    loaded = choose(request.profile, scans[0], stream.info.profile).config
+    loaded = choose(request.profile, scans[0], stream.info).config
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch)

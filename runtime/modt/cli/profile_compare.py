@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     stream = assemble.stream(request)
     asked = {**assemble.identity(request, stream), "fov": request.fov, "asked": list(request.frames)}
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
-    loaded = choose(request.profile, next(iter(stream), None), stream.info.profile).config
+    loaded = choose(request.profile, next(iter(stream), None), stream.info).config
     board, info = loaded.energy, stream.info
     meters = metering.discovery(board).choose(arguments.meter).meters
     metered = meters[0].facts.kind is not Kind.ESTIMATED

@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     info = stream.info
     itself = assemble.identity(request, stream)
     calibration = [read_calibration(path, itself, request.fov) for path in arguments.calibration]
-    loaded = choose(request.profile, next(iter(stream), None), info.profile).config
+    loaded = choose(request.profile, next(iter(stream), None), info).config
     share = 3 if arguments.observe == "third" and info.n_frames is not None else 1
     first = None if info.n_frames is None else -(-info.n_frames // share)
     seen = observe(request, loaded, first)

@@ -27,7 +27,9 @@ def progress(total: int | None, *, shown: bool) -> Iterator[Tick]:
     with tqdm(total=total, unit="frame", file=sys.stderr, leave=False, dynamic_ncols=True) as bar:
 
         def tick(result: FrameResult) -> None:
-            bar.set_postfix_str(f"{len(result.proposals)} proposals, {result.n_classified} classified", refresh=False)
+            bar.set_postfix_str(
+                f"{len(result.proposals)} proposals, {len(result.classified)} classified", refresh=False
+            )
             bar.update()
 
         yield tick

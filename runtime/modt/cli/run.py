@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from modt import host
@@ -41,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     # NumPy is imported from here on, after the process is pinned.
     from modt.cli.assemble import Request
     from modt.cli.live_session import LiveSession
-    from modt.cli.live_source import open_source
+    from modt.cli.live_source import open_source, recorded_path
     from modt.service.live_loop import NamedSink
     from modt.service.status import one_line
     from modt.sinks.addresses import open_sink
@@ -54,7 +55,8 @@ def run(arguments: argparse.Namespace) -> int:
     with host.elsewhere(cores):
         source = open_source(arguments.source, cores)
         sinks = [NamedSink(address, open_sink(address)) for address in dict.fromkeys(arguments.sink)]
-        command, request = ["modt", *sys.argv[1:]], Request.of(arguments)
+        command = ["modt", *sys.argv[1:]]
+        request = replace(Request.of(arguments), path=recorded_path(arguments.source))
         out, metrics = arguments.out, arguments.metrics
         session = LiveSession(request, source, sinks, out, metrics, pinned, cores, command, lacking)
     status = session.run(supervisor)

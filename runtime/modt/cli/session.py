@@ -38,7 +38,7 @@ class Session:
     def __init__(self, request: assemble.Request, out: Path | None, core: int | None, command: list[str]) -> None:
         self.request, self.core = request, core
         found = PeekedStream(assemble.stream(request))
-        chosen = choose(request.profile, found.first, found.info.profile)
+        chosen = choose(request.profile, found.first, found.info)
         self.odometry = assemble.odometry(request, found, chosen.config.odometry)
         self.stream = PosedStream(found, self.odometry)
         self.parts = Parts(request, chosen, pipeline_of(request, self.stream, chosen.config, Ledger()))

@@ -38,7 +38,7 @@ class JudgedFrame:
             points=result.frame.points,
             proposal=proposals.label(len(result.frame.points)),
             n_proposals=len(proposals),
-            classified=result.n_classified,
+            classified=len(result.classified),
             track=tracks.id[seen],
             of_track=tracks.proposal[seen],
             said=tracks.object_class[seen],

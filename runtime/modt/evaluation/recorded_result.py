@@ -43,9 +43,8 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     proposals = _proposals(n_proposals)
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
-    calls, deferred = int(record["classifications"]), int(record["deferred"])
     classified = np.array(record.get("classified", []), np.int64)
-    return FrameResult(frame, proposals, tracks, names, calls, deferred, classified)
+    return FrameResult(frame, proposals, tracks, names, int(record["deferred"]), classified)
 
 
 def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:

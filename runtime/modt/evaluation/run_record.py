@@ -48,7 +48,7 @@ class RunRecord:
             facts = from_yaml(described.read_text(encoding="utf-8"), described)
             stream, fov, sensor = facts["stream"]["path"], facts["fov"], facts["recognition"]["used"]
             stream, sensor = Path(stream) if stream else None, Path(sensor).stem
-            live = bool(facts.get("service", False))
+            live = stream is None and bool(facts.get("service", False))
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
         return cls(path, stream, fov, sensor, live)

@@ -106,7 +106,7 @@ class ModeRun:
                 int((visible & (tracks.object_class != ObjectClass.BACKGROUND)).sum()),
                 len(alive - self._life.keys()),
                 len(classified - self._classified),
-                result.n_classified,
+                len(result.classified),
                 len((classified & self._classified) - self._seen),
                 row.get("points", 0),
                 row.get("calls", 0),

@@ -66,7 +66,7 @@ class Summary:
         tracks = result.tracks
         self.frames += 1
         self.proposals += len(result.proposals)
-        self.classified += result.n_classified
+        self.classified += len(result.classified)
         self.deferred += result.n_deferred
         seen, foreground = tracks.proposal != NONE, tracks.object_class != ObjectClass.BACKGROUND
         self.lives.add(zip(tracks.id.tolist(), seen.tolist(), foreground.tolist(), strict=True))

@@ -7,8 +7,8 @@ from enum import Enum, IntEnum
 
 from modt.types import Budget
 
-CALM_S = 0.7
-"""Slack after which something is taken back: within a second, at 10 Hz, the result is a better one."""
+CALM_S = 0.5
+"""Slack after which something is taken back: within a second, at 5 Hz, the result is a better one."""
 BUSY_SHARE, AMPLE_SHARE = 0.8, 0.5
 """Of the period between arrival and result: below it there is slack; slack for everything at once."""
 NEAR_SHARE = 0.9
@@ -116,7 +116,7 @@ class Ladder:
             self.patience_s = min(2 * self.patience_s, MAX_PATIENCE_S) if failed else CALM_S
             self._cause, self._calm_s, self._ample_s = event, now_s, now_s
         elif self.step < before:
-            self._down_s = self._calm_s = self._ample_s = now_s
+            self._down_s = self._calm_s = now_s  # slack that is ample goes on being so
         return Change(before, self.step, event) if self.step != before else None
 
 

@@ -81,7 +81,7 @@ class LiveLoop:
     Attributes:
         ladder, timing, failures, rest: what is known of the frames so far.
         changes: number of times that each step of the ladder was entered.
-        shed: sweeps left out by the last step.
+        shed: sweeps left out by the last step, or that came during the first frame.
         budget_ms: of the last frame, for classification.
         reloads, refused_reloads: counts.
     """
@@ -106,6 +106,7 @@ class LiveLoop:
         self.shed = self.reloads = self.refused_reloads = self.frames = 0
         self.budget_ms = 0.0
         self._shed_last = False
+        self._fresh_s = float("-inf")  # sweeps that arrived before are left out
         self._reported_s = float("-inf")
 
     def run(self) -> None:
@@ -138,7 +139,7 @@ class LiveLoop:
 
     def _sweep(self, received: Received) -> None:
         self._shed_last = self.ladder.step is Step.DROPPED and not self._shed_last
-        if self._shed_last:
+        if self._shed_last or received.arrived_s < self._fresh_s:
             self.shed += 1
             return
         start_s, period_s = self._clock(), self._stages.period_s
@@ -153,9 +154,11 @@ class LiveLoop:
             return
         self.failures.succeed()
         finish_s, self.frames = self._clock(), self.frames + 1
-        if self.frames > 1:  # the first one warms up
+        if self.frames > 1:
             share = self.timing.add(received.arrived_s, start_s, finish_s, period_s)
             self._changed(self.ladder.frame(finish_s, share))
+        else:  # it takes long, choosing the profile: what came meanwhile would be late
+            self._fresh_s = finish_s
 
     def _frame(self, received: Received, deadline_s: float) -> None:
         step = self.ladder.step

@@ -10,7 +10,7 @@ from typing import Any
 
 COUNTERS = re.compile(
     r"(frames|proposals|classifications|deferred|missed_deadlines|shed_sweeps|reloads|refused_reloads|steps_entered"
-    r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|sent|dropped)"
+    r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|(?:un)?sent|dropped)"
 )
 """Names of what only grows."""
 LABELS = {

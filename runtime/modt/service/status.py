@@ -32,7 +32,7 @@ class Counts:
         """Add a frame."""
         self._frames += 1
         self.proposals += len(result.proposals)
-        self.classifications += result.n_classified
+        self.classifications += len(result.classified)
         self.deferred += result.n_deferred
         self.tracks = len(result.tracks)
         seen = result.tracks.object_class[result.tracks.proposal != NONE]

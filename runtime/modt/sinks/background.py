@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
-from modt.sinks.output import Health, LedgerSink, Writer
+from modt.sinks.output import Health, LedgerSink, Reporting, Writer
 
 log = logging.getLogger(__name__)
 
@@ -66,8 +66,10 @@ class Background(Generic[T]):
             self._put(lambda: writer.ledger(record))
 
     def health(self) -> Health:
-        """Items written, dropped for want of room, failed; what is wrong now."""
+        """Items written, dropped for want of room, failed; what is wrong now; what the writer itself counts."""
+        own = self._writer.health() if isinstance(self._writer, Reporting) else {}
         return {
+            **own,
             "written": self._written,
             "dropped": self._dropped,
             "failed": self._failed,

@@ -26,11 +26,16 @@ class Writer(Protocol[T_contra]):
         """Close the files."""
 
 
-class Sink(Writer[FrameResult], Protocol):
-    """Takes the results of frames."""
+@runtime_checkable
+class Reporting(Protocol):
+    """What a writer is besides, if it counts."""
 
     def health(self) -> Health:
-        """What has become of them so far."""
+        """What has become of the items so far."""
+
+
+class Sink(Writer[FrameResult], Reporting, Protocol):
+    """Takes the results of frames."""
 
 
 LineSink = Writer[dict[str, Any]]

@@ -6,6 +6,7 @@ from modt.address import Address
 from modt.ros2.address import domain_of, name_of
 from modt.ros2.dds import Publication, participant
 from modt.sinks import ros2_detections, ros2_markers
+from modt.sinks.output import Health
 from modt.types import FrameResult
 
 PREFIX, FRAME_ID = "modt", "lidar"
@@ -13,14 +14,10 @@ PREFIX, FRAME_ID = "modt", "lidar"
 
 
 class Ros2Sink:
-    """Publishes each frame on PREFIX/detections and PREFIX/markers, where somebody has subscribed.
-
-    Attributes:
-        unsent: messages that DDS did not take at once, because a reliable subscriber is behind.
-    """
+    """Publishes each frame on PREFIX/detections and PREFIX/markers, where somebody has subscribed."""
 
     def __init__(self, detections: Publication, markers: Publication, frame_id: str) -> None:
-        self.unsent = 0
+        self._unsent = 0
         self._frame_id = frame_id
         self._topics = [(detections, ros2_detections.encode), (markers, ros2_markers.encode)]
 
@@ -28,7 +25,11 @@ class Ros2Sink:
         """Publish a frame; never waits for a subscriber."""
         for publication, encode in self._topics:
             if publication.receivers:
-                self.unsent += not publication.write(encode(result, self._frame_id))
+                self._unsent += not publication.write(encode(result, self._frame_id))
+
+    def health(self) -> Health:
+        """Messages that DDS did not take at once, because a reliable subscriber is behind."""
+        return {"unsent": self._unsent}
 
     def close(self) -> None:
         """Leave the topics."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import re
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, ModtError
 from modt.sinks.output import writing
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 
@@ -32,6 +34,26 @@ class ServiceDirectory:
         foreign = sorted({p.name for p in path.iterdir()} - _KNOWN) if path.is_dir() else []
         if foreign and not (path / TRACKS).exists():
             raise MisuseError(path, f"holds {foreign[0]}, which is no record", "give an empty or a new directory")
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other services out until the process ends; where no lock can be written, none is kept out.
+
+        Raises:
+            ModtError: another service is in.
+        """
+        with ExitStack() as stack:
+            try:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                lock = os.open(self.path.with_name(f".{self.path.name}.lock"), os.O_RDONLY | os.O_CREAT)
+                stack.callback(os.close, lock)
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                remedy = "end it, or give another --out"
+                raise ModtError(self.path, "another modt run records into it", remedy) from None
+            except OSError:  # said when the recording begins
+                pass
+            yield
 
     def begin(self, description: str, limit_bytes: float) -> None:
         """Keep the part before under the next name, delete the oldest ones beyond a limit, and begin a new part.

@@ -56,7 +56,7 @@ def _frame_fields(result: FrameResult) -> dict[str, Any]:
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 6),
         "proposals": len(result.proposals),
-        "classifications": result.n_classified,
+        "classifications": len(result.classified),
         "deferred": result.n_deferred,
         "classified": result.classified.tolist(),
     }

@@ -49,6 +49,20 @@ class EchoDecoder:
         return []
 
 
+def test_a_group_is_joined_and_what_is_none_is_refused(port):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        if probe.connect_ex(("239.7.7.7", port)):
+            pytest.skip("no route to a multicast group")
+    reader = PacketReader(bound_socket("sensor", port, "239.7.7.7"), EchoDecoder(), clock=lambda: 7.0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        sender.sendto(b"packet", ("239.7.7.7", port))
+    assert reader.read(5.0) == [(7.0, b"packet")]
+    reader.close()
+    for group in ("10.0.0.1", "nowhere"):
+        with pytest.raises(MisuseError, match=f"group {group} cannot be joined"):
+            bound_socket("sensor", port, group)
+
+
 def test_what_is_received_from_the_sensor_is_decoded_at_once(port, to):
     reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "127.0.0.1", clock=lambda: 7.0)
     to.send(b"packet")

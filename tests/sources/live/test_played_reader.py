@@ -41,6 +41,7 @@ def test_sweeps_come_at_the_pace_of_their_stamps():
     assert [at for at, _ in out] == [0.0, 0.1, 1.5]
     assert [sweep.stamp_s for _, sweep in out] == [7.0, 7.1, 8.5]
     assert [sweep.points[0, 0] for _, sweep in out] == [0, 1, 2]
+    assert [sweep.index for _, sweep in out] == [0, 1, 2]
     with pytest.raises(StreamEndedError):
         reader.read(0.2)
 
@@ -51,6 +52,7 @@ def test_a_loop_goes_on_with_rising_stamps():
     out = played(reader, time, 5)
     assert [round(sweep.stamp_s, 6) for _, sweep in out] == [7.0, 7.1, 7.2, 7.3, 7.4]
     assert [at for at, _ in out] == [0.0, 0.1, 0.2, 0.3, 0.4]
+    assert {sweep.index for _, sweep in out} == {None}
 
 
 def test_a_loop_over_nothing_ends():

@@ -40,7 +40,7 @@ def test_messages_become_sweeps_and_the_frame_is_reported(caplog):
     reader = PointCloudReader(Scripted([cloud(5.0), cloud(5.1)], [cloud(5.2)]), "/points")
     assert [sweep.stamp_s for sweep in reader.read(0.0)] == [5.0, 5.1]
     assert [len(sweep.points) for sweep in reader.read(0.0)] == [10]
-    assert reader.frame_id == "lidar"
+    assert reader.reception.frame_id == "lidar"
     assert caplog.text.count("points are in the frame 'lidar'") == 1
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from modt.service.timing import Timing
 from modt.sources.live.sweep_reader import Sweep
-from tools.deploy.faults import FAULTS
+from tools.deploy.faults import FAULTS, FULL_DISK
 from tools.deploy.soak import Episode, Witness, judge
 
 SWEEP = Sweep(10.0, np.random.default_rng(0).uniform(-30, 30, (500, 4)).astype(np.float32))
@@ -22,13 +22,14 @@ def test_a_fault_makes_sweeps_that_a_sensor_could_send_and_leaves_its_own_alone(
     np.testing.assert_array_equal(SWEEP.points, before)
 
 
-def session():
-    return SimpleNamespace(loop=SimpleNamespace(timing=Timing()), recording=SimpleNamespace(health=dict))
+def session(lost):
+    recording = SimpleNamespace(health=lambda: {"lost_lines": lost})
+    return SimpleNamespace(loop=SimpleNamespace(timing=Timing()), recording=recording)
 
 
 def witness(full_from=0.0, missed_at=(), growth=0.0):
     seen = Witness()
-    for k in range(1, 1000):
+    for k in range(1, 2000):
         seen.times_s.append(0.1 * k)
         seen.full.append(not 50 < 0.1 * k < full_from)
         seen.missed.append(sum(at <= 0.1 * k for at in missed_at))
@@ -46,11 +47,18 @@ EPISODE = (FAULTS[0], 48.0, 3, 50.0, 4)
         (witness(missed_at=(49.0, 51.0)), EPISODE, None),
         (witness(), (*EPISODE[:4], 3), "no counter told"),
         (witness(full_from=55.0), EPISODE, "recovery took 5.0 s"),
-        (witness(missed_at=(30.0,)), EPISODE, "1 deadlines missed between faults"),
+        (witness(missed_at=(30.0,)), EPISODE, None),
+        (witness(missed_at=(30.0, 31.0)), EPISODE, "2 deadlines missed between faults"),
         (witness(growth=0.3), EPISODE, "memory grew"),
     ],
 )
 def test_the_verdict_names_what_is_wrong(seen, episode, wrong, capsys):
-    found = judge(seen, [Episode(*episode)], session())
+    found = judge(seen, [Episode(*episode)], session(0))
     assert [wrong in line for line in found] == ([True] if wrong else [])
     assert FAULTS[0].name in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("lost", "wrong"), [(7, []), (8, ["1 records lost but on a full disk"])])
+def test_records_may_be_lost_on_a_full_disk_alone(lost, wrong):
+    disk = next(fault for fault in FAULTS if fault.name == FULL_DISK)
+    assert judge(witness(), [Episode(disk, 48.0, 3, 50.0, 10)], session(lost)) == wrong

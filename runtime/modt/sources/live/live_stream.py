@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import logging
-import os
 import threading
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from modt import host
 from modt.errors import ScanError
 from modt.sources.live.sweep_reader import Sweep, SweepReader
 from modt.sources.scan_file import sanitised
@@ -122,6 +121,7 @@ class LiveStream:
             "silences": self.silences,
             "time_steps": self.time_steps,
             "silent": self._silent,
+            "frame_id": reception.frame_id,
         }
 
     def close(self) -> None:
@@ -132,9 +132,9 @@ class LiveStream:
             self._thread.join(2 * READ_S)
 
     def _receive(self) -> None:
-        if self._cores:
-            with suppress(OSError):  # a core that is not allowed: stay where the process is
-                os.sched_setaffinity(0, self._cores)
+        lacking = host.serve_loop(self._cores)
+        if lacking:
+            log.warning("%s: %s", self.info.name, lacking)
         while not self._ended:
             try:
                 sweeps = self.reader.read(READ_S)
@@ -163,7 +163,8 @@ class LiveStream:
         if self._silent:
             log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
         self._silent, self._last_s = False, arrived_s
-        index, self._index = self._index, self._index + 1
+        index = self._index if sweep.index is None else sweep.index
+        self._index = index + 1
         doubt = self._doubt(sweep.stamp_s, arrived_s)
         flaws = (doubt,) if doubt else arrival.flaws
         used = arrival.usable and not doubt

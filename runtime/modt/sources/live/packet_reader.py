@@ -72,11 +72,11 @@ class PacketReader:
         self._socket.close()
 
 
-def bound_socket(name: str, port: int) -> socket.socket:
-    """A socket that receives what is sent to a UDP port of this machine, broadcasts included.
+def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
+    """A socket that receives what is sent to a UDP port of this machine, broadcasts and a multicast group included.
 
     Raises:
-        MisuseError: the port is taken or not allowed.
+        MisuseError: the port is taken or not allowed, or the group cannot be joined.
     """
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
@@ -85,6 +85,13 @@ def bound_socket(name: str, port: int) -> socket.socket:
         made.close()
         remedy = "end what else reads this sensor, or give the port that it sends to"
         raise MisuseError(name, f"port {port} cannot be bound ({error.strerror})", remedy) from None
+    try:
+        if group:
+            made.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + bytes(4))
+    except OSError as error:
+        made.close()
+        remedy = "give an address from 224.0.0.0 on, and a route to it (ip route add 224.0.0.0/4 dev INTERFACE)"
+        raise MisuseError(name, f"group {group} cannot be joined ({error})", remedy) from None
     made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
     granted = made.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux says twice what it granted
     if granted < BUFFER_BYTES:

@@ -20,9 +20,10 @@ VELODYNE_PERIOD_S = 0.1
 
 
 def open_velodyne(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """A Velodyne at velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE].
+    """A Velodyne at velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE&group=ADDRESS].
 
-    HOST is the sensor, whose packets alone are used; PORT of this machine is where it sends them.
+    HOST is the sensor, whose packets alone are used; PORT of this machine, or of a multicast group, is where it sends
+    them.
     """
     model = address.option("model")
     calibration = address.option("calibration")
@@ -33,7 +34,7 @@ def open_velodyne(address: Address, cores: frozenset[int] | None) -> LiveStream:
 
 
 def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """An Ouster at ouster://[HOST][:PORT]?metadata=FILE; HOST and PORT as of a Velodyne.
+    """An Ouster at ouster://[HOST][:PORT]?metadata=FILE[&group=ADDRESS]; HOST, PORT and group as of a Velodyne.
 
     Raises:
         MisuseError: no metadata.
@@ -50,7 +51,7 @@ def _stream(
     address: Address, decoder: PacketDecoder, port: int, period_s: float, cores: frozenset[int] | None
 ) -> LiveStream:
     source = address_of(address.text, address.host)
-    reader = PacketReader(bound_socket(address.text, port), decoder, source)
+    reader = PacketReader(bound_socket(address.text, port, address.option("group")), decoder, source)
     info = StreamInfo(
         name=address.text,
         layout=f"{address.scheme} packets",

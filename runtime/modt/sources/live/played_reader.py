@@ -32,7 +32,7 @@ class PlayedReader:
         wait: Callable[[float], bool] | None = None,
     ) -> None:
         self.reception = Reception()
-        self._stream, self._closed = stream, threading.Event()
+        self._stream, self._loop, self._closed = stream, loop, threading.Event()
         self._clock, self._wait = clock, wait or self._closed.wait
         self._frames = _again(stream) if loop else ((frame.stamp_s, frame) for frame in stream)
         self._next: tuple[float, Frame] | None = None  # read ahead of its time
@@ -59,7 +59,7 @@ class PlayedReader:
         self.reception.messages += 1
         if self._stream.faults.count:
             self.reception.refused["faulty scans"] = self._stream.faults.count
-        return (Sweep(stamp_s, frame.points, frame.turn_s),)
+        return (Sweep(stamp_s, frame.points, frame.turn_s, index=None if self._loop else frame.index),)
 
     def close(self) -> None:
         """End a wait."""

@@ -27,13 +27,12 @@ RELIABILITIES = {"best_effort": False, "reliable": True}
 
 
 class PointCloudReader:
-    """Messages of a topic to sweeps; `frame_id` names the frame of their points, which is taken for the sensor's."""
+    """Messages of a topic to sweeps."""
 
     profile = None  # a message does not tell
 
     def __init__(self, subscription: Subscription, name: str) -> None:
         self.reception = Reception()
-        self.frame_id = ""
         self._subscription: Subscription | None = subscription
         self._name, self._missing = name, MissingSweeps()
 
@@ -67,8 +66,8 @@ class PointCloudReader:
                 what = f"message refused ({error.reason}): {error}"
                 log.warning("%s: %s; later ones are only counted", self._name, what)
             return None
-        if cloud.frame_id != self.frame_id:
-            self.frame_id = cloud.frame_id
+        if cloud.frame_id != self.reception.frame_id:
+            self.reception.frame_id = cloud.frame_id
             foreign = cloud.frame_id.lstrip("/") in FOREIGN_FRAMES
             remedy = ", not in the sensor's: subscribe to what its driver publishes" if foreign else ""
             level = logging.WARNING if foreign else logging.INFO

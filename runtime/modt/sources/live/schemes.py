@@ -27,13 +27,13 @@ class Scheme:
 SCHEMES = {
     "velodyne": Scheme(
         "modt.sources.live.packets:open_velodyne",
-        frozenset({"model", "calibration"}),
-        "velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE]",
+        frozenset({"model", "calibration", "group"}),
+        "velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE&group=ADDRESS]",
     ),
     "ouster": Scheme(
         "modt.sources.live.packets:open_ouster",
-        frozenset({"metadata"}),
-        "ouster://[HOST][:PORT]?metadata=FILE",
+        frozenset({"metadata", "group"}),
+        "ouster://[HOST][:PORT]?metadata=FILE[&group=ADDRESS]",
     ),
     "ros2": Scheme(
         "modt.sources.live.ros2:open_ros2",

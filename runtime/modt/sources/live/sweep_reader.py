@@ -20,12 +20,14 @@ class Sweep:
     Attributes:
         stamp_s, points, turn_s: as in modt.types.Frame; points may hold values that are not finite.
         complete: no message of the turn is known to be missing.
+        index: of the frame in the recording that it comes from; None: count them.
     """
 
     stamp_s: float
     points: Float32
     turn_s: float = 0.0
     complete: bool = True
+    index: int | None = None
 
 
 @dataclass(slots=True)
@@ -35,6 +37,7 @@ class Reception:
     messages: int = 0  # taken from the network or file
     lost: int = 0  # missing by their sequence numbers, stamps or angles
     refused: dict[str, int] = field(default_factory=dict)  # messages that cannot be used, by reason
+    frame_id: str = ""  # of the points, where messages name it; taken for the sensor's
 
     def refuse(self, reason: str) -> bool:
         """Count a refused message; whether it is the first for this reason."""
