@@ -2,8 +2,8 @@
 
     python -m tools.sequences --n 10000 --seed 1
 
-Frames are empty, huge, repeated, late, or not finite, poses leap, clocks are set, sensors change in mid-run. The first
-broken promise is printed with the shortest sequence that breaks it; then the exit status is 1.
+Frames are empty, huge, repeated, late, or not finite, poses leap, clocks are set, sensors change in mid-run. The
+first broken promise is printed with the shortest sequence that breaks it; then the exit status is 1.
 """
 
 from __future__ import annotations

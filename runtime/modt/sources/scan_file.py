@@ -20,9 +20,9 @@ MAX_IMPLAUSIBLE_SHARE = 0.02
 def read_scan(path: Path) -> tuple[Float32, list[str]]:
     """Points of a file by its suffix, a key of READERS, and its flaws.
 
-    Points that are not finite, or far beyond any range, are set to the origin, which counts as no return, so that rows
-    keep their indices. A reflectance that is not finite or negative counts as not recorded. Reflectances from 0 to 255 are scaled to 0 to
-    1.
+    Points that are not finite, or far beyond any range, are set to the origin, which counts as no return, so that
+    rows keep their indices. A reflectance that is not finite or negative counts as not recorded. Reflectances from 0
+    to 255 are scaled to 0 to 1.
 
     Raises:
         ScanError: missing, unreadable, empty, truncated, or of other columns.
