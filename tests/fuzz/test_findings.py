@@ -92,10 +92,10 @@ def test_infinities_of_either_sign_are_no_return(tmp_path: Path) -> None:
     assert read_scan(path)[0].tolist() == [[0, 0, 0, 0]]
 
 
-def test_a_name_in_a_database_that_is_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_database_whose_schema_is_no_text_is_refused(tmp_path: Path) -> None:
     (seed,), call = TARGETS["database"].prepare(tmp_path)
     with limits(), pytest.raises(ModtError, match="cannot be read"):
-        call(seed.replace(b"sensor_msgs/msg/PointCloud2", b"\xbcensor_msgs/msg/PointCloud2"))
+        call(seed.replace(b"NOT NULL", b"NOT NU\xbc\xb3"))
 
 
 def test_a_message_of_a_channel_that_is_not_listed_is_refused(tmp_path: Path) -> None:
