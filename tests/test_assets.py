@@ -9,6 +9,7 @@ import pytest
 
 from modt import assets
 from modt.errors import MisuseError
+from tools import deps
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PROBE = """
@@ -71,6 +72,11 @@ def test_from_a_wheel(expected, environment, tmp_path):
     package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path)
     assert package.startswith(str(environment))
     assert files == expected
+
+
+@pytest.mark.install
+def test_a_wheel_is_the_same_wherever_and_whenever_it_is_built():
+    assert deps.wheel() == 0
 
 
 @pytest.mark.install
