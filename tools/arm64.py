@@ -111,7 +111,7 @@ def main() -> int:
         stack.enter_context(mounted("/dev", root / "dev", "--rbind"))
         stack.enter_context(mounted("proc", root / "proc", "-t", "proc"))
         stack.enter_context(mounted(cores, root / "proc/cpuinfo", "--bind"))
-        environment = {"QEMU_CPU": CPU, "HOME": "/root", "PATH": "/usr/bin:/bin", "PYTHONDONTWRITEBYTECODE": "1"}
+        environment = {"QEMU_CPU": CPU, "HOME": "/root", "PATH": "/usr/sbin:/usr/bin", "PYTHONDONTWRITEBYTECODE": "1"}
         environment["PYTHONPATH"] = "/opt/modt/runtime:/opt/libraries"
         tests = ["-m", "not slow and not install and not kitti", "-p", "no:cacheprovider", *given.tests]
         inside = f"cd /opt/modt && exec python3 -m pytest {' '.join(map(repr, tests))}"
