@@ -10,6 +10,7 @@ import pytest
 
 from modt import assets
 from modt.errors import MisuseError
+from tools import deps
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PROBE = """
@@ -89,6 +90,11 @@ def test_from_a_wheel_made_without_a_compiler(expected, environment, tmp_path):
     assert wheel.name.endswith("py3-none-any.whl")
     install(environment, str(wheel))
     assert probe(str(environment / "bin" / "python"), cwd=tmp_path)[1] == expected
+
+
+@pytest.mark.install
+def test_a_wheel_is_the_same_wherever_and_whenever_it_is_built():
+    assert deps.wheel() == 0
 
 
 @pytest.mark.install

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import tomllib
+from itertools import chain
 from pathlib import Path
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
 
 import modt
 
@@ -57,6 +59,19 @@ def test_hooks_run_what_make_test_runs_before_pytest():
     run = set().union(*(commands(hook["entry"].removeprefix("make ")) for hook in hooks))
     assert commands("test") - run == {"$(BIN)/python -m pytest"}
     assert run <= commands("test")
+
+
+def test_the_lock_of_the_service_holds_each_dependency_within_its_bounds_and_with_hashes():
+    lock = (ROOT / "systemd" / "requirements.txt").read_text()
+    locked = re.findall(r"^(\S+)==(\S+).*\n    --hash=sha256:", lock, re.MULTILINE)
+    assert len(locked) == len(re.findall(r"^\S+==", lock, re.MULTILINE))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = re.match(r"# modt\[(.+)\]", lock)[1].split(",")
+    wanted = [project["dependencies"], *(project["optional-dependencies"][extra] for extra in extras)]
+    for requirement in map(Requirement, chain.from_iterable(wanted)):
+        versions = [version for name, version in locked if name == requirement.name]
+        assert versions, requirement
+        assert all(version in requirement.specifier for version in versions)
 
 
 def test_citation_names_this_version_and_the_paper():

@@ -92,6 +92,27 @@ def test_infinities_of_either_sign_are_no_return(tmp_path: Path) -> None:
     assert read_scan(path)[0].tolist() == [[0, 0, 0, 0]]
 
 
+def test_a_database_whose_schema_is_no_text_is_refused(tmp_path: Path) -> None:
+    (seed,), call = TARGETS["database"].prepare(tmp_path)
+    with limits(), pytest.raises(ModtError, match="cannot be read"):
+        call(seed.replace(b"NOT NULL", b"NOT NU\xbc\xb3"))
+
+
+def test_a_message_of_a_channel_that_is_not_listed_is_refused(tmp_path: Path) -> None:
+    (seed, _), call = TARGETS["mcap"].prepare(tmp_path)
+    whole = bytearray(seed)
+    channel = whole.rindex(b"\x04", 0, whole.rindex(b"/odom"))  # its record in the summary
+    whole[channel + 9] ^= 0xFF
+    with limits(), pytest.raises(ModtError, match="cannot be read"):
+        call(bytes(whole))
+
+
+def test_packets_that_do_not_make_a_frame_are_refused(tmp_path: Path) -> None:
+    (seed,), call = TARGETS["ouster_metadata"].prepare(tmp_path)
+    with limits(), pytest.raises(ModtError, match="512 columns in packets of 15"):
+        call(seed.replace(b'"columns_per_packet":16', b'"columns_per_packet":15'))
+
+
 def test_a_chunk_of_2_to_the_63_bytes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "cut.mcap"
     path.write_bytes(chunk_of(2**63, tmp_path))

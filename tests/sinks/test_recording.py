@@ -109,11 +109,11 @@ def test_a_disk_that_is_full_at_the_start_is_no_obstacle(tmp_path, monkeypatch):
     time, room = Time(), []
     real = ServiceDirectory.write
 
-    def write(directory, name, text):
+    def write(directory, name, text, **options):
         if not room:
             with output.writing(directory.path):
                 raise OSError(errno.ENOSPC, "No space left on device")
-        real(directory, name, text)
+        real(directory, name, text, **options)
 
     monkeypatch.setattr(ServiceDirectory, "write", write)
     recording = made(tmp_path, time=time)

@@ -140,3 +140,14 @@ def test_an_outlier_does_not_rescale_the_others(tmp_path):
     points, _ = read_scan(path)
     np.testing.assert_allclose(np.delete(points[:, 3], 7), np.delete(scan[:, 3], 7))
     assert points[7, 3] == 1.0
+
+
+def test_a_few_points_beyond_any_range_are_no_return(tmp_path):
+    points = np.tile(np.array([9.0, 1.0, -1.0, 0.5], np.float32), (200, 1))
+    points[7, 1] = 3e38
+    path = tmp_path / "a.bin"
+    path.write_bytes(points.tobytes())
+    read, flaws = read_scan(path)
+    assert read[7].tolist() == [0.0, 0.0, 0.0, 0.0]
+    assert np.array_equal(read[:7], points[:7])
+    assert flaws == []

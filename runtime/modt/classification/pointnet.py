@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
-import re
 from collections.abc import Mapping
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnxruntime as ort
@@ -17,6 +18,7 @@ from modt import assets
 from modt.classes import N_CLASSES
 from modt.classification import box_classifier, reflectance_classifier
 from modt.classification.crops import canonical, gather, ground_z_m
+from modt.classification.model_file import REMEDY, read_model
 from modt.classification.prior import box_pool_weight
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
@@ -32,6 +34,8 @@ _MODEL_ERRORS = (
     ort_errors.RuntimeException,
     UnicodeDecodeError,  # of its names
 )
+MEMORY_BYTES = 1 << 30
+"""For the numbers and the results of a model: no file can take more."""
 CLASS_FREQUENCY_KEY = "class_frequency"
 """Key of the class frequency in the metadata of a model: (4,), background first."""
 _MIN_PROBABILITY = 1e-12  # keeps logarithms finite
@@ -55,16 +59,16 @@ class PointNet:
         class_frequency: of the objects' classes among proposals, which the posteriors assume; None where not stated.
 
     Raises:
-        MisuseError: no such model, a hash that differs from the card's, not ONNX, not (batch, points, 3) to
-            (batch, 4), or malformed metadata.
+        MisuseError: no such model, a hash that differs from the card's, not plain ONNX, not (batch, points, 3) to
+            (batch, 4), more memory than MEMORY_BYTES, or malformed metadata.
     """
 
     def __init__(self, config: ClassificationConfig, sensor: SensorConfig) -> None:
         self.config = config
         self._sensor = sensor
         self.path = assets.find("models", config.model, ".onnx")
-        self.sha256 = _checked_hash(self.path)
-        self._session = _session(self.path)
+        raw, self.sha256 = read_model(self.path)
+        self._session = _session(self.path, raw)
         self._input = self._session.get_inputs()[0].name
         metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
         try:
@@ -74,6 +78,7 @@ class PointNet:
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
             raise MisuseError(self.path, cause, "export the model again") from None
+        self._try(config.batch, config.max_points)
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) class probabilities of the given proposals, in their order.
@@ -109,6 +114,20 @@ class PointNet:
         """File and hash of the model, for the record of a run."""
         return {"file": self.path.name, "sha256": self.sha256}
 
+    def _try(self, batch: int, points: int) -> None:
+        """Run the largest batch: what it takes is known before the first frame.
+
+        Raises:
+            MisuseError: it cannot be run.
+        """
+        try:
+            shape = self.infer(np.zeros((batch, points, 3), np.float32)).shape
+        except _MODEL_ERRORS as error:
+            cause = f"cannot run {batch} proposals of {points} points ({str(error).splitlines()[0]})"
+            raise MisuseError(self.path, cause, f"use a smaller model; it has {MEMORY_BYTES >> 20} MiB") from None
+        if shape != (batch, N_CLASSES):
+            raise MisuseError(self.path, f"an output of shape {shape}", REMEDY)
+
     def infer(self, batch: Float32) -> Float32:
         """(b, 4) network output of a (b, n, 3) canonical batch."""
         (output,) = self._session.run(None, {self._input: batch})
@@ -116,21 +135,37 @@ class PointNet:
         return probability
 
 
-def _session(path: Path) -> ort.InferenceSession:
-    """Session on the calling thread alone: an idle thread pool would spin on the core between frames."""
+@cache
+def _limit_memory() -> None:
+    """Of all sessions of this process together."""
+    info = ort.OrtMemoryInfo("Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT)
+    automatic = ("arena_extend_strategy", "initial_chunk_size_bytes", "max_dead_bytes_per_chunk")
+    arena = ort.OrtArenaCfg({"max_mem": MEMORY_BYTES, **dict.fromkeys(automatic, -1)})
+    with suppress(*_MODEL_ERRORS):  # a program that uses the library has registered its own
+        ort.create_and_register_allocator(info, arena)
+
+
+def _session(path: Path, raw: bytes) -> ort.InferenceSession:
+    """Session on the calling thread alone: an idle thread pool would spin on the core between frames.
+
+    Constants are not folded: before the first run, some versions do so outside the limit of the memory.
+    """
+    _limit_memory()
     options = ort.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.execution_mode = ort.ExecutionMode.ORT_SEQUENTIAL
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.add_session_config_entry("session.inter_op.allow_spinning", "0")
+    options.add_session_config_entry("session.use_env_allocators", "1")
     options.log_severity_level = 4
+    plainly: dict[str, Any] = {"disabled_optimizers": ["ConstantFolding"], "enable_fallback": 0}
     try:
-        session = ort.InferenceSession(str(path), options, providers=["CPUExecutionProvider"], enable_fallback=0)
+        session = ort.InferenceSession(raw, options, providers=["CPUExecutionProvider"], **plainly)
         ends = [(end.name, tuple(end.shape)) for end in (*session.get_inputs(), *session.get_outputs())]
         session.get_modelmeta()
     except _MODEL_ERRORS as error:
         cause = f"not an ONNX model ({str(error).splitlines()[0]})"
-        raise MisuseError(path, cause, "use a model of tools/train/export_pointnet.py") from None
+        raise MisuseError(path, cause, REMEDY) from None
     shapes = [shape for _, shape in ends]
     if len(shapes) != 2 or not _fits(shapes[0], (None, None, 3)) or not _fits(shapes[1], (None, N_CLASSES)):
         cause = f"inputs and outputs of shape {' and '.join(map(str, shapes))}"
@@ -151,15 +186,3 @@ def _class_frequency(metadata: Mapping[str, str]) -> tuple[float, ...] | None:
 def _fits(shape: tuple[int | str | None, ...], wanted: tuple[int | None, ...]) -> bool:
     """Whether the fixed dimensions agree and the others (None) are dynamic."""
     return tuple(n if isinstance(n, int) else None for n in shape) == wanted
-
-
-def _checked_hash(path: Path) -> str:
-    try:
-        sha256 = hashlib.sha256(path.read_bytes()).hexdigest()
-        card = path.with_suffix(".md")
-        named = re.search(r"sha256\W+([0-9a-f]{64})", card.read_text(encoding="utf-8")) if card.is_file() else None
-    except (OSError, UnicodeDecodeError) as error:
-        raise MisuseError(path, f"cannot be read ({error})", "make model and card readable") from None
-    if named and named[1] != sha256:
-        raise MisuseError(path, f"is not the model of {card.name} (sha256 {sha256})", "restore the model or its card")
-    return sha256

@@ -181,6 +181,7 @@ class LiveSession:
 
     def _write(self, status: dict[str, Any]) -> None:
         try:
+            self.recording.sync()
             if self.recording.parts:
                 self.directory.write(STATUS, json.dumps(status, indent=1) + "\n")
             if self.metrics is not None:

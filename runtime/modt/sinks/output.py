@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -64,6 +65,15 @@ def writing(path: Path) -> Iterator[None]:
         raise ModtError(path, cause, remedy) from None
 
 
+def sync_folder(path: Path) -> None:
+    """Have the names in a folder outlast a power cut; raises OSError."""
+    number = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(number)
+    finally:
+        os.close(number)
+
+
 class LineFile(Generic[T]):
     """An unbuffered text file of whole lines; `encode` gives the lines of an item.
 
@@ -91,9 +101,18 @@ class LineFile(Generic[T]):
                     written += self._file.write(data[written:])
             except OSError:
                 with suppress(OSError):
-                    self._file.truncate(whole)
+                    self._file.truncate(self._file.seek(whole))  # the next line begins where this one did
                 raise
         self._written += 1
+
+    def sync(self) -> None:
+        """Have all that was written outlast a power cut; waits for the disk.
+
+        Raises:
+            ModtError: it may not.
+        """
+        with writing(self.path):
+            os.fsync(self._file.fileno())
 
     def health(self) -> Health:
         """The items written."""

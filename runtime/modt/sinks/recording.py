@@ -53,6 +53,7 @@ class Recording:
         self._writer, self._describe, self._clock = writer, describe, clock
         self._files: dict[str, LineFile[str]] = {}
         self._begun, self._bytes, self._retry_s = False, 0, float("-inf")
+        self._synced, self._named = 0, 0  # lines, and files, that outlast a power cut
         writer.submit(self._begin)
 
     def write(self, result: FrameResult) -> None:
@@ -83,9 +84,15 @@ class Recording:
     def close(self) -> None:
         """No effect: `finish` ends the files on their own thread."""
 
+    def sync(self) -> None:
+        """Have the lines so far outlast a power cut; once a second."""
+        if self.cause is None and self._synced != self.lines and self._attempt(self._sync):
+            self._synced = self.lines
+
     def finish(self) -> None:
         """Close the files."""
-        files, self._files = self._files, {}
+        self.sync()
+        files, self._files, self._named = self._files, {}, 0
         for file in files.values():
             file.close()
 
@@ -115,12 +122,19 @@ class Recording:
 
     def _redescribe(self) -> None:
         if self._begun:
-            self._attempt(lambda: self.directory.write(RUN, self._describe()))
+            self._attempt(lambda: self.directory.write(RUN, self._describe(), lasting=True))
 
     def _line(self, name: str, text: str) -> None:
         if name not in self._files:
             self._files[name] = LineFile(self.directory.path / name)
         self._files[name].write(text)
+
+    def _sync(self) -> None:
+        for file in self._files.values():
+            file.sync()
+        if self._named != len(self._files):
+            self.directory.sync()
+            self._named = len(self._files)
 
     def _attempt(self, action: Callable[[], None]) -> bool:
         """Whether an action went well; failures pause the recording, and its return is logged."""

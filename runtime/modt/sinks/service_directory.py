@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from modt.errors import MisuseError, ModtError
-from modt.sinks.output import writing
+from modt.sinks.output import sync_folder, writing
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 
 STATUS = "status.json"
@@ -65,10 +65,10 @@ class ServiceDirectory:
             self._keep()
             self._trim(limit_bytes)
             self.path.mkdir(parents=True, exist_ok=True)
-        self.write(RUN, description)
+        self.write(RUN, description, lasting=True)
 
-    def write(self, name: str, text: str) -> None:
-        """Write a file of the present part atomically.
+    def write(self, name: str, text: str, *, lasting: bool = False) -> None:
+        """Write a file of the present part atomically; a lasting one is never found empty after a power cut.
 
         Raises:
             ModtError: it cannot be written.
@@ -76,12 +76,26 @@ class ServiceDirectory:
         partial = self.path / _FILES[name]
         with writing(self.path / name):
             try:
-                partial.write_text(text, encoding="utf-8")
+                with partial.open("w", encoding="utf-8") as file:
+                    file.write(text)
+                    file.flush()
+                    if lasting:
+                        os.fsync(file.fileno())
                 partial.replace(self.path / name)
             except OSError:
                 with suppress(OSError):
                     partial.unlink()
                 raise
+
+    def sync(self) -> None:
+        """Have the names of the present part and its files outlast a power cut.
+
+        Raises:
+            ModtError: they may not.
+        """
+        with writing(self.path):
+            sync_folder(self.path)
+            sync_folder(self.path.parent)
 
     def kept(self) -> list[Path]:
         """Earlier parts, the oldest first."""

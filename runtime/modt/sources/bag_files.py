@@ -77,7 +77,7 @@ class DatabaseFile:
         """Messages of these topics in the order of their recording."""
         query = (
             "SELECT name, timestamp, data FROM messages JOIN topics ON topic_id = topics.id "
-            f"WHERE name IN ({', '.join('?' * len(topics))}) ORDER BY timestamp"
+            f"WHERE name IN ({', '.join('?' * len(topics))}) AND typeof(data) = 'blob' ORDER BY timestamp"
         )
         with self._open() as database:
             for name, recorded_ns, data in database.execute(query, tuple(topics)):
@@ -89,7 +89,7 @@ class DatabaseFile:
             address = f"file:{quote(str(self.path))}?immutable=1"
             with closing(sqlite3.connect(address, uri=True, check_same_thread=False)) as database:
                 yield database
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError, TypeError) as error:  # a column may hold anything
             raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
 
 
@@ -108,7 +108,10 @@ class McapFile:
         except ImportError:
             raise MisuseError(path, "needs the library mcap", "pip install mcap, or 'modt[ros2]'") from None
         # What the library and its decompressors raise where the bytes are no recording, or not all of one.
-        self.path, self._errors = path, (McapError, ZstdError, struct.error, ValueError, RuntimeError, *TOO_LARGE)
+        self.path, self._errors = (
+            path,
+            (McapError, ZstdError, struct.error, LookupError, ValueError, RuntimeError, *TOO_LARGE),
+        )
         self._indexed, self._sequential = SeekingReader, NonSeekingReader
 
     def topics(self) -> dict[str, BagTopic]:

@@ -20,9 +20,9 @@ MAX_IMPLAUSIBLE_SHARE = 0.02
 def read_scan(path: Path) -> tuple[Float32, list[str]]:
     """Points of a file by its suffix, a key of READERS, and its flaws.
 
-    Points that are not finite are set to the origin, which counts as no return, so that rows keep their indices. A
-    reflectance that is not finite or negative counts as not recorded. Reflectances from 0 to 255 are scaled to 0 to
-    1.
+    Points that are not finite, or far beyond any range, are set to the origin, which counts as no return, so that
+    rows keep their indices. A reflectance that is not finite or negative counts as not recorded. Reflectances from 0
+    to 255 are scaled to 0 to 1.
 
     Raises:
         ScanError: missing, unreadable, empty, truncated, or of other columns.
@@ -71,10 +71,12 @@ def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:
             flaws.append(f"{unread}: have the sensor's driver write them")
     negative = np.flatnonzero(reflectance < 0)
     implausible = np.count_nonzero(reflectance[negative] != UNRECORDED) + np.count_nonzero(reflectance > 255)
-    implausible += np.count_nonzero(np.abs(points[:, :3]) > MAX_COORDINATE_M)
+    far = (np.abs(points[:, :3]) > MAX_COORDINATE_M).any(axis=1)
+    implausible += np.count_nonzero(far)
     if implausible > MAX_IMPLAUSIBLE_SHARE * len(points):
         cause = "its columns are not x, y, z [m], reflectance"
         raise ScanError(origin, cause, "the frame is skipped; convert it to float32 rows of these four")
+    points[far] = 0.0
     if reflectance.max(initial=0.0) > 1.0:  # 0 to 255, unless only a few outliers exceed 1
         in_bytes = np.count_nonzero(reflectance > 1.0) > MAX_IMPLAUSIBLE_SHARE * (len(points) - len(negative))
         np.clip(reflectance / np.float32(255 if in_bytes else 1), 0, 1, out=reflectance)

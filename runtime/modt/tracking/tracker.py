@@ -23,6 +23,8 @@ from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
 
+CREEPING = 0.1
+"""Of the period: shorter steps are those of a clock that stands."""
 _MAX_LENGTH_M = np.array([spec.max_length_m for spec in CLASSES.values()])
 
 
@@ -166,7 +168,8 @@ class Tracker:
         dt_s = self._lapse_s(stamp_s)
         self._stamp_s = stamp_s
         t, noise = self._tracks, self.config.filter
-        t.unseen_s += dt_s or self._period_s  # a clock that stands does not keep tracks alive
+        creeps = dt_s < CREEPING * self._period_s  # a clock that stands does not keep tracks alive
+        t.unseen_s += self._period_s if creeps else dt_s
         t.last_class = t.object_class
         x, P = components_first(t.x, t.P)
         t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, noise.acceleration_sigma_mps2, noise.turn_sigma_radps))

@@ -84,11 +84,15 @@ class OusterDecoder:
     def _read(self, metadata: Path) -> Any:
         remedy = "save what the sensor says at /api/v1/sensor/metadata"
         try:
-            return self._sdk.SensorInfo(metadata.read_text("utf-8"))
+            info = self._sdk.SensorInfo(metadata.read_text("utf-8"))
         except OSError as error:
             raise MisuseError(metadata, f"cannot be read ({error.strerror})", remedy) from None
         except Exception as error:  # of the SDK's parser, of no common type
             raise MisuseError(metadata, f"no metadata of an Ouster ({one_line(error)})", remedy) from None
+        width, columns = info.format.columns_per_frame, info.format.columns_per_packet
+        if columns < 1 or width % columns:
+            raise MisuseError(metadata, f"no metadata of an Ouster ({width} columns in packets of {columns})", remedy)
+        return info
 
     def _flaw(self, payload: bytes) -> str | None:
         """Why a payload is no packet of points that fits the metadata; None if it is one."""

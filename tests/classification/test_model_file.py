@@ -1,0 +1,155 @@
+"""Models of a stranger: they open no other file, and take no more memory than there is for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import onnx
+import pytest
+from onnx import TensorProto, helper, numpy_helper
+
+from modt import assets
+from modt.classification import model_file
+from modt.classification.model_file import read_model
+from modt.classification.pointnet import PointNet
+from modt.config import ClassificationConfig, SensorConfig
+from modt.errors import MisuseError
+from tests.fuzz.execution import limits
+from tests.fuzz.runs import network
+
+SECRET = "secret.bin"
+
+
+def saved(folder: Path, model: onnx.ModelProto) -> Path:
+    path = folder / "net.onnx"
+    path.write_bytes(model.SerializeToString())
+    return path
+
+
+def load(path: Path) -> PointNet:
+    return PointNet(ClassificationConfig(model=str(path)), SensorConfig())
+
+
+def external(tensor: TensorProto) -> None:
+    tensor.ClearField("raw_data")
+    tensor.data_location = TensorProto.EXTERNAL
+    for key, value in (("location", SECRET), ("length", "48")):
+        entry = tensor.external_data.add()
+        entry.key, entry.value = key, value
+
+
+def with_weight_elsewhere() -> onnx.ModelProto:
+    model = network()
+    external(model.graph.initializer[0])
+    return model
+
+
+def with_constant_elsewhere() -> onnx.ModelProto:
+    model, tensor = network(), numpy_helper.from_array(np.zeros(12, np.float32), "c")
+    external(tensor)
+    model.graph.node.append(helper.make_node("Constant", [], ["c"], value=tensor))
+    return model
+
+
+def with_sparse_weight_elsewhere() -> onnx.ModelProto:
+    model = network()
+    sparse = model.graph.sparse_initializer.add()
+    sparse.values.name = "s"
+    external(sparse.values)
+    return model
+
+
+def with_branch() -> onnx.ModelProto:
+    model = network()
+    branch = helper.make_graph([], "branch", [], [])
+    model.graph.node.append(helper.make_node("If", ["x"], ["y"], then_branch=branch, else_branch=branch))
+    return model
+
+
+def with_function() -> onnx.ModelProto:
+    model = network()
+    model.functions.append(helper.make_function("own", "f", ["a"], ["a"], [], []))
+    return model
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        (with_weight_elsewhere, "another file"),
+        (with_constant_elsewhere, "another file"),
+        (with_sparse_weight_elsewhere, "another file"),
+        (with_branch, "a graph within a node"),
+        (with_function, "functions"),
+    ],
+)
+def test_what_reaches_beyond_the_file_is_refused_before_it_runs(model, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / SECRET).write_bytes(bytes(48))
+    path = saved(tmp_path, model())
+    with pytest.raises(MisuseError, match=said):
+        read_model(path)
+
+
+def large(*nodes: onnx.NodeProto, **numbers: list[int]) -> onnx.ModelProto:
+    """A small file that makes large tensors."""
+    model = network()
+    del model.graph.node[:], model.graph.initializer[:]
+    model.graph.node.extend(nodes)
+    model.graph.initializer.extend(
+        numpy_helper.from_array(np.array(value, np.int64), name) for name, value in numbers.items()
+    )
+    return model
+
+
+POOLED = helper.make_node("ReduceMax", ["points"], ["pooled"], axes=[1], keepdims=0)
+LARGE = {
+    "constants": large(
+        POOLED,
+        helper.make_node("ConstantOfShape", ["shape"], ["weight"]),
+        helper.make_node("MatMul", ["pooled", "weight"], ["wide"]),
+        helper.make_node("Slice", ["wide", "begin", "end", "axis"], ["probability"]),
+        **{"shape": [3, 1 << 28], "begin": [0], "end": [4], "axis": [1]},
+    ),
+    "results": large(
+        POOLED,
+        helper.make_node("Tile", ["pooled", "repeats"], ["wide"]),
+        helper.make_node("Slice", ["wide", "begin", "end", "axis"], ["probability"]),
+        **{"repeats": [1, 1 << 28], "begin": [0], "end": [4], "axis": [1]},
+    ),
+}
+
+
+@pytest.mark.parametrize("model", LARGE.values(), ids=LARGE)
+def test_a_small_file_that_takes_all_memory_is_refused(model, tmp_path):
+    with limits(), pytest.raises(MisuseError, match="cannot run 8 proposals"):
+        load(saved(tmp_path, model))
+
+
+def test_an_output_of_another_shape_than_promised_is_refused(tmp_path):
+    model = network()
+    model.graph.node[-1].output[0] = "once"
+    model.graph.node.append(helper.make_node("Tile", ["once", "repeats"], ["probability"]))
+    model.graph.initializer.append(numpy_helper.from_array(np.array([2, 1], np.int64), "repeats"))
+    with pytest.raises(MisuseError, match=r"an output of shape \(16, 4\)"):
+        load(saved(tmp_path, model))
+
+
+def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(model_file, "MAX_BYTES", 100)
+    with pytest.raises(MisuseError, match="larger than"):
+        read_model(saved(tmp_path, network()))
+
+
+@pytest.mark.parametrize(
+    "raw", [b"", b"\x08", b"\x3a\xff\xff\xff\xff\x0f", b"\x0b", b"\xff" * 20, b"\xba\x80\x80\x80\x10\x00"]
+)
+def test_what_is_no_message_is_refused(raw, tmp_path):
+    (tmp_path / "net.onnx").write_bytes(raw)
+    with pytest.raises(MisuseError, match="not an ONNX model"):
+        load(tmp_path / "net.onnx")
+
+
+def test_the_shipped_models_are_plain():
+    for path in assets.folder("models").glob("*.onnx"):
+        assert read_model(path)[0] == path.read_bytes()

@@ -1,0 +1,126 @@
+"""Full and read-only disks, and descriptors used up, as the system itself has them: lines are lost and counted."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from modt.config import RecordingConfig
+from modt.sinks.recording import RETRY_S, Recording
+from modt.sinks.records import read_records
+from modt.sinks.service_directory import ServiceDirectory
+from modt.sinks.tracks import SCHEMA
+from tests.crash.test_power_cut import OURS
+from tests.results import CAR, result
+from tests.sinks.test_recording import AtOnce, Time
+
+
+def mount(*arguments):
+    done = subprocess.run(["mount", *map(str, arguments)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip(f"nothing can be mounted here: {done.stderr.strip()}")
+
+
+@pytest.fixture(name="disk")
+def disks(tmp_path):
+    """A disk of 256 KiB."""
+    folder = tmp_path / "disk"
+    folder.mkdir()
+    mount("-t", "tmpfs", "-o", "size=256k", "tmpfs", folder)
+    yield folder
+    subprocess.run(["umount", "--lazy", folder], check=True)
+
+
+class Service:
+    """A recording of ten frames a second, and what became of them."""
+
+    def __init__(self, folder):
+        self.time, self.n = Time(), 0
+        self.path = folder / "run"
+        config = RecordingConfig(disk_mb=10.0, keep="tracks")
+        self.recording = Recording(ServiceDirectory(self.path), config, AtOnce(), lambda: OURS, self.time)
+
+    def run(self, frames):
+        for _ in range(frames):
+            self.time.now += 0.1
+            self.recording.write(result(self.n, [5, 4], {0: 1, 1: 2}, {1: CAR}))
+            self.n += 1
+            if self.n % 10 == 0:
+                self.recording.sync()
+
+    def lost(self):
+        kept = [record["frame"] for record in read_records(self.path / "tracks.jsonl", SCHEMA)]
+        assert self.recording.health()["lost_lines"] == self.n - len(kept)
+        return sorted({*range(self.n)} - {*kept})
+
+
+def test_a_full_disk_costs_what_does_not_fit_and_no_line_is_broken(disk):
+    (disk / "others").write_bytes(bytes(200_000))
+    service = Service(disk)
+    service.run(400)
+    assert "No space left" in service.recording.health()["failing"]
+    assert (service.path / "tracks.jsonl").read_bytes().endswith(b"\n")
+    (disk / "others").unlink()
+    service.run(50)
+    service.recording.finish()
+    lost = service.lost()
+    assert lost == list(range(lost[0], lost[-1] + 1))
+    assert 400 <= lost[-1] <= 400 + RETRY_S / 0.1
+
+
+def test_a_disk_that_becomes_read_only_costs_the_lines_meanwhile(disk):
+    service = Service(disk)
+    mount("-o", "remount,ro", disk)
+    service.run(50)
+    assert "Read-only" in service.recording.health()["failing"]
+    mount("-o", "remount,rw", disk)
+    service.run(50)
+    service.recording.finish()
+    lost = service.lost()
+    assert lost == list(range(len(lost)))
+    assert 50 <= len(lost) <= 51 + RETRY_S / 0.1
+
+
+def test_a_restart_on_a_read_only_disk_runs_without_records(disk):
+    Service(disk).recording.finish()
+    mount("-o", "remount,ro", disk)
+    service = Service(disk)
+    service.run(10)
+    assert service.recording.health()["lost_lines"] == 10
+
+
+@contextmanager
+def no_more_descriptors():
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    taken = [os.open(os.devnull, os.O_RDONLY)]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (max(map(int, os.listdir("/proc/self/fd"))) + 1, hard))
+    with suppress(OSError):
+        while True:  # until the gaps below the limit are filled
+            taken.append(os.dup(taken[0]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        for number in taken:
+            os.close(number)
+
+
+def test_without_descriptors_open_files_go_on_and_a_new_part_waits(tmp_path):
+    service = Service(tmp_path)
+    service.run(20)
+    with no_more_descriptors():
+        service.run(20)
+        assert service.recording.health()["lost_lines"] == 0
+        service.recording._bytes = 100_000_000  # the part is full
+        service.run(20)
+        assert "Too many open files" in service.recording.health()["failing"]
+    service.run(40)
+    service.recording.finish()
+    assert 20 <= service.recording.health()["lost_lines"] <= 20 + RETRY_S / 0.1
+    kept = [r["frame"] for p in ("run~1", "run") for r in read_records(tmp_path / p / "tracks.jsonl", SCHEMA)]
+    assert kept[:40] == list(range(40))
+    assert kept[-1] == 99

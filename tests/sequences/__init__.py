@@ -1,0 +1,1 @@
+"""Sequences of frames that no recording has, and what a pipeline promises whatever it is fed with."""

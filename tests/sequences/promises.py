@@ -1,0 +1,154 @@
+"""What holds after every frame, whatever it was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from modt import assembly, profile
+from modt.classification.pointnet import PointNet
+from modt.classification.scheduler import Scheduler, Selection
+from modt.config import ProfileConfig, TrackingConfig
+from modt.energy.ledger import Ledger
+from modt.geometry import FieldOfView
+from modt.sinks.records import line
+from modt.sinks.tracks import frame_line
+from modt.types import NONE, Budget, Frame, FrameResult
+
+LONGEST_UNSEEN = 10
+"""A track is kept unseen for at most this many times `max_missed` frames, however small their steps in time."""
+_CALL_POINTS = np.full(8, 100)
+
+
+@dataclass
+class Clock:
+    """Of a test [ns]: the same readings for the same calls, at times none passes, at times it goes back."""
+
+    back: int = 0
+    _calls: int = 0
+    _now: int = 0
+
+    def __call__(self) -> int:
+        self._calls += 1
+        self._now += 1_000 * (self._calls % 7) - self.back * (self._calls % 11 == 0)
+        return self._now
+
+
+class Watched:
+    """A scheduler whose grants are held against the budget."""
+
+    def __init__(self, scheduler: Scheduler) -> None:
+        self._scheduler, self._cost = scheduler, scheduler._cost
+
+    def select(self, tracks: Any, proposals: Any, asks: Any, budget: Budget) -> Selection:
+        chosen = self._scheduler.select(tracks, proposals, asks, budget)
+        points = proposals.count[tracks.proposal[chosen.rows]]
+        assert len(set(chosen.rows.tolist())) == len(chosen.rows)
+        assert len(chosen.rows) + chosen.deferred == np.count_nonzero(asks & (tracks.proposal != NONE))
+        assert budget.calls is None or len(chosen.rows) <= budget.calls
+        if budget.cpu_ms is not None and len(points):
+            assert self._cost.cost_ms(points) <= budget.cpu_ms or (self._cost.outdated and len(points) == 1)
+        return chosen
+
+
+@cache
+def config(sensor: str, association: str) -> ProfileConfig:
+    """A shipped profile with an association."""
+    found = profile.resolve((sensor,)).config
+    return replace(found, tracking=replace(found.tracking, association=association))
+
+
+@cache
+def _network(*arguments: Any) -> PointNet:
+    return PointNet(*arguments)
+
+
+def _warm_up(classifier: Any, cost: Any, *_: Any) -> None:
+    cost.warmed_up(_CALL_POINTS, 1.0)
+
+
+@dataclass
+class Run:
+    """A pipeline with its promises, and what it has written so far."""
+
+    mode: str
+    config: ProfileConfig
+    budget: Budget
+    back: int = 0
+    text: str = ""
+    frames: list[str] = field(default_factory=list)
+    proposals: list[int] = field(default_factory=list)
+    _before: frozenset[int] = frozenset()
+    _next_id: int = 0
+
+    def __post_init__(self) -> None:
+        clock = SimpleNamespace(thread_time_ns=Clock())
+        with patch.multiple(assembly, PointNet=_network, warm_up=_warm_up, time=clock):
+            ledger = Ledger(Clock(self.back), Clock(self.back))
+            made = assembly.pipeline(assembly.MODES[self.mode], self.config, FieldOfView(), ledger)
+        self.pipeline = replace(made, scheduler=Watched(made.scheduler))  # type: ignore[arg-type]
+
+    def step(self, frame: Frame) -> FrameResult:
+        """One frame, after which all promises are kept."""
+        result = self.pipeline.step(frame, self.budget)
+        book = self.pipeline.ledger.close_frame(frame.index)
+        self.proposals.append(len(result.proposals))
+        self._proposals_are_of_the_frame(result)
+        self._bounded(result)
+        self._tracks(result)
+        self._posteriors(result)
+        self._parts_are_the_whole(book)
+        self.frames.append(frame_line(result))
+        self.text += self.frames[-1] + line(book)
+        return result
+
+    def _proposals_are_of_the_frame(self, result: FrameResult) -> None:
+        found = result.proposals
+        assert found.offsets[0] == 0
+        assert (found.count > 0).all()
+        assert found.offsets[-1] == len(found.members) == len(np.unique(found.members))
+        assert not len(found.members) or 0 <= found.members.min() <= found.members.max() < len(result.frame.points)
+        assert np.isfinite(found.box).all()
+        assert np.isfinite(found.centroid).all()
+
+    def _tracks(self, result: FrameResult) -> None:
+        tracks, ids = result.tracks, result.tracks.id.tolist()
+        own = tracks.proposal[tracks.proposal != NONE]
+        assert sorted(own.tolist()) == list(range(len(result.proposals)))  # every proposal has one track
+        assert len(set(ids)) == len(ids)
+        new = set(ids) - self._before
+        assert all(number >= self._next_id for number in new)  # no identity comes back
+        self._before, self._next_id = frozenset(ids), max([self._next_id - 1, *ids]) + 1
+        assert result.n_classified == len(result.classified)
+        assert set(result.classified.tolist()) <= set(tracks.id[tracks.proposal != NONE].tolist())
+        for name, column in tracks.columns():
+            assert np.isfinite(column).all(), name
+
+    def _posteriors(self, result: FrameResult) -> None:
+        tracks, frequency = result.tracks, self.pipeline.decision.frequency
+        for column in (tracks.prior, tracks.posterior, tracks.key_prior, tracks.key_posterior, frequency[None]):
+            assert (column >= 0).all()
+            np.testing.assert_allclose(column.sum(axis=1), 1.0, rtol=0, atol=1e-9)
+
+    def _bounded(self, result: FrameResult) -> None:
+        """Nothing is remembered but what recent frames have shown, and a map of a fixed size."""
+        tracker: Any = self.pipeline.tracker
+        assert len(result.tracks) <= sum(self.proposals[-most_frames(self.config.tracking) :])
+        assert len(tracker.background_map._top) <= tracker.background_map.config.capacity
+        landmarks: Any = self.pipeline.odometry._landmarks  # type: ignore[attr-defined]
+        assert set(landmarks._id.tolist()) <= self._before
+
+    def _parts_are_the_whole(self, book: dict[str, Any]) -> None:
+        parts = [stage["wall_ns"] for stage in book["stages"].values()]
+        assert book["wall_ns"] == sum(parts) + book["overhead_ns"] + book["idle_ns"]
+        assert min([book["overhead_ns"], book["idle_ns"], book["cpu_ns"], *parts]) >= 0
+
+
+def most_frames(tracking: TrackingConfig) -> int:
+    """Frames after which a track that is not seen is gone for certain."""
+    return LONGEST_UNSEEN * (tracking.max_missed + 2)

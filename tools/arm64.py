@@ -1,0 +1,122 @@
+"""Run the tests on an emulated 64-bit Arm: a Debian of its own, with aarch64 wheels from the package index.
+
+    sudo python -m tools.arm64 [FOLDER] [--tests tests/golden tests/tracking …]
+
+Needs root, debootstrap, qemu-user-static (apt install) and uv (pip install). The userland in FOLDER is kept, so that
+a second run begins at once. The emulator is registered with the kernel while this runs. It is some 20 times slower
+than the machine: the default is the perception stages, the golden replays, the readers and the writers.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from tools.options import parser
+
+ROOT = Path(__file__).resolve().parents[1]
+SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates"
+PLATFORM = "aarch64-manylinux_2_28"
+LACKING = {"cyclonedds", "ruff", "mypy"}
+"""Of the extra [test]: without a wheel for this platform, or of no use there."""
+TESTS = (
+    *("golden", "segmentation", "odometry", "tracking", "box_tracking", "geometry", "classification", "energy"),
+    *("sources", "sinks", "ros2", "service", "profile", "crash", "test_library.py", "test_pipeline.py"),
+)
+QEMU = Path("/usr/bin/qemu-aarch64-static")
+CPU = "cortex-a72"
+CORE = """processor\t: {number}
+Features\t: fp asimd evtstrm crc32 cpuid
+CPU implementer\t: 0x41
+CPU architecture: 8
+CPU variant\t: 0x0
+CPU part\t: 0xd08
+CPU revision\t: 3
+
+"""
+"""Of /proc/cpuinfo on the core of a Raspberry Pi 4: that of the machine below ends ONNX Runtime."""
+BINFMT = Path("/proc/sys/fs/binfmt_misc")
+NAME = "modt-aarch64"
+MAGIC = r"\x7fELF\x02\x01\x01\x00\x00\x00\x00\x00\x00\x00\x00\x00\x02\x00\xb7\x00"
+MASK = r"\xff\xff\xff\xff\xff\xff\xff\x00\xff\xff\xff\xff\xff\xff\xff\xff\xfe\xff\xff\xff"
+
+
+def run(*command: object) -> None:
+    """Run a command; its failure ends this one."""
+    done = subprocess.run([*map(str, command)], check=False)
+    if done.returncode:
+        raise SystemExit(f"arm64: {command[0]} ended with status {done.returncode}")
+
+
+@contextmanager
+def emulator() -> Iterator[None]:
+    """Have the kernel run Arm programs by the emulator."""
+    if not (BINFMT / "register").exists():
+        run("mount", "-t", "binfmt_misc", "binfmt_misc", BINFMT)
+    known = any("aarch64" in entry.name for entry in BINFMT.iterdir())
+    if not known:
+        (BINFMT / "register").write_text(f":{NAME}:M::{MAGIC}:{MASK}:{QEMU}:F")
+    try:
+        yield
+    finally:
+        if not known:
+            (BINFMT / NAME).write_text("-1")
+
+
+@contextmanager
+def mounted(what: object, where: Path, *options: str) -> Iterator[None]:
+    """Mount something within a context."""
+    run("mount", *options, what, where)
+    try:
+        yield
+    finally:
+        run("umount", "--recursive", "--lazy", where)
+
+
+def install(root: Path) -> None:
+    """The userland, and the libraries as wheels."""
+    if not (root / "usr/bin/python3").exists():
+        run("debootstrap", "--arch=arm64", "--variant=minbase", f"--include={PACKAGES}", SUITE, root)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    wanted = [
+        name for name in wanted if name.split(">")[0] not in LACKING and not name.startswith(("types-", "scipy-"))
+    ]
+    uv = shutil.which("uv") or Path(sys.executable).with_name("uv")
+    form = ["--only-binary", ":all:", "--python-platform", PLATFORM, "--python-version", PYTHON]
+    run(uv, "--no-config", "pip", "install", "--quiet", *form, "--target", root / "opt/libraries", *wanted)
+
+
+def main() -> int:
+    options = parser(__doc__)
+    options.add_argument("folder", type=Path, nargs="?", default=Path("/var/tmp/modt-arm64"), metavar="FOLDER")
+    options.add_argument("--tests", nargs="+", default=[f"tests/{name}" for name in TESTS])
+    given = options.parse_args()
+    if os.geteuid() or not shutil.which("debootstrap") or not QEMU.exists():
+        raise SystemExit("arm64: needs root, debootstrap and qemu-user-static")
+    root = given.folder.resolve()
+    with ExitStack() as stack:
+        stack.enter_context(emulator())
+        install(root)
+        (root / "opt/modt").mkdir(exist_ok=True)
+        cores = root / "opt/cpuinfo"
+        cores.write_text("".join(CORE.format(number=number) for number in range(os.cpu_count() or 1)))
+        stack.enter_context(mounted(ROOT, root / "opt/modt", "--bind", "-o", "ro"))
+        stack.enter_context(mounted("/dev", root / "dev", "--rbind"))
+        stack.enter_context(mounted("proc", root / "proc", "-t", "proc"))
+        stack.enter_context(mounted(cores, root / "proc/cpuinfo", "--bind"))
+        environment = {"QEMU_CPU": CPU, "HOME": "/root", "PATH": "/usr/sbin:/usr/bin", "PYTHONDONTWRITEBYTECODE": "1"}
+        environment["PYTHONPATH"] = "/opt/modt/runtime:/opt/libraries"
+        tests = ["-m", "not slow and not install and not kitti", "-p", "no:cacheprovider", *given.tests]
+        inside = f"cd /opt/modt && exec python3 -m pytest {' '.join(map(repr, tests))}"
+        return subprocess.run(["chroot", str(root), "sh", "-c", inside], check=False, env=environment).returncode
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
