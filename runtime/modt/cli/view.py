@@ -26,6 +26,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
     out = "FILE.html, a page that plays the run (default: RUN/view.html), or FILE.svg (with --frame: RUN/view-N.svg)"
     options.add_capture_option(p)
+    truth = "labels to compare with, as for modt evaluate (default: those that lie with its source)"
+    p.add_argument("--truth", type=Path, metavar="TRUTH", help=truth)
     p.add_argument("--out", type=Path, metavar="FILE", help=out)
     p.set_defaults(run=run)
 
@@ -50,6 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(out, "no kind of picture", f"give a name that ends with {PLAYER} or {PICTURE}")
     recorded = RecordedRun.read(directory)
     at = 0 if frame is None else recorded.position(frame)
+    mark_truth(recorded, directory, arguments.truth)
     whole = out.suffix == PLAYER
     numbers = recorded.numbers if whole else recorded.numbers[at : at + 1]
     stream, grid = source(recorded, arguments.capture), Grid(recorded.config)
@@ -61,6 +64,31 @@ def run(arguments: argparse.Namespace) -> int:
         save_picture(out, recorded, at, grid.step_cm, None if cells is None else next(cells))
     print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
     return 0
+
+
+def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None) -> None:
+    """Add to the frames what is true of them, by labels or by those that lie with the source of the run.
+
+    Raises:
+        MisuseError: labels are given that cannot be used.
+    """
+    from modt.evaluation.run_record import RunRecord
+    from modt.evaluation.truth_files import labels_beside, open_truth
+    from modt.viewer.truth_marks import truth_marks
+
+    run = RunRecord.open(directory)
+    found = labels or (labels_beside(run.stream) if run.stream else None)
+    if found is None:
+        return
+    try:
+        marks = truth_marks(run, open_truth(found, run.stream))
+    except ModtError as error:
+        if labels is not None:
+            raise
+        print(f"modt: without truth: {error}", file=sys.stderr)
+        return
+    for frame in recorded.frames:
+        frame |= marks[frame["frame"]]
 
 
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:

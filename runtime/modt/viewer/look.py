@@ -34,6 +34,12 @@ def states(names: Iterable[str]) -> list[Entry]:
     return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
 
 
+def truth() -> dict[str, Entry]:
+    """Of what became of labelled objects, and of tracks that are said to be what they are not."""
+    colours = {"found": COLOURS[7], "missed": "#d6177f", "not judged": _GREY, "false": "#e07b00"}
+    return {name: {"name": name, "colour": colour} for name, colour in colours.items()}
+
+
 def stages(names: Sequence[str] = STAGES) -> list[Entry]:
     """Of the stages of a frame."""
     return [{"name": name, "colour": COLOURS[k % len(COLOURS)]} for k, name in enumerate(names)]
