@@ -18,9 +18,16 @@ from typing import Any
 NAMES = "chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 WAIT_S = 30.0
 OPTIONS = (
-    "--headless=new --no-sandbox --disable-gpu --disable-dev-shm-usage --hide-scrollbars --no-first-run "
-    "--disable-background-networking --disable-extensions --remote-debugging-pipe"
-).split()
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-extensions",
+    "--remote-debugging-pipe",
+)
 
 
 def find() -> str | None:

@@ -165,3 +165,29 @@ def test_a_drive_of_full_sweeps_fits_a_page(drive_0005, tmp_path, chromium):
     assert (tmp_path / "run" / "view.html").stat().st_size < 25e6
     assert [len(cell) > 40_000 for cell, _ in Page(tmp_path / "run" / "view.html").points] == [True] * 154
     assert chromium.opened(tmp_path / "run" / "view.html", "slide:153")["frame"] == 153
+
+
+def test_truth_beside_the_source_is_marked_and_drawn(tmp_path, chromium):
+    def done(*command):
+        finished = modt(*command, cwd=tmp_path)
+        assert (finished.returncode, finished.stderr) == (0, "")
+
+    done("simulate", "--sensor", "vlp-16", "--seconds", 1.5, "--all-around", "--out", "sim")
+    (drive,) = (tmp_path / "sim").glob("*/*_sync")
+    marks = {}
+    for name, more in (("exact", ["--labels"]), ("boxes", [])):
+        done("replay", drive, "--profile", "vlp-16", "--quiet", "--out", name, *more)
+        done("view", name)
+        marks[name] = Page(tmp_path / name / "view.html").run["frames"]
+    outcomes = {name: [o["outcome"] for f in frames for o in f["truth"]] for name, frames in marks.items()}
+    assert {"found", "missed"} <= set(outcomes["exact"])
+    assert np.mean([a == b for a, b in zip(*outcomes.values(), strict=True)]) > 0.95
+    shown = chromium.opened(tmp_path / "exact" / "view.html", "slide:14")
+    frame = marks["exact"][14]
+    found, missed = (sum(o["outcome"] == name for o in frame["truth"]) for name in ("found", "missed"))
+    assert f"found, missed, false {found}, {missed}, {len(frame['false'])}" in shown["facts"]
+    assert "foundmissednot judgedfalse" in shown["legends"]
+    (tmp_path / "other").mkdir()
+    refused = modt("view", "exact", "--truth", "other", cwd=tmp_path)
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+    assert "holds no labels" in refused.stderr

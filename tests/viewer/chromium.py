@@ -32,8 +32,8 @@ SHOWN = """({
   story: element("story").innerText,
   legends: ["classes", "states", "stage-legend", "truth"].map((id) => element(id).textContent),
   wide: document.documentElement.scrollWidth > innerWidth,
-  small: [...document.body.querySelectorAll("*")].filter((e) => e.innerText && parseFloat(getComputedStyle(e).fontSize) < 12)
-    .map((e) => e.outerHTML),
+  small: [...document.body.querySelectorAll("*")]
+    .filter((e) => e.innerText && parseFloat(getComputedStyle(e).fontSize) < 12).map((e) => e.outerHTML),
 })"""
 SETTLED = "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 50))"
 

@@ -48,9 +48,8 @@ def main() -> None:
         tab.until("canvas.dataset.frame !== undefined")
         ms = tab.value(LATENCIES)
         rate = tab.value(RATE)
-        print(
-            f"{arguments.page.stat().st_size / 1e6:.1f} MB; slider median {ms[len(ms) // 2]:.0f} ms, worst {ms[-1]:.0f} ms"
-        )
+        size_MB, median_ms = arguments.page.stat().st_size / 1e6, ms[len(ms) // 2]
+        print(f"{size_MB:.1f} MB; slider median {median_ms:.0f} ms, worst {ms[-1]:.0f} ms")
         print(f"{rate:.1f} frames a second of 40; failures: {tab.failures() or 'none'}")
 
 

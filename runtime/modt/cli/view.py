@@ -88,7 +88,7 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None) -> N
         print(f"modt: without truth: {error}", file=sys.stderr)
         return
     for frame in recorded.frames:
-        frame |= marks[frame["frame"]]
+        frame.update(marks[frame["frame"]])
 
 
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:
