@@ -127,6 +127,26 @@ def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):
     assert (loop["reloads"], loop["refused_reloads"]) == (1, 1)
 
 
+def test_the_run_is_seen_in_a_browser_while_it_goes_on(scans, start, chromium):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    service = start(f"{scans}?loop=yes", "--profile", "vlp-16", "--view", f"127.0.0.1:{port}")
+    service.hear("READY=1")
+    with chromium.tab(f"http://127.0.0.1:{port}/", width=390) as tab:
+        tab.until("state.at > 3 && state.at === last && drawn.length > 10")
+        assert tab.value("new Int32Array(image.data.buffer).some((value) => value !== colours.paperPixel)")
+        tab.value("slider.value = 1; slider.dispatchEvent(new Event('input'))")
+        before = tab.value("last")
+        tab.until(f"last > {before} + 2")
+        assert tab.value("[state.at, canvas.dataset.frame === String(frames[1].frame)]") == [1, True]
+        tab.press("End")
+        tab.until(f"state.at > {before}")
+    assert service.end()[0] == 0
+    sink = json.loads((service.out / "status.json").read_text())["sinks"][f"view://127.0.0.1:{port}"]
+    assert (sink["failed"], sink["state"]) == (0, "ok")
+
+
 def test_a_killed_service_has_lost_no_more_than_a_second_and_starts_again(scans, start, tmp_path):
     service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
     service.hear("READY=1")

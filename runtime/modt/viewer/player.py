@@ -68,8 +68,8 @@ def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any
     }
 
 
-def content(states: list[look.Entry], budget: str, step_cm: int | None) -> dict[str, Any]:
-    """What each page knows: columns, legends, the budget of a frame, and the width of a cell; None without points."""
+def content(states: list[look.Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
+    """What each page knows: columns, legends, the budget of a frame, the width of a cell (None without points)."""
     return {
         "schema": "modt.player/2",
         "columns": [(name, SCALE.get(name, 1)) for name in COLUMNS],

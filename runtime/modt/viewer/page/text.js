@@ -24,7 +24,7 @@ function showFrame() {
     facts.push(["found, missed, false", `${count("found")}, ${count("missed")}, ${frame.false.length}`]);
   }
   list.replaceChildren();
-  for (const [name, value] of facts) add(list, "dt", name), add(list, "dd", value);
+  for (const [name, value] of facts.filter(([, value]) => value !== null)) add(list, "dt", name), add(list, "dd", value);
   element("stages").replaceChildren();
   for (const { name, colour } of run.stages) {
     const part = (frame.cpu_ms || {})[name] || 0;
