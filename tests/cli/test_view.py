@@ -10,7 +10,7 @@ import pytest
 
 from tests.viewer.pages import Page
 
-from .commands import modt
+from .commands import environment, modt
 
 FRAMES = 12
 
@@ -123,14 +123,57 @@ def test_a_frame_as_a_picture(run, records):
     assert done.returncode == 0, done.stderr
     root = ElementTree.parse(run / "view-9.svg").getroot()
     tag = "{http://www.w3.org/2000/svg}"
-    assert len(root.findall(f"{tag}polygon")) == len(records[9]["tracks"])
-    assert len([c for c in root.findall(f"{tag}circle") if c.get("class") == "ring"]) == records[9]["classifications"]
+    titles = [title.text for title in root.findall(f"{tag}polygon/{tag}title")]
+    assert len(titles) == len(records[9]["tracks"])
+    rings = [circle for circle in root.findall(f"{tag}circle") if circle.get("stroke") == "var(--ink)"]
+    assert len(rings) == records[9]["classifications"]
     text = " ".join(node.text or "" for node in root.iter(f"{tag}text"))
     assert f"{records[9]['classifications']} classified, {records[9]['deferred']} deferred" in text
     assert "budget 16 calls" in text
     assert "mJ (" in text
-    dots = {p.get("class"): p.get("d").count("M") for p in root.findall(f"{tag}path")}
-    assert min(dots["ground"], dots["above"]) > 1000
+    ground, above = (path.get("d").count("M") for path in root.findall(f"{tag}path"))
+    assert min(ground, above) > 1000
+
+
+def test_a_frame_as_pixels(run):
+    Image = pytest.importorskip("PIL.Image")
+    done = modt("view", run, "--frame", 9, "--out", "view.png", cwd=run)
+    assert done.returncode == 0, done.stderr
+    with Image.open(run / "view.png") as image:
+        assert image.size == (1280, 910)
+        colours = {colour for _, colour in image.getcolors(1 << 20)}
+    assert {(255, 255, 255), (0x2B, 0x8A, 0x3E)} <= colours
+
+
+def test_a_film_has_every_frame(run):
+    Image = pytest.importorskip("PIL.Image")
+    done = modt("view", run, "--frame", 4, "--out", "view.gif", cwd=run)
+    assert done.returncode == 0, done.stderr
+    with Image.open(run / "view.gif") as film:
+        assert (film.n_frames, film.info["duration"]) == (FRAMES - 4, 100)
+
+
+def test_a_film_by_ffmpeg(run):
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("ffmpeg is not installed")
+    pytest.importorskip("PIL")
+    done = modt("view", run, "--animate", cwd=run)
+    assert done.returncode == 0, done.stderr
+    assert (run / "view.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_what_a_film_needs_is_named(run, tmp_path):
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "PIL.py").write_text("raise ModuleNotFoundError('PIL', name='PIL')")
+    without = {**environment(), "PYTHONPATH": f"{tmp_path / 'broken'}:{environment()['PYTHONPATH']}"}
+    done = modt("view", run, "--out", tmp_path / "view.png", cwd=tmp_path, env=without)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "needs PIL; pip install 'modt[view]'" in done.stderr
+    pytest.importorskip("PIL")
+    without = {**environment(), "PATH": str(tmp_path)}
+    done = modt("view", run, "--out", tmp_path / "view.mp4", cwd=tmp_path, env=without)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "needs ffmpeg; install it, or give a name that ends with .gif" in done.stderr
 
 
 def test_without_its_source_a_run_has_no_points(moved, chromium):
@@ -148,7 +191,7 @@ def test_misuse_is_one_line_with_the_remedy(run, tmp_path):
     for arguments, message in (
         ((tmp_path,), "describes no run"),
         ((run, "--frame", 77), f"give one from 0 to {FRAMES - 1}"),
-        ((run, "--out", "view.gif"), "give a name that ends with .html or .svg"),
+        ((run, "--out", "view.jpg"), "give a name that ends with .html, .svg, .png, .gif, .mp4"),
     ):
         done = modt("view", *arguments, cwd=tmp_path)
         assert done.returncode == 2

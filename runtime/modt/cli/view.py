@@ -1,10 +1,12 @@
-"""`modt view`: a recorded run from above, as a page that plays it or as the picture of a frame."""
+"""`modt view`: a recorded run from above, as a page that plays it, a picture of a frame, or a film."""
 
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,19 +14,30 @@ from modt.cli import options
 from modt.errors import MisuseError, ModtError
 
 if TYPE_CHECKING:
+    from PIL import Image
+
     from modt.sources.stream import Stream
+    from modt.viewer.point_cells import Cells, Grid
     from modt.viewer.recorded_run import RecordedRun
 
-PLAYER, PICTURE = ".html", ".svg"
+PLAYER, PICTURE, PIXELS, GIF, MP4 = ".html", ".svg", ".png", ".gif", ".mp4"
+PICTURE_WIDTH, FILM_WIDTH = 1280, 960
+"""Pixels."""
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("view", help="show a recorded run from above, with the points of its source")
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")
-    frame = "draw one frame as .svg, or begin a page there"
-    p.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
-    out = "FILE.html, a page that plays the run (default: RUN/view.html), or FILE.svg (with --frame: RUN/view-N.svg)"
+    which = p.add_mutually_exclusive_group()
+    frame = "draw one frame, or begin a page or a film there"
+    which.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
+    film = "make a film, RUN/view.mp4, or RUN/view.gif where ffmpeg is not installed"
+    which.add_argument("--animate", action="store_true", help=film)
+    out = (
+        "FILE.html, a page that plays the run (default: RUN/view.html); of one frame FILE.svg (with --frame: "
+        "RUN/view-N.svg) or FILE.png; a film, FILE.gif or FILE.mp4"
+    )
     options.add_capture_option(p)
     truth = "labels to compare with, as for modt evaluate (default: those that lie with its source)"
     p.add_argument("--truth", type=Path, metavar="TRUTH", help=truth)
@@ -33,37 +46,119 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the page or the picture.
+    """Write the page, the picture or the film.
 
     Raises:
-        MisuseError: no run, a frame that is not recorded, or a file of another kind.
+        MisuseError: no run, a frame that is not recorded, a file of another kind, or a missing extra.
         ModtError: the file cannot be written.
     """
-    from modt.viewer.picture import MOST_CELLS, save_picture
-    from modt.viewer.player import most_cells, save_player
     from modt.viewer.point_cells import Grid
     from modt.viewer.recorded_run import RecordedRun
-    from modt.viewer.sweeps import sweeps
 
-    directory, frame = arguments.run_directory, arguments.frame
-    default = directory / (f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}")
-    out: Path = arguments.out or default
-    if out.suffix not in (PLAYER, PICTURE):
-        raise MisuseError(out, "no kind of picture", f"give a name that ends with {PLAYER} or {PICTURE}")
+    directory = arguments.run_directory
+    out: Path = arguments.out or directory / default_name(arguments.frame, arguments.animate)
+    if out.suffix not in FORMS:
+        raise MisuseError(out, "no kind of picture", f"give a name that ends with {', '.join(FORMS)}")
     recorded = RecordedRun.read(directory)
-    at = 0 if frame is None else recorded.position(frame)
+    at = 0 if arguments.frame is None else recorded.position(arguments.frame)
     mark_truth(recorded, directory, arguments.truth)
-    whole = out.suffix == PLAYER
-    numbers = recorded.numbers if whole else recorded.numbers[at : at + 1]
-    stream, grid = source(recorded, arguments.capture), Grid(recorded.config)
-    most = most_cells(len(numbers)) if whole else MOST_CELLS
-    cells = None if stream is None else sweeps(numbers, stream, grid, most)
-    if whole:
-        save_player(out, recorded, at, grid.step_cm, cells)
-    else:
-        save_picture(out, recorded, at, grid.step_cm, None if cells is None else next(cells))
+    FORMS[out.suffix](View(recorded, at, source(recorded, arguments.capture), Grid(recorded.config), out))
     print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
     return 0
+
+
+def default_name(frame: int | None, animate: bool) -> str:
+    """Of the file, where none is given."""
+    if animate:
+        return f"view{MP4 if shutil.which('ffmpeg') else GIF}"
+    return f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}"
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What is to be shown, and where."""
+
+    run: RecordedRun
+    at: int  # index of the frame, or of the first
+    stream: Stream | None
+    grid: Grid
+    out: Path
+
+    def cells(self, numbers: Sequence[int], most: int) -> Iterator[Cells] | None:
+        """Those of the frames, None without points."""
+        from modt.viewer.sweeps import sweeps
+
+        return None if self.stream is None else sweeps(numbers, self.stream, self.grid, most)
+
+    def images(self, width: int, n: int | None = None) -> Iterator[Image.Image]:
+        """Of the frames from the first one on.
+
+        Raises:
+            MisuseError: Pillow is not installed.
+        """
+        try:
+            from modt.viewer.pixel_canvas import PixelCanvas
+        except ModuleNotFoundError as error:
+            raise MisuseError(self.out, f"needs {error.name}", "pip install 'modt[view]'") from None
+        from modt.viewer.picture import draw
+
+        numbers = self.run.numbers[self.at :][:n]
+        cells = self.cells(numbers, sys.maxsize)
+        for at in range(self.at, self.at + len(numbers)):
+            canvas = PixelCanvas(width)
+            draw(canvas, self.run, at, self.grid.step_cm, None if cells is None else next(cells))
+            yield canvas.image()
+
+    @property
+    def period_s(self) -> float:
+        """Between two frames."""
+        stamps: list[float] = [frame["stamp_s"] for frame in self.run.frames]
+        return max((stamps[-1] - stamps[0]) / max(len(stamps) - 1, 1), 0.02)
+
+
+def _player(view: View) -> None:
+    from modt.viewer.player import most_cells, save_player
+
+    numbers = view.run.numbers
+    save_player(view.out, view.run, view.at, view.grid.step_cm, view.cells(numbers, most_cells(len(numbers))))
+
+
+def _svg(view: View) -> None:
+    from modt.reporting.page import save
+    from modt.viewer.picture import MOST_CELLS, draw
+    from modt.viewer.svg_canvas import SvgCanvas
+
+    canvas, number = SvgCanvas(), view.run.numbers[view.at]
+    cells = view.cells([number], MOST_CELLS)
+    draw(canvas, view.run, view.at, view.grid.step_cm, None if cells is None else next(cells))
+    save(view.out, canvas.document(f"{view.run.facts['stream']['name']}, frame {number}"))
+
+
+def _png(view: View) -> None:
+    from modt.sinks.output import writing
+
+    image = next(view.images(PICTURE_WIDTH, 1))
+    with writing(view.out):
+        image.save(view.out, optimize=True)
+
+
+def _gif(view: View) -> None:
+    images = view.images(FILM_WIDTH)
+    first = next(images)  # says that Pillow is missing before the module that needs it is imported
+    from modt.viewer.film import save_gif
+
+    save_gif(view.out, first, images, view.period_s)
+
+
+def _mp4(view: View) -> None:
+    images = view.images(FILM_WIDTH)
+    first = next(images)
+    from modt.viewer.film import save_mp4
+
+    save_mp4(view.out, first, images, view.period_s)
+
+
+FORMS = {PLAYER: _player, PICTURE: _svg, PIXELS: _png, GIF: _gif, MP4: _mp4}
 
 
 def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None) -> None:
