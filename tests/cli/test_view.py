@@ -8,6 +8,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from modt.classes import CLASS_NAMES
+from tests.viewer.chromium import LOADED, WIDE
 from tests.viewer.pages import Page
 
 from .commands import environment, modt
@@ -160,6 +162,30 @@ def test_a_film_by_ffmpeg(run):
     done = modt("view", run, "--animate", cwd=run)
     assert done.returncode == 0, done.stderr
     assert (run / "view.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_how_the_class_of_a_track_was_decided(run, records, chromium):
+    numbers = [id_ for record in records for id_ in record["classified"]]
+    id_ = max(set(numbers), key=numbers.count)
+    done = modt("view", run, "--track", id_, cwd=run)
+    assert done.returncode == 0, done.stderr
+    page = run / f"track-{id_}.html"
+    seen = [next(t for t in record["tracks"] if t["id"] == id_) for record in records if id_ in record["classified"]]
+    with chromium.tab(page.as_uri(), width=390, ready=LOADED) as tab:
+        assert not tab.value(WIDE)
+        text = tab.value("document.body.innerText")
+        pictures = (
+            "[...document.querySelectorAll('section > svg')].map((svg) => svg.querySelectorAll('circle').length)"
+        )
+        drawn = tab.value(pictures)
+    assert f"classifications\n{len(seen)}\n" in text
+    for track in seen:
+        posterior = ", ".join(f"{c} {100 * p:.1f} %" for c, p in zip(CLASS_NAMES, track["posterior"], strict=True))
+        assert f"Posterior: {posterior}" in text
+    assert len(drawn) >= 2 * len(seen)
+    assert sum(drawn) > 0
+    refused = modt("view", run, "--track", 10**8, cwd=run)
+    assert (refused.returncode, "is not recorded" in refused.stderr) == (2, True)
 
 
 def test_what_a_film_needs_is_named(run, tmp_path):

@@ -35,6 +35,9 @@ SHOWN = """({
   small: [...document.body.querySelectorAll("*")]
     .filter((e) => e.innerText && parseFloat(getComputedStyle(e).fontSize) < 12).map((e) => e.outerHTML),
 })"""
+DRAWN = "canvas.dataset.frame !== undefined"
+LOADED = "document.readyState === 'complete' && location.protocol === 'file:'"
+WIDE = "document.documentElement.scrollWidth > innerWidth"
 SETTLED = "new Promise((done) => setTimeout(() => requestAnimationFrame(() => requestAnimationFrame(done)), 50))"
 
 
@@ -53,10 +56,10 @@ class Chromium:
             return tab.value(SHOWN)
 
     @contextmanager
-    def tab(self, url: str, *, width: int = 1280, height: int = 800, dark: bool = False):
+    def tab(self, url: str, *, width: int = 1280, height: int = 800, dark: bool = False, ready: str = DRAWN):
         """A page that has drawn a frame, and must have no failure when it is left."""
         with closing(Tab(self._browser, url, width, height, dark=dark, first=RECORD)) as tab:
-            tab.until("canvas.dataset.frame !== undefined")
+            tab.until(ready)
             yield tab
             assert tab.failures() == []
 

@@ -34,6 +34,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     which.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
     film = "make a film, RUN/view.mp4, or RUN/view.gif where ffmpeg is not installed"
     which.add_argument("--animate", action="store_true", help=film)
+    track = "tell how the class of a track was decided (default: RUN/track-ID.html)"
+    which.add_argument("--track", type=options.integer(0, 10**9, "the number of a track"), metavar="ID", help=track)
     out = (
         "FILE.html, a page that plays the run (default: RUN/view.html); of one frame FILE.svg (with --frame: "
         "RUN/view-N.svg) or FILE.png; a film, FILE.gif or FILE.mp4"
@@ -56,6 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.viewer.recorded_run import RecordedRun
 
     directory = arguments.run_directory
+    if arguments.track is not None:
+        return tell(arguments)
     out: Path = arguments.out or directory / default_name(arguments.frame, arguments.animate)
     if out.suffix not in FORMS:
         raise MisuseError(out, "no kind of picture", f"give a name that ends with {', '.join(FORMS)}")
@@ -64,6 +68,26 @@ def run(arguments: argparse.Namespace) -> int:
     mark_truth(recorded, directory, arguments.truth)
     FORMS[out.suffix](View(recorded, at, source(recorded, arguments.capture), Grid(recorded.config), out))
     print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
+    return 0
+
+
+def tell(arguments: argparse.Namespace) -> int:
+    """Write the page of a track.
+
+    Raises:
+        MisuseError: no run, or no such track.
+        ModtError: the file cannot be written.
+    """
+    from modt.reporting.page import save
+    from modt.viewer.recorded_run import RecordedRun
+    from modt.viewer.track_page import track_page, track_rows, views
+
+    directory, out = arguments.run_directory, arguments.out
+    recorded = RecordedRun.read(directory)
+    rows = track_rows(recorded, arguments.track)
+    out = out or directory / f"track-{arguments.track}{PLAYER}"
+    save(out, track_page(recorded, rows, views(recorded, rows, source(recorded, arguments.capture))))
+    print(out)
     return 0
 
 

@@ -49,6 +49,7 @@ svg text{font-size:11px;fill:var(--soft)}.end{text-anchor:end}.mid{text-anchor:m
 .legend{margin:.3rem 0 0;color:var(--soft);font-size:.85rem}
 .legend span{margin-right:14px;white-space:nowrap}
 .legend i{display:inline-block;width:10px;height:10px;border-radius:2px;margin-right:5px}
+@media (max-width:600px){svg text{font-size:17px}}
 @media print{:root{--ink:#000;--soft:#444;--line:#bbb;--paper:#fff;--panel:#fff}body{max-width:none;padding:0}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}.plots{grid-template-columns:1fr 1fr}}
 """
@@ -60,7 +61,11 @@ Plot = tuple[str, str, str]
 
 def document_page(document: Document, drawn: Iterable[Plot]) -> str:
     """HTML of a report with its plots."""
-    blocks = [_tiles(document), plots(drawn), *map(_table, document.tables)]
+    blocks = [
+        _tiles((name, _cell(value), note) for name, value, note in document.results),
+        plots(drawn),
+        *map(_table, document.tables),
+    ]
     notes = "".join(f'<p class="legend">{escape(note)}</p>' for note in (document.test, LEGEND))
     return page(document.title, "; ".join(document.about), [*blocks, notes])
 
@@ -76,6 +81,11 @@ def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
         f"<title>{escape(title)}</title><style>{THEME}{_STYLE}{colours}</style></head><body>"
         f'<h1>{escape(title)}</h1><p class="sub">{escape(subtitle)}</p>{"".join(blocks)}</body></html>\n'
     )
+
+
+def tiles(facts: Iterable[tuple[str, str, str]]) -> str:
+    """Facts side by side: name, value and note of each."""
+    return _tiles((name, escape(value), note) for name, value, note in facts)
 
 
 def plots(items: Iterable[Plot]) -> str:
@@ -97,10 +107,11 @@ def save(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _tiles(document: Document) -> str:
+def _tiles(facts: Iterable[tuple[str, str, str]]) -> str:
+    """Facts whose values are HTML."""
     cells = (
-        f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
-        for name, value, note in document.results
+        f'<div class="tile"><small>{escape(name)}</small><b>{value}</b><small>{escape(note)}</small></div>'
+        for name, value, note in facts
     )
     return f'<div class="tiles">{"".join(cells)}</div>'
 
