@@ -143,8 +143,9 @@ def test_a_frame_as_pixels(run):
     assert done.returncode == 0, done.stderr
     with Image.open(run / "view.png") as image:
         assert image.size == (1280, 910)
-        colours = {colour for _, colour in image.getcolors(1 << 20)}
-    assert {(255, 255, 255), (0x2B, 0x8A, 0x3E)} <= colours
+        colours = np.array([colour for _, colour in image.convert("RGB").getcolors(1 << 20)])
+    for wanted in ((0xFF, 0xFF, 0xFF), (0x2B, 0x8A, 0x3E)):  # paper, and the edge of what is classified
+        assert np.abs(colours - wanted).sum(axis=1).min() < 20
 
 
 def test_a_film_has_every_frame(run):
@@ -178,7 +179,7 @@ def test_how_the_class_of_a_track_was_decided(run, records, chromium):
             "[...document.querySelectorAll('section > svg')].map((svg) => svg.querySelectorAll('circle').length)"
         )
         drawn = tab.value(pictures)
-    assert f"classifications\n{len(seen)}\n" in text
+    assert f"classifications {len(seen)} " in " ".join(text.split()), text[:600]
     for track in seen:
         posterior = ", ".join(f"{c} {100 * p:.1f} %" for c, p in zip(CLASS_NAMES, track["posterior"], strict=True))
         assert f"Posterior: {posterior}" in text

@@ -162,8 +162,10 @@ def _png(view: View) -> None:
     from modt.sinks.output import writing
 
     image = next(view.images(PICTURE_WIDTH, 1))
+    from modt.viewer.film import few_colours
+
     with writing(view.out):
-        image.save(view.out, optimize=True)
+        few_colours(image).save(view.out, optimize=True)
 
 
 def _gif(view: View) -> None:

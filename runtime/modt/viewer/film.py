@@ -5,15 +5,37 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
 from modt.errors import MisuseError, ModtError
+from modt.reporting.page import LIGHT
 from modt.sinks.output import writing
+from modt.viewer import look
 
-COLOURS = 64
-"""Of a GIF."""
+_MIXED = (1.0, 0.75, 0.5, 0.35, 0.2, 0.1)
+"""Parts of a colour over paper: edges, and what shines through."""
+
+
+@cache
+def _palette() -> Image.Image:
+    """The colours that pictures are drawn in; one found in the picture would lose what is small."""
+    entries = [*look.classes(), *look.truth().values(), *look.states(look.STATES)]
+    drawn = dict.fromkeys([*LIGHT.values(), *(entry["colour"] for entry in entries)])
+    colours = np.array([list(bytes.fromhex(colour[1:])) for colour in drawn])
+    paper = np.array(list(bytes.fromhex(LIGHT["paper"][1:])))
+    mixed = [np.rint(paper + part * (colours - paper)).astype(np.uint8) for part in _MIXED]
+    image = Image.new("P", (1, 1))
+    image.putpalette(np.concatenate(mixed)[:256].tobytes())
+    return image
+
+
+def few_colours(image: Image.Image) -> Image.Image:
+    """The picture in the colours of its palette, for a small file."""
+    return image.quantize(palette=_palette(), dither=Image.Dither.NONE)
 
 
 def save_gif(path: Path, first: Image.Image, rest: Iterator[Image.Image], period_s: float) -> None:
@@ -22,12 +44,9 @@ def save_gif(path: Path, first: Image.Image, rest: Iterator[Image.Image], period
     Raises:
         ModtError: it cannot be written.
     """
-    palette = first.quantize(COLOURS)
-    others = (image.quantize(palette=palette, dither=Image.Dither.NONE) for image in rest)
+    others, period_ms = map(few_colours, rest), round(1e3 * period_s)
     with writing(path):
-        palette.save(
-            path, save_all=True, append_images=others, duration=round(1e3 * period_s), loop=0, optimize=False
-        )
+        few_colours(first).save(path, save_all=True, append_images=others, duration=period_ms, loop=0)
 
 
 def save_mp4(path: Path, first: Image.Image, rest: Iterator[Image.Image], period_s: float) -> None:

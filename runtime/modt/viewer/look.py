@@ -22,6 +22,7 @@ _STATE_COLOURS = {
     "lost_classified": COLOURS[3],
     "lost_unclassified": COLOURS[6],
 }
+STATES = tuple(_STATE_COLOURS)
 
 
 def classes() -> list[Entry]:

@@ -54,11 +54,7 @@ def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32])
     facts = [
         ("said at the end", name, f"posterior {100 * last[f'p_{name}']:.1f} %"),
         ("followed", f"{len(rows)} frames", f"{number[int(first['at'])]} to {number[int(last['at'])]}"),
-        (
-            "classified",
-            f"{len(classified)} times",
-            f"by tracking by detection {sum(r['seen'] > 0 for r in rows)} times",
-        ),
+        ("classifications", f"{len(classified)}", f"{sum(r['seen'] > 0 for r in rows)} by tracking by detection"),
         ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated, by CPU time"),
         ("certain from frame", "never" if final is None else f"{number[int(final['at'])]}", "asked for no more"),
     ]
