@@ -11,7 +11,6 @@ from modt.evaluation.evaluation import ALL, RANGES_M, Evaluation
 from modt.evaluation.report import report
 from modt.reporting import svg
 from modt.reporting.page import Plot, page, plots, preformatted, tiles
-from modt.types import Float64
 
 _COLOURS = {name: spec.colour for name, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)}
 _MIDDLE_M = {name: (low + high) / 2 for name, (low, high) in RANGES_M.items() if name != ALL}
@@ -61,7 +60,7 @@ def _plots(found: Evaluation) -> Iterator[Plot]:
     yield "Precision over recall", svg.lines(curves, "recall [%]", "precision [%]"), "by posterior"
     kinds = [kind for kind in (ALL, *CLASS_NAMES) if kind in found.tracks]
     lives = np.array([found.tracks[kind].life.ratio or 0.0 for kind in kinds])
-    edges: Float64 = np.arange(len(kinds) + 1) - 0.5
+    edges = np.arange(len(kinds) + 1, dtype=np.float64) - 0.5
     note = ", ".join(f"{k}: {kind}" for k, kind in enumerate(kinds)) or "labels without identities"
     yield "Life of tracks, of the ideal", svg.bars(edges, lives, "objects", "share"), note
 
