@@ -197,19 +197,17 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None) -> N
     from modt.evaluation.truth_files import labels_beside, open_truth
     from modt.viewer.truth_marks import truth_marks
 
-    run = RunRecord.open(directory)
-    found = labels or (labels_beside(run.stream) if run.stream else None)
-    if found is None:
-        return
     try:
-        marks = truth_marks(run, open_truth(found, run.stream))
+        run = RunRecord.open(directory)
+        found = labels or (labels_beside(run.stream) if run.stream else None)
+        marks = {} if found is None else truth_marks(run, open_truth(found, run.stream))
     except ModtError as error:
         if labels is not None:
             raise
         print(f"modt: without truth: {error}", file=sys.stderr)
         return
     for frame in recorded.frames:
-        frame.update(marks[frame["frame"]])
+        frame.update(marks.get(frame["frame"], {}))
 
 
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:
