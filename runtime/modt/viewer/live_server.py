@@ -5,8 +5,9 @@ from __future__ import annotations
 import socket
 import threading
 from contextlib import suppress
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from http.server import BaseHTTPRequestHandler
 from ipaddress import ip_address
+from socketserver import ThreadingTCPServer
 
 MOST_CLIENTS = 8
 SEND_S = 5.0
@@ -45,7 +46,7 @@ class Client:
             return None if self._ended else event or b": alive\n\n"
 
 
-class LiveServer(ThreadingHTTPServer):
+class LiveServer(ThreadingTCPServer):
     """Serves a page at /, and events at /events, in threads of its own.
 
     Attributes:
@@ -57,7 +58,7 @@ class LiveServer(ThreadingHTTPServer):
         OSError: the address cannot be bound.
     """
 
-    daemon_threads = True
+    daemon_threads = allow_reuse_address = True
 
     def __init__(self, host: str, port: int, page: bytes) -> None:
         self.page = page

@@ -115,7 +115,8 @@ function drawTrack(row, wrong) {
   context.fillStyle = filled;
   context.fill();
   context.globalAlpha = object || chosen ? 1 : row.seen ? 0.5 : 0.3;
-  stroke(chosen ? colours.ink : wrong ? run.truth.false.colour : edge, chosen || wrong ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
+  const shown = chosen ? colours.ink : wrong ? run.truth.false.colour : edge;
+  stroke(shown, chosen || wrong ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
   if (object && row.world_speed_mps > 0.5) {
     const heading = row.world_heading - frames[state.at].pose[2], reach = row.world_speed_mps;
     path([middle, screen(row.x + reach * Math.cos(heading), row.y + reach * Math.sin(heading))], false);
@@ -158,7 +159,8 @@ function draw() {
   dot = devicePixelRatio || 1;
   drawPoints();
   drawRings();
-  const frame = frames[state.at], wrong = new Set(state.truth ? frame.false : []), chosen = state.kept ?? state.hovered;
+  const frame = frames[state.at], wrong = new Set(state.truth ? frame.false : []);
+  const chosen = state.kept ?? state.hovered;
   const shown = (rowsAt[state.at] || []).filter((row) => state.background || row.class || row.id === chosen);
   shown.sort((a, b) => a.class - b.class || a.seen - b.seen);
   for (const row of shown) drawTrack(row, wrong.has(row.id));
@@ -167,8 +169,9 @@ function draw() {
   if (state.truth) (frame.truth || []).forEach(drawTruth);
   for (const row of shown.reverse())
     if ((state.labels && row.class) || row.id === chosen) {
-      const box = outline(row), text = wrong.has(row.id) ? `false: ${label(row)}` : label(row);
-      write(text, middleOf(box), topOf(box), wrong.has(row.id) ? run.truth.false.colour : colours.ink, row.id === chosen);
+      const box = outline(row), at = [middleOf(box), topOf(box)], needed = row.id === chosen;
+      if (wrong.has(row.id)) write(`false: ${label(row)}`, ...at, run.truth.false.colour, needed);
+      else write(label(row), ...at, colours.ink, needed);
     }
   canvas.dataset.frame = frame.frame;
 }

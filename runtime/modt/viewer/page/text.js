@@ -35,6 +35,8 @@ function showFrame() {
   slider.value = state.at;
 }
 
+const stateOf = (row) => run.states[row.state].name.replaceAll("_", " ");
+
 // Every change of state and every classification of a track.
 function events(rows) {
   const found = [];
@@ -45,7 +47,7 @@ function events(rows) {
       const range = Math.hypot(row.x, row.y).toFixed(0);
       found.push([row.at, `classified: ${row.points} points, ${view} m at ${range} m: ${said}`]);
     }
-    if (k === 0 || row.state !== rows[k - 1].state) found.push([row.at, run.states[row.state].name.replaceAll("_", " ")]);
+    if (k === 0 || row.state !== rows[k - 1].state) found.push([row.at, stateOf(row)]);
   });
   return found;
 }
@@ -59,8 +61,7 @@ function showStory() {
   add(box, "b", row ? label(row) : `#${id}, not in this frame`);
   let spent = 0;
   for (const row of rows) if (row.classified) spent += frames[row.at].call_mJ || 0;
-  const now = row ? `${run.states[row.state].name.replaceAll("_", " ")}, ${row.points} points, ` +
-    `${row.world_speed_mps.toFixed(1)} m/s; ` : "";
+  const now = row ? `${stateOf(row)}, ${row.points} points, ${row.world_speed_mps.toFixed(1)} m/s; ` : "";
   const [begin, end] = [rows[0], rows[rows.length - 1]].map((row) => frames[row.at].frame);
   add(box, "div", `${now}frames ${begin} to ${end}; ${spent.toFixed(1)} mJ of classification (estimated)`);
   const list = add(box, "ol");
