@@ -96,8 +96,10 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert described["service"] is True
     assert described["recognition"]["used"] == "as found"
     assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
-    report = modt("report", tmp_path / "run", cwd=tmp_path, module="modt.cli.profile")
+    page = "--html", tmp_path / "page.html"
+    report = modt("report", tmp_path / "run", *page, cwd=tmp_path, module="modt.cli.profile")
     assert report.returncode == 0, report.stderr
+    assert "<h2>Lateness</h2>" in page[1].read_text()
 
 
 def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):

@@ -193,7 +193,8 @@ class LiveSession:
         """Write what waits, the last status and the summary."""
         self.recording.ledger(self._windows.close())
         status = self.status()
-        summary = self._summary.result() | {"run": _run(status), "status": status}
+        lateness = self.loop.timing.lateness.beyond()
+        summary = self._summary.result() | {"run": _run(status), "status": status, "lateness": lateness}
         self._writer.submit(self.recording.finish)
         self._writer.submit(lambda: self._write(status))
         self._writer.submit(lambda: self.directory.write(SUMMARY, json.dumps(summary, indent=2) + "\n"))
