@@ -19,5 +19,5 @@ def lateness_plots(run: Path) -> list[Plot]:
     if not late.get("frames"):
         return []
     trace = svg.Trace("", np.array(late["ms"], float), np.array(late["frames"], float))
-    plot = svg.lines([trace], "from the arrival of the sweep [ms]", "frames that began so late or later", log=True)
+    plot = svg.lines([trace], "from the arrival of the sweep [ms]", "frames as late or later", log=True)
     return [("Lateness", plot, "measured")]
