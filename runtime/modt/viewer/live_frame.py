@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from modt.sinks.records import line
-from modt.types import NONE, FrameResult
+from modt.types import NONE, Float64, FrameResult
 from modt.viewer import look
 from modt.viewer.packed import packed_cells, packed_table
 from modt.viewer.point_cells import LEVEL_M, LEVELS, SIDE, Cells, occupied
@@ -20,7 +20,7 @@ FASTEST = 1
 """Level of the compression."""
 
 
-def live_message(result: FrameResult, costs: dict[str, Any], pose: np.ndarray) -> tuple[str, np.ndarray]:
+def live_message(result: FrameResult, costs: dict[str, Any], pose: Float64) -> tuple[str, Float64]:
     """Line of JSON of a frame, and the pose of the sensor, given that of the frame before."""
     tracks = result.tracks
     seen = np.flatnonzero(tracks.proposal != NONE)

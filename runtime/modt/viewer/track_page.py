@@ -21,7 +21,7 @@ from modt.viewer.track_rows import COLUMNS, SCALE
 Row = dict[str, float]
 
 
-def track_rows(run: RecordedRun, id_: int) -> list[Row]:
+def rows_of(run: RecordedRun, id_: int) -> list[Row]:
     """What is recorded of a track, frame by frame [m, rad, m/s].
 
     Raises:
