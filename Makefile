@@ -11,6 +11,7 @@ BIN    := $(VENV)/bin
 replay: $(VENV)/.run
 	$(BIN)/modt replay --out runs/embedded
 	$(BIN)/modt-profile report runs/embedded
+	@echo "To look at it: $(BIN)/modt view runs/embedded, then open runs/embedded/view.html in a browser"
 
 test: check
 	$(BIN)/python -m pytest

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from tests.ros2.network import loopback  # noqa: F401
+from tests.viewer.chromium import chromium  # noqa: F401
 
 settings.register_profile("modt", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
 settings.load_profile("modt")

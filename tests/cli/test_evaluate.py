@@ -5,6 +5,8 @@ import shutil
 
 import pytest
 
+from tests.viewer.chromium import LOADED, WIDE
+
 from .commands import modt
 
 DAY = "2020_01_01/2020_01_01_drive_0000_sync"
@@ -54,6 +56,17 @@ def test_report_and_what_else_counts(drives, tmp_path):
         classes = json.loads(done.stdout)["sensors"]["vlp-16"]["ranges"]["all"]["classification"]
         called.append(sum(score["called"] for score in classes.values()))
     assert called[0] < called[1]
+
+
+def test_the_page_has_the_figures_and_their_plots(drives, tmp_path, chromium):
+    done = modt("evaluate", *drives["vlp-16"], "--html", "page.html", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with chromium.tab((tmp_path / "page.html").as_uri(), width=390, ready=LOADED) as tab:
+        assert not tab.value(WIDE)
+        assert done.stdout.strip() in tab.value("document.querySelector('pre').textContent")
+        titles = tab.value("[...document.querySelectorAll('.plots h2')].map((title) => title.textContent)")
+        assert len([title for title in titles if "by range" in title]) == 2
+        assert tab.value("document.querySelectorAll('polyline').length") >= 3
 
 
 def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):

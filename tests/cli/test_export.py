@@ -4,6 +4,7 @@ import base64
 import csv
 import json
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -136,6 +137,27 @@ def test_csv_has_a_row_a_track_and_frame(recorded, tmp_path):
             assert float(row["box_yaw_rad"]) == track["box"]["yaw"]
         else:
             assert row["proposal"] == row["box_yaw_rad"] == ""
+
+
+def test_parquet_is_the_table_of_csv(recorded, tmp_path):
+    pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    run, _ = recorded
+    assert export(run, "--parquet", tmp_path / "a.parquet") == 0
+    table = parquet.read_table(tmp_path / "a.parquet").to_pydict()
+    tracks = [track for record in records(run) for track in record["tracks"]]
+    assert table["id"] == [track["id"] for track in tracks]
+    assert table["box_x_m"] == [track["box"] and track["box"]["x"] for track in tracks]
+    assert table["class"] == [track["class"] for track in tracks]
+    assert [path.name for path in tmp_path.iterdir()] == ["a.parquet"]
+
+
+def test_parquet_names_the_extra_that_it_needs(recorded, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    assert export(recorded[0], "--parquet", tmp_path / "a.parquet") == 2
+    assert "pip install 'modt[parquet]'" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 def moved(run, folder):

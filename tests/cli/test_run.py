@@ -96,8 +96,10 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     assert described["service"] is True
     assert described["recognition"]["used"] == "as found"
     assert "modt_counts_frames_total" in (tmp_path / "modt.prom").read_text()
-    report = modt("report", tmp_path / "run", cwd=tmp_path, module="modt.cli.profile")
+    page = "--html", tmp_path / "page.html"
+    report = modt("report", tmp_path / "run", *page, cwd=tmp_path, module="modt.cli.profile")
     assert report.returncode == 0, report.stderr
+    assert "<h2>Lateness</h2>" in page[1].read_text()
     pytest.importorskip("foxglove")
     exported = modt("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr
@@ -129,6 +131,26 @@ def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):
     assert "the profile before stays in use" in said
     loop = json.loads((service.out / "status.json").read_text())["loop"]
     assert (loop["reloads"], loop["refused_reloads"]) == (1, 1)
+
+
+def test_the_run_is_seen_in_a_browser_while_it_goes_on(scans, start, chromium):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    service = start(f"{scans}?loop=yes", "--profile", "vlp-16", "--view", f"127.0.0.1:{port}")
+    service.hear("READY=1")
+    with chromium.tab(f"http://127.0.0.1:{port}/", width=390) as tab:
+        tab.until("state.at > 3 && state.at === last && drawn.length > 10")
+        assert tab.value("new Int32Array(image.data.buffer).some((value) => value !== colours.paperPixel)")
+        tab.value("slider.value = 1; slider.dispatchEvent(new Event('input'))")
+        before = tab.value("last")
+        tab.until(f"last > {before} + 2")
+        assert tab.value("[state.at, canvas.dataset.frame === String(frames[1].frame)]") == [1, True]
+        tab.press("End")
+        tab.until(f"state.at > {before}")
+    assert service.end()[0] == 0
+    sink = json.loads((service.out / "status.json").read_text())["sinks"][f"view://127.0.0.1:{port}"]
+    assert (sink["failed"], sink["state"]) == (0, "ok")
 
 
 def test_a_killed_service_has_lost_no_more_than_a_second_and_starts_again(scans, start, tmp_path):

@@ -3,18 +3,17 @@
 import json
 import re
 import shutil
-import subprocess
-from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from modt.classes import CLASS_NAMES
+from tests.viewer.chromium import LOADED, WIDE
 from tests.viewer.pages import Page
 
-from .commands import modt
+from .commands import environment, modt
 
-OPEN_PAGE = Path(__file__).resolve().parents[1] / "viewer" / "open_page.mjs"
 FRAMES = 12
 
 
@@ -40,18 +39,6 @@ def moved(run):
 @pytest.fixture(scope="module")
 def records(run):
     return [json.loads(line) for line in (run / "tracks.jsonl").read_text().splitlines()]
-
-
-def opened(page, *actions):
-    """What a page shows after some actions."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("node is not installed")
-    done = subprocess.run([node, OPEN_PAGE, page, *actions], capture_output=True, text=True, check=False, timeout=120)
-    assert done.returncode == 0, done.stderr
-    shown = json.loads(done.stdout)
-    assert shown["failures"] == []
-    return shown
 
 
 def test_the_page_holds_the_run(run, records):
@@ -81,34 +68,50 @@ def test_the_page_needs_nothing_from_outside(run):
     assert not re.search(r"https?:|<link|\bsrc=|\bimport\b|fetch\(", re.sub(r'<script type="text[^<]*', "", text))
 
 
-def test_the_page_opens_and_the_slider_moves(run, records):
-    shown = opened(run / "view.html")
+def test_the_page_opens_and_the_slider_moves(run, records, chromium):
+    shown = chromium.opened(run / "view.html")
     assert (shown["frame"], shown["at"]) == (records[0]["frame"], 0)
     assert shown["pixels"] > 1000
     assert f"{records[0]['classifications']}, {records[0]['deferred']} budget 16 calls" in shown["facts"]
-    later = opened(run / "view.html", "slide:9")
+    later = chromium.opened(run / "view.html", "slide:9")
     assert later["frame"] == records[9]["frame"]
     assert f"proposals {records[9]['proposals']} " in later["facts"]
-    cars = [track["id"] for track in records[9]["tracks"] if track["class"] == "car"]
-    assert cars
-    assert all(any(label.startswith(f"#{id_} car ") for label in later["labels"]) for id_ in cars)
+    said = {f"#{t['id']} {t['class']}" for t in records[9]["tracks"] if t["class"] != "background"}
+    drawn = {label.rpartition(" ")[0].rpartition(" ")[0] for label in later["labels"] if label.startswith("#")}
+    assert drawn <= said
+    assert len(drawn) > len(said) / 2
 
 
-def test_pointing_at_a_track_tells_its_story(run, records):
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_everything_can_be_read(run, chromium, width, dark):
+    shown = chromium.opened(run / "view.html", "slide:9", width=width, dark=dark)
+    assert (shown["wide"], shown["small"]) == (False, [])
+    assert shown["pixels"] > 1000
+
+
+def test_playing_ends_at_the_last_frame(run, chromium):
+    with chromium.tab((run / "view.html").as_uri()) as tab:
+        tab.value("speed.value = 4")
+        tab.press(" ")
+        tab.until("!state.playing && state.at === last")
+        assert tab.value("element('play').textContent") == "Play"
+
+
+def test_pointing_at_a_track_tells_its_story(run, records, chromium):
     track = next(t for t in records[9]["tracks"] if t["class"] == "car" and t["box"])
-    shown = opened(run / "view.html", "slide:9", f"hover:{track['box']['x']},{track['box']['y']}")
+    shown = chromium.opened(run / "view.html", "slide:9", f"hover:{track['box']['x']},{track['box']['y']}")
     assert f"#{track['id']} car" in shown["story"]
     times = sum(track["id"] in record["classified"] for record in records)
     assert shown["story"].count("classified: ") == times > 0
-    assert f"{track['state']}, {track['points']} points" in shown["story"]
+    assert f"{track['state'].replace('_', ' ')}, {track['points']} points" in shown["story"]
 
 
-def test_keys_step_and_hide(run, records):
-    shown = opened(run / "view.html", "key:ArrowRight", "key:ArrowRight", "key:p", "key:b", "theme:dark")
+def test_keys_step_and_hide(run, records, chromium):
+    shown = chromium.opened(run / "view.html", "key:ArrowRight", "key:ArrowRight", "key:p", "key:b", dark=True)
     assert shown["at"] == 2
     assert shown["pixels"] == 0
     assert shown["boxes"] == 1 + sum(track["class"] != "background" for track in records[2]["tracks"])
-    assert opened(run / "view.html", "key:End")["at"] == FRAMES - 1
+    assert chromium.opened(run / "view.html", "key:End")["at"] == FRAMES - 1
 
 
 def test_the_page_may_begin_at_a_frame(run, tmp_path):
@@ -122,23 +125,91 @@ def test_a_frame_as_a_picture(run, records):
     assert done.returncode == 0, done.stderr
     root = ElementTree.parse(run / "view-9.svg").getroot()
     tag = "{http://www.w3.org/2000/svg}"
-    assert len(root.findall(f"{tag}polygon")) == len(records[9]["tracks"])
-    assert len([c for c in root.findall(f"{tag}circle") if c.get("class") == "ring"]) == records[9]["classifications"]
+    titles = [title.text for title in root.findall(f"{tag}polygon/{tag}title")]
+    assert len(titles) == len(records[9]["tracks"])
+    rings = [circle for circle in root.findall(f"{tag}circle") if circle.get("stroke") == "var(--ink)"]
+    assert len(rings) == records[9]["classifications"]
     text = " ".join(node.text or "" for node in root.iter(f"{tag}text"))
     assert f"{records[9]['classifications']} classified, {records[9]['deferred']} deferred" in text
     assert "budget 16 calls" in text
     assert "mJ (" in text
-    dots = {p.get("class"): p.get("d").count("M") for p in root.findall(f"{tag}path")}
-    assert min(dots["ground"], dots["above"]) > 1000
+    ground, above = (path.get("d").count("M") for path in root.findall(f"{tag}path"))
+    assert min(ground, above) > 1000
 
 
-def test_without_its_source_a_run_has_no_points(moved):
+def test_a_frame_as_pixels(run):
+    Image = pytest.importorskip("PIL.Image")
+    done = modt("view", run, "--frame", 9, "--out", "view.png", cwd=run)
+    assert done.returncode == 0, done.stderr
+    with Image.open(run / "view.png") as image:
+        assert image.size == (1280, 910)
+        colours = np.array([colour for _, colour in image.convert("RGB").getcolors(1 << 20)])
+    for wanted in ((0xFF, 0xFF, 0xFF), (0x2B, 0x8A, 0x3E)):  # paper, and the edge of what is classified
+        assert np.abs(colours - wanted).sum(axis=1).min() < 20
+
+
+def test_a_film_has_every_frame(run):
+    Image = pytest.importorskip("PIL.Image")
+    done = modt("view", run, "--frame", 4, "--out", "view.gif", cwd=run)
+    assert done.returncode == 0, done.stderr
+    with Image.open(run / "view.gif") as film:
+        assert (film.n_frames, film.info["duration"]) == (FRAMES - 4, 100)
+
+
+def test_a_film_by_ffmpeg(run):
+    if shutil.which("ffmpeg") is None:
+        pytest.skip("ffmpeg is not installed")
+    pytest.importorskip("PIL")
+    done = modt("view", run, "--animate", cwd=run)
+    assert done.returncode == 0, done.stderr
+    assert (run / "view.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_how_the_class_of_a_track_was_decided(run, records, chromium):
+    numbers = [id_ for record in records for id_ in record["classified"]]
+    id_ = max(set(numbers), key=numbers.count)
+    done = modt("view", run, "--track", id_, cwd=run)
+    assert done.returncode == 0, done.stderr
+    page = run / f"track-{id_}.html"
+    seen = [next(t for t in record["tracks"] if t["id"] == id_) for record in records if id_ in record["classified"]]
+    with chromium.tab(page.as_uri(), width=390, ready=LOADED) as tab:
+        assert not tab.value(WIDE)
+        text = tab.value("document.body.innerText")
+        pictures = (
+            "[...document.querySelectorAll('section > svg')].map((svg) => svg.querySelectorAll('circle').length)"
+        )
+        drawn = tab.value(pictures)
+    assert f"classifications {len(seen)} " in " ".join(text.split()), text[:600]
+    for track in seen:
+        posterior = ", ".join(f"{c} {100 * p:.1f} %" for c, p in zip(CLASS_NAMES, track["posterior"], strict=True))
+        assert f"Posterior: {posterior}" in text
+    assert len(drawn) >= 2 * len(seen)
+    assert sum(drawn) > 0
+    refused = modt("view", run, "--track", 10**8, cwd=run)
+    assert (refused.returncode, "is not recorded" in refused.stderr) == (2, True)
+
+
+def test_what_a_film_needs_is_named(run, tmp_path):
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "PIL.py").write_text("raise ModuleNotFoundError('PIL', name='PIL')")
+    without = {**environment(), "PYTHONPATH": f"{tmp_path / 'broken'}:{environment()['PYTHONPATH']}"}
+    done = modt("view", run, "--out", tmp_path / "view.png", cwd=tmp_path, env=without)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "needs PIL; pip install 'modt[view]'" in done.stderr
+    pytest.importorskip("PIL")
+    without = {**environment(), "PATH": str(tmp_path)}
+    done = modt("view", run, "--out", tmp_path / "view.mp4", cwd=tmp_path, env=without)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "needs ffmpeg; install it, or give a name that ends with .gif" in done.stderr
+
+
+def test_without_its_source_a_run_has_no_points(moved, chromium):
     done = modt("view", moved, cwd=moved)
     assert done.returncode == 0, done.stderr
     assert "without points: /nowhere/at/all" in done.stderr
     page = Page(moved / "view.html")
     assert (page.points, page.run["points"]) == ([], None)
-    shown = opened(moved / "view.html")
+    shown = chromium.opened(moved / "view.html")
     assert (shown["pixels"], shown["at"]) == (0, 0)
     assert shown["boxes"] > 1
 
@@ -147,7 +218,7 @@ def test_misuse_is_one_line_with_the_remedy(run, tmp_path):
     for arguments, message in (
         ((tmp_path,), "describes no run"),
         ((run, "--frame", 77), f"give one from 0 to {FRAMES - 1}"),
-        ((run, "--out", "view.gif"), "give a name that ends with .html or .svg"),
+        ((run, "--out", "view.jpg"), "give a name that ends with .html, .svg, .png, .gif, .mp4"),
     ):
         done = modt("view", *arguments, cwd=tmp_path)
         assert done.returncode == 2
@@ -157,10 +228,36 @@ def test_misuse_is_one_line_with_the_remedy(run, tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.kitti
-def test_a_drive_of_full_sweeps_fits_a_page(drive_0005, tmp_path):
+def test_a_drive_of_full_sweeps_fits_a_page(drive_0005, tmp_path, chromium):
     for command in (("replay", drive_0005, "--quiet", "--out", "run"), ("view", "run")):
         done = modt(*command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "run" / "view.html").stat().st_size < 25e6
     assert [len(cell) > 40_000 for cell, _ in Page(tmp_path / "run" / "view.html").points] == [True] * 154
-    assert opened(tmp_path / "run" / "view.html", "slide:153")["frame"] == 153
+    assert chromium.opened(tmp_path / "run" / "view.html", "slide:153")["frame"] == 153
+
+
+def test_truth_beside_the_source_is_marked_and_drawn(tmp_path, chromium):
+    def done(*command):
+        finished = modt(*command, cwd=tmp_path)
+        assert (finished.returncode, finished.stderr) == (0, "")
+
+    done("simulate", "--sensor", "vlp-16", "--seconds", 1.5, "--all-around", "--out", "sim")
+    (drive,) = (tmp_path / "sim").glob("*/*_sync")
+    marks = {}
+    for name, more in (("exact", ["--labels"]), ("boxes", [])):
+        done("replay", drive, "--profile", "vlp-16", "--quiet", "--out", name, *more)
+        done("view", name)
+        marks[name] = Page(tmp_path / name / "view.html").run["frames"]
+    outcomes = {name: [o["outcome"] for f in frames for o in f["truth"]] for name, frames in marks.items()}
+    assert {"found", "missed"} <= set(outcomes["exact"])
+    assert np.mean([a == b for a, b in zip(*outcomes.values(), strict=True)]) > 0.95
+    shown = chromium.opened(tmp_path / "exact" / "view.html", "slide:14")
+    frame = marks["exact"][14]
+    found, missed = (sum(o["outcome"] == name for o in frame["truth"]) for name in ("found", "missed"))
+    assert f"found, missed, false {found}, {missed}, {len(frame['false'])}" in shown["facts"]
+    assert "foundmissednot judgedfalse" in shown["legends"]
+    (tmp_path / "other").mkdir()
+    refused = modt("view", "exact", "--truth", "other", cwd=tmp_path)
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+    assert "holds no labels" in refused.stderr

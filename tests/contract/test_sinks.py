@@ -26,6 +26,7 @@ ADDRESSES = {
     "unix": lambda root: open_sink(f"unix://{root}/lines.sock"),
     "udp": lambda root: open_sink("udp://127.0.0.1:9"),
     "foxglove": lambda root: open_sink("foxglove://:0"),
+    "view": lambda root: open_sink("view://:0"),
 }
 """Sinks that are asked for by their address, of those without a reader."""
 EXTRAS = {"mcap": "foxglove", "foxglove": "foxglove"}

@@ -49,4 +49,4 @@ class Page:
 
     def column(self, name: str) -> np.ndarray:
         """Of the tracks."""
-        return self.tracks[:, self.run["columns"].index(name)]
+        return self.tracks[:, [column for column, _ in self.run["columns"]].index(name)]

@@ -17,6 +17,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     pairs = "run directories (of replay --labels) and their labels"
     p.add_argument("pairs", nargs="+", type=Path, metavar="RUN TRUTH", help=pairs)
     p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
+    p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots, too")
     vans = "KITTI's vans as cars (all), or ignored (paper)"
     p.add_argument("--classes", choices=("all", "paper"), default="all", help=vans)
     what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
@@ -55,6 +56,11 @@ def run(arguments: argparse.Namespace) -> int:
     sensors = {name: evaluation(found) for name, found in by_sensor.items()}
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for found in by_sensor.values() for rows in found])
+    if arguments.html is not None:
+        from modt.reporting.page import save
+        from modt.viewer.evaluation_page import evaluation_page
+
+        save(arguments.html, evaluation_page(sensors))
     if arguments.json:
         text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(found) for name, found in sensors.items()}})
         print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))

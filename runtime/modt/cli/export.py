@@ -32,6 +32,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     labels = "point labels (of replay --labels)"
     form.add_argument("--semantickitti", type=Path, metavar="DIR", help=labels)
     form.add_argument("--csv", type=Path, metavar="FILE", help="a row a track and frame")
+    form.add_argument("--parquet", type=Path, metavar="FILE", help="the same as a Parquet table")
     options.add_frames_option(p)
     p.add_argument("--no-points", action="store_true", help="MCAP without points: needs no source")
     options.add_capture_option(p)
@@ -186,9 +187,25 @@ def _csv(export: Export, target: Path) -> None:
             file.write(rows)
 
 
+def _parquet(export: Export, target: Path) -> None:
+    """The table of --csv, by the reader of Arrow."""
+    try:
+        from pyarrow import csv, parquet
+    except ModuleNotFoundError as error:
+        raise MisuseError("--parquet", f"needs {error.name}", "pip install 'modt[parquet]'") from None
+    from modt.sinks.output import writing
+
+    text = target.with_suffix(".csv")
+    _csv(export, text)
+    table = csv.read_csv(text)
+    with writing(target):
+        parquet.write_table(table, target)
+
+
 FORMS: dict[str, Callable[[Export, Path], None]] = {
     "mcap": _mcap,
     "kitti": _kitti,
     "semantickitti": _semantickitti,
     "csv": _csv,
+    "parquet": _parquet,
 }

@@ -198,8 +198,9 @@ class LiveSession:
         """Write what waits, the last status and the summary."""
         self.recording.ledger(self._windows.close())
         status = self.status()
-        kernels = self.stages.parts.pipeline.segmenter.facts()
-        summary = self._summary.result() | {"run": _run(status) | kernels, "status": status}
+        run = _run(status) | self.stages.parts.pipeline.segmenter.facts()
+        lateness = self.loop.timing.lateness.beyond()
+        summary = self._summary.result() | {"run": run, "status": status, "lateness": lateness}
         self._writer.submit(self.recording.finish)
         self._writer.submit(lambda: self._write(status))
         self._writer.submit(lambda: self.directory.write(SUMMARY, json.dumps(summary, indent=2) + "\n"))

@@ -19,6 +19,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Report."""
+    from modt.reporting.lateness_plot import lateness_plots
     from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
     from modt.reporting.run_report import run_tree
@@ -29,7 +30,9 @@ def run(arguments: argparse.Namespace) -> int:
         tree = run_tree(arguments.run_directory)
         document = run_document(tree)
         text = json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else document.text()
-        page = None if arguments.html is None else document_page(document, run_plots(tree))
+        page = None
+        if arguments.html is not None:
+            page = document_page(document, [*run_plots(tree), *lateness_plots(arguments.run_directory)])
     if page is not None:
         save(arguments.html, page)
     print(text)

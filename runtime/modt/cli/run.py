@@ -25,6 +25,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     source = "address of a sensor, or a recording to play: PATH, PATH?loop=yes (default: a synthetic stream)"
     p.add_argument("source", nargs="?", default="", metavar="SOURCE", help=source)
     options.add_sink_option(p)
+    view = "show the run to browsers at http://HOST:PORT/ (default: 127.0.0.1:8766, which no other machine reaches)"
+    p.add_argument("--view", nargs="?", const="", metavar="HOST:PORT", help=view)
     options.add_profile_option(p)
     options.add_core_option(p)
     p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
@@ -54,7 +56,8 @@ def run(arguments: argparse.Namespace) -> int:
         log.warning("%s", what)
     with host.elsewhere(cores):
         source = open_source(arguments.source, cores)
-        sinks = [NamedSink(address, open_sink(address)) for address in dict.fromkeys(arguments.sink)]
+        addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
+        sinks = [NamedSink(address, open_sink(address)) for address in dict.fromkeys(addresses)]
         command = ["modt", *sys.argv[1:]]
         request = replace(Request.of(arguments), path=recorded_path(arguments.source))
         out, metrics = arguments.out, arguments.metrics

@@ -1,66 +1,117 @@
-"""`modt view`: a recorded run from above, as a page that plays it or as the picture of a frame."""
+"""`modt view`: a recorded run from above, as a page that plays it, a picture of a frame, or a film."""
 
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from modt.cli import options
+from modt.cli.view_forms import FORMS, GIF, MP4, PICTURE, PLAYER, View
 from modt.errors import MisuseError, ModtError
 
 if TYPE_CHECKING:
     from modt.sources.stream import Stream
     from modt.viewer.recorded_run import RecordedRun
 
-PLAYER, PICTURE = ".html", ".svg"
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("view", help="show a recorded run from above, with the points of its source")
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")
-    frame = "draw one frame as .svg, or begin a page there"
-    p.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
-    out = "FILE.html, a page that plays the run (default: RUN/view.html), or FILE.svg (with --frame: RUN/view-N.svg)"
+    which = p.add_mutually_exclusive_group()
+    frame = "draw one frame, or begin a page or a film there"
+    which.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
+    film = "make a film, RUN/view.mp4, or RUN/view.gif where ffmpeg is not installed"
+    which.add_argument("--animate", action="store_true", help=film)
+    track = "tell how the class of a track was decided (default: RUN/track-ID.html)"
+    which.add_argument("--track", type=options.integer(0, 10**9, "the number of a track"), metavar="ID", help=track)
+    out = (
+        "FILE.html, a page that plays the run (default: RUN/view.html); of one frame FILE.svg (with --frame: "
+        "RUN/view-N.svg) or FILE.png; a film, FILE.gif or FILE.mp4"
+    )
     options.add_capture_option(p)
+    truth = "labels to compare with, as for modt evaluate (default: those that lie with its source)"
+    p.add_argument("--truth", type=Path, metavar="TRUTH", help=truth)
     p.add_argument("--out", type=Path, metavar="FILE", help=out)
     p.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Write the page or the picture.
+    """Write the page, the picture or the film.
 
     Raises:
-        MisuseError: no run, a frame that is not recorded, or a file of another kind.
+        MisuseError: no run, a frame that is not recorded, a file of another kind, or a missing extra.
         ModtError: the file cannot be written.
     """
-    from modt.viewer.picture import MOST_CELLS, save_picture
-    from modt.viewer.player import most_cells, save_player
     from modt.viewer.point_cells import Grid
     from modt.viewer.recorded_run import RecordedRun
-    from modt.viewer.sweeps import sweeps
 
-    directory, frame = arguments.run_directory, arguments.frame
-    default = directory / (f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}")
-    out: Path = arguments.out or default
-    if out.suffix not in (PLAYER, PICTURE):
-        raise MisuseError(out, "no kind of picture", f"give a name that ends with {PLAYER} or {PICTURE}")
+    directory = arguments.run_directory
+    if arguments.track is not None:
+        return tell(arguments)
+    out: Path = arguments.out or directory / default_name(arguments.frame, arguments.animate)
+    if out.suffix not in FORMS:
+        raise MisuseError(out, "no kind of picture", f"give a name that ends with {', '.join(FORMS)}")
     recorded = RecordedRun.read(directory)
-    at = 0 if frame is None else recorded.position(frame)
-    whole = out.suffix == PLAYER
-    numbers = recorded.numbers if whole else recorded.numbers[at : at + 1]
-    stream, grid = source(recorded, arguments.capture), Grid(recorded.config)
-    most = most_cells(len(numbers)) if whole else MOST_CELLS
-    cells = None if stream is None else sweeps(numbers, stream, grid, most)
-    if whole:
-        save_player(out, recorded, at, grid.step_cm, cells)
-    else:
-        save_picture(out, recorded, at, grid.step_cm, None if cells is None else next(cells))
+    at = 0 if arguments.frame is None else recorded.position(arguments.frame)
+    mark_truth(recorded, directory, arguments.truth)
+    FORMS[out.suffix](View(recorded, at, source(recorded, arguments.capture), Grid(recorded.config), out))
     print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
     return 0
+
+
+def tell(arguments: argparse.Namespace) -> int:
+    """Write the page of a track.
+
+    Raises:
+        MisuseError: no run, or no such track.
+        ModtError: the file cannot be written.
+    """
+    from modt.reporting.page import save
+    from modt.viewer.recorded_run import RecordedRun
+    from modt.viewer.track_page import rows_of, track_page, views
+
+    directory, out = arguments.run_directory, arguments.out
+    recorded = RecordedRun.read(directory)
+    rows = rows_of(recorded, arguments.track)
+    out = out or directory / f"track-{arguments.track}{PLAYER}"
+    save(out, track_page(recorded, rows, views(recorded, rows, source(recorded, arguments.capture))))
+    print(out)
+    return 0
+
+
+def default_name(frame: int | None, animate: bool) -> str:
+    """Of the file, where none is given."""
+    if animate:
+        return f"view{MP4 if shutil.which('ffmpeg') else GIF}"
+    return f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}"
+
+
+def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None) -> None:
+    """Add to the frames what is true of them, by labels or by those that lie with the source of the run.
+
+    Raises:
+        MisuseError: labels are given that cannot be used.
+    """
+    from modt.evaluation.run_record import RunRecord
+    from modt.evaluation.truth_files import labels_beside, open_truth
+    from modt.viewer.truth_marks import truth_marks
+
+    try:
+        run = RunRecord.open(directory)
+        found = labels or (labels_beside(run.stream) if run.stream else None)
+        marks = {} if found is None else truth_marks(run, open_truth(found, run.stream))
+    except ModtError as error:
+        if labels is not None:
+            raise
+        print(f"modt: without truth: {error}", file=sys.stderr)
+        return
+    for frame in recorded.frames:
+        frame.update(marks.get(frame["frame"], {}))
 
 
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,11 @@ from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.sources.scan_file import read_scan
-from modt.types import Float64, Int
+from modt.types import Float32, Float64, Int
 
 LABELS = "labels"
+Proposed = Callable[[dict[str, Any], Float32], Int]
+"""(N,) proposal of each point, NONE where it belongs to none, by the record of a frame and its (N, 4) points."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,8 +77,12 @@ class RunRecord:
                 lines[line["frames"][1]].append(line)
         return lines
 
-    def frames(self, truth: Truth) -> Iterator[JudgedFrame]:
+    def frames(self, truth: Truth, proposed: Proposed | None = None) -> Iterator[JudgedFrame]:
         """Every recorded frame beside its truth.
+
+        Args:
+            truth: of the run's recording.
+            proposed: says which points are of which proposal; None: the labels that replay --labels has written.
 
         Raises:
             MisuseError: the run is of another recording, empty or without labels, or a record is broken.
@@ -102,7 +108,7 @@ class RunRecord:
                 points, _ = read_scan(scan)
             except ModtError as error:
                 raise MisuseError(scan, error.cause, "restore the scan") from None
-            proposals = self.proposals(index)
+            proposals = self.proposals(index) if proposed is None else proposed(record, points)
             if len(proposals) != len(points):
                 cause = f"{len(proposals)} labels for a scan of {len(points)} points"
                 raise MisuseError(self._labels(index), cause, "give the truth of the run's own recording")

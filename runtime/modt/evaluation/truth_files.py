@@ -73,6 +73,16 @@ def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False)
     raise MisuseError(path, cause, GIVE)
 
 
+def labels_beside(stream: Path) -> Path | None:
+    """Where the labels of a recording lie, if they lie where those of its layout do."""
+    if (stream / TRACKLETS).is_file():
+        return stream
+    sequence = stream.parent.parent / "label_02" / f"{stream.name}.txt"
+    if sequence.is_file():
+        return sequence
+    return stream.parent if (stream.parent / CUBOIDS).is_file() else None
+
+
 def _scans(beside: Path, run_path: Path | None) -> ScanStream | None:
     """The recording beside the labels, or else the one that the run names."""
     for path in (beside, run_path):

@@ -43,3 +43,11 @@ class LogHistogram:
             "max": self.maximum_s,
         }
         return {name: round(1e3 * seconds, 3) for name, seconds in times_s.items()}
+
+    def beyond(self) -> dict[str, list[float]]:
+        """Lower edges of the bins in use [ms], and how many times are that long or longer."""
+        used = np.flatnonzero(self._counts)
+        bins = np.arange(used[0], used[-1] + 1) if len(used) else used
+        edges_ms = 1e3 * LEAST_S * 2 ** (bins / PER_OCTAVE)
+        frames = np.cumsum(self._counts[::-1])[::-1][bins]
+        return {"ms": edges_ms.round(4).tolist(), "frames": frames.tolist()}

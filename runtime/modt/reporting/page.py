@@ -10,10 +10,18 @@ from modt.reporting.document import Cell, Document, Table
 from modt.reporting.quantity import LEGEND
 from modt.sinks.output import writing
 
-COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a")
-THEME = """
-:root{--ink:#1c2430;--soft:#5d6876;--line:#d8dde4;--paper:#fff;--panel:#f6f8fa}
-@media (prefers-color-scheme:dark){:root{--ink:#e4e8ee;--soft:#9aa6b5;--line:#38424f;--paper:#151a21;--panel:#1d242d}}
+COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a", "#3a97a6")
+LIGHT = {"ink": "#1c2430", "soft": "#5d6876", "line": "#d8dde4", "paper": "#ffffff", "panel": "#f6f8fa"}
+DARK = {"ink": "#e4e8ee", "soft": "#9aa6b5", "line": "#38424f", "paper": "#151a21", "panel": "#1d242d"}
+
+
+def _variables(theme: dict[str, str]) -> str:
+    return ":root{" + ";".join(f"--{name}:{colour}" for name, colour in theme.items()) + "}"
+
+
+THEME = f"""
+{_variables(LIGHT)}
+@media (prefers-color-scheme:dark){{{_variables(DARK)}}}
 """
 """Colours of pages, for light and dark screens."""
 _STYLE = """
@@ -41,6 +49,7 @@ svg text{font-size:11px;fill:var(--soft)}.end{text-anchor:end}.mid{text-anchor:m
 .legend{margin:.3rem 0 0;color:var(--soft);font-size:.85rem}
 .legend span{margin-right:14px;white-space:nowrap}
 .legend i{display:inline-block;width:10px;height:10px;border-radius:2px;margin-right:5px}
+@media (max-width:600px){svg text{font-size:17px}}
 @media print{:root{--ink:#000;--soft:#444;--line:#bbb;--paper:#fff;--panel:#fff}body{max-width:none;padding:0}
 *{-webkit-print-color-adjust:exact;print-color-adjust:exact}.plots{grid-template-columns:1fr 1fr}}
 """
@@ -52,7 +61,11 @@ Plot = tuple[str, str, str]
 
 def document_page(document: Document, drawn: Iterable[Plot]) -> str:
     """HTML of a report with its plots."""
-    blocks = [_tiles(document), plots(drawn), *map(_table, document.tables)]
+    blocks = [
+        _tiles((name, _cell(value), note) for name, value, note in document.results),
+        plots(drawn),
+        *map(_table, document.tables),
+    ]
     notes = "".join(f'<p class="legend">{escape(note)}</p>' for note in (document.test, LEGEND))
     return page(document.title, "; ".join(document.about), [*blocks, notes])
 
@@ -70,6 +83,11 @@ def page(title: str, subtitle: str, blocks: Iterable[str]) -> str:
     )
 
 
+def tiles(facts: Iterable[tuple[str, str, str]]) -> str:
+    """Facts side by side: name, value and note of each."""
+    return _tiles((name, escape(value), note) for name, value, note in facts)
+
+
 def plots(items: Iterable[Plot]) -> str:
     """Plots side by side."""
     cells = (
@@ -77,6 +95,11 @@ def plots(items: Iterable[Plot]) -> str:
         for title, svg, note in items
     )
     return f'<div class="plots">{"".join(cells)}</div>'
+
+
+def preformatted(text: str) -> str:
+    """Text whose lines and columns stay as they are."""
+    return f"<section><pre>{escape(text)}</pre></section>"
 
 
 def save(path: Path, text: str) -> None:
@@ -89,10 +112,11 @@ def save(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def _tiles(document: Document) -> str:
+def _tiles(facts: Iterable[tuple[str, str, str]]) -> str:
+    """Facts whose values are HTML."""
     cells = (
-        f'<div class="tile"><small>{escape(name)}</small><b>{_cell(value)}</b><small>{escape(note)}</small></div>'
-        for name, value, note in document.results
+        f'<div class="tile"><small>{escape(name)}</small><b>{value}</b><small>{escape(note)}</small></div>'
+        for name, value, note in facts
     )
     return f'<div class="tiles">{"".join(cells)}</div>'
 

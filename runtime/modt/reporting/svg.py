@@ -27,6 +27,7 @@ class Trace:
     y: Float64
     dots: bool = False  # marks instead of a line
     dashed: bool = False
+    colour: str = ""  # instead of that of its place
 
 
 def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = False) -> str:
@@ -43,8 +44,9 @@ def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = Fa
             ]
         else:
             dash = ' stroke-dasharray="6 4"' if trace.dashed else ""
-            body.append(f'<polyline class="l{k}"{dash} points="{_points(x, y)}"/>')
-    return _frame(scale, "".join(body), x_label, y_label, [t.name for t in traces])
+            style = f' style="stroke:{trace.colour}"' if trace.colour else ""
+            body.append(f'<polyline class="l{k}"{style}{dash} points="{_points(x, y)}"/>')
+    return _frame(scale, "".join(body), x_label, y_label, [t.name for t in traces], [t.colour for t in traces])
 
 
 def areas(x: Float64, parts: dict[str, Float64], x_label: str, y_label: str) -> str:
@@ -117,7 +119,9 @@ class _Scale:
         return [step * k for k in range(first, math.floor(high / step) + 1)]
 
 
-def _frame(scale: _Scale, body: str, x_label: str, y_label: str, legend: Sequence[str]) -> str:
+def _frame(
+    scale: _Scale, body: str, x_label: str, y_label: str, legend: Sequence[str], own: Sequence[str] = ()
+) -> str:
     right, floor = WIDTH - RIGHT, HEIGHT - BOTTOM
     parts = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(y_label)} over {escape(x_label)}">']
     for tick in scale.ticks(scale.y0, scale.y1):
@@ -135,7 +139,12 @@ def _frame(scale: _Scale, body: str, x_label: str, y_label: str, legend: Sequenc
         f'<text class="mid" transform="translate(12 {middle}) rotate(-90)">{escape(y_label)}</text>',
         "</svg>",
     ]
-    keys = "".join(f'<span><i class="b{k}"></i>{escape(name)}</span>' for k, name in enumerate(legend) if name)
+    colours = {k: f' style="background:{colour}"' for k, colour in enumerate(own) if colour}
+    keys = "".join(
+        f'<span><i class="b{k}"{colours.get(k, "")}></i>{escape(name)}</span>'
+        for k, name in enumerate(legend)
+        if name
+    )
     return "".join(parts) + (f'<p class="legend">{keys}</p>' if keys else "")
 
 

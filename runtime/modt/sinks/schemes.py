@@ -39,5 +39,6 @@ SCHEMES = {
         "foxglove",
         depth=4,
     ),
+    "view": Scheme("modt.viewer.live_page:open_view", "view://[HOST][:PORT]", depth=6),
     "ros2": Scheme("modt.sinks.ros2:open_sink", "ros2:///PREFIX", frozenset({"domain", "frame_id"}), "ros2", depth=4),
 }

@@ -16,9 +16,9 @@ CELL_BYTES = 3
 NUMBER_BYTES = 4
 
 
-def packed(data: bytes) -> str:
+def packed(data: bytes, level: int = LEVEL) -> str:
     """Text of bytes; the page undoes it by `atob` and `DecompressionStream("deflate")`."""
-    return base64.b64encode(zlib.compress(data, LEVEL)).decode("ascii")
+    return base64.b64encode(zlib.compress(data, level)).decode("ascii")
 
 
 def planes(numbers: Int, n_bytes: int) -> bytes:
@@ -32,11 +32,11 @@ def differences(numbers: Int) -> Int:
     return np.diff(numbers, prepend=0)
 
 
-def packed_cells(cells: Cells) -> str:
+def packed_cells(cells: Cells, level: int = LEVEL) -> str:
     """Cells of a sweep: differences of the cells in CELL_BYTES planes, then the levels."""
-    return packed(planes(differences(cells.cell), CELL_BYTES) + planes(cells.level, 1))
+    return packed(planes(differences(cells.cell), CELL_BYTES) + planes(cells.level, 1), level)
 
 
-def packed_table(table: Int) -> str:
+def packed_table(table: Int, level: int = LEVEL) -> str:
     """(R, C) table, column by column: differences in NUMBER_BYTES planes."""
-    return packed(b"".join(planes(differences(column), NUMBER_BYTES) for column in table.T))
+    return packed(b"".join(planes(differences(column), NUMBER_BYTES) for column in table.T), level)

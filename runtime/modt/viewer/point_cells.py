@@ -58,13 +58,16 @@ class Grid:
         height = self._segmenter.ground.height_above(sweep, self._segmenter.sensor_height_m(points))
         sweep_range = sweep.sqrt_range**2
         used = (sweep_range > 0) & (sweep_range < self._range_m)
-        column, row = (
-            np.floor(v[used] * (100 / self.step_cm)).astype(np.int64) + SIDE // 2 for v in (sweep.x, sweep.y)
-        )
         level = np.clip(np.rint(height[used] / LEVEL_M), 1, LEVELS - 1).astype(np.int64)
         level[height[used] <= self._clearance_m] = 0
-        # Sorted by cell, then by height: the last of each cell is its highest.
-        packed = np.sort((SIDE * row + column) * LEVELS + level)
-        cell, level = np.divmod(packed, LEVELS)
-        highest = np.append(np.diff(cell) > 0, True)[: len(cell)]
-        return Cells(cell[highest], level[highest])
+        return occupied(sweep.x[used], sweep.y[used], level, self.step_cm)
+
+
+def occupied(x: Float32, y: Float32, level: Int, step_cm: int) -> Cells:
+    """The cells of points x, y [m] within the grid, each with the highest level of its points."""
+    column, row = (np.floor(v * (100 / step_cm)).astype(np.int64) + SIDE // 2 for v in (x, y))
+    # Sorted by cell, then by height: the last of each cell is its highest.
+    packed = np.sort((SIDE * row + column) * LEVELS + level)
+    cell, level = np.divmod(packed, LEVELS)
+    highest = np.append(np.diff(cell) > 0, True)[: len(cell)]
+    return Cells(cell[highest], level[highest])

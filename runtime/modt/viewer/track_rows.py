@@ -10,7 +10,7 @@ import numpy as np
 from modt.classes import CLASS_NAMES
 from modt.geometry import wrap
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.types import Float64, Int
+from modt.types import NONE, Float64, FrameResult, Int
 from modt.viewer.sensor_pose import sensor_pose
 
 PLAIN = ("id", "at", "state", "class", "seen", "final", "classified", "points")
@@ -56,8 +56,35 @@ def track_table(frames: Iterable[Sequence[Sequence[float]]]) -> tuple[Int, Float
     rows = np.concatenate(parts) if parts else np.zeros((0, len(COLUMNS)))
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     _fill_lost(rows, poses)
+    return scaled(rows), poses
+
+
+def scaled(rows: Float64) -> Int:
+    """Rows in the units of the table."""
     rows[:, len(PLAIN) :] *= [SCALE[name] for name in SCALED]
-    return np.rint(rows).astype(np.int64), poses
+    return np.rint(rows).astype(np.int64)
+
+
+def result_rows(result: FrameResult, pose: Float64) -> Float64:
+    """(M, COLUMNS) rows of the tracks of a result, at frame 0; pose: (3,) x, y [m], yaw [rad] of the sensor."""
+    tracks = result.tracks
+    seen = tracks.proposal != NONE
+    box = tracks.box.copy()
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    dx, dy = (tracks.x[:, :2] - pose[:2]).T
+    box[:, 0], box[:, 1], box[:, 6] = c * dx + s * dy, c * dy - s * dx, wrap(box[:, 6] - pose[2])
+    box[seen] = result.proposals.box[tracks.proposal[seen]]
+    plain = (
+        tracks.id,
+        np.zeros(len(tracks)),
+        tracks.state,
+        tracks.object_class,
+        seen,
+        tracks.final,
+        np.isin(tracks.id, result.classified),
+        tracks.points,
+    )
+    return np.column_stack([*plain, tracks.posterior, box, tracks.x]).astype(np.float64)
 
 
 def _poses(parts: Sequence[Float64]) -> Float64:

@@ -1,0 +1,58 @@
+"""A result, still in memory, as a page takes it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modt.sinks.records import line
+from modt.types import NONE, Float64, FrameResult
+from modt.viewer import look
+from modt.viewer.packed import packed_cells, packed_table
+from modt.viewer.point_cells import LEVEL_M, LEVELS, SIDE, Cells, occupied
+from modt.viewer.sensor_pose import sensor_pose
+from modt.viewer.track_rows import result_rows, scaled
+
+STEP_CM = 5
+MOST_CELLS = 50_000
+FASTEST = 1
+"""Level of the compression."""
+
+
+def live_message(result: FrameResult, costs: dict[str, Any], pose: Float64) -> tuple[str, Float64]:
+    """Line of JSON of a frame, and the pose of the sensor, given that of the frame before."""
+    tracks = result.tracks
+    seen = np.flatnonzero(tracks.proposal != NONE)
+    boxes = result.proposals.box[tracks.proposal[seen]]
+    pose = sensor_pose(boxes[:, :2], tracks.x[seen, :2], pose)
+    frame = {
+        "frame": result.frame.index,
+        "stamp_s": round(result.frame.stamp_s, 3),
+        "proposals": len(result.proposals),
+        "classifications": len(result.classified),
+        "deferred": result.n_deferred,
+        "pose": pose.round(4).tolist(),
+        **costs,
+    }
+    content = {
+        "frame": frame,
+        "states": look.states(result.state_names),
+        "tracks": packed_table(scaled(result_rows(result, pose)), FASTEST),
+        "points": packed_cells(live_cells(result).thinned(MOST_CELLS), FASTEST),
+    }
+    return line(content), pose
+
+
+def live_cells(result: FrameResult) -> Cells:
+    """Cells of the sweep; what is part of no proposal counts as ground."""
+    x, y, z = (result.frame.points[:, k] for k in range(3))
+    reach_m = (SIDE // 2 - 1) * STEP_CM / 100
+    used = (np.abs(x) < reach_m) & (np.abs(y) < reach_m) & ((x != 0) | (y != 0))
+    level = np.zeros(len(x), np.int64)
+    members = result.proposals.members
+    ground = used.copy()
+    ground[members] = False
+    floor_m = float(np.median(z[ground])) if ground.any() else 0.0
+    level[members] = np.clip(np.rint((z[members] - floor_m) / LEVEL_M), 1, LEVELS - 1)
+    return occupied(x[used], y[used], level[used], STEP_CM)

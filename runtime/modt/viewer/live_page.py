@@ -1,0 +1,70 @@
+"""The sink view://: the page of a run that is going on, for browsers."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+
+from modt.address import Address
+from modt.energy import ledger, windows
+from modt.errors import MisuseError
+from modt.types import FrameResult
+from modt.viewer.live_frame import STEP_CM, live_message
+from modt.viewer.live_server import LiveServer
+from modt.viewer.player import content, page
+
+log = logging.getLogger(__name__)
+
+PORT = 8766
+LOCAL = "127.0.0.1"
+
+
+class LivePage:
+    """Publishes each frame with what it cost, when the ledger's line of it comes, to those who look."""
+
+    def __init__(self, host: str, port: int) -> None:
+        head, tail = page("modt", "waits for a sweep", content([], None, STEP_CM), "live")
+        self._server = LiveServer(host, port, (head + tail).encode())
+        self.port = int(self._server.server_address[1])
+        self._result: FrameResult | None = None
+        self._pose = np.zeros(3)
+        self._energy: dict[str, Any] = {}
+
+    def write(self, result: FrameResult, /) -> None:
+        """Keep a frame until its line comes."""
+        self._result = result if self._server.watched else None
+
+    def ledger(self, record: dict[str, Any], /) -> None:
+        """Take the line of a frame, or the energy of the frames of a window."""
+        if record["schema"] == windows.SCHEMA:
+            n = record["frames"][2]
+            if n and record["energy_J"] is not None:
+                self._energy = {"energy_mJ": 1e3 * record["energy_J"] / n, "kind": record["kind"]}
+        elif record["schema"] == ledger.SCHEMA and self._result is not None:
+            result, self._result = self._result, None
+            if result.frame.index == record["frame"]:
+                cpu_ms = {name: round(1e-6 * stage["cpu_ns"], 3) for name, stage in record["stages"].items()}
+                text, self._pose = live_message(result, {"cpu_ms": cpu_ms, **self._energy}, self._pose)
+                self._server.publish(text)
+
+    def close(self) -> None:
+        """Leave everybody."""
+        self._server.close()
+
+
+def open_view(address: Address) -> LivePage:
+    """A page at 127.0.0.1, which nobody else reaches, if no other host is given.
+
+    Raises:
+        MisuseError: it cannot be bound.
+    """
+    host = address.host or LOCAL
+    try:
+        opened = LivePage(host, PORT if address.port is None else address.port)
+    except OSError as error:
+        remedy = "give a host of this machine and a free port, view://HOST:PORT"
+        raise MisuseError(address.text, f"cannot be bound ({error.strerror or error})", remedy) from None
+    log.warning("the run is shown at http://%s:%d/", f"[{host}]" if ":" in host else host, opened.port)
+    return opened

@@ -1,0 +1,153 @@
+"""A page over HTTP, and events for those who have it open; nobody waits for one of them."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from contextlib import suppress
+from http.server import BaseHTTPRequestHandler
+from ipaddress import ip_address
+from socketserver import ThreadingTCPServer
+
+MOST_CLIENTS = 8
+SEND_S = 5.0
+"""A client that takes nothing for so long is left."""
+POLL_S = 0.1
+"""Between two looks whether the end has come."""
+ALIVE_S = 10.0
+"""Longest time without a sign of life to a client."""
+
+
+class Client:
+    """What a client shall get next: the newest event, those before it are not missed."""
+
+    def __init__(self) -> None:
+        self._changed = threading.Condition()
+        self._event: bytes | None = None
+        self._ended = False
+
+    def put(self, event: bytes) -> None:
+        """Replace what has not been sent yet."""
+        with self._changed:
+            self._event = event
+            self._changed.notify()
+
+    def end(self) -> None:
+        """Send nothing more."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify()
+
+    def take(self) -> bytes | None:
+        """The next event, a sign of life after a while without one, None at the end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._event is not None or self._ended, ALIVE_S)
+            event, self._event = self._event, None
+            return None if self._ended else event or b": alive\n\n"
+
+
+class LiveServer(ThreadingTCPServer):
+    """Serves a page at /, and events at /events, in threads of its own.
+
+    Attributes:
+        page: HTML.
+        names: hosts that a request may name, None for all: a page of another site could reach the loopback by a name
+            of its own.
+
+    Raises:
+        OSError: the address cannot be bound.
+    """
+
+    daemon_threads = allow_reuse_address = True
+
+    def __init__(self, host: str, port: int, page: bytes) -> None:
+        self.page = page
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        self.address_family = family
+        super().__init__((str(address[0]), int(address[1])), _Handler)
+        local = ip_address(str(address[0])).is_loopback
+        self.names = {"localhost", "127.0.0.1", "[::1]", host} if local else None
+        self._clients: set[Client] = set()
+        self._lock = threading.Lock()
+        threading.Thread(target=self.serve_forever, args=(POLL_S,), name="view", daemon=True).start()
+
+    @property
+    def watched(self) -> bool:
+        """Whether anybody has the page open."""
+        return bool(self._clients)
+
+    def publish(self, data: str) -> None:
+        """Hand an event to everybody."""
+        event = f"data: {data.rstrip()}\n\n".encode()
+        with self._lock:
+            for client in self._clients:
+                client.put(event)
+
+    def enter(self) -> Client | None:
+        """A new client, None where there are too many."""
+        with self._lock:
+            if len(self._clients) >= MOST_CLIENTS:
+                return None
+            client = Client()
+            self._clients.add(client)
+            return client
+
+    def leave(self, client: Client) -> None:
+        """Forget a client."""
+        with self._lock:
+            self._clients.discard(client)
+
+    def close(self) -> None:
+        """End everything."""
+        self.shutdown()
+        with self._lock:
+            for client in self._clients:
+                client.end()
+        self.server_close()
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """A client that has gone is no error."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: LiveServer
+    timeout = SEND_S
+
+    def do_GET(self) -> None:
+        name = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
+        if self.server.names is not None and name not in self.server.names:
+            self.send_error(403, "another host")
+        elif self.path == "/":
+            self._head("text/html; charset=utf-8")
+            self.wfile.write(self.server.page)
+        elif self.path == "/events":
+            self._events()
+        elif self.path == "/favicon.ico":  # browsers ask for it by themselves
+            self.send_response(204)
+            self.end_headers()
+        else:
+            self.send_error(404)
+
+    def _events(self) -> None:
+        client = self.server.enter()
+        if client is None:
+            self.send_error(503, "too many pages are open")
+            return
+        try:
+            self._head("text/event-stream")
+            while (event := client.take()) is not None:
+                self.wfile.write(event)
+        except OSError:
+            with suppress(OSError):
+                self.connection.close()
+        finally:
+            self.server.leave(client)
+
+    def _head(self, kind: str) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: the loop's log is for the loop."""

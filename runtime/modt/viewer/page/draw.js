@@ -1,0 +1,184 @@
+// ---- drawing
+
+const canvas = element("view"), context = canvas.getContext("2d", { alpha: false });
+const TRAIL = 30; // frames
+let sweep = null, pixels = null, palette = null, colours = {}, dot = 1, taken = [];
+
+function theme() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of ["ink", "soft", "line", "paper"]) colours[name] = style.getPropertyValue(`--${name}`).trim();
+  const rgb = (hex) => {
+    const long = hex.length === 4 ? [...hex.slice(1)].map((c) => c + c).join("") : hex.slice(1);
+    return [0, 2, 4].map((k) => parseInt(long.slice(k, k + 2), 16));
+  };
+  const paper = rgb(colours.paper), ink = rgb(colours.ink);
+  const mixed = (part) => {
+    const [r, g, b] = paper.map((value, k) => Math.round(value + part * (ink[k] - value)));
+    return (255 << 24) | (b << 16) | (g << 8) | r;
+  };
+  palette = Int32Array.from({ length: 64 }, (_, level) => mixed(level ? 0.35 + 0.5 * Math.min(level / 25, 1) : 0.15));
+  colours.paperPixel = mixed(0);
+}
+
+function screen(x, y) {
+  const { metre, up } = state;
+  return up ? [state.x - metre * y, state.y - metre * x] : [state.x + metre * x, state.y - metre * y];
+}
+
+function place(px, py) {
+  const u = (px - state.x) / state.metre, v = (state.y - py) / state.metre;
+  return state.up ? [v, -u] : [u, v];
+}
+
+function drawPoints() {
+  const { width, height } = canvas;
+  if (!pixels || pixels.width !== width || pixels.height !== height) pixels = context.createImageData(width, height);
+  const out = new Int32Array(pixels.data.buffer);
+  out.fill(colours.paperPixel);
+  if (sweep && state.points) {
+    const { x, y, level } = sweep, { metre, up } = state;
+    const size = Math.max(1, Math.min(4, Math.round((metre * run.points.step_cm) / 100)));
+    const [xx, xy] = up ? [0, -metre] : [metre, 0], [yx, yy] = up ? [-metre, 0] : [0, -metre];
+    for (const ground of [true, false]) // what stands lies above the ground
+      for (let k = 0; k < x.length; k++) {
+        if ((level[k] === 0) !== ground) continue;
+        const px = (state.x + xx * x[k] + xy * y[k]) | 0, py = (state.y + yx * x[k] + yy * y[k]) | 0;
+        if (px < 0 || py < 0 || px + size > width || py + size > height) continue;
+        for (let dy = 0; dy < size; dy++)
+          for (let dx = 0; dx < size; dx++) out[(py + dy) * width + px + dx] = palette[level[k]];
+      }
+  }
+  context.putImageData(pixels, 0, 0);
+}
+
+function path(points, closed) {
+  context.beginPath();
+  points.forEach(([x, y], k) => (k ? context.lineTo(x, y) : context.moveTo(x, y)));
+  if (closed) context.closePath();
+}
+
+function outline({ x, y, l, w, yaw }) {
+  const c = Math.cos(yaw), s = Math.sin(yaw);
+  return [[l, w], [-l, w], [-l, -w], [l, -w]].map(([u, v]) => screen(x + (c * u - s * v) / 2, y + (s * u + c * v) / 2));
+}
+
+function stroke(colour, width, dash = []) {
+  context.strokeStyle = colour;
+  context.lineWidth = width * dot;
+  context.setLineDash(dash.map((part) => part * dot));
+  context.stroke();
+  context.setLineDash([]);
+}
+
+function trail(row) {
+  const rows = rowsOf.get(row.id), end = rows.indexOf(row) + 1, [x0, y0, yaw] = frames[state.at].pose;
+  const c = Math.cos(yaw), s = Math.sin(yaw);
+  return rows.slice(Math.max(0, end - TRAIL), end).map(({ world_x, world_y }) => {
+    const dx = world_x - x0, dy = world_y - y0;
+    return screen(c * dx + s * dy, c * dy - s * dx);
+  });
+}
+
+const label = (row) => {
+  const { name } = run.classes[row.class];
+  return `#${row.id} ${name} ${(100 * row[`p_${name}`]).toFixed(0)} %`;
+};
+
+// A line of text centred at x, above y, or further up where another one lies; left out where there is no room.
+function write(text, x, y, colour, needed) {
+  const width = context.measureText(text).width, height = 14 * dot;
+  if (x < 0 || x > canvas.width || y < 0 || y > canvas.height + height) return;
+  const left = Math.max(2, Math.min(canvas.width - width - 2, x - width / 2));
+  for (let k = 0; k < 4; k++) {
+    const box = [left, y - (k + 1) * height, left + width, y - k * height];
+    if (!needed && taken.some((t) => box[0] < t[2] && t[0] < box[2] && box[1] < t[3] && t[1] < box[3])) continue;
+    taken.push(box);
+    context.lineWidth = 3 * dot;
+    context.strokeStyle = colours.paper;
+    context.fillStyle = colour;
+    context.strokeText(text, box[0], box[3] - 3 * dot);
+    context.fillText(text, box[0], box[3] - 3 * dot);
+    return;
+  }
+}
+
+function drawTrack(row, wrong) {
+  const chosen = row.id === (state.kept ?? state.hovered), object = row.class > 0;
+  const box = outline(row), middle = screen(row.x, row.y), filled = run.classes[row.class].colour;
+  const edge = run.states[row.state].colour;
+  if (state.trails && (object || chosen)) {
+    path(trail(row), false);
+    stroke(filled, chosen ? 3 : 2);
+  }
+  path(box, true);
+  context.globalAlpha = object ? 0.35 : row.seen ? 0.1 : 0.04;
+  context.fillStyle = filled;
+  context.fill();
+  context.globalAlpha = object || chosen ? 1 : row.seen ? 0.5 : 0.3;
+  const shown = chosen ? colours.ink : wrong ? run.truth.false.colour : edge;
+  stroke(shown, chosen || wrong ? 3 : object ? 2 : 1, row.seen ? [] : [4, 3]);
+  if (object && row.world_speed_mps > 0.5) {
+    const heading = row.world_heading - frames[state.at].pose[2], reach = row.world_speed_mps;
+    path([middle, screen(row.x + reach * Math.cos(heading), row.y + reach * Math.sin(heading))], false);
+    stroke(edge, 2);
+  }
+  if (row.classified) {
+    context.beginPath();
+    context.arc(...middle, Math.max(9 * dot, 0.7 * state.metre * Math.hypot(row.l, row.w)), 0, 7);
+    stroke(colours.ink, 1.5);
+  }
+  context.globalAlpha = 1;
+}
+
+function drawTruth({ outcome, class: class_, ...box }) {
+  const corners = outline(box), { colour } = run.truth[outcome];
+  path(corners, true);
+  stroke(colour, outcome === "missed" ? 3 : 1.5, [2, 2]);
+  if (outcome === "missed" && state.labels)
+    write(`missed ${run.classes[class_].name}`, middleOf(corners), topOf(corners), colour);
+}
+
+const topOf = (box) => Math.min(...box.map((corner) => corner[1])) - 2 * dot;
+const middleOf = (box) => box.reduce((sum, corner) => sum + corner[0] / box.length, 0);
+
+function drawRings() {
+  context.font = `${11 * dot}px system-ui,sans-serif`;
+  context.fillStyle = colours.soft;
+  for (let range = 20; range <= 100; range += 20) {
+    context.beginPath();
+    context.arc(state.x, state.y, range * state.metre, 0, 7);
+    stroke(colours.line, 1);
+    context.fillText(`${range} m`, state.x + 4 * dot, state.y - range * state.metre - 3 * dot);
+  }
+  path([[1, 0], [-0.7, 0.6], [-0.7, -0.6]].map(([x, y]) => screen(x, y)), true);
+  context.fillStyle = colours.ink;
+  context.fill();
+}
+
+function draw() {
+  dot = devicePixelRatio || 1;
+  drawPoints();
+  drawRings();
+  const frame = frames[state.at], wrong = new Set(state.truth ? frame.false : []);
+  const chosen = state.kept ?? state.hovered;
+  const shown = (rowsAt[state.at] || []).filter((row) => state.background || row.class || row.id === chosen);
+  shown.sort((a, b) => a.class - b.class || a.seen - b.seen);
+  for (const row of shown) drawTrack(row, wrong.has(row.id));
+  context.font = `${12 * dot}px system-ui,sans-serif`;
+  taken = [];
+  if (state.truth) (frame.truth || []).forEach(drawTruth);
+  for (const row of shown.reverse())
+    if ((state.labels && row.class) || row.id === chosen) {
+      const box = outline(row), at = [middleOf(box), topOf(box)], needed = row.id === chosen;
+      if (wrong.has(row.id)) write(`false: ${label(row)}`, ...at, run.truth.false.colour, needed);
+      else write(label(row), ...at, colours.ink, needed);
+    }
+  canvas.dataset.frame = frame.frame;
+}
+
+let drawing = false;
+function redraw() {
+  if (drawing || !frames[state.at]) return;
+  drawing = true;
+  requestAnimationFrame(() => { drawing = false; if (frames[state.at]) draw(); });
+}

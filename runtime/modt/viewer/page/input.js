@@ -1,0 +1,133 @@
+// ---- time, pointer and keys
+
+const slider = element("slider"), speed = element("speed");
+
+async function go(at) {
+  state.at = Math.max(first, Math.min(last, at));
+  const wanted = state.at, found = await readSweep(wanted);
+  if (wanted !== state.at) return; // overtaken
+  sweep = found;
+  showFrame();
+  showStory();
+  redraw();
+  for (let ahead = 1; state.playing && ahead < 5; ahead++) readSweep(wanted + ahead);
+}
+
+let play = async () => {
+  state.playing = !state.playing;
+  element("play").textContent = state.playing ? "Pause" : "Play";
+  if (state.playing && state.at === last) await go(0);
+  let then = performance.now(), stamp = frames[state.at].stamp_s, reached = state.at;
+  const tick = async (now) => {
+    if (!state.playing) return;
+    if (state.at !== reached) stamp = frames[state.at].stamp_s; // somebody moved the slider
+    stamp += Math.min((now - then) / 1000, 0.5) * Number(speed.value);
+    then = now;
+    let at = state.at;
+    while (at < last && frames[at + 1].stamp_s <= stamp) at++;
+    reached = at;
+    if (at !== state.at) await go(at);
+    if (at === last) play();
+    else requestAnimationFrame(tick);
+  };
+  if (state.playing) requestAnimationFrame(tick);
+};
+
+function fit() {
+  dot = devicePixelRatio || 1;
+  canvas.width = Math.max(1, Math.round(canvas.clientWidth * dot));
+  canvas.height = Math.max(1, Math.round(canvas.clientHeight * dot));
+}
+
+function reset() {
+  fit();
+  state.up = canvas.height > canvas.width;
+  state.metre = Math.min(canvas.width, canvas.height) / 70;
+  state.x = canvas.width * (state.up ? 0.5 : 0.35);
+  state.y = canvas.height * (state.up ? 0.65 : 0.5);
+}
+
+function zoom(factor, px = canvas.width / 2, py = canvas.height / 2) {
+  const metre = Math.max(1, Math.min(400, state.metre * factor));
+  state.x = px + (state.x - px) * metre / state.metre;
+  state.y = py + (state.y - py) * metre / state.metre;
+  state.metre = metre;
+}
+
+function trackAt(px, py) {
+  const [x, y] = place(px, py), near = 12 / state.metre;
+  let best = null, least = Infinity;
+  for (const row of rowsAt[state.at] || []) {
+    if (!state.background && !row.class) continue;
+    const dx = x - row.x, dy = y - row.y, c = Math.cos(row.yaw), s = Math.sin(row.yaw);
+    const u = Math.abs(c * dx + s * dy), v = Math.abs(c * dy - s * dx);
+    const off = Math.hypot(Math.max(u - row.l / 2, 0), Math.max(v - row.w / 2, 0));
+    if (off < near && off < least) [best, least] = [row.id, off];
+  }
+  return best;
+}
+
+const pointers = new Map();
+let moved = false;
+const spot = (event) => [event.offsetX * dot, event.offsetY * dot];
+
+canvas.onpointerdown = (event) => {
+  pointers.set(event.pointerId, spot(event));
+  canvas.setPointerCapture(event.pointerId);
+  moved = false;
+};
+canvas.onpointermove = (event) => {
+  const now = spot(event), before = pointers.get(event.pointerId);
+  if (!before) state.hovered = trackAt(...now);
+  else {
+    const other = [...pointers].find(([id]) => id !== event.pointerId)?.[1];
+    const away = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]);
+    if (other) zoom(away(now) / Math.max(away(before), 1), ...other);
+    else [state.x, state.y] = [state.x + now[0] - before[0], state.y + now[1] - before[1]];
+    moved ||= Math.hypot(now[0] - before[0], now[1] - before[1]) > 2;
+    pointers.set(event.pointerId, now);
+  }
+  showStory();
+  redraw();
+};
+canvas.onpointerup = canvas.onpointercancel = (event) => {
+  pointers.delete(event.pointerId);
+  if (!moved) state.kept = trackAt(...spot(event));
+  showStory();
+  redraw();
+};
+canvas.onwheel = (event) => {
+  event.preventDefault();
+  zoom(Math.exp(-event.deltaY / 500), ...spot(event));
+  redraw();
+};
+
+const toggle = (name) => () => (state[name] = !state[name]);
+const KEYS = {
+  " ": () => play(),
+  ArrowLeft: (event) => go(state.at - (event.shiftKey ? 10 : 1)),
+  ArrowRight: (event) => go(state.at + (event.shiftKey ? 10 : 1)),
+  Home: () => go(first),
+  End: () => go(last),
+  "+": () => zoom(1.25),
+  "-": () => zoom(0.8),
+  0: reset,
+  r: toggle("up"), p: toggle("points"), t: toggle("trails"), b: toggle("background"), l: toggle("labels"),
+  g: toggle("truth"),
+  Escape: () => (state.kept = state.hovered = null),
+};
+document.onkeydown = (event) => {
+  const act = KEYS[event.key] || KEYS[event.key.toLowerCase()];
+  if (!act || event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT") return;
+  event.preventDefault();
+  act(event);
+  redraw();
+};
+
+slider.oninput = () => go(Number(slider.value));
+element("play").onclick = (event) => { event.currentTarget.blur(); play(); }; // or Space would press it, too
+onresize = () => { fit(); redraw(); };
+matchMedia("(prefers-color-scheme: dark)").onchange = () => { theme(); redraw(); };
+theme();
+reset();
+legends();

@@ -1,0 +1,44 @@
+// ---- a run that is going on: frames come as events, the last ones are kept; who looks at the newest sees the next
+
+const HISTORY = 600; // frames
+const packedSweeps = [], said = document.querySelector("header span");
+let waiting = 0, done = Promise.resolve(), lost = false;
+
+packedSweep = (at) => packedSweeps[at];
+play = () => go(last);
+state.at = last = -1;
+speed.hidden = true;
+element("play").textContent = "Newest";
+
+async function take({ frame, states, tracks, points }) {
+  const at = last + 1, follows = state.at === last;
+  await addTracks(tracks, at);
+  frames[at] = frame;
+  packedSweeps[at] = points;
+  last = slider.max = at;
+  forget(at - HISTORY);
+  if (run.states.length !== states.length) legend("states", (run.states = states), true);
+  if (follows || state.at < first) await go(at);
+}
+
+function forget(old) {
+  if (old < 0) return;
+  first = slider.min = old + 1;
+  delete frames[old], delete rowsAt[old], delete packedSweeps[old];
+  for (const [id, rows] of rowsOf) {
+    if (rows[0].at <= old) rows.shift();
+    if (!rows.length) rowsOf.delete(id);
+  }
+}
+
+const source = new EventSource("events");
+source.onopen = () => (lost ? location.reload() : (said.textContent = "live"));
+source.onerror = () => {
+  lost = true;
+  said.textContent = "does not answer: the run has ended, or too many look at it";
+};
+source.onmessage = (event) => {
+  if (waiting > 2) return; // a page that cannot keep up misses frames
+  waiting++;
+  done = done.then(() => take(JSON.parse(event.data))).finally(() => waiting--);
+};

@@ -1,0 +1,88 @@
+// ---- text
+
+const add = (parent, tag, text = "", more = {}) => {
+  const made = Object.assign(document.createElement(tag), { textContent: text }, more);
+  parent.append(made);
+  return made;
+};
+
+function showFrame() {
+  const frame = frames[state.at], rows = rowsAt[state.at] || [], list = element("frame");
+  const cpu = Object.values(frame.cpu_ms || {}).reduce((a, b) => a + b, 0);
+  const facts = [
+    ["number", `${frame.frame}`],
+    ["proposals", frame.proposals],
+    ["tracks, lost among them", `${rows.length}, ${rows.filter((row) => !row.seen).length}`],
+    ["said to be objects", rows.filter((row) => row.class && row.seen).length],
+    ["classified, deferred", `${frame.classifications}, ${frame.deferred}`],
+    ["budget", run.budget],
+    ["CPU time", cpu ? `${cpu.toFixed(1)} ms` : "not recorded"],
+    ["energy", frame.energy_mJ === undefined ? "not recorded" : `${frame.energy_mJ.toFixed(0)} mJ, ${frame.kind}`],
+  ];
+  if (frame.truth) {
+    const count = (outcome) => frame.truth.filter((object) => object.outcome === outcome).length;
+    facts.push(["found, missed, false", `${count("found")}, ${count("missed")}, ${frame.false.length}`]);
+  }
+  list.replaceChildren();
+  for (const [name, value] of facts.filter(([, value]) => value !== null)) add(list, "dt", name), add(list, "dd", value);
+  element("stages").replaceChildren();
+  for (const { name, colour } of run.stages) {
+    const part = (frame.cpu_ms || {})[name] || 0;
+    add(element("stages"), "i", "", { title: `${name} ${part.toFixed(1)} ms` })
+      .style.cssText = `width:${100 * part / (cpu || 1)}%;background:${colour}`;
+  }
+  element("time").textContent = `${frame.stamp_s.toFixed(2)} s, ${state.at + 1} / ${last + 1}`;
+  slider.value = state.at;
+}
+
+const stateOf = (row) => run.states[row.state].name.replaceAll("_", " ");
+
+// Every change of state and every classification of a track.
+function events(rows) {
+  const found = [];
+  rows.forEach((row, k) => {
+    if (row.classified) {
+      const said = run.classes.map((c) => `${c.name} ${(100 * row[`p_${c.name}`]).toFixed(1)} %`).join(", ");
+      const view = [row.l, row.w, row.h].map((side) => side.toFixed(1)).join(" × ");
+      const range = Math.hypot(row.x, row.y).toFixed(0);
+      found.push([row.at, `classified: ${row.points} points, ${view} m at ${range} m: ${said}`]);
+    }
+    if (k === 0 || row.state !== rows[k - 1].state) found.push([row.at, stateOf(row)]);
+  });
+  return found;
+}
+
+function showStory() {
+  const id = state.kept ?? state.hovered, box = element("story"), rows = rowsOf.get(id);
+  if (!rows || box.dataset.shown === `${id} ${state.at}`) return;
+  box.dataset.shown = `${id} ${state.at}`;
+  box.replaceChildren();
+  const row = rows.find((row) => row.at === state.at);
+  add(box, "b", row ? label(row) : `#${id}, not in this frame`);
+  let spent = 0;
+  for (const row of rows) if (row.classified) spent += frames[row.at].call_mJ || 0;
+  const now = row ? `${stateOf(row)}, ${row.points} points, ${row.world_speed_mps.toFixed(1)} m/s; ` : "";
+  const [begin, end] = [rows[0], rows[rows.length - 1]].map((row) => frames[row.at].frame);
+  add(box, "div", `${now}frames ${begin} to ${end}; ${spent.toFixed(1)} mJ of classification (estimated)`);
+  const list = add(box, "ol");
+  for (const [at, text] of events(rows))
+    add(add(list, "li"), "button", `${frames[at].frame}: ${text}`, { onclick: () => go(at) });
+}
+
+function legend(id, entries, outline) {
+  element(id).replaceChildren();
+  for (const { name, colour } of entries) {
+    const line = add(element(id), "span"), mark = add(line, "i");
+    mark.style[outline ? "borderColor" : "background"] = colour;
+    if (outline) mark.className = "outline";
+    line.append(name.replaceAll("_", " "));
+  }
+}
+
+function legends() {
+  legend("classes", run.classes, false);
+  legend("states", run.states, true);
+  legend("stage-legend", run.stages, false);
+  element("truth-title").hidden = !run.truth;
+  legend("truth", Object.entries(run.truth || {}).map(([name, { colour }]) => ({ name, colour })), true);
+}

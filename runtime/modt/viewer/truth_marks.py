@@ -1,0 +1,62 @@
+"""What is true of the frames of a run, and what it made of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modt.evaluation.matching import judge
+from modt.evaluation.overlap import inside
+from modt.evaluation.rows import Rows
+from modt.evaluation.run_record import LABELS, RunRecord
+from modt.evaluation.truth import FrameTruth, Truth
+from modt.geometry import inverse, transform_boxes
+from modt.sinks.tracks import BOX_KEYS
+from modt.types import NONE, Float32, Int
+
+MARGIN_M = 0.02
+"""Around the boxes of proposals, which are rounded."""
+DRAWN = [BOX_KEYS.index(key) for key in ("x", "y", "l", "w", "yaw")]
+
+
+def truth_marks(run: RunRecord, truth: Truth) -> dict[int, dict[str, Any]]:
+    """By number of a frame: `truth`, its labelled objects, and `false`, ids of tracks said to be what they are not.
+
+    Judged as by modt evaluate; where the run was made without --labels, a proposal has the points in its box.
+
+    Raises:
+        MisuseError: the labels are not those of the run's recording.
+    """
+    exact = (run.path / LABELS).is_dir()
+    marks = {}
+    for frame in run.frames(truth, None if exact else points_in_boxes):
+        objects, proposals, _ = judge(frame, truth.rules)
+        called = proposals[proposals["to_call"] & (proposals["said"] > 0)]
+        false = called["track"][called["said"] != called["owner"]]
+        marks[frame.index] = {"truth": _objects(frame.truth, objects), "false": false.tolist()}
+    return marks
+
+
+def _objects(truth: FrameTruth, rows: Rows) -> list[dict[str, Any]]:
+    """Those of a class, in the frame of the sensor; found: and said to be what they are."""
+    boxes = transform_boxes(inverse(truth.T_box_sensor), truth.box)[:, DRAWN]
+    found = rows["said"] == rows["class"]
+    outcome = np.where(found, "found", np.where(rows["to_segment"] & rows["to_classify"], "missed", "not judged"))
+    columns = zip(boxes.tolist(), rows["class"].tolist(), outcome.tolist(), strict=True)
+    names = [BOX_KEYS[k] for k in DRAWN]
+    return [dict(zip(names, box, strict=True)) | {"class": c, "outcome": o} for box, c, o in columns if c]
+
+
+def points_in_boxes(record: dict[str, Any], points: Float32) -> Int:
+    """(N,) proposal of each point, by the boxes of a record, NONE where it lies in none."""
+    order = np.argsort(points[:, 0], kind="stable")
+    sorted_x = points[order, 0]
+    found = np.full(len(points), NONE, np.int64)
+    for track in record["tracks"]:
+        if track["box"] is not None:
+            box = np.array([track["box"][key] for key in BOX_KEYS])
+            reach = np.hypot(box[3], box[4]) / 2 + MARGIN_M
+            near = order[slice(*np.searchsorted(sorted_x, [box[0] - reach, box[0] + reach]))]
+            found[near[inside(points[near], box, MARGIN_M, -MARGIN_M)]] = track["proposal"]
+    return found

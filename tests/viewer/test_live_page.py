@@ -1,0 +1,158 @@
+import http.client
+import json
+import socket
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from modt.address import parse_address
+from modt.errors import MisuseError
+from modt.sinks.schemes import SCHEMES
+from modt.viewer.live_frame import live_cells
+from modt.viewer.live_page import open_view
+from modt.viewer.live_server import MOST_CLIENTS
+from modt.viewer.track_rows import COLUMNS, SCALED, result_rows
+from tests import results
+
+from . import pages
+
+WAIT_S = 10.0
+
+
+def ledger(frame):
+    return {"schema": "modt.ledger/1", "frame": frame, "stages": {"tracking": {"cpu_ns": 2_000_000}}}
+
+
+def opened(text="view://:0"):
+    return open_view(parse_address(text, {"view": SCHEMES["view"].options}))
+
+
+@pytest.fixture
+def live():
+    with closing(opened()) as page:
+        yield page
+
+
+def show(live, frame):
+    """A frame, and what it cost."""
+    live.write(frame)
+    live.ledger(ledger(frame.frame.index))
+
+
+class Reader:
+    """One who reads the events."""
+
+    def __init__(self, live, path="/events", **headers):
+        self.connection = http.client.HTTPConnection("127.0.0.1", live.port, timeout=WAIT_S)
+        self.connection.request("GET", path, headers=headers)
+        self.answer = self.connection.getresponse()
+
+    def event(self):
+        text = self.answer.readline().decode()
+        assert self.answer.readline() == b"\n"
+        return json.loads(text.removeprefix("data: "))
+
+    def close(self):
+        self.answer.close()
+        self.connection.close()
+
+
+@pytest.fixture
+def read(live):
+    readers = []
+
+    def begin(*arguments, **headers):
+        readers.append(Reader(live, *arguments, **headers))
+        return readers[-1]
+
+    yield begin
+    for reader in readers:
+        reader.close()
+
+
+def test_a_frame_reaches_who_looks(live, read):
+    reader = read()
+    show(live, results.result(3, [5, 4], {0: 1, 1: 2}, {1: results.CAR}))
+    event = reader.event()
+    assert (event["frame"]["frame"], event["frame"]["cpu_ms"]) == (3, {"tracking": 2.0})
+    table = pages.table(event["tracks"], len(COLUMNS))
+    assert table[:, COLUMNS.index("id")].tolist() == [1, 2]
+    number, level = pages.cells(event["points"])
+    assert len(number) == len(level)
+
+
+def test_nothing_is_made_while_nobody_looks_and_for_a_line_without_its_frame(live, read, monkeypatch):
+    made = []
+    monkeypatch.setattr("modt.viewer.live_page.live_message", lambda *given: made.append(given))
+    show(live, results.result(0, [5], {0: 1}))
+    reader = read()
+    live.write(results.result(1, [5], {0: 1}))
+    live.ledger(ledger(2))
+    assert made == []
+    assert reader.answer.status == 200
+
+
+def test_energy_is_that_of_the_last_window(live, read):
+    reader = read()
+    window = {"schema": "modt.energy/1", "energy_J": 2.0, "frames": [0, 9, 10], "kind": "measured"}
+    live.ledger(window)
+    live.ledger(window | {"energy_J": None})
+    show(live, results.result(0, [5], {0: 1}))
+    frame = reader.event()["frame"]
+    assert (frame["energy_mJ"], frame["kind"]) == (200.0, "measured")
+
+
+def test_one_that_stalls_holds_nobody_up_and_misses_what_is_old(live, read):
+    stalled = socket.create_connection(("127.0.0.1", live.port), timeout=WAIT_S)
+    with stalled:
+        stalled.sendall(b"GET /events HTTP/1.0\r\nHost: localhost\r\n\r\n")
+        assert stalled.recv(15).startswith(b"HTTP/1.0 200")
+        reader = read()
+        for index in range(300):
+            show(live, results.result(index, [5, 4], {0: 1}))
+        seen = 0
+        while seen < 299:
+            seen = reader.event()["frame"]["frame"]
+
+
+def test_too_many_are_refused(live, read):
+    answers = [read().answer.status for _ in range(MOST_CLIENTS + 1)]
+    assert answers == [200] * MOST_CLIENTS + [503]
+
+
+@pytest.mark.parametrize(
+    ("path", "name", "status"),
+    [("/", "localhost:8766", 200), ("/etc", "127.0.0.1", 404), ("/", "elsewhere.example", 403), ("/events", "", 403)],
+)
+def test_other_paths_and_names_are_refused(read, path, name, status):
+    assert read(path, Host=name).answer.status == status
+
+
+def test_it_listens_at_the_loopback_unless_told(live):
+    assert live._server.server_address[0] == "127.0.0.1"
+
+
+@pytest.mark.parametrize("address", ["view://127.0.0.1:{port}", "view://192.0.2.1:0"])
+def test_what_cannot_be_bound_is_one_error(live, address):
+    with pytest.raises(MisuseError, match="cannot be bound"):
+        opened(address.format(port=live.port))
+
+
+def test_rows_of_a_result_are_in_the_frame_of_the_sensor():
+    result = results.result(0, [5, 4], {0: 1}, {1: results.CAR}, lost=(9,))
+    result.tracks.x[:] = [[12.0, 1.0, 0.3, 2.0], [10.0, 4.0, 0.0, 0.0]]
+    result.tracks.box[1] = [0, 0, -1, 4, 2, 1.5, 0.5 + np.pi / 2]
+    rows = result_rows(result, np.array([10.0, 1.0, np.pi / 2]))
+    seen, lost = (dict(zip(COLUMNS, row, strict=True)) for row in rows)
+    assert (seen["seen"], lost["seen"], lost["id"]) == (1, 0, 9)
+    assert seen["x"] == result.proposals.box[0, 0]
+    assert [lost[key] for key in ("x", "y", "z", "l", "w", "h", "yaw")] == pytest.approx([3, 0, -1, 4, 2, 1.5, 0.5])
+    assert rows.shape == (2, len(COLUMNS))
+    assert [seen[name] for name in SCALED[-4:]] == [12.0, 1.0, 0.3, 2.0]
+
+
+def test_points_of_proposals_stand_out():
+    cells = live_cells(results.result(0, [5, 4], {0: 1}))
+    assert len(cells) >= 1
+    assert (cells.level > 0).any()

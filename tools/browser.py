@@ -1,0 +1,186 @@
+"""A Chromium without a window, driven through a pipe by its DevTools protocol."""
+
+from __future__ import annotations
+
+import base64
+import fcntl
+import json
+import os
+import selectors
+import shutil
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+NAMES = "chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
+WAIT_S = 30.0
+OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--hide-scrollbars",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-extensions",
+    "--remote-debugging-pipe",
+)
+
+
+def find() -> str | None:
+    """Path of an installed Chromium or Chrome, None without one."""
+    return next(filter(None, map(shutil.which, NAMES)), None)
+
+
+class Browser:
+    """Commands to a browser that reads them at one descriptor and answers at another."""
+
+    def __init__(self, to: int, back: int) -> None:
+        self._to, self._back, self._buffer, self._number = to, back, b"", 0
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(back, selectors.EVENT_READ)
+        self.events: list[dict[str, Any]] = []
+
+    def call(self, method: str, session: str | None = None, **params: Any) -> dict[str, Any]:
+        """The result of a command; events that come before it are kept.
+
+        Raises:
+            RuntimeError: it is refused.
+            TimeoutError: no answer.
+        """
+        self._number += 1
+        message = {"id": self._number, "method": method, "params": params} | (
+            {"sessionId": session} if session else {}
+        )
+        os.write(self._to, json.dumps(message).encode() + b"\0")
+        end_s = time.monotonic() + WAIT_S
+        while True:
+            answer = self._message(end_s)
+            if answer.get("id") != self._number:
+                self.events.append(answer)
+            elif "error" in answer:
+                raise RuntimeError(f"{method}: {answer['error']}")
+            else:
+                return dict(answer["result"])
+
+    def _message(self, end_s: float) -> dict[str, Any]:
+        while b"\0" not in self._buffer:
+            if not self._selector.select(max(end_s - time.monotonic(), 0)):
+                raise TimeoutError("the browser does not answer")
+            part = os.read(self._back, 1 << 20)
+            if not part:
+                raise RuntimeError("the browser has ended")
+            self._buffer += part
+        text, _, self._buffer = self._buffer.partition(b"\0")
+        return dict(json.loads(text))
+
+
+class Tab:
+    """A page in a browser, of some size."""
+
+    def __init__(self, browser: Browser, url: str, width: int, height: int, *, dark: bool, first: str = "") -> None:
+        self._browser = browser
+        self._target = browser.call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = browser.call("Target.attachToTarget", targetId=self._target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log"):
+            self.call(f"{domain}.enable")
+        self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.call("Emulation.setEmulatedMedia", features=[scheme])
+        if first:
+            self.call("Page.addScriptToEvaluateOnNewDocument", source=first)
+        self.call("Page.navigate", url=url)
+
+    def call(self, method: str, **params: Any) -> dict[str, Any]:
+        """The result of a command to the page."""
+        return self._browser.call(method, self._session, **params)
+
+    def value(self, expression: str) -> Any:
+        """Value of an expression or of its promise.
+
+        Raises:
+            RuntimeError: it throws.
+        """
+        found = self.call("Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True)
+        if "exceptionDetails" in found:
+            raise RuntimeError(found["exceptionDetails"]["exception"].get("description", "it throws"))
+        return found["result"].get("value")
+
+    def until(self, condition: str, within_s: float = WAIT_S) -> None:
+        """Wait for a condition.
+
+        Raises:
+            TimeoutError: it does not come to hold.
+        """
+        end_s = time.monotonic() + within_s
+        while not self.value(f"(() => {{ try {{ return Boolean({condition}) }} catch {{ return false }} }})()"):
+            if time.monotonic() > end_s:
+                raise TimeoutError(f"{condition} does not hold within {within_s:g} s; {self.failures()}")
+            time.sleep(0.02)
+
+    def failures(self) -> list[str]:
+        """Errors and warnings of its console so far, and exceptions that nobody has caught."""
+        self.value("0")  # takes what has come until now
+        found = []
+        for event in self._browser.events:
+            method, params = event.get("method"), event.get("params", {})
+            if event.get("sessionId") != self._session:
+                continue
+            if method == "Runtime.exceptionThrown":
+                found.append(json.dumps(params["exceptionDetails"]))
+            elif method == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning"):
+                found.append(json.dumps(params["args"]))
+            elif method == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
+                found.append(f"{params['entry']['text']} {params['entry'].get('url', '')}")
+        return found
+
+    def point(self, x: float, y: float, *, click: bool = False) -> None:
+        """Move the mouse there [CSS pixels], and click."""
+        for kind in ("mouseMoved", *(("mousePressed", "mouseReleased") if click else ())):
+            button = {} if kind == "mouseMoved" else {"button": "left", "clickCount": 1}
+            self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **button)
+
+    def press(self, key: str) -> None:
+        """A key, by its name in JavaScript."""
+        text = {"text": key} if len(key) == 1 else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", key=key)
+
+    def save_screenshot(self, path: Path, *, whole: bool = False) -> None:
+        """Write what is seen, or the whole page, as PNG."""
+        png = self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
+        path.write_bytes(base64.b64decode(png))
+
+    def close(self) -> None:
+        """Leave the page."""
+        self._browser.call("Target.closeTarget", targetId=self._target)
+
+
+@contextmanager
+def browser(path: str) -> Iterator[Browser]:
+    """An executable, started, and ended at the end."""
+    to_browser, from_browser = os.pipe(), os.pipe()
+    # Above the descriptors 3 and 4, at which the browser expects them.
+    ends = [fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 10) for fd in (*to_browser, *from_browser)]
+    for fd in (*to_browser, *from_browser):
+        os.close(fd)
+    read, to, back, write = ends
+    with TemporaryDirectory(prefix="browser-", ignore_cleanup_errors=True) as profile, open(os.devnull, "w") as null:
+        actions = [(os.POSIX_SPAWN_DUP2, read, 3), (os.POSIX_SPAWN_DUP2, write, 4)]
+        actions += [(os.POSIX_SPAWN_DUP2, null.fileno(), fd) for fd in (1, 2)]
+        command = [path, *OPTIONS, f"--user-data-dir={profile}", "about:blank"]
+        pid = os.posix_spawn(path, command, os.environ, file_actions=actions)
+        os.close(read)
+        os.close(write)
+        started = Browser(to, back)
+        try:
+            yield started
+        finally:
+            with suppress(Exception):
+                started.call("Browser.close")
+            os.waitpid(pid, 0)
+            os.close(to)
+            os.close(back)
