@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from modt.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    out = tmp_path_factory.mktemp("results")
+    words = ["evaluate", "--experiment", "table4", "fig10", "fig15", "--simulated", "2", "--seconds", "0.3"]
+    assert main([*words, "--out", str(out)]) == 0
+    return out
+
+
+def test_results_are_written_in_every_form(results):
+    found = json.loads((results / "results.json").read_text())
+    assert found["schema"] == "modt.experiments/1"
+    with (results / "fig10.csv").open() as table:
+        own = [row for row in found["rows"] if row["experiment"] == "fig10"]
+        assert len(list(csv.DictReader(table))) == len(own) > 26
+    picture = (results / "fig10-2-simulated-drives-average-precision.svg").read_text()
+    assert picture.startswith("<svg xmlns")
+    assert "<polyline" in picture
+    assert "with_trk, AP car" in picture
+    assert "Fig. 10" in (results / "index.html").read_text()
+    page = (results / "results.md").read_text()
+    assert "## Table IV" in page
+    assert "## Where this falls short" in page
+
+
+def test_simulated_drives_stand_apart_and_beside_no_figure_of_the_paper(results):
+    found = json.loads((results / "results.json").read_text())["rows"]
+    assert {row["kind"] for row in found} == {"simulated"}
+    assert {row["paper"] for row in found} == {None}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--experiment", "table9", "--simulated", "1"], "table3"),
+        (["--experiment", "table4"], "no drives"),
+        (["RUN", "--experiment", "table4"], "takes no runs"),
+        (["--experiment", "table3", "--simulated", "1"], "none of the drives"),
+    ],
+)
+def test_misuse_is_told(words, said, capsys, tmp_path):
+    if "RUN" in words:
+        words = ["RUN", "TRUTH", *words[1:]]
+    assert main(["evaluate", *words, "--out", str(tmp_path)]) == 2
+    assert said in capsys.readouterr().err
