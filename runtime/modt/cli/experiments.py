@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not drives:
         raise MisuseError("--experiment", "no drives", "give --kitti ROOT, --simulated N or both")
     out: Path = arguments.out
-    study = Study(experiments, drives, arguments.profile, Store(arguments.cache or out / "cache"))
+    study = Study(experiments, drives, arguments.profile, Store((arguments.cache or out / "cache").resolve()))
     executor: Executor = Here() if arguments.jobs == 1 else Processes(arguments.jobs)
     if arguments.scheduler:
         executor = Cluster(arguments.scheduler)

@@ -11,6 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from modt.errors import MisuseError
 from modt.evaluation.rules import CUBOID_RULES, Rules
 from modt.evaluation.truth import KITTI_TYPES, FrameTruth, Role, Truth
@@ -42,6 +44,10 @@ class Drive(Protocol):
     @property
     def name(self) -> str:
         """Of the drive."""
+
+    @property
+    def number(self) -> str:
+        """Of the recording, whatever labels it is judged by."""
 
     @property
     def kind(self) -> str:
@@ -81,7 +87,7 @@ class KittiDrive:
 
     Attributes:
         name: number of the raw drive, and the sequence if its labels are those.
-        number: of the raw drive.
+        number: of the raw drive, the sequence where it is not known.
         path: of the drive, or the label file.
         scans: whether sweeps of half of the labelled frames or more are there.
     """
@@ -146,6 +152,11 @@ class SimulatedDrive:
         """Scene and seed."""
         return f"{self.scene} {self.seed}"
 
+    @property
+    def number(self) -> str:
+        """The same."""
+        return self.name
+
     def digest(self) -> str:
         """Of its description: the same one gives the same bytes."""
         return f"{self.scene}, {self.sensor}, {self.seconds:g} s, seed {self.seed}"
@@ -163,10 +174,11 @@ class SimulatedDrive:
         return FieldOfView()
 
     def sweeps(self) -> Iterator[tuple[Frame, FrameTruth]]:
-        """Every sweep."""
+        """Every sweep; what has no point in it is not labelled."""
         for frame, truth in SyntheticStream(self.scene, self.sensor, self.seconds, self.seed).sweeps():
-            names = [kind.name for kind in truth.kinds]
-            yield frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies.tolist(), names, truth.boxes)
+            seen = np.flatnonzero(truth.points)
+            names = [truth.kinds[k].name for k in seen]
+            yield frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies[seen].tolist(), names, truth.boxes[seen])
 
 
 def kitti_drives(root: Path) -> list[KittiDrive]:
@@ -213,8 +225,9 @@ def _drive(path: Path) -> KittiDrive:
         found = re.fullmatch(r"(\d{4}_\d\d_\d\d)_drive_(\d{4})_sync", path.name)
         number = found[2] if found and found[1] == "2011_09_26" else path.name
         return KittiDrive(number, number, path, scans)
-    number = DRIVE_OF_SEQUENCE.get(int(path.stem), "?") if path.stem.isdigit() else "?"
-    return KittiDrive(f"{number}, tracking {path.stem}", number, path, scans)
+    sequence = f"tracking {path.stem}"
+    number = DRIVE_OF_SEQUENCE.get(int(path.stem)) if path.stem.isdigit() else None
+    return KittiDrive(f"{number}, {sequence}" if number else sequence, number or sequence, path, scans)
 
 
 @cache

@@ -92,7 +92,8 @@ class Study:
     def units(self) -> list[Unit]:
         """All that are needed, each once, drive by drive."""
         found = {unit.key: unit for units in self._units.values() for unit in units.values()}
-        return sorted(found.values(), key=lambda unit: unit.drive.name)
+        order = list(self._digests)
+        return sorted(found.values(), key=lambda unit: order.index(unit.drive))
 
     def complete(self, executor: Executor, tick: Callable[[Unit], None]) -> None:
         """Work off the units whose outcomes are missing; those that are ready stay, should it be interrupted."""
@@ -116,7 +117,7 @@ class Study:
         if simulated:
             yield Streams(f"{len(simulated)} simulated drives", simulated)
         recorded = [drive for drive in suited if drive.kind == KITTI]
-        once = tuple({drive.name[:4]: drive for drive in recorded}.values())
+        once = tuple({drive.number: drive for drive in recorded}.values())
         if len(once) > 1:
             yield Streams(f"{len(once)} KITTI drives", once)
         for drive in sorted(recorded, key=lambda drive: drive.had_a_say):
