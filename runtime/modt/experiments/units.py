@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
+from threading import Thread
 from typing import Any, Protocol
 
 from modt.errors import MisuseError, ModtError
@@ -73,12 +75,24 @@ class Processes:
 
     def outcomes(self, units: Sequence[Unit], folder: Path) -> Iterator[tuple[Unit, bytes]]:
         """As each is ready; what is shared by the units of a drive is computed by the first."""
-        with ProcessPoolExecutor(self.n, mp_context=get_context("spawn")) as pool:
+        with ProcessPoolExecutor(self.n, get_context("spawn"), _end_with_parent) as pool:
             try:
                 yield from _in_two_rounds(units, lambda unit: pool.submit(work, unit, folder), as_completed)
             except BaseException:
                 pool.shutdown(cancel_futures=True)
                 raise
+
+
+def _end_with_parent() -> None:
+    """In a worker: end when the process that asked for it has ended, however it did."""
+    parent = parent_process()
+
+    def wait() -> None:
+        if parent is not None:
+            parent.join()
+            os._exit(1)
+
+    Thread(target=wait, daemon=True).start()
 
 
 @dataclass(frozen=True, slots=True)
