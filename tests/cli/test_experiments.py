@@ -52,3 +52,13 @@ def test_misuse_is_told(words, said, capsys, tmp_path):
         words = ["RUN", "TRUTH", *words[1:]]
     assert main(["evaluate", *words, "--out", str(tmp_path)]) == 2
     assert said in capsys.readouterr().err
+
+
+def test_another_profile_stands_beside_the_first(tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text("fusion:\n  start_frame: 1\n")
+    words = ["evaluate", "--experiment", "table4", "--simulated", "1", "--seconds", "0.2", "--beside", str(other)]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    rows = json.loads((tmp_path / "out" / "results.json").read_text())["rows"]
+    assert [row["profile"] for row in rows].count("default") == len(rows) / 2
+    assert f"with_trk, profile {other}" in (tmp_path / "out" / "results.md").read_text()

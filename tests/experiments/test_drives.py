@@ -18,7 +18,7 @@ def test_a_folder_without_labels_is_refused(tmp_path):
 @pytest.mark.kitti
 def test_the_labels_give_table_iii(kitti_root, tmp_path):
     drives = kitti_drives(kitti_root)
-    study = Study([TABLE_III, FIGURE_8], drives, (), Store(tmp_path))
+    study = Study([TABLE_III, FIGURE_8], drives, [()], Store(tmp_path))
     study.complete(Here(), lambda unit: None)
     rows = study.rows()
     found = {row.streams: row for row in rows if row.experiment == "table3" and row.quantity == "N_go"}

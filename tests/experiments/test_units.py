@@ -15,13 +15,13 @@ NAMES = ("table5",)
 
 
 def rows(folder, executor: Executor, n: int = 2, frames: int = 3) -> list[Row]:
-    study = Study(chosen(NAMES), short_drives(n, frames), (), Store(folder))
+    study = Study(chosen(NAMES), short_drives(n, frames), [()], Store(folder))
     study.complete(executor, lambda unit: None)
     return study.rows()
 
 
 def test_results_are_kept_and_an_interrupted_study_goes_on(tmp_path):
-    study = Study(chosen(NAMES), short_drives(1, 3), (), Store(tmp_path))
+    study = Study(chosen(NAMES), short_drives(1, 3), [()], Store(tmp_path))
     total = study.missing
 
     def stop(unit):
@@ -42,13 +42,13 @@ def test_the_key_of_a_unit_follows_drive_replay_and_profile():
     keys = {
         unit.key
         for drive, profiles in ((one, ()), (other, ()), (one, ("small-robot",)))
-        for unit in Study([experiment], [drive], profiles, Store(None)).units
+        for unit in Study([experiment], [drive], [profiles], Store(None)).units
     }
-    assert len(keys) == 3 * len(Study([experiment], [one], (), Store(None)).units)
+    assert len(keys) == 3 * len(Study([experiment], [one], [()], Store(None)).units)
 
 
 def test_a_worker_with_other_code_is_refused(tmp_path):
-    unit = Study(chosen(["table4"]), short_drives(1), (), Store(tmp_path)).units[0]
+    unit = Study(chosen(["table4"]), short_drives(1), [()], Store(tmp_path)).units[0]
     with pytest.raises(MisuseError, match="another version"):
         work(dataclasses.replace(unit, code="older"), tmp_path)
 
@@ -69,4 +69,4 @@ def test_a_cluster_gives_the_same_rows(tmp_path):
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         found = rows(tmp_path / "a", Cluster(cluster.scheduler_address), n=20, frames=1)
     assert found == rows(tmp_path / "b", Here(), n=20, frames=1)
-    assert all(isinstance(unit, Unit) for unit in Study(chosen(NAMES), short_drives(1), (), Store(tmp_path)).units)
+    assert all(isinstance(unit, Unit) for unit in Study(chosen(NAMES), short_drives(1), [()], Store(tmp_path)).units)

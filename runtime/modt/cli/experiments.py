@@ -25,6 +25,8 @@ def add_options(p: argparse.ArgumentParser) -> None:
     seconds = options.real(0.2, 3600, "seconds")
     g.add_argument("--seconds", type=seconds, default=6.0, metavar="S", help="of each (default: %(default)g)")
     options.add_profile_option(g, "on top of each drive's sensor; later ones win key by key")
+    beside = "the same again with this profile on top; repeatable"
+    g.add_argument("--beside", action="append", default=[], metavar="NAME|FILE", help=beside)
     g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: %(default)s")
     g.add_argument("--cache", type=Path, metavar="DIR", help="of intermediate results (default: OUT/cache)")
     where = g.add_mutually_exclusive_group()
@@ -55,13 +57,15 @@ def run(arguments: argparse.Namespace) -> int:
     if not drives:
         raise MisuseError("--experiment", "no drives", "give --kitti ROOT, --simulated N or both")
     out: Path = arguments.out
-    study = Study(experiments, drives, arguments.profile, Store((arguments.cache or out / "cache").resolve()))
+    base = tuple(arguments.profile)
+    profiles = [base, *((*base, name) for name in arguments.beside)]
+    study = Study(experiments, drives, profiles, Store((arguments.cache or out / "cache").resolve()))
     executor: Executor = Here() if arguments.jobs == 1 else Processes(arguments.jobs)
     if arguments.scheduler:
         executor = Cluster(arguments.scheduler)
     with bar(study.missing, "replay", shown=not arguments.quiet and sys.stderr.isatty()) as tick:
         study.complete(executor, lambda unit: tick(unit.drive.name))
-    about = About.of(_command(arguments), arguments.profile)
+    about = About.of(_command(arguments), profiles)
     rows = study.rows()
     if not rows:
         raise MisuseError(
@@ -79,4 +83,5 @@ def _command(arguments: argparse.Namespace) -> str:
     words += ["--simulated", str(arguments.simulated)] if arguments.simulated else []
     words += ["--seconds", f"{arguments.seconds:g}"] if arguments.simulated else []
     words += [word for name in arguments.profile for word in ("--profile", name)]
+    words += [word for name in arguments.beside for word in ("--beside", name)]
     return shlex.join(words)

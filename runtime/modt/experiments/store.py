@@ -19,19 +19,9 @@ from numpy.typing import NDArray
 from modt.errors import ModtError
 
 Arrays = Mapping[str, NDArray[Any]]
-NO_EFFECT = tuple(
-    f"{part}/"
-    for part in (
-        "cli",
-        "energy/meters",
-        "experiments/catalogue",
-        "experiments/output",
-        "reporting",
-        "ros2",
-        "service",
-        "sinks",
-        "viewer",
-    )
+NO_EFFECT = (
+    *(f"{part}/" for part in ("cli", "energy/meters", "reporting", "ros2", "service", "sinks", "viewer")),
+    *(f"experiments/{part}" for part in ("catalogue/", "output/", "paper.py", "study.py", "units.py")),
 )
 """Parts of the package that no result follows from."""
 

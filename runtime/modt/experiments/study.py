@@ -14,10 +14,12 @@ from modt.experiments.catalogue.experiment import Experiment, Label
 from modt.experiments.catalogue.figures import Figure
 from modt.experiments.drives import KITTI, SIMULATED, Drive
 from modt.experiments.judged import Judged
-from modt.experiments.store import Store, catalogue_digest, key_of
+from modt.experiments.store import Arrays, Store, catalogue_digest, key_of
 from modt.experiments.units import Executor, Unit
 
 DIGITS = 6
+DEFAULT = "default"
+Profiles = tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +30,7 @@ class Row:
         experiment: its name.
         streams: drives that it is of.
         kind: KITTI or simulated.
+        profile: names of the profiles on top of that of the sensor, DEFAULT for none.
         had_a_say: whether a choice of this project was confirmed on sweeps of one of them.
         variant, at, quantity: as in Figure.
         value, low, high: the figure and its 95 % interval, None where there is none.
@@ -38,6 +41,7 @@ class Row:
     experiment: str
     streams: str
     kind: str
+    profile: str
     had_a_say: bool
     variant: str
     at: float | None
@@ -69,22 +73,25 @@ class Study:
     Args:
         experiments: to make.
         drives: to make them on.
-        profiles: names or files on top of that of each drive's sensor.
+        profiles: each some names or files on top of that of a drive's sensor, compared with one another; labels
+            alone follow from none of them.
         store: of results.
     """
 
     def __init__(
-        self, experiments: Sequence[Experiment], drives: Sequence[Drive], profiles: Sequence[str], store: Store
+        self, experiments: Sequence[Experiment], drives: Sequence[Drive], profiles: Sequence[Profiles], store: Store
     ) -> None:
-        self._experiments, self._store = experiments, store
+        self._experiments, self._profiles, self._store = experiments, profiles, store
         self._digests = {drive: drive.digest() for drive in drives}
-        configs = {sensor: profile.load((sensor, *profiles)) for sensor in {drive.sensor for drive in drives}}
-        self._units: dict[tuple[str, Drive], dict[Label, Unit]] = {
-            (e.name, drive): {
+        sensors = {drive.sensor for drive in drives}
+        configs = {(sensor, names): profile.load((sensor, *names)) for sensor in sensors for names in profiles}
+        self._units: dict[tuple[str, Profiles, Drive], dict[Label, Unit]] = {
+            (e.name, names, drive): {
                 label: Unit.of(drive, self._digests[drive], replay)
-                for label, replay in e.replays(configs[drive.sensor]).items()
+                for label, replay in e.replays(configs[drive.sensor, names]).items()
             }
             for e in experiments
+            for names in self._compared(e)
             for drive in _suited(e, drives)
         }
 
@@ -109,7 +116,16 @@ class Study:
 
     def rows(self) -> list[Row]:
         """Of every experiment, streams that had no say in choices first."""
-        return [row for e in self._experiments for streams in self._streams(e) for row in self._rows(e, streams)]
+        return [
+            row
+            for e in self._experiments
+            for streams in self._streams(e)
+            for names in self._compared(e)
+            for row in self._rows(e, streams, names)
+        ]
+
+    def _compared(self, experiment: Experiment) -> Sequence[Profiles]:
+        return self._profiles if experiment.scans else self._profiles[:1]
 
     def _streams(self, experiment: Experiment) -> Iterator[Streams]:
         suited = _suited(experiment, list(self._digests))
@@ -123,20 +139,25 @@ class Study:
         for drive in sorted(recorded, key=lambda drive: drive.had_a_say):
             yield Streams(drive.name, (drive,))
 
-    def _rows(self, experiment: Experiment, streams: Streams) -> list[Row]:
-        units = [self._units[experiment.name, drive] for drive in streams.drives]
+    def _rows(self, experiment: Experiment, streams: Streams, names: Profiles) -> list[Row]:
+        units = [self._units[experiment.name, names, drive] for drive in streams.drives]
         keys = [[unit.key for unit in of_drive.values()] for of_drive in units]
-        key = key_of("figures", catalogue_digest(), experiment.name, streams.name, keys)
-        made = self._store.made(key, lambda: {"rows": np.array(json.dumps(self._made(experiment, streams, units)))})
-        return [Row(**row) for row in json.loads(str(made["rows"]))]
+        key = key_of("figures", catalogue_digest(), experiment.name, streams.name, names, keys)
+
+        def make() -> Arrays:
+            return {
+                "rows": np.array(json.dumps([asdict(row) for row in self._made(experiment, streams, names, units)]))
+            }
+
+        return [Row(**row) for row in json.loads(str(self._store.made(key, make)["rows"]))]
 
     def _made(
-        self, experiment: Experiment, streams: Streams, units: Sequence[Mapping[Label, Unit]]
-    ) -> list[dict[str, object]]:
+        self, experiment: Experiment, streams: Streams, names: Profiles, units: Sequence[Mapping[Label, Unit]]
+    ) -> list[Row]:
         outcomes = {
             label: Judged.pooled([self._outcome(of_drive[label]) for of_drive in units]) for label in units[0]
         }
-        return [asdict(_row(experiment, streams, figure)) for figure in experiment.figures(outcomes)]
+        return [_row(experiment, streams, names, figure) for figure in experiment.figures(outcomes)]
 
     def _outcome(self, unit: Unit) -> Judged:
         found = self._store.get(unit.key)
@@ -149,13 +170,14 @@ def _suited(experiment: Experiment, drives: Sequence[Drive]) -> list[Drive]:
     return [drive for drive in drives if (drive.scans if experiment.scans else drive.kind == KITTI)]
 
 
-def _row(experiment: Experiment, streams: Streams, figure: Figure) -> Row:
+def _row(experiment: Experiment, streams: Streams, names: Profiles, figure: Figure) -> Row:
     estimate, kind = figure.estimate, streams.drives[0].kind
     stated = paper.figure(experiment.name, streams.name, figure.variant, figure.at, figure.quantity)
     return Row(
         experiment=experiment.name,
         streams=streams.name,
         kind=kind,
+        profile=" + ".join(names) or DEFAULT,
         had_a_say=experiment.scans and streams.had_a_say,
         variant=figure.variant,
         at=figure.at,

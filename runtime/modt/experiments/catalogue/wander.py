@@ -17,8 +17,8 @@ from modt.experiments.replays import NetworkReplay, Replay
 from modt.types import Float64
 
 CENTRES = {"mean": "mean of the points (the paper's)", "box": "centre of the box", "filter": "position of the track"}
-MAX_DRAWN = 12
-"""Cars whose distances are listed."""
+MAX_DRAWN = 7
+"""Cars whose distances are listed, those seen longest."""
 
 
 def _replays(config: ProfileConfig) -> dict[Label, Replay]:
@@ -43,7 +43,8 @@ def _figures(outcomes: Mapping[Label, Judged]) -> Iterator[Figure]:
         yield Figure(
             name, None, "step from frame to frame [m]", ratio([s.sum() for s in jump], [len(s) for s in jump])
         )
-    for car in cars if len(cars) <= MAX_DRAWN else ():
+    longest = sorted(cars, key=len, reverse=True)[:MAX_DRAWN]
+    for car in longest if len(np.unique(outcomes["accurate", None].frames["drive"])) == 1 else ():
         for column, name in list(CENTRES.items())[::2]:
             distance: Float64 = np.hypot(*(car[column] - car["start"]).T)
             for frame, metres in zip(car["frame"].tolist(), distance.tolist(), strict=True):

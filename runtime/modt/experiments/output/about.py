@@ -19,17 +19,20 @@ class About:
 
     command: str
     commit: str
-    profiles: tuple[str, ...]
-    model: str
-    sha256: str
+    models: dict[str, str]  # hash by file
     processor: str
 
     @classmethod
-    def of(cls, command: str, profiles: Sequence[str]) -> About:
-        """Of this program and machine."""
-        config = profile.load(list(profiles))
-        facts = PointNet(config.classification, config.sensor).facts()
-        return cls(command, _commit(), tuple(profiles), facts["file"], facts["sha256"], _processor())
+    def of(cls, command: str, profiles: Sequence[Sequence[str]]) -> About:
+        """Of this program and machine, with each of the profiles."""
+        configs = [profile.load(list(names)) for names in profiles]
+        facts = [PointNet(config.classification, config.sensor).facts() for config in configs]
+        return cls(command, _commit(), {found["file"]: found["sha256"] for found in facts}, _processor())
+
+    def sources(self) -> str:
+        """In a line."""
+        models = ", ".join(f"{file} ({sha256[:12]})" for file, sha256 in self.models.items())
+        return f"Commit {self.commit}, model {models}, {self.processor}"
 
 
 def _commit() -> str:

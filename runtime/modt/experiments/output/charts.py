@@ -7,8 +7,8 @@ from html import escape
 
 import numpy as np
 
-from modt.experiments.catalogue.experiment import Chart
-from modt.experiments.study import Row
+from modt.experiments.catalogue.experiment import Chart, Experiment
+from modt.experiments.study import DEFAULT, Row
 from modt.reporting import svg
 from modt.reporting.page import COLOURS
 
@@ -18,6 +18,16 @@ _STYLE = (
     ".grid{stroke:#d8dde4}.axis{stroke:#5d6876}polyline{fill:none;stroke-width:2}"
     + "".join(f".l{k}{{stroke:{c}}}.c{k}{{fill:{c}}}" for k, c in enumerate(COLOURS))
 )
+
+
+def drawings(experiment: Experiment, rows: Sequence[Row]) -> Iterator[tuple[str, Chart, list[svg.Trace]]]:
+    """The charts of some streams, with their name, that of the profiles added where it is not the default."""
+    for streams, names in dict.fromkeys((row.streams, row.profile) for row in rows):
+        own = [row for row in rows if (row.streams, row.profile) == (streams, names)]
+        for chart in experiment.charts:
+            drawn = traces(chart, own)
+            if drawn:
+                yield streams if names == DEFAULT else f"{streams}, {names}", chart, drawn
 
 
 def traces(chart: Chart, rows: Sequence[Row]) -> list[svg.Trace]:

@@ -31,13 +31,9 @@ def write(out: Path, about: About, experiments: Sequence[Experiment], rows: Sequ
     for experiment in experiments:
         own = [row for row in rows if row.experiment == experiment.name]
         texts[f"{experiment.name}.csv"] = _csv(own)
-        for streams in dict.fromkeys(row.streams for row in own):
-            of_streams = [row for row in own if row.streams == streams]
-            for chart in experiment.charts:
-                drawn = charts.traces(chart, of_streams)
-                if drawn:
-                    name = re.sub(r"[^\w.]+", "-", f"{experiment.name}-{streams}-{chart.title}")
-                    texts[f"{name}.svg"] = charts.standalone(chart, drawn)
+        for streams, chart, drawn in charts.drawings(experiment, own):
+            name = re.sub(r"[^\w.]+", "-", f"{experiment.name}-{streams}-{chart.title}")
+            texts[f"{name}.svg"] = charts.standalone(chart, drawn)
     texts["results.md"] = markdown(about, experiments, rows)
     texts["index.html"] = html(about, experiments, rows)
     for name, text in texts.items():

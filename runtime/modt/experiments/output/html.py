@@ -16,7 +16,7 @@ from modt.reporting import page
 def html(about: About, experiments: Sequence[Experiment], rows: Sequence[Row]) -> str:
     """A self-contained page."""
     blocks = [block for e in experiments for block in _blocks(e, [row for row in rows if row.experiment == e.name])]
-    subtitle = f"{about.commit}; model {about.model} ({about.sha256[:12]}); in brackets, 95 % intervals over objects"
+    subtitle = f"{about.sources()}. In brackets, 95 % intervals over objects."
     return page.page("Results of the experiments", subtitle, blocks)
 
 
@@ -27,14 +27,10 @@ def _blocks(experiment: Experiment, rows: Sequence[Row]) -> Iterator[str]:
     for table in tables(experiment, rows, most=10**6):
         yield _table(table)
     yield "</section>"
-    plots = []
-    for streams in dict.fromkeys(row.streams for row in rows):
-        of_streams = [row for row in rows if row.streams == streams]
-        for chart in experiment.charts:
-            drawn = charts.traces(chart, of_streams)
-            if drawn:
-                plots.append((f"{chart.title}: {streams}", charts.picture(chart, drawn), experiment.title))
-    yield page.plots(plots)
+    yield page.plots(
+        (f"{chart.title}: {streams}", charts.picture(chart, drawn), experiment.title)
+        for streams, chart, drawn in charts.drawings(experiment, rows)
+    )
 
 
 def _table(table: Table) -> str:

@@ -30,7 +30,7 @@ def _head(about: About, rows: Sequence[Row]) -> Iterator[str]:
         "",
         f"    {about.command}",
         "",
-        f"Commit `{about.commit}`, model `{about.model}` ({about.sha256[:12]}), {about.processor}. In brackets: the "
+        f"{about.sources()}. In brackets: the "
         "95 % interval of a bootstrap over objects (beta, false alarms: over tracks), not given of a single one; "
         "*paper*: what the paper states, over its eight drives where not of the drive itself. Simulated drives and "
         "KITTI's stand apart; streams that had no say in any choice of this project come first. "

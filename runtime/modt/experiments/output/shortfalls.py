@@ -8,7 +8,7 @@ from modt.experiments import paper
 from modt.experiments.catalogue.every import EXPERIMENTS
 from modt.experiments.drives import KITTI
 from modt.experiments.output.tables import number
-from modt.experiments.study import Row
+from modt.experiments.study import DEFAULT, Row
 
 _BETTER_HIGH = ("AP ", "N_go of objects")
 _BETTER_LOW = ("beta", "mis-associations", "discontinuities")
@@ -44,9 +44,9 @@ def _behind(row: Row) -> bool:
 
 def _made_worse(rows: Sequence[Row]) -> Iterator[str]:
     """Average precisions in which tracking costs something."""
-    without = {(r.experiment, r.streams, r.quantity): r for r in rows if r.variant == "det_only"}
+    without = {(r.experiment, r.streams, r.profile, r.quantity): r for r in rows if r.variant == "det_only"}
     for row in rows:
-        before = without.get((row.experiment, row.streams, row.quantity))
+        before = without.get((row.experiment, row.streams, row.profile, row.quantity))
         if row.experiment not in ("table4", "table5") or row.variant != "with_trk" or before is None:
             continue
         if row.value is not None and before.value is not None and row.value < before.value:
@@ -78,4 +78,5 @@ def _few(row: Row) -> bool:
 def _named(row: Row) -> str:
     where = "" if row.at is None else f" at {row.at:g}"
     title = EXPERIMENTS[row.experiment].title.partition(":")[0]
-    return f"{title}, {row.streams}, {row.variant}, {row.quantity}{where}:"
+    names = "" if row.profile == DEFAULT else f"profile {row.profile}, "
+    return f"{title}, {row.streams}, {names}{row.variant}, {row.quantity}{where}:"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from modt.experiments.catalogue.experiment import Experiment
 from modt.experiments.study import Row
@@ -24,7 +24,12 @@ class Table:
 
 def tables(experiment: Experiment, rows: Sequence[Row], most: int) -> Iterator[Table]:
     """The figures of an experiment; of a sweep, at most so many values."""
-    listed = [row for row in rows if not row.quantity.startswith((CURVE, DISTANCE))]
+    several = len({row.profile for row in rows}) > 1
+    listed = [
+        replace(row, variant=f"{row.variant}, profile {row.profile}") if several else row
+        for row in rows
+        if not row.quantity.startswith((CURVE, DISTANCE))
+    ]
     if not listed:
         return
     swept = sorted({row.at for row in listed if row.at is not None})
