@@ -52,13 +52,14 @@ def picture(chart: Chart, drawn: Sequence[svg.Trace]) -> str:
     return svg.lines(drawn, chart.x_label, chart.y_label)
 
 
-def standalone(chart: Chart, drawn: Sequence[svg.Trace]) -> str:
+def standalone(title: str, chart: Chart, drawn: Sequence[svg.Trace]) -> str:
     """A file of its own, with style and legend."""
     body = picture(chart, drawn).partition("</svg>")[0].partition(">")[2]
     height = svg.HEIGHT + _LINE_PX * len(drawn)
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {svg.WIDTH} {height}">'
-        f"<style>{_STYLE}</style>{body}{''.join(_legend(drawn))}</svg>\n"
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {svg.WIDTH} {height}"><title>{escape(title)}</title>'
+        f'<style>{_STYLE}</style><rect width="100%" height="100%" fill="#fff"/>'
+        f"{body}{''.join(_legend(drawn))}</svg>\n"
     )
 
 

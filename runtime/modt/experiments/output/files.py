@@ -33,7 +33,7 @@ def write(out: Path, about: About, experiments: Sequence[Experiment], rows: Sequ
         texts[f"{experiment.name}.csv"] = _csv(own)
         for streams, chart, drawn in charts.drawings(experiment, own):
             name = re.sub(r"[^\w.]+", "-", f"{experiment.name}-{streams}-{chart.title}")
-            texts[f"{name}.svg"] = charts.standalone(chart, drawn)
+            texts[f"{name}.svg"] = charts.standalone(f"{experiment.title}: {streams}", chart, drawn)
     texts["results.md"] = markdown(about, experiments, rows)
     texts["index.html"] = html(about, experiments, rows)
     for name, text in texts.items():
