@@ -37,6 +37,13 @@ def test_results_are_kept_and_an_interrupted_study_goes_on(tmp_path):
     assert not done
 
 
+def test_a_broken_result_is_made_again(tmp_path):
+    before = rows(tmp_path, Here(), n=1)
+    for path in tmp_path.rglob("*.npz"):
+        path.write_bytes(b"PK")
+    assert rows(tmp_path, Here(), n=1) == before
+
+
 def test_the_key_of_a_unit_follows_drive_replay_and_profile():
     (one, other), experiment = short_drives(2), EXPERIMENTS["fig11"]
     keys = {

@@ -160,9 +160,9 @@ class Study:
         return [_row(experiment, streams, names, figure) for figure in experiment.figures(outcomes)]
 
     def _outcome(self, unit: Unit) -> Judged:
-        found = self._store.get(unit.key)
-        assert found is not None, unit.key
-        return Judged.of_arrays(found)
+        """As stored; made again if that is broken."""
+        made = self._store.made(unit.key, lambda: unit.replay.judged(unit.drive, unit.digest, self._store).arrays())
+        return Judged.of_arrays(made)
 
 
 def _suited(experiment: Experiment, drives: Sequence[Drive]) -> list[Drive]:
