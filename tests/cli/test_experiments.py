@@ -11,7 +11,7 @@ from modt.cli.main import main
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     out = tmp_path_factory.mktemp("results")
-    words = ["evaluate", "--experiment", "table4", "fig10", "fig15", "--simulated", "2", "--seconds", "0.3"]
+    words = ["evaluate", "--experiment", "table4", "budget", "fig15", "--simulated", "2", "--seconds", "0.3"]
     assert main([*words, "--out", str(out)]) == 0
     return out
 
@@ -19,14 +19,14 @@ def results(tmp_path_factory):
 def test_results_are_written_in_every_form(results):
     found = json.loads((results / "results.json").read_text())
     assert found["schema"] == "modt.experiments/1"
-    with (results / "fig10.csv").open() as table:
-        own = [row for row in found["rows"] if row["experiment"] == "fig10"]
-        assert len(list(csv.DictReader(table))) == len(own) > 26
-    picture = (results / "fig10-2-simulated-drives-average-precision.svg").read_text()
+    with (results / "budget.csv").open() as table:
+        own = [row for row in found["rows"] if row["experiment"] == "budget"]
+        assert len(list(csv.DictReader(table))) == len(own) > 9
+    picture = (results / "budget-2-simulated-drives-average-precision.svg").read_text()
     assert picture.startswith("<svg xmlns")
     assert "<polyline" in picture
-    assert "with_trk, AP car" in picture
-    assert "Fig. 10" in (results / "index.html").read_text()
+    assert "accurate, AP car" in picture
+    assert "Budget of classifications" in (results / "index.html").read_text()
     page = (results / "results.md").read_text()
     assert "## Table IV" in page
     assert "## Where this falls short" in page

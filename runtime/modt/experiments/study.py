@@ -166,7 +166,7 @@ class Study:
 
 
 def _suited(experiment: Experiment, drives: Sequence[Drive]) -> list[Drive]:
-    """With sweeps where they are needed; labels alone: KITTI's, since the simulator labels what no sensor sees."""
+    """With sweeps where they are needed; of labels alone, KITTI's."""
     return [drive for drive in drives if (drive.scans if experiment.scans else drive.kind == KITTI)]
 
 
