@@ -42,7 +42,8 @@ _CHARTS = (
 )
 _NOTE = (
     "Proposals beyond the range are left out before tracking. The gate by boxes and the map of background spare most "
-    "calls as configured; without them every new track is classified, as in the paper."
+    "calls as configured; without them every new track is classified, as in the paper, as far as the budget of a "
+    "frame goes."
 )
 FIGURE_12 = Experiment(
     "fig12",
