@@ -78,12 +78,13 @@ class SightedSegmenter:
         return self.segmenter.segment(kept)
 
 
-def _segmenter(profile: ProfileConfig, fov: FieldOfView) -> SegmenterStage:
+def segmenter(profile: ProfileConfig, fov: FieldOfView) -> SegmenterStage:
+    """The first stage, the same in every mode."""
     kernels = kernel_choice.choose(profile.segmentation.kernels)
-    sensor, segmenter = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
+    sensor, stage = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
     if sensor.blind_sectors_deg is None:
-        return segmenter
-    return SightedSegmenter(segmenter, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
+        return stage
+    return SightedSegmenter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
 
 
 def _check_budget(budget: Budget, cost: LinearCost) -> None:
@@ -112,7 +113,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     _check_budget(mode.budget(profile), cost)
     counting = CountingClassifier(network, ledger, limits.max_points, limits.batch)
     return Pipeline(
-        segmenter=_segmenter(profile, fov),
+        segmenter=segmenter(profile, fov),
         odometry=Odometry(profile.odometry),
         tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s),
         fusion=mode.fusion(fusion, prior),

@@ -124,7 +124,6 @@ class Run:
         new = set(ids) - self._before
         assert all(number >= self._next_id for number in new)  # no identity comes back
         self._before, self._next_id = frozenset(ids), max([self._next_id - 1, *ids]) + 1
-        assert result.n_classified == len(result.classified)
         assert set(result.classified.tolist()) <= set(tracks.id[tracks.proposal != NONE].tolist())
         for name, column in tracks.columns():
             assert np.isfinite(column).all(), name

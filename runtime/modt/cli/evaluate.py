@@ -1,10 +1,11 @@
-"""`modt evaluate`: recorded runs against labels."""
+"""`modt evaluate`: recorded runs against labels, and experiments on whole drives."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
+from modt.cli import experiments
 from modt.errors import MisuseError
 from modt.evaluation.rules import IGNORABLE
 
@@ -15,7 +16,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare the command and its options."""
     p = commands.add_parser("evaluate", help="judge recorded runs against labels")
     pairs = "run directories (of replay --labels) and their labels"
-    p.add_argument("pairs", nargs="+", type=Path, metavar="RUN TRUTH", help=pairs)
+    p.add_argument("pairs", nargs="*", type=Path, metavar="RUN TRUTH", help=pairs)
     p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
     p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots, too")
     vans = "KITTI's vans as cars (all), or ignored (paper)"
@@ -23,15 +24,20 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
     p.add_argument("--count", action="append", choices=IGNORABLE, default=[], metavar="WHAT", help=what)
     p.add_argument("--sector", type=float, metavar="DEG", help="half the labelled sector (KITTI: 40; cuboids: 180)")
+    experiments.add_options(p)
     p.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Evaluate and print.
+    """Evaluate and print, or make experiments.
 
     Raises:
         MisuseError: a run or its labels cannot be used, or do not belong together.
     """
+    if arguments.experiment:
+        if arguments.pairs:
+            raise MisuseError("--experiment", "takes no runs", "leave RUN TRUTH out, or --experiment")
+        return experiments.run(arguments)
     import json
     from dataclasses import asdict, replace
 
@@ -41,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.evaluation.truth_files import open_truth
 
     paths: list[Path] = arguments.pairs
-    if len(paths) % 2:
+    if not paths or len(paths) % 2:
         raise MisuseError("RUN TRUTH", f"{len(paths)} paths are no pairs", "give each run followed by its labels")
     if arguments.sector is not None and not 0 < arguments.sector <= 180:
         raise MisuseError("--sector", f"{arguments.sector:g} is no half sector", "give more than 0 and at most 180")

@@ -39,7 +39,7 @@ def add_core_option(p: Parser) -> None:
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
 
 
-def add_profile_option(p: Parser, meaning: str = PROFILES) -> None:
+def add_profile_option(p: argparse._ActionsContainer, meaning: str = PROFILES) -> None:
     """Profiles."""
     p.add_argument("--profile", action="append", default=[], metavar="NAME|FILE", help=meaning)
 

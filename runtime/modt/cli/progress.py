@@ -14,22 +14,27 @@ Tick = Callable[[FrameResult], None]
 @contextmanager
 def progress(total: int | None, *, shown: bool) -> Iterator[Tick]:
     """Function to call after every frame; without effect unless shown."""
+    with bar(total, "frame", shown=shown) as step:
+        yield lambda result: step(f"{len(result.proposals)} proposals, {len(result.classified)} classified")
+
+
+@contextmanager
+def bar(total: int | None, unit: str, *, shown: bool) -> Iterator[Callable[[str], None]]:
+    """Function to call with a few words after every unit; without effect unless shown."""
     if not shown:
-        yield lambda result: None
+        yield lambda words: None
         return
     try:
         from tqdm import tqdm
     except ImportError:
         print("modt: no progress bar; pip install 'modt[progress]' to see one", file=sys.stderr)
-        yield lambda result: None
+        yield lambda words: None
         return
     tqdm.monitor_interval = 0  # its monitor would be a second thread
-    with tqdm(total=total, unit="frame", file=sys.stderr, leave=False, dynamic_ncols=True) as bar:
+    with tqdm(total=total, unit=unit, file=sys.stderr, leave=False, dynamic_ncols=True) as drawn:
 
-        def tick(result: FrameResult) -> None:
-            bar.set_postfix_str(
-                f"{len(result.proposals)} proposals, {len(result.classified)} classified", refresh=False
-            )
-            bar.update()
+        def step(words: str) -> None:
+            drawn.set_postfix_str(words, refresh=False)
+            drawn.update()
 
-        yield tick
+        yield step

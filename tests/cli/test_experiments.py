@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from modt.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    out = tmp_path_factory.mktemp("results")
+    words = ["evaluate", "--experiment", "table4", "budget", "fig15", "--simulated", "2", "--seconds", "0.3"]
+    assert main([*words, "--out", str(out)]) == 0
+    return out
+
+
+def test_results_are_written_in_every_form(results):
+    found = json.loads((results / "results.json").read_text())
+    assert found["schema"] == "modt.experiments/1"
+    with (results / "budget.csv").open() as table:
+        own = [row for row in found["rows"] if row["experiment"] == "budget"]
+        assert len(list(csv.DictReader(table))) == len(own) > 9
+    picture = (results / "budget-2-simulated-drives-average-precision.svg").read_text()
+    assert picture.startswith("<svg xmlns")
+    assert "<polyline" in picture
+    assert "accurate, AP car" in picture
+    assert "Budget of classifications" in (results / "index.html").read_text()
+    page = (results / "results.md").read_text()
+    assert "## Table IV" in page
+    assert "## Where this falls short" in page
+
+
+def test_simulated_drives_stand_apart_and_beside_no_figure_of_the_paper(results):
+    found = json.loads((results / "results.json").read_text())["rows"]
+    assert {row["kind"] for row in found} == {"simulated"}
+    assert {row["paper"] for row in found} == {None}
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--experiment", "table9", "--simulated", "1"], "table3"),
+        (["--experiment", "table4"], "no drives"),
+        (["RUN", "--experiment", "table4"], "takes no runs"),
+        (["--experiment", "table3", "--simulated", "1"], "none of the drives"),
+    ],
+)
+def test_misuse_is_told(words, said, capsys, tmp_path):
+    if "RUN" in words:
+        words = ["RUN", "TRUTH", *words[1:]]
+    assert main(["evaluate", *words, "--out", str(tmp_path)]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_another_profile_stands_beside_the_first(tmp_path):
+    other = tmp_path / "other.yaml"
+    other.write_text("fusion:\n  start_frame: 1\n")
+    words = ["evaluate", "--experiment", "table4", "--simulated", "1", "--seconds", "0.2", "--beside", str(other)]
+    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    rows = json.loads((tmp_path / "out" / "results.json").read_text())["rows"]
+    assert [row["profile"] for row in rows].count("default") == len(rows) / 2
+    assert f"with_trk, profile {other}" in (tmp_path / "out" / "results.md").read_text()
