@@ -23,12 +23,15 @@ from tools.options import parser
 ROOT = Path(__file__).resolve().parents[1]
 SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates"
 PLATFORM = "aarch64-manylinux_2_28"
+LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
 LACKING = {"cyclonedds", "ruff", "mypy"}
 """Of the extra [test]: without a wheel for this platform, or of no use there."""
 TESTS = (
     *("golden", "segmentation", "odometry", "tracking", "box_tracking", "geometry", "classification", "energy"),
     *("sources", "sinks", "ros2", "service", "profile", "crash", "test_library.py", "test_pipeline.py"),
 )
+BEYOND = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
+"""The emulator does not hand over the kernel's count of dropped datagrams."""
 QEMU = Path("/usr/bin/qemu-aarch64-static")
 CPU = "cortex-a72"
 CORE = """processor\t: {number}
@@ -90,7 +93,7 @@ def install(root: Path) -> None:
     ]
     uv = shutil.which("uv") or Path(sys.executable).with_name("uv")
     form = ["--only-binary", ":all:", "--python-platform", PLATFORM, "--python-version", PYTHON]
-    run(uv, "--no-config", "pip", "install", "--quiet", *form, "--target", root / "opt/libraries", *wanted)
+    run(uv, "--no-config", "pip", "install", "--quiet", *form, "--target", root / LIBRARIES, *wanted)
 
 
 def main() -> int:
@@ -112,8 +115,9 @@ def main() -> int:
         stack.enter_context(mounted("proc", root / "proc", "-t", "proc"))
         stack.enter_context(mounted(cores, root / "proc/cpuinfo", "--bind"))
         environment = {"QEMU_CPU": CPU, "HOME": "/root", "PATH": "/usr/sbin:/usr/bin", "PYTHONDONTWRITEBYTECODE": "1"}
-        environment["PYTHONPATH"] = "/opt/modt/runtime:/opt/libraries"
-        tests = ["-m", "not slow and not install and not kitti", "-p", "no:cacheprovider", *given.tests]
+        environment["PYTHONPATH"] = "/opt/modt/runtime"
+        chosen = ["-m", "not slow and not install and not kitti", "--deselect", BEYOND]
+        tests = [*chosen, "-p", "no:cacheprovider", *given.tests]
         inside = f"cd /opt/modt && exec python3 -m pytest {' '.join(map(repr, tests))}"
         return subprocess.run(["chroot", str(root), "sh", "-c", inside], check=False, env=environment).returncode
 
