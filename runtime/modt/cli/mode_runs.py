@@ -11,7 +11,7 @@ import numpy as np
 from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
-from modt.energy.instrumentation import padded_points
+from modt.energy.instrumentation import padded_size
 from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter
 from modt.reporting.comparison import ModeRun, RecordingClassifier, Repetition, interleave
@@ -74,14 +74,13 @@ def observe(request: assemble.Request, profile: ProfileConfig, frames: int | Non
     """(F, 5) prediction.OBSERVED of the first so many frames, tracked without a classification."""
     fov = assemble.field_of_view(request, assemble.stream(request))
     pipeline = assembly.pipeline(assembly.MODES[BASELINE], profile, fov, NullLedger())
-    limits, rows = profile.classification, []
+    size, rows = padded_size(profile.classification), []
     alive: set[int] = set()
     for frame in islice(assemble.stream(request), frames):
         result = pipeline.step(frame, Budget(calls=0))
         before, alive = alive, set(result.tracks.id.tolist())
         count = result.proposals.count
-        points = padded_points(count, limits.max_points, limits.batch)
-        rows.append((len(frame.points), len(count), len(alive), len(alive - before), points))
+        rows.append((len(frame.points), len(count), len(alive), len(alive - before), size(count)))
     return np.array(rows, np.int64).reshape(-1, len(OBSERVED))
 
 
