@@ -46,9 +46,7 @@ class CountingClassifier:
 
 def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
     """Points that the network processes, padding included, for proposals of (R,) points."""
-    return partial(
-        padded_points, max_points=limits.max_points, batch=limits.batch, min_points=limits.min_points
-    )
+    return partial(padded_points, max_points=limits.max_points, batch=limits.batch, min_points=limits.min_points)
 
 
 def padded_points(count: Int, max_points: int, batch: int, min_points: int = 1) -> int:

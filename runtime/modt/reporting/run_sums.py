@@ -16,6 +16,7 @@ from modt.energy.savings import Counts
 from modt.pipeline import CLASSIFICATION, STAGES
 from modt.reporting.frame_series import FrameSeries
 from modt.reporting.histogram import Histogram
+from modt.types import Int
 
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
 COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")
