@@ -60,7 +60,7 @@ def _range(metres: float) -> str:
     return f"sensor: {{max_range_m: {metres}}}\n"
 
 
-PAPER, DEAR = _network("pointnet-paper"), _network("pointnet-dear")
+PAPER, DEAR = _network("pointnet-paper-40"), _network("pointnet-dear")
 HDL = ("street-hdl-64e-1", "crossing-hdl-64e-2"), ("street-hdl-64e-3", "crossing-hdl-64e-4")
 VLP = ("street-vlp-16-1", "crossing-vlp-16-2"), ("street-vlp-16-3", "crossing-vlp-16-4")
 REAL = ("street-hdl-64e-1", "crossing-hdl-64e-2", "pandaset-002"), ("kitti-0005",)
