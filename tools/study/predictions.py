@@ -23,12 +23,9 @@ import numpy as np
 
 from tools.options import parser
 
-SECONDS, FRAMES = 5, "0:50"
-"""Of simulated drives, and of the others."""
-RECORDED = {
-    "kitti-0005": "raw/2011_09_26/2011_09_26_drive_0005_sync",
-    "pandaset-002": "pandaset_002/scans",
-}
+SECONDS, FRAMES = 5, "0:24"
+"""Of simulated drives, and those that are used of every stream."""
+RECORDED = {"kitti-0005": "raw/2011_09_26/2011_09_26_drive_0005_sync"}
 RIVALS = ("gamma = N_go", "Equation 3 bare", "the calibration's ratio")
 NEAR, BOUND = 0.06, 0.10
 """Errors that are told."""
@@ -61,23 +58,23 @@ def _range(metres: float) -> str:
 
 
 PAPER, DEAR = _network("pointnet-paper-40"), _network("pointnet-dear")
-HDL = ("street-hdl-64e-1", "crossing-hdl-64e-2"), ("street-hdl-64e-3", "crossing-hdl-64e-4")
-VLP = ("street-vlp-16-1", "crossing-vlp-16-2"), ("street-vlp-16-3", "crossing-vlp-16-4")
-REAL = ("street-hdl-64e-1", "crossing-hdl-64e-2", "pandaset-002"), ("kitti-0005",)
+HDL, VLP = (
+    tuple(f"{scene}-{sensor}-{seed}" for seed, scene in enumerate(("street", "crossing") * 2, 1))
+    for sensor in ("hdl-64e", "vlp-16")
+)
+REAL = "kitti-0005"
 REGIMES = {
-    "default": Regime(("hdl-64e", ""), "full", *HDL),
-    "default, camera": Regime(("hdl-64e", ""), "camera", HDL[0], (HDL[1][0],)),
-    "paper's network": Regime(("hdl-64e", PAPER), "full", *HDL),
-    "paper's network, 20 m": Regime(("hdl-64e", PAPER + _range(20.0)), "full", HDL[0], (HDL[1][0],)),
-    "paper": Regime(("paper", ""), "full", HDL[0], (HDL[1][0],)),
-    "paper, camera": Regime(("paper", ""), "camera", HDL[0], (HDL[1][0],)),
-    "dear network, camera": Regime(("hdl-64e", DEAR), "camera", HDL[0], (HDL[1][0],)),
-    "dear network, 10 m": Regime(("hdl-64e", DEAR + _range(10.0)), "full", HDL[0], (HDL[1][0],)),
-    "VLP-16": Regime(("vlp-16", ""), "full", *VLP),
-    "VLP-16, paper's network": Regime(("vlp-16", PAPER), "full", VLP[0], (VLP[1][0],)),
-    "VLP-16, dear network": Regime(("vlp-16", DEAR), "full", VLP[0], (VLP[1][1],)),
-    "recorded": Regime(("hdl-64e", ""), "full", *REAL),
-    "recorded, paper's network": Regime(("hdl-64e", PAPER), "full", *REAL),
+    "default": Regime(("hdl-64e", ""), "full", HDL[:2], (*HDL[2:], REAL)),
+    "default, camera": Regime(("hdl-64e", ""), "camera", HDL[:2], (HDL[2],)),
+    "paper's network": Regime(("hdl-64e", PAPER), "full", HDL[:2], (*HDL[2:], REAL)),
+    "paper's network, 20 m": Regime(("hdl-64e", PAPER + _range(20.0)), "full", HDL[:2], (HDL[2],)),
+    "paper": Regime(("paper", ""), "full", HDL[:2], (HDL[2],)),
+    "paper, camera": Regime(("paper", ""), "camera", HDL[:2], (HDL[2],)),
+    "dear network, camera": Regime(("hdl-64e", DEAR), "camera", HDL[:2], (HDL[2],)),
+    "dear network, 10 m": Regime(("hdl-64e", DEAR + _range(10.0)), "full", HDL[:2], (HDL[2],)),
+    "VLP-16": Regime(("vlp-16", ""), "full", VLP[:2], VLP[2:]),
+    "VLP-16, paper's network": Regime(("vlp-16", PAPER), "full", VLP[:2], (VLP[2],)),
+    "VLP-16, dear network": Regime(("vlp-16", DEAR), "full", VLP[:2], (VLP[3],)),
 }
 
 
@@ -120,10 +117,10 @@ class Study:
         profile = self._work / "profiles" / f"{_slug(name)}.yaml"
         profile.parent.mkdir(parents=True, exist_ok=True)
         profile.write_text(f"extends: {base}\n{own}", encoding="utf-8")
-        shared = ("--profile", profile, "--fov", regime.fov, "--core", self._core)
+        shared = ("--frames", FRAMES, "--profile", profile, "--fov", regime.fov, "--core", self._core)
         if stream in RECORDED:
             assert self._kitti is not None
-            return (self._kitti / RECORDED[stream], "--frames", FRAMES, *shared)
+            return (self._kitti / RECORDED[stream], *shared)
         return (self._drive(stream), *shared)
 
     def _drive(self, stream: str) -> Path:

@@ -3,7 +3,7 @@
     python -m tools.train.train_textbook MODELS_DIR CROPS.npz [--dear]
 
 Writes pointnet-paper-40 and pointnet-paper, the network of section V-A after 40 and after 100 epochs of one training;
-with --dear pointnet-dear, one that costs eight times as much, after 10. They are networks alone, without calibration,
+with --dear pointnet-dear, one that costs eight times as much, after 4. They are networks alone, without calibration,
 class frequency or box classifier. One drive in five is held out; the card has its scores. An epoch is as many crops
 as the scans show under the default segmentation, drawn by class among all.
 """
@@ -34,7 +34,7 @@ from tools.train.textbook_graph import textbook_graph
 from tools.train.train_pointnet import MAX_POINTS, POINTS, logits, tensors
 
 EPOCHS = {"pointnet-paper-40": 40, "pointnet-paper": 100}
-DEAR = {"pointnet-dear": 10}
+DEAR = {"pointnet-dear": 4}
 FOLDS, HELD_OUT = 5, 4
 RATE, DECAY, DECAY_EPOCHS = 1e-3, 0.7, 20
 """Of the optimiser Adam, as PointNet's authors have it."""
