@@ -13,11 +13,10 @@ GAMMA = slice(3, None)
 FRAMES = 240
 
 
-def run(mode: str, n: int, n_go: float, points: int, random: np.random.Generator, noise: float = 0.05) -> RunCosts:
-    """A run of known costs: n proposals a frame on average, tracks of that life, sweeps of that many points."""
-    proposals = np.maximum(random.poisson(n, FRAMES), 1)
-    started = random.poisson(n / n_go, FRAMES)
-    started[0] = n
+def run(mode: str, seen: np.ndarray, n_go: float, random: np.random.Generator, noise: float = 0.05) -> RunCosts:
+    """A run of known costs on what is seen: (F, 3) proposals, new tracks, points of the sweep."""
+    proposals, started, sweep_points = seen.T
+    n = proposals.mean()
     classified = {
         "conventional": proposals,
         "efficient": np.minimum(started, proposals),
@@ -31,7 +30,7 @@ def run(mode: str, n: int, n_go: float, points: int, random: np.random.Generator
         "classified": classified,
         "points": network,
         "calls": classified > 0,
-        "sweep_points": random.normal(points, points / 50, FRAMES),
+        "sweep_points": sweep_points,
         "alive": proposals + 2,
     }
     counts = np.zeros((FRAMES, len(COUNTS)), np.int64)
@@ -48,8 +47,12 @@ def run(mode: str, n: int, n_go: float, points: int, random: np.random.Generator
 def stream(seed: int, n: int = 40, n_go: float = 20.0, points: int = 100_000) -> Stream:
     """Four in five new tracks ask for a class."""
     random = np.random.default_rng(seed)
+    proposals = np.maximum(random.poisson(n, FRAMES), 1)
+    started = random.poisson(n / n_go, FRAMES)
+    started[0] = n
+    seen = np.column_stack([proposals, started, random.normal(points, points / 50, FRAMES).astype(int)])
     modes = ("conventional", "efficient", "accurate", "varied")
-    runs = {mode: run(mode, n, n_go, points, random) for mode in modes}
+    runs = {mode: run(mode, seen, n_go, random) for mode in modes}
     seen = runs["conventional"].counts[:, [COUNTS.index(name) for name in OBSERVED]]
     asked = random.binomial(seen[:, OBSERVED.index("tracks")], 0.8)
     return Stream(runs, np.column_stack([seen, asked, asked]))

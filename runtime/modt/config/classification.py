@@ -17,7 +17,7 @@ class ClassificationConfig(StageConfig):
         "pooled", ("pooled", "network"), "of the network with the classifiers of box and reflectance, or of it alone"
     )
     max_points: int = number(128, 8, 4096, "", "points of a proposal handed to the network")
-    min_points: int = number(1, 1, 4096, "", "to which they are repeated, which costs more and changes nothing")
+    min_points: int = number(1, 1, 4096, "", "to which they are repeated, which costs more and changes no class")
     batch: int = number(8, 1, 256, "", "proposals of one network call at most")
 
 

@@ -50,49 +50,61 @@ class Views:
     """How a mode selects what it classifies."""
 
     each: float  # classifications of a track that asks
-    size: float  # network's points of a selected proposal over those of any proposal
+    size: float  # network's points of such a proposal over those of any that is seen
     calls: float  # rate of calls over the rate of classifications; below 1 where these come together
 
     @classmethod
-    def of(cls, run: RunCosts, base: RunCosts, asked: Int) -> Self:
-        """Of a mode's run, against tracking-by-detection on the same frames, in which (F,) tracks asked."""
+    def of(cls, run: RunCosts, asking: Float64, size: float) -> Self:
+        """Of a mode's run.
+
+        Args:
+            run: of the mode.
+            asking: (F,) tracks that ask.
+            size: network's points of a proposal that is seen.
+        """
         each = _column(run, "classified").mean()
         if not each:
             return cls(0.0, 1.0, 1.0)
         frames_with_calls = min(_column(run, "calls").mean(), 1.0 - 0.5 / len(run.counts))
-        every = _column(base, "points").sum() / max(_column(base, "classified").sum(), 1.0)
-        size = _column(run, "points").sum() / _column(run, "classified").sum() / max(every, 1e-9)
-        return cls(each / max(float(asked.mean()), 1e-9), size, -np.log1p(-frames_with_calls) / each)
+        relative = _column(run, "points").sum() / _column(run, "classified").sum() / max(size, 1e-9)
+        return cls(each / max(float(asking.mean()), 1e-9), relative, -np.log1p(-frames_with_calls) / each)
 
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """What units of work cost [CPU s], and how the modes select."""
+    """What units of work cost [CPU s], and how the modes select.
+
+    Tracking, scheduling and fusion are by what tracking alone sees: known classes regroup proposals, so that a mode
+    has others than are seen without.
+    """
 
     segmentation: Float64  # (2,) a frame, a point of the sweep
     classification: Float64  # (3,) a call, a proposal, a point of the network
     tracking: dict[str, Float64]  # of each mode: (3,) a frame, a proposal, a track
     scheduling: dict[str, Float64]  # of each mode, with fusion: (2,) a frame, a track
-    views: dict[str, Views]  # of the modes but tracking-by-detection
+    views: dict[str, Views]  # of each mode; of tracking-by-detection, in which every proposal asks
 
     @classmethod
     def fit(cls, streams: Sequence[Stream]) -> Self:
         """Over all frames of the calibration's streams."""
         runs = {name: _joined([stream.runs[name] for stream in streams]) for name in streams[0].runs}
-        asked = np.concatenate([stream.observed[:, len(OBSERVED) :] for stream in streams])
+        observed = np.concatenate([stream.observed for stream in streams]).astype(float)
         *modes, _ = runs
-        base, *others = modes
+        _, n, alive, _, all_points = observed.T[: len(OBSERVED)]
+        asking, size = [n, *observed.T[len(OBSERVED) :]], float(all_points.sum() / max(n.sum(), 1.0))
+        every_frame = np.ones(len(n))
         every = _joined([*runs.values()])
         points = _column(every, "sweep_points")
         segmentation = np.array([0.0, every.cost[:, SEG].sum() / max(points.sum(), 1.0)])
         if points.std() > _VARIED * points.mean():
-            segmentation = _fit(every, ("sweep_points",), [SEG])
+            segmentation = _fit((np.ones(len(points)), points), every.cost[:, [SEG]])
+        load = [_column(every, name) for name in ("calls", "classified", "points")]
         return cls(
             segmentation=segmentation,
-            classification=_fit(every, ("calls", "classified", "points"), [CLASS], constant=False),
-            tracking={mode: _fit(runs[mode], ("proposals", "alive"), TRACK) for mode in modes},
-            scheduling={mode: _fit(runs[mode], ("alive",), SCHEDULE) for mode in modes},
-            views={mode: Views.of(runs[mode], runs[base], asked[:, k]) for k, mode in enumerate(others)},
+            classification=_fit(load, every.cost[:, [CLASS]]),
+            tracking={mode: _fit((every_frame, n, alive), runs[mode].cost[:, TRACK]) for mode in modes},
+            scheduling={mode: _fit((every_frame, alive), runs[mode].cost[:, SCHEDULE]) for mode in modes},
+            views={mode: Views.of(runs[mode], asks, size) for mode, asks in zip(modes, asking, strict=True)},
         )
 
 
@@ -111,25 +123,24 @@ class Expected:
 
 def expect(rates: Rates, observed: Int, frames: int) -> Expected:
     """Costs of a stream of so many frames, of which (F, 7) OBSERVED were seen, the first among them."""
-    points, n, alive, _, all_points, *_ = observed.mean(axis=0).tolist()
+    sweep_points, n, alive, _, all_points, *_ = observed.mean(axis=0).tolist()
     tracks, *asked = _whole(observed[:, [OBSERVED.index("tracks"), *range(len(OBSERVED), observed.shape[1])]], frames)
-    e_seg = float(rates.segmentation @ [1.0, points])
-    cost = {}
-    asking = dict(zip(rates.views, asked, strict=True))
-    for mode in rates.tracking:
-        load = np.array([float(n > 0), n, all_points])
-        if mode in rates.views:
-            views = rates.views[mode]
-            items = min(views.each * asking[mode], n)
-            size = views.size * all_points / max(n, 1e-9)
-            load = np.array([1.0 - np.exp(-views.calls * items), items, size * items])
+    e_seg = float(rates.segmentation @ [1.0, sweep_points])
+    asking = dict(zip(rates.views, [n, *asked], strict=True))
+    most = n * next(iter(rates.views.values())).each
+    cost, loads = {}, {}
+    for mode, views in rates.views.items():
+        items = min(views.each * asking[mode], most)
+        points = items * views.size * all_points / max(n, 1e-9)
+        loads[mode] = [1.0 - np.exp(-views.calls * items), items, points]
         cost[mode] = float(
             e_seg
             + rates.tracking[mode] @ [1.0, n, alive]
             + rates.scheduling[mode] @ [1.0, alive]
-            + rates.classification @ load
+            + rates.classification @ loads[mode]
         )
-    e_class = float(rates.classification @ [1.0, n, all_points]) / max(n, 1e-9)
+    base = next(iter(loads.values()))
+    e_class = float(rates.classification @ base) / max(base[1], 1e-9)
     return Expected(cost, EnergyModel(e_seg, e_class, n, n / tracks if tracks else 1.0))
 
 
@@ -201,7 +212,7 @@ def _column(run: RunCosts, name: str) -> Float64:
     return run.counts[:, COUNTS.index(name)].astype(float)
 
 
-def _fit(run: RunCosts, names: Sequence[str], stages: list[int], *, constant: bool = True) -> Float64:
-    columns = [_column(run, name) for name in names]
-    X = np.stack([np.ones(len(run.counts)), *columns] if constant else columns, axis=1)
-    return nonnegative_fit(X.T @ X, X.T @ run.cost[:, stages].sum(axis=1))
+def _fit(columns: Sequence[Float64], cost: Float64) -> Float64:
+    """(k,) costs of k columns of (F,) counts, of (F, S) stages together."""
+    X = np.stack(columns, axis=1)
+    return nonnegative_fit(X.T @ X, X.T @ cost.sum(axis=1))
