@@ -65,16 +65,16 @@ HDL, VLP = (
 REAL = "kitti-0005"
 REGIMES = {
     "default": Regime(("hdl-64e", ""), "full", HDL[:2], (*HDL[2:], REAL)),
-    "default, camera": Regime(("hdl-64e", ""), "camera", HDL[:2], (HDL[2],)),
+    "default, camera": Regime(("hdl-64e", ""), "camera", HDL[:2], HDL[2:]),
     "paper's network": Regime(("hdl-64e", PAPER), "full", HDL[:2], (*HDL[2:], REAL)),
-    "paper's network, 20 m": Regime(("hdl-64e", PAPER + _range(20.0)), "full", HDL[:2], (HDL[2],)),
-    "paper": Regime(("paper", ""), "full", HDL[:2], (HDL[2],)),
-    "paper, camera": Regime(("paper", ""), "camera", HDL[:2], (HDL[2],)),
-    "dear network, camera": Regime(("hdl-64e", DEAR), "camera", HDL[:2], (HDL[2],)),
-    "dear network, 10 m": Regime(("hdl-64e", DEAR + _range(10.0)), "full", HDL[:2], (HDL[2],)),
+    "paper's network, 20 m": Regime(("hdl-64e", PAPER + _range(20.0)), "full", HDL[:2], HDL[2:]),
+    "paper": Regime(("paper", ""), "full", HDL[:2], HDL[2:]),
+    "paper, camera": Regime(("paper", ""), "camera", HDL[:2], HDL[2:]),
+    "dear network, camera": Regime(("hdl-64e", DEAR), "camera", HDL[:2], HDL[2:]),
+    "dear network, 10 m": Regime(("hdl-64e", DEAR + _range(10.0)), "full", HDL[:2], HDL[2:]),
     "VLP-16": Regime(("vlp-16", ""), "full", VLP[:2], VLP[2:]),
-    "VLP-16, paper's network": Regime(("vlp-16", PAPER), "full", VLP[:2], (VLP[2],)),
-    "VLP-16, dear network": Regime(("vlp-16", DEAR), "full", VLP[:2], (VLP[3],)),
+    "VLP-16, paper's network": Regime(("vlp-16", PAPER), "full", VLP[:2], VLP[2:]),
+    "VLP-16, dear network": Regime(("vlp-16", DEAR), "full", VLP[:2], VLP[2:]),
 }
 
 
