@@ -1,9 +1,10 @@
-"""Blind predictions of gamma over regimes: profile by profile, calibrated on some streams, tested on others.
+"""Blind predictions of gamma over regimes: calibrated on some streams, tested on others.
 
     python -m tools.study.predictions WORK_DIR [--kitti ROOT] [--regimes NAME ...] [--repeat K] [--core N|none]
 
 By the commands of a user: `modt simulate`, `modt-profile compare` of the calibrations' streams, then `modt-profile
-predict` of every test, and only then `modt-profile compare --against` of these. Files in WORK_DIR are not made again.
+predict` of every test, and only then `modt-profile compare` of these. A test is predicted by the calibrations of all
+regimes with its network and field of view. Files in WORK_DIR are not made again.
 Prints Markdown: a row for each test and mode, gamma predicted with its interval at 95 %, measured, and the errors of
 the prediction and of its rivals; then how often and how far it was off, and how far the reconciliation. Without
 --kitti its streams are left out.
@@ -14,7 +15,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -40,12 +41,18 @@ class Regime:
         fov: field of view.
         calibrations: streams, SCENE-SENSOR-SEED of simulated ones or names of RECORDED.
         tests: streams.
+        network: regimes of one network share their calibrations.
     """
 
     profile: tuple[str, str]
     fov: str
     calibrations: tuple[str, ...]
     tests: tuple[str, ...]
+    network: str
+
+    def shares_with(self, other: Regime) -> bool:
+        """Whether the calibrations of one serve the other."""
+        return (self.network, self.fov) == (other.network, other.fov)
 
 
 def _network(name: str) -> str:
@@ -64,17 +71,17 @@ HDL, VLP = (
 )
 REAL = "kitti-0005"
 REGIMES = {
-    "default": Regime(("hdl-64e", ""), "full", HDL[:2], (*HDL[2:], REAL)),
-    "default, camera": Regime(("hdl-64e", ""), "camera", HDL[:2], HDL[2:]),
-    "paper's network": Regime(("hdl-64e", PAPER), "full", HDL[:2], (*HDL[2:], REAL)),
-    "paper's network, 20 m": Regime(("hdl-64e", PAPER + _range(20.0)), "full", HDL[:2], HDL[2:]),
-    "paper": Regime(("paper", ""), "full", HDL[:2], HDL[2:]),
-    "paper, camera": Regime(("paper", ""), "camera", HDL[:2], HDL[2:]),
-    "dear network, camera": Regime(("hdl-64e", DEAR), "camera", HDL[:2], HDL[2:]),
-    "dear network, 10 m": Regime(("hdl-64e", DEAR + _range(10.0)), "full", HDL[:2], HDL[2:]),
-    "VLP-16": Regime(("vlp-16", ""), "full", VLP[:2], VLP[2:]),
-    "VLP-16, paper's network": Regime(("vlp-16", PAPER), "full", VLP[:2], VLP[2:]),
-    "VLP-16, dear network": Regime(("vlp-16", DEAR), "full", VLP[:2], VLP[2:]),
+    "default": Regime(("hdl-64e", ""), "full", HDL[:2], (*HDL[2:], REAL), "default"),
+    "default, camera": Regime(("hdl-64e", ""), "camera", HDL[:2], HDL[2:], "default"),
+    "paper's network": Regime(("hdl-64e", PAPER), "full", HDL[:2], (*HDL[2:], REAL), "paper's"),
+    "paper's network, 20 m": Regime(("hdl-64e", PAPER + _range(20.0)), "full", HDL[:2], HDL[2:], "paper's"),
+    "paper": Regime(("paper", ""), "full", HDL[:2], HDL[2:], "paper's method"),
+    "paper, camera": Regime(("paper", ""), "camera", HDL[:2], HDL[2:], "paper's method"),
+    "dear network, camera": Regime(("hdl-64e", DEAR), "camera", HDL[:2], HDL[2:], "dear"),
+    "dear network, 10 m": Regime(("hdl-64e", DEAR + _range(10.0)), "full", HDL[:2], HDL[2:], "dear"),
+    "VLP-16": Regime(("vlp-16", ""), "full", VLP[:2], VLP[2:], "default"),
+    "VLP-16, paper's network": Regime(("vlp-16", PAPER), "full", VLP[:2], VLP[2:], "paper's"),
+    "VLP-16, dear network": Regime(("vlp-16", DEAR), "full", VLP[:2], VLP[2:], "dear"),
 }
 
 
@@ -94,20 +101,18 @@ class Study:
         for stream in filter(self.has, regime.calibrations):
             self._made(self._calibration(name, stream), "compare", *self._run(name, regime, stream))
 
-    def predict(self, name: str, regime: Regime, test: str) -> None:
-        """Predict a test, on which no mode has run yet."""
-        given = [
-            x for s in filter(self.has, regime.calibrations) for x in ("--calibration", self._calibration(name, s))
-        ]
-        out, stream = self._file("predictions", name, test), self._stream(name, regime, test)
-        self._made(out, "predict", *stream, *given, "--observe", "all", "--json")
+    def predict(self, name: str, regime: Regime, test: str, regimes: Mapping[str, Regime]) -> dict[str, Any]:
+        """Predict a test, on which no mode has run yet, by the calibrations of these regimes."""
+        given: list[str | Path] = []
+        for other, calibrated in regimes.items():
+            for stream in filter(self.has, calibrated.calibrations if regime.shares_with(calibrated) else ()):
+                given += ["--calibration", self._calibration(other, stream)]
+        out, stream_options = self._file("predictions", name, test), self._stream(name, regime, test)
+        return self._made(out, "predict", *stream_options, *given, "--observe", "all", "--json")
 
     def measure(self, name: str, regime: Regime, test: str) -> dict[str, Any]:
-        """Run the modes on a test, against its prediction."""
-        out, prediction = self._file("measured", name, test), self._file("predictions", name, test)
-        self._made(out, "compare", *self._run(name, regime, test), "--against", prediction)
-        tree: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
-        return tree
+        """Run the modes on a test."""
+        return self._made(self._file("measured", name, test), "compare", *self._run(name, regime, test))
 
     def _run(self, name: str, regime: Regime, stream: str) -> tuple[str | Path, ...]:
         return (*self._stream(name, regime, stream), "--repeat", str(self._repeat), "--json")
@@ -139,13 +144,15 @@ class Study:
     def _file(self, kind: str, name: str, stream: str) -> Path:
         return self._work / kind / f"{_slug(name)}-{stream}.json"
 
-    def _made(self, out: Path, *command: str | Path) -> None:
-        if out.exists():
-            return
-        print(f"{out.parent.name}: {out.stem}", file=sys.stderr, flush=True)
-        text = _command("modt.cli.profile", *command)
-        out.parent.mkdir(parents=True, exist_ok=True)
-        out.write_text(text, encoding="utf-8")
+    def _made(self, out: Path, *command: str | Path) -> dict[str, Any]:
+        """What a command writes, or has written."""
+        if not out.exists():
+            print(f"{out.parent.name}: {out.stem}", file=sys.stderr, flush=True)
+            text = _command("modt.cli.profile", *command)
+            out.parent.mkdir(parents=True, exist_ok=True)
+            out.write_text(text, encoding="utf-8")
+        tree: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
+        return tree
 
 
 @dataclass(frozen=True)
@@ -175,13 +182,12 @@ class Outcome:
         return self.interval[0] <= self.measured <= self.interval[1]
 
 
-def outcomes(regime: str, test: str, tree: dict[str, Any]) -> Iterator[Outcome]:
-    """Of each mode, by a comparison against a prediction."""
-    rows = {row["name"]: row for row in tree["against"]}
-    for mode, saved in tree["savings"].items():
-        mine = {name: rows[f"gamma, {mode}: {name}"]["predicted"] for name in ("predicted", *RIVALS)}
-        interval = mine["predicted"]["low"], mine["predicted"]["high"]
-        said = {name: float(each["value"]) for name, each in mine.items()}
+def outcomes(regime: str, test: str, prediction: dict[str, Any], found: dict[str, Any]) -> Iterator[Outcome]:
+    """Of each mode, by a prediction and the comparison that came after it."""
+    for mode, saved in found["savings"].items():
+        row = prediction["gamma"][mode]
+        interval = row["predicted"]["low"], row["predicted"]["high"]
+        said = {name: float(row[name]["value"]) for name in ("predicted", *RIVALS)}
         measured, reconciled = (float(saved[f"gamma_{k}"]["value"]) for k in ("measured_cpu", "reconciled"))
         yield Outcome(regime, test, mode, measured, interval, said, reconciled)
 
@@ -236,12 +242,16 @@ def main() -> None:
     options.add_argument("--core", default="last", metavar="N|none")
     args = options.parse_args()
     study = Study(args.work, args.kitti, args.repeat, args.core)
-    pairs = [(name, REGIMES[name], test) for name in args.regimes for test in filter(study.has, REGIMES[name].tests)]
-    for name, regime, _ in pairs:
+    regimes = {name: REGIMES[name] for name in args.regimes}
+    for name, regime in regimes.items():
         study.calibrate(name, regime)
-    for pair in pairs:
-        study.predict(*pair)
-    found = [o for name, regime, test in pairs for o in outcomes(name, test, study.measure(name, regime, test))]
+    pairs = [(name, regime, test) for name, regime in regimes.items() for test in filter(study.has, regime.tests)]
+    predictions = [study.predict(*pair, regimes) for pair in pairs]
+    found = [
+        outcome
+        for (name, regime, test), prediction in zip(pairs, predictions, strict=True)
+        for outcome in outcomes(name, test, prediction, study.measure(name, regime, test))
+    ]
     print("\n".join([*table(found), "", *summary(found)]))
 
 
