@@ -6,7 +6,6 @@ import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, ProfileConfig
-from modt.energy.instrumentation import CountingClassifier, padded_points
+from modt.energy.instrumentation import CountingClassifier, padded_size
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
 from modt.geometry.blind_sectors import BlindSectors
@@ -103,7 +102,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     host.keep_freed_pages()
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
-    size = partial(padded_points, max_points=limits.max_points, batch=limits.batch)
+    size = padded_size(limits)
     cost = LinearCost(limits.max_points, size, profile.scheduler.cost)
     warm_up(network, cost, limits.max_points, limits.batch, time.thread_time_ns)
     fusion = profile.fusion
@@ -111,7 +110,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
         fusion = replace(fusion, prior=network.class_frequency)
     prior = make_prior(network.boxes, network.reflectance, fusion.prior, profile.sensor)
     _check_budget(mode.budget(profile), cost)
-    counting = CountingClassifier(network, ledger, limits.max_points, limits.batch)
+    counting = CountingClassifier(network, ledger, size)
     return Pipeline(
         segmenter=segmenter(profile, fov),
         odometry=Odometry(profile.odometry),

@@ -112,6 +112,13 @@ def test_efficient_requests_one_certain_view() -> None:
     assert not fusion.asks(tracks, proposals, asking).any()
 
 
+def test_the_first_view_of_the_paper_is_final_whatever_it_says() -> None:
+    proposals, tracks = scene((50,))
+    likelihood = np.array([[0.4, 0.2, 0.2, 0.2]])
+    assert not fuse(OneView(FusionConfig()), tracks, proposals, np.array([0]), likelihood).any()
+    assert fuse(OneView(FusionConfig(first_view_final="any")), tracks, proposals, np.array([0]), likelihood).all()
+
+
 def test_an_uncertain_view_of_efficient_is_replaced_by_one_with_clearly_more_points() -> None:
     config = FusionConfig(review_point_ratio=2.0, review_extra_points=5)
     proposals, tracks = scene((50,))

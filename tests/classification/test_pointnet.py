@@ -6,14 +6,17 @@ import dataclasses
 import shutil
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import onnx
 import pytest
 
 from modt import assets
+from modt.classification.box_classifier import NoBoxClassifier
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
+from modt.energy.instrumentation import padded_size
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Proposals
 from tests.classification.scenes import blobs
@@ -56,7 +59,7 @@ def save(folder: Path, layers: Layers, **options: bool) -> Path:
     return path
 
 
-def network(model: str | Path, **options: int) -> PointNet:
+def network(model: str | Path, **options: Any) -> PointNet:
     return PointNet(ClassificationConfig(model=str(model), **options), SENSOR)
 
 
@@ -109,6 +112,27 @@ def test_rows_are_probability_distributions(shipped: PointNet) -> None:
     assert out.shape == (4, 4)
     assert (out >= 0).all()
     np.testing.assert_allclose(out.sum(axis=1), 1.0, atol=1e-5)
+
+
+def test_the_network_alone(shipped: PointNet) -> None:
+    points, proposals = blobs([40, 7, 200, 5], np.random.default_rng(4))
+    alone, rows = network(shipped.path, likelihood="network"), np.arange(4)
+    bare = network(shipped.path)
+    bare._pooled = lambda out, *_: out  # type: ignore[method-assign]
+    np.testing.assert_allclose(alone.classify(points, proposals, rows), bare.classify(points, proposals, rows))
+    assert isinstance(alone.boxes, NoBoxClassifier)
+    assert np.abs(alone.classify(points, proposals, rows) - shipped.classify(points, proposals, rows)).max() > 1e-3
+
+
+def test_points_are_repeated_to_a_least_number(shipped: PointNet, monkeypatch: pytest.MonkeyPatch) -> None:
+    points, proposals = blobs([40, 7, 500], np.random.default_rng(4))
+    paper, sizes = network(shipped.path, max_points=400, min_points=400, batch=1), []
+    expected = network(shipped.path, max_points=400).classify(points, proposals, np.arange(3))
+    infer = PointNet.infer
+    monkeypatch.setattr(PointNet, "infer", lambda self, batch: (sizes.append(batch.shape[:2]), infer(self, batch))[1])
+    np.testing.assert_allclose(paper.classify(points, proposals, np.arange(3)), expected, atol=1e-5)
+    assert sizes == [(1, 400)] * 3
+    assert padded_size(paper.config)(proposals.count) == 1200
 
 
 def test_no_proposals_give_no_rows(shipped: PointNet) -> None:

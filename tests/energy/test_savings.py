@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.config import ClassificationConfig
 from modt.energy.equations import EnergyModel
-from modt.energy.instrumentation import CountingClassifier
+from modt.energy.instrumentation import CountingClassifier, padded_size
 from modt.energy.ledger import Ledger
 from modt.energy.savings import Counts, OtherCosts, UnitCosts, reconcile
 from modt.types import Float32, Float64, Int, Proposals
@@ -96,7 +97,7 @@ def test_points_are_counted_with_padding(batch: int, points: int) -> None:
     ledger = Ledger()
     offsets = np.array([0, 10, 710, 1000, 1001])
     proposals = replace(Proposals.empty(), members=np.arange(1001), offsets=offsets)
-    counted = CountingClassifier(Half(), ledger, max_points=400, batch=batch)
+    counted = CountingClassifier(Half(), ledger, padded_size(ClassificationConfig(max_points=400, batch=batch)))
     which = np.array([0, 1, 2])
     out = ledger.run("classification", counted.classify, np.zeros((1001, 4), np.float32), proposals, which)
     assert out.shape == (3, 4)
@@ -107,6 +108,6 @@ def test_points_are_counted_with_padding(batch: int, points: int) -> None:
 
 def test_nothing_to_classify_has_no_points() -> None:
     ledger = Ledger()
-    counted = CountingClassifier(Half(), ledger, max_points=400, batch=8)
+    counted = CountingClassifier(Half(), ledger, padded_size(ClassificationConfig(max_points=400)))
     counted.classify(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64))
     assert ledger.close_frame(0)["stages"]["classification"]["points"] == 0

@@ -35,8 +35,8 @@ def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> RunCosts:
     return RunCosts(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
 
 
-def varied(noise: float = 0.0, passes: int = 2) -> RunCosts:
-    return run(np.random.default_rng(7).integers(0, N, passes * FRAMES), noise, seed=9)
+def varied(noise: float = 0.0) -> RunCosts:
+    return run(np.random.default_rng(7).integers(0, N, FRAMES), noise, seed=8)
 
 
 EVERY = np.full(FRAMES, N)

@@ -6,18 +6,17 @@ import pytest
 from modt.pipeline import STAGES
 from modt.reporting.comparison import COUNTS
 from modt.reporting.gamma import RunCosts
-from modt.reporting.prediction import Rates, Runs, expect, forecast, measured, observed_of
+from modt.reporting.prediction import OBSERVED, Rates, Stream, expect, forecast, measured
 
 SEG_S, TRACK_S, SCHEDULE_S, CLASS_S = 5e-8, (1e-3, 5e-5, 2e-5), (2e-4, 1e-6), (5e-4, 4e-4, 1e-6)
 GAMMA = slice(3, None)
 FRAMES = 240
 
 
-def run(mode: str, n: int, n_go: float, points: int, random: np.random.Generator, noise: float = 0.05) -> RunCosts:
-    """A run of known costs: n proposals a frame on average, tracks of that life, sweeps of that many points."""
-    proposals = np.maximum(random.poisson(n, FRAMES), 1)
-    started = random.poisson(n / n_go, FRAMES)
-    started[0] = n
+def run(mode: str, seen: np.ndarray, n_go: float, random: np.random.Generator, noise: float = 0.05) -> RunCosts:
+    """A run of known costs on what is seen: (F, 3) proposals, new tracks, points of the sweep."""
+    proposals, started, sweep_points = seen.T
+    n = proposals.mean()
     classified = {
         "conventional": proposals,
         "efficient": np.minimum(started, proposals),
@@ -31,7 +30,7 @@ def run(mode: str, n: int, n_go: float, points: int, random: np.random.Generator
         "classified": classified,
         "points": network,
         "calls": classified > 0,
-        "sweep_points": random.normal(points, points / 50, FRAMES),
+        "sweep_points": sweep_points,
         "alive": proposals + 2,
     }
     counts = np.zeros((FRAMES, len(COUNTS)), np.int64)
@@ -45,17 +44,26 @@ def run(mode: str, n: int, n_go: float, points: int, random: np.random.Generator
     return RunCosts(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
 
 
-def stream(seed: int, n: int = 40, n_go: float = 20.0, points: int = 100_000) -> Runs:
+def stream(seed: int, n: int = 40, n_go: float = 20.0, points: int = 100_000) -> Stream:
+    """Four in five new tracks ask for a class."""
     random = np.random.default_rng(seed)
-    return {mode: run(mode, n, n_go, points, random) for mode in ("conventional", "efficient", "accurate", "varied")}
+    proposals = np.maximum(random.poisson(n, FRAMES), 1)
+    started = random.poisson(n / n_go, FRAMES)
+    started[0] = n
+    seen = np.column_stack([proposals, started, random.normal(points, points / 50, FRAMES).astype(int)])
+    modes = ("conventional", "efficient", "accurate", "varied")
+    runs = {mode: run(mode, seen, n_go, random) for mode in modes}
+    seen = runs["conventional"].counts[:, [COUNTS.index(name) for name in OBSERVED]]
+    asked = random.binomial(seen[:, OBSERVED.index("tracks")], 0.8)
+    return Stream(runs, np.column_stack([seen, asked, asked]))
 
 
 CALIBRATION = [stream(1, 30, 15.0, 110_000), stream(2, 50, 25.0, 90_000), stream(3, 25, 10.0, 120_000)]
 TEST = stream(9, 40, 30.0, 60_000)
 
 
-def predicted(calibration: list[Runs] = CALIBRATION, seen: Runs = TEST, share: float = 1 / 3):
-    observed = observed_of(seen)[: int(FRAMES * share)]
+def predicted(calibration: list[Stream] = CALIBRATION, seen: Stream = TEST, share: float = 1 / 3):
+    observed = seen.observed[: int(FRAMES * share)]
     return forecast(calibration, observed, FRAMES, np.random.default_rng(0))
 
 
@@ -69,20 +77,20 @@ def test_unit_costs_are_found() -> None:
     # points and proposals vary together from frame to frame: their sum is what counts
     assert found.classification @ [1, 40, 4000] == pytest.approx(CLASS_S @ np.array([1, 40, 4000]), rel=0.02)
     assert found.tracking["efficient"] @ [1, 40, 42] == pytest.approx(TRACK_S @ np.array([1, 40, 42]), rel=0.02)
-    assert found.views["accurate"].per_track == pytest.approx(3.0, rel=0.1)
+    assert found.views["accurate"].each == pytest.approx(3.0 / 0.8, rel=0.15)
 
 
 def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation() -> None:
     streams = [stream(1, points=120_000), stream(2, points=30_000)]
     for each in streams:
-        for mode in each.values():
+        for mode in each.runs.values():
             mode.cost[:, STAGES.index("segmentation")] += 2e-3
     np.testing.assert_allclose(Rates.fit(streams).segmentation, [2e-3, SEG_S], rtol=0.05)
     assert Rates.fit(streams[:1]).segmentation[0] == 0.0
 
 
 @pytest.mark.parametrize("calibration", [CALIBRATION, CALIBRATION[:1]])
-def test_another_stream_is_predicted(calibration: list[Runs]) -> None:
+def test_another_stream_is_predicted(calibration: list[Stream]) -> None:
     found, truth = predicted(calibration), measured(TEST)
     assert truth[GAMMA].min() > 2.5
     np.testing.assert_allclose(found.expected.values, truth, rtol=0.12)
@@ -100,14 +108,14 @@ def test_it_is_nearer_than_what_one_would_guess() -> None:
 
 def test_it_misses_where_the_life_of_tracks_is_wrong() -> None:
     """The same proposals in tracks of a tenth of the life."""
-    broken = {name: RunCosts(each.counts.copy(), each.cost) for name, each in TEST.items()}
-    broken["conventional"].counts[:, COUNTS.index("tracks")] *= 10
+    broken = Stream(TEST.runs, TEST.observed.copy())
+    broken.observed[:, [OBSERVED.index("tracks"), -2, -1]] *= 10
     assert not covers(predicted(seen=broken), measured(TEST))[GAMMA].any()
 
 
 def test_it_misses_where_tracking_costs_twice_as_much() -> None:
-    dear = {name: RunCosts(each.counts, each.cost.copy()) for name, each in TEST.items()}
-    for each in dear.values():
+    dear = Stream({name: RunCosts(each.counts, each.cost.copy()) for name, each in TEST.runs.items()}, TEST.observed)
+    for each in dear.runs.values():
         each.cost[:, STAGES.index("tracking")] *= 2
     assert not covers(predicted(), measured(dear)).any()
 
@@ -116,12 +124,12 @@ def test_the_first_third_stands_for_the_whole() -> None:
     """All tracks of the first frame are new: the rate of the others is what goes on."""
     third, whole = predicted(share=1 / 3), predicted(share=1.0)
     np.testing.assert_allclose(third.expected.values, whole.expected.values, rtol=0.1)
-    counts = TEST["conventional"].counts
+    counts = TEST.runs["conventional"].counts
     n_go = counts[:, COUNTS.index("proposals")].sum() / counts[:, COUNTS.index("tracks")].sum()
     assert whole.expected.equation.n_go == pytest.approx(n_go)
 
 
 def test_a_stream_without_proposals_saves_nothing() -> None:
-    found = expect(Rates.fit(CALIBRATION), np.zeros((3, 5), np.int64), 10)
+    found = expect(Rates.fit(CALIBRATION), np.zeros((3, 7), np.int64), 10)
     assert found.cost["conventional"] == pytest.approx(found.cost["efficient"], rel=0.05)
     assert found.equation.gamma == 1.0

@@ -7,7 +7,8 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.config import ProfileConfig
+from modt.config import ClassificationConfig, ProfileConfig
+from modt.energy.instrumentation import padded_size
 from modt.errors import MisuseError
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
@@ -164,7 +165,7 @@ def test_a_report_of_a_long_run_holds_no_more_than_one_of_a_short_run(tmp_path):
     """Tracks begin and end all the time; what is held after 1,500 frames is what is held after 3,000."""
 
     def held(frames):
-        sums = FrameSums(400, 8)
+        sums = FrameSums(padded_size(ClassificationConfig(max_points=400)))
         for k in range(frames):
             tracks = [track(id_, id_ - k, named=True) for id_ in range(k, k + 20)]
             record = {"proposals": 20, "classifications": 1, "deferred": 0, "tracks": tracks}

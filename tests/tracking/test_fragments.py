@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt.config import FragmentConfig
+from modt.config import FragmentConfig, TrackingConfig
 from modt.geometry.kdop import DIRECTIONS
-from modt.tracking.fragments import Reunion, swap_proposals
+from modt.tracking.fragments import NoReunion, Reunion, swap_proposals
 from modt.types import NONE
 from tests.tracking.tracking_scenes import EYE, Follower, associated, box, frame_of, tracks_at
 
@@ -165,3 +165,11 @@ def test_a_car_behind_a_pole_keeps_its_track():
             follower.classify(CAR)
             i += 1
         assert follower.tracks.id[follower.tracks.proposal == larger].tolist() == [0]
+
+
+def test_without_reunion_every_track_keeps_its_proposal():
+    tracker = Follower(TrackingConfig(fragments=FragmentConfig(min_coverage=1.0))).tracker
+    assert isinstance(tracker._reunion, NoReunion)
+    frame = associated(frame_of([FRONT], points=40)[1], [1])
+    matches = NoReunion().reunite(tracks_at([WHOLE, FRONT], CAR, CAR), frame.observations, frame.matches)
+    assert matches is frame.matches

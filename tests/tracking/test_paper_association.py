@@ -50,3 +50,22 @@ def test_the_last_box_is_compared_where_the_filter_expects_it():
 def test_a_weight_of_overlap_below_the_threshold_matches_what_is_apart():
     config = PaperAssociationConfig(alpha=0.5)
     assert len(PaperAssociation(config).match(*pair(box(10, 0), box(30, 0))).rows) == 1
+
+
+def test_as_printed_a_difference_makes_a_match_cheaper():
+    tracks, observations = pair(box(10, 0), box(10, 0, l=5.0), 90)
+    zero = np.array([0])
+    printed = PaperAssociation(PaperAssociationConfig(differences="subtracted"))
+    expected = 2.0 * (1 - 4 / 5) - 0.01 * 30 - 0.1 * 1.0
+    np.testing.assert_allclose(printed.cost(tracks, observations, zero, zero), expected, atol=1e-9)
+    far, at = pair(box(10, 0), box(30, 0), 200)
+    assert len(printed.match(far, at).rows) == 1
+
+
+@pytest.mark.parametrize(("gate", "row"), [("before", 0), ("after", 1)])
+def test_pairs_above_the_threshold_compete_where_the_gate_comes_after(gate, row):
+    """Crosswise both tracks cost least together, one pair of them too much."""
+    tracks, observations = tracks_at([box(10, 0)] * 2), observe(frame_of([box(10, 0)] * 2)[1], EYE)
+    association = PaperAssociation(PaperAssociationConfig(gate=gate, t_da=0.3))
+    association.cost = lambda *_: np.array([0.1, 0.4, 0.2, 0.9])
+    assert association.match(tracks, observations).rows.tolist() == [row]

@@ -42,6 +42,7 @@ CONDITIONS = {
     "fusion.mismatch_probability": "--mode accurate, efficient",
     "fusion.first_view_min_object_probability": "--mode efficient",
     "fusion.first_view_min_hits": "--mode efficient",
+    "fusion.first_view_final": "--mode efficient",
     "odometry": "--odometry udp://, unix://",
     "odometry.registration": "frames without a pose",
     "odometry.registration.initial_turn_rad": "the first frames without a pose",

@@ -69,7 +69,7 @@ def train(data: Dataset, rows: Int, steps: int, seed: int) -> tuple[PointNet, li
 
 
 @torch.no_grad()
-def logits(net: PointNet, data: Dataset, rows: Int) -> Float64:
+def logits(net: torch.nn.Module, data: Dataset, rows: Int) -> Float64:
     """(R, 4) of rows of the data set, without augmentation."""
     rng = np.random.default_rng(0)
     parts = np.split(rows, np.arange(BATCH_SIZE, len(rows), BATCH_SIZE))

@@ -29,13 +29,14 @@ class Crops:
         """(R,) points of each crop."""
         return np.diff(self.offsets)
 
-    def padded(self, rows: Int) -> Float32:
-        """(len(rows), n, 3) crops of these rows, each padded to the largest with repetitions of its own points.
+    def padded(self, rows: Int, least: int = 1) -> Float32:
+        """(len(rows), n, 3) crops of these rows, each padded with repetitions of its own points to the largest, or to
+        the least n.
 
         Repeated points leave the output unchanged: the network takes the maximum over points.
         """
         count = self.count[rows, None]
-        batch: Float32 = self.xyz[self.offsets[rows, None] + np.arange(count.max(initial=1)) % count]
+        batch: Float32 = self.xyz[self.offsets[rows, None] + np.arange(count.max(initial=least)) % count]
         return batch
 
 

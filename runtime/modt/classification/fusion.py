@@ -34,6 +34,14 @@ class Certainty:
         return objects | (evidence >= self._background)
 
 
+class AnyView:
+    """Every posterior is final (Table I)."""
+
+    def __call__(self, posterior: Float64) -> Bool:
+        """(R,) True of posteriors (R, 4)."""
+        return np.ones(len(posterior), np.bool_)
+
+
 class EveryFrame:
     """Tracking by detection: every proposal is classified, its likelihood is the posterior (Fig. 2a)."""
 
@@ -55,7 +63,7 @@ class OneView(EveryFrame):
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
     minimum number of observations, since spurious proposals do not last. An uncertain class is replaced by that of
-    the first view with clearly more points.
+    the first view with clearly more points. In the paper the first view is final, whatever it says.
 
     Args:
         config: conditions of a view, and thresholds of certainty.
@@ -65,7 +73,7 @@ class OneView(EveryFrame):
     def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         self.config = config
         self.prior = prior or FrequencyPrior(config.prior)
-        self._certain = Certainty(config)
+        self._certain = AnyView() if config.first_view_final == "any" else Certainty(config)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""

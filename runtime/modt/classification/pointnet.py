@@ -71,9 +71,10 @@ class PointNet:
         self._session = _session(self.path, raw)
         self._input = self._session.get_inputs()[0].name
         metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
+        pooled = metadata if config.likelihood == "pooled" else {}
         try:
-            self.boxes = box_classifier.from_metadata(metadata)
-            self.reflectance = reflectance_classifier.from_metadata(metadata, sensor)
+            self.boxes = box_classifier.from_metadata(pooled)
+            self.reflectance = reflectance_classifier.from_metadata(pooled, sensor)
             self.class_frequency = _class_frequency(metadata)
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
@@ -94,7 +95,7 @@ class PointNet:
         by_size = np.argsort(crops.count, kind="stable")
         for first in range(0, len(crops), self.config.batch):
             rows = by_size[first : first + self.config.batch]
-            out[rows] = self.infer(crops.padded(rows))
+            out[rows] = self.infer(crops.padded(rows, self.config.min_points))
         return self._pooled(out, proposals, which)
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import islice
 
@@ -11,18 +10,19 @@ import numpy as np
 from modt import assembly
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
-from modt.energy.instrumentation import padded_points
+from modt.energy.instrumentation import padded_size
 from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter
-from modt.reporting.comparison import ModeRun, RecordingClassifier, Repetition, interleave
+from modt.reporting.comparison import ModeRun, RecordingClassifier, RecordingFusion, Repetition, interleave
 from modt.reporting.prediction import OBSERVED
-from modt.types import Budget, Frame, Int
+from modt.types import UNLIMITED, Budget, Frame, Int
 
 BASELINE = "conventional"
 MODES = (BASELINE, "efficient", "accurate")
 VARIED = "varied"
 """Tracking-by-detection with a random classification load: its costs are the unit costs of the reconciliation."""
-_LOADS = (0, 1, 2, 3, 5, 8, 12, 16, 20, 30, 45, 60)
+_LOADS = (0, 1, 2, 4, 8, 16, 32, 64, 128, None, None)
+"""Calls of a frame, None for all: unit costs found from few calls alone do not hold for many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +44,9 @@ class Comparison:
         """
         return self.turn or (10**9 if self.meters else 1)
 
-    def repetition(self, seed: int) -> Repetition:
-        """Every mode once through the stream, from its initial state."""
-        runs = {name: self._mode_run(name, seed) for name in (*MODES, VARIED)}
+    def repetition(self) -> Repetition:
+        """Every mode once through the stream, from its initial state; all repetitions do the same work."""
+        runs = {name: self._mode_run(name) for name in (*MODES, VARIED)}
         stream = assemble.stream(self.request)
         for frame in islice(stream, 1):
             for mode_run in runs.values():
@@ -54,7 +54,7 @@ class Comparison:
         interleave(stream, [*runs.values()], self.turn_frames)
         return runs
 
-    def _mode_run(self, name: str, seed: int) -> ModeRun:
+    def _mode_run(self, name: str) -> ModeRun:
         mode = assembly.MODES[BASELINE if name == VARIED else name]
         ledger = Ledger()
         fov = assemble.field_of_view(self.request, assemble.stream(self.request))
@@ -65,24 +65,35 @@ class Comparison:
             pipeline=replace(pipeline, classifier=recorder),
             ledger=ledger,
             recorder=recorder,
-            budget=varied_load(seed) if name == VARIED else lambda _frame: budget,
+            budget=varied_load if name == VARIED else lambda _frame: budget,
             windows=metering.windows(self.meters, self.core, window) if self.meters else None,
         )
 
 
 def observe(request: assemble.Request, profile: ProfileConfig, frames: int | None) -> Int:
-    """(F, 5) prediction.OBSERVED of the first so many frames, tracked without a classification."""
+    """(F, 7) of the first so many frames, tracked without a classification.
+
+    Columns as prediction.OBSERVED, then of each mode but the baseline the tracks that ask for a class for the first
+    time.
+    """
+    columns = [_tracked(request, profile, frames, mode) for mode in MODES]
+    return np.concatenate([columns[0][:, :-1], *(found[:, -1:] for found in columns[1:])], axis=1)
+
+
+def _tracked(request: assemble.Request, profile: ProfileConfig, frames: int | None, mode: str) -> Int:
+    """(F, 6) prediction.OBSERVED, and the tracks that ask for the first time."""
     fov = assemble.field_of_view(request, assemble.stream(request))
-    pipeline = assembly.pipeline(assembly.MODES[BASELINE], profile, fov, NullLedger())
-    limits, rows = profile.classification, []
+    pipeline = assembly.pipeline(assembly.MODES[mode], profile, fov, NullLedger())
+    fusion = RecordingFusion(pipeline.fusion)
+    pipeline, size, rows = replace(pipeline, fusion=fusion), padded_size(profile.classification), []
     alive: set[int] = set()
     for frame in islice(assemble.stream(request), frames):
         result = pipeline.step(frame, Budget(calls=0))
         before, alive = alive, set(result.tracks.id.tolist())
         count = result.proposals.count
-        points = padded_points(count, limits.max_points, limits.batch)
-        rows.append((len(frame.points), len(count), len(alive), len(alive - before), points))
-    return np.array(rows, np.int64).reshape(-1, len(OBSERVED))
+        started, asked = len(alive - before), fusion.first_asked(alive)
+        rows.append((len(frame.points), len(count), len(alive), started, size(count), asked))
+    return np.array(rows, np.int64).reshape(-1, len(OBSERVED) + 1)
 
 
 def _warm_up(mode_run: ModeRun, frame: Frame) -> None:
@@ -92,10 +103,7 @@ def _warm_up(mode_run: ModeRun, frame: Frame) -> None:
     parts.classifier.classify(frame.points, proposals, np.arange(len(proposals)))
 
 
-def varied_load(seed: int) -> Callable[[int], Budget]:
-    """A random budget for each frame, reproducible by the seed."""
-
-    def budget(frame: int) -> Budget:
-        return Budget(calls=int(np.random.default_rng([seed, frame]).choice(_LOADS)))
-
-    return budget
+def varied_load(frame: int) -> Budget:
+    """A random budget for each frame, the same in every repetition."""
+    load = _LOADS[np.random.default_rng(frame).integers(len(_LOADS))]
+    return UNLIMITED if load is None else Budget(calls=load)

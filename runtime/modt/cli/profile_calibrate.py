@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.cli.chosen_profile import choose
     from modt.config import WindowConfig
     from modt.energy.attribution import FitError
-    from modt.energy.instrumentation import CountingClassifier
+    from modt.energy.instrumentation import CountingClassifier, padded_size
     from modt.energy.ledger import Ledger
     from modt.energy.window_fit_calibration import Workload
     from modt.geometry import FieldOfView
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     loaded = choose(request.profile, scans[0], stream.info).config
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
-    network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, limits.max_points, limits.batch)
+    network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, padded_size(limits))
     segmenter = Segmenter(loaded.segmentation, loaded.sensor, FieldOfView())
     windows = metering.windows(meters, pinned, WindowConfig(min_s=1e9))
     workload = Workload(scans, segmenter.segment, network.classify, ledger, windows)

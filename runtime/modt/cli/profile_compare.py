@@ -35,13 +35,13 @@ def run(arguments: argparse.Namespace) -> int:
     # NumPy is imported from here on, after the process is pinned.
     from modt.cli import assemble, metering
     from modt.cli.chosen_profile import choose
-    from modt.cli.mode_runs import MODES, VARIED, Comparison
+    from modt.cli.mode_runs import MODES, VARIED, Comparison, observe
     from modt.energy.conditions import Conditions
     from modt.energy.meters.meter import Kind
     from modt.reporting.compare_report import Basis, compare_tree
     from modt.reporting.compare_view import compare_document, compare_plots
     from modt.reporting.page import document_page, save
-    from modt.reporting.prediction_report import against, read_prediction
+    from modt.reporting.prediction_report import against, observed_tree, read_prediction
     from modt.reporting.quantity import to_json
 
     request = assemble.Request.of(arguments)
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     for number in range(arguments.repeat):
         if sys.stderr.isatty():
             print(f"modt-profile: {number + 1} of {arguments.repeat}", file=sys.stderr)
-        repetitions.append(comparison.repetition(number))
+        repetitions.append(comparison.repetition())
     frames = len(repetitions[0][VARIED].lines)
     if not frames:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
@@ -74,6 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         "host": host.description(),
     }
     tree = compare_tree(repetitions, MODES, VARIED, basis, about)
+    tree["observed"] = observed_tree(observe(request, loaded, None))
     if prediction is not None:
         tree["against"] = against(prediction, tree["modes"], tree["savings"])
     document = compare_document(tree)

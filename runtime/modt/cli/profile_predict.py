@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
         "calibration": [name for name, _ in calibration],
         "core": pinned,
     }
-    found = forecast([runs for _, runs in calibration], seen, frames, np.random.default_rng(0))
+    found = forecast([stream for _, stream in calibration], seen, frames, np.random.default_rng(0))
     tree = prediction_tree(found, loaded.energy.active_W, about)
     text = json.dumps(to_json(tree), indent=2)
     if arguments.out is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from modt.classes import CLASSES
-from modt.config.base import StageConfig, mechanism, number, per_class, shares
+from modt.config.base import StageConfig, choice, mechanism, number, per_class, shares
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -13,7 +13,11 @@ class ClassificationConfig(StageConfig):
     """The network and its input (section V-A)."""
 
     model: str = field(default="pointnet-kitti", metadata={"meaning": "name in models/ or path of an .onnx file"})
+    likelihood: str = choice(
+        "pooled", ("pooled", "network"), "of the network with the classifiers of box and reflectance, or of it alone"
+    )
     max_points: int = number(128, 8, 4096, "", "points of a proposal handed to the network")
+    min_points: int = number(1, 1, 4096, "", "to which they are repeated, which costs more and changes no class")
     batch: int = number(8, 1, 256, "", "proposals of one network call at most")
 
 
@@ -76,6 +80,7 @@ class FusionConfig(StageConfig):
     mismatch_probability: float = number(0.1, 0.0, 1.0, "", "that a proposal is not the object of its track")
     first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")
     first_view_min_hits: int = number(3, 1, 1000, "frames", "with a proposal, to be classified")
+    first_view_final: str = choice("certain", ("certain", "any"), "view that is final; the paper: any")
     min_object_probability: float = number(0.01, 0.0, 1.0, "", "by the box prior, for the first of several views")
     start_frame: int = number(5, 1, 1000, "frames", "age of a track from which views are fused")
     object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")

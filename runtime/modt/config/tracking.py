@@ -16,7 +16,9 @@ class FilterConfig(StageConfig):
     initial_position_sigma_m: float = number(0.3, 0.01, 5.0, "m", "of the position of a new track")
     initial_speed_sigma_mps: float = number(5.0, 0.1, 50.0, "m/s", "of the speed of a new track")
     stationary_radius_m: float = number(0.5, 0.05, 5.0, "m", "a track this near to its rest position is stationary")
-    stationary_sigma_mps: float = number(1.0, 0.01, 50.0, "m/s", "of the speed 0 that is observed of such a track")
+    stationary_sigma_mps: float | None = number(
+        1.0, 0.01, 50.0, "m/s", "of the speed 0 that is observed of such a track; null: none is"
+    )
     stopped_mps: float = number(0.5, 0.01, 5.0, "m/s", "a moving track slower than this has a new rest position")
     rest_gain: float = number(0.1, 0.0, 1.0, "", "weight of a new position in the rest position")
 
@@ -29,6 +31,10 @@ class PaperAssociationConfig(StageConfig):
     beta: float = number(0.01, 0.0, 10.0, "", "weight of the difference of point number")
     gamma: float = number(0.1, 0.0, 10.0, "", "weight of the difference of size")
     t_da: float = number(0.95, 0.0, 100.0, "", "highest cost of an association")
+    differences: str = choice(
+        "added", ("added", "subtracted"), "of number and size, to the cost; the paper: subtracted"
+    )
+    gate: str = choice("before", ("before", "after"), "the assignment, T_DA; the paper: after")
     position_sigma_m: float = number(0.3, 0.01, 5.0, "m", "of a measured position")
 
 
@@ -54,7 +60,9 @@ class KdopAssociationConfig(StageConfig):
 class FragmentConfig(StageConfig):
     """One track for the fragments of one object."""
 
-    min_coverage: float = number(0.6, 0.0, 1.0, "", "part of one that lies within what is known of the other")
+    min_coverage: float = number(
+        0.6, 0.0, 1.0, "", "part of one that lies within what is known of the other; 1: none are reunited"
+    )
     shrink: float = number(1.2, 1.0, 10.0, "", "a k-DOP smaller by this factor than the known extent is a fragment")
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
+from modt.config import ClassificationConfig
 from modt.energy.ledger import StageLedger
 from modt.types import Float32, Float64, Int, Proposals
 
@@ -23,25 +26,35 @@ class Classifier(Protocol):
 
 
 class CountingClassifier:
-    """Adds the points processed by the network, padding included, to the ledger's classification entry."""
+    """Adds the points processed by the network, padding included, to the ledger's classification entry.
 
-    def __init__(self, classifier: Classifier, ledger: StageLedger, max_points: int, batch: int) -> None:
-        self._classifier, self._ledger = classifier, ledger
-        self._max_points, self._batch = max_points, batch
+    Args:
+        classifier: that classifies.
+        ledger: that is added to.
+        size: points that the network processes for proposals of (R,) points.
+    """
+
+    def __init__(self, classifier: Classifier, ledger: StageLedger, size: Callable[[Int], int]) -> None:
+        self._classifier, self._ledger, self._size = classifier, ledger, size
         self.facts = classifier.facts
 
     def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) P(Y|X) of the R proposals given by index, in their order."""
-        points_processed = padded_points(proposals.count[which], self._max_points, self._batch)
-        self._ledger.count("classification", points=points_processed)
+        self._ledger.count("classification", points=self._size(proposals.count[which]))
         return self._classifier.classify(points, proposals, which)
 
 
-def padded_points(count: Int, max_points: int, batch: int) -> int:
+def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
+    """Points that the network processes, padding included, for proposals of (R,) points."""
+    return partial(padded_points, max_points=limits.max_points, batch=limits.batch, min_points=limits.min_points)
+
+
+def padded_points(count: Int, max_points: int, batch: int, min_points: int = 1) -> int:
     """Points processed by the network, padding included, for R proposals of (R,) count points.
 
-    A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them.
+    A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them and
+    to min_points.
     """
-    size = np.sort(np.minimum(count, max_points))
+    size = np.sort(np.maximum(np.minimum(count, max_points), min_points))
     ends = np.minimum(np.arange(batch, len(size) + batch, batch), len(size))
     return int(np.diff(ends, prepend=0) @ size[ends - 1])

@@ -19,7 +19,7 @@ from modt.reporting.histogram import Histogram
 from modt.reporting.quantity import Quantity, estimate, quantity
 from modt.types import Float64
 
-SCHEMA = "modt.compare/2"
+SCHEMA = "modt.compare/3"
 _COUNTING = "Energy is assumed power times CPU time: the reconciliation tests counts and unit costs, not the physics."
 _PHYSICS = "Energy is the meter's: the reconciliation is with the meter as a whole."
 
@@ -45,7 +45,7 @@ def compare_tree(
     passes = {name: [repetition[name] for repetition in repetitions] for name in (*modes, varied)}
     runs = {mode: gamma.RunCosts.median(passes[mode]) for mode in modes}
     windows = {mode: [line for run in passes[mode] for line in run.energy_lines] for mode in modes}
-    load_varied_run = gamma.RunCosts.concatenated(passes[varied])
+    load_varied_run = gamma.RunCosts.median(passes[varied])
     baseline = runs[modes[0]]
     energy = {mode: _energy(run, windows[mode], basis, random) for mode, run in runs.items()}
     savings = {

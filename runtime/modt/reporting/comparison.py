@@ -13,9 +13,9 @@ from modt.classes import ObjectClass
 from modt.energy.ledger import Ledger, Line
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
-from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Pipeline
+from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Fusion, Pipeline
 from modt.reporting.histogram import Histogram
-from modt.types import NONE, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals
+from modt.types import NONE, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
 
 COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
 """Columns of a run's counts."""
@@ -37,6 +37,28 @@ class RecordingClassifier:
         """(R, 4) P(Y|X) of the R proposals given by index."""
         self.rows = which
         return self._classifier.classify(points, proposals, which)
+
+
+class RecordingFusion:
+    """A fusion that records which tracks have asked for a class."""
+
+    def __init__(self, fusion: Fusion) -> None:
+        self.fuse, self._asks = fusion.fuse, fusion.asks
+        self._asked: set[int] = set()
+        self._known: set[int] = set()
+
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks whose view is worth a classification."""
+        asks = self._asks(tracks, proposals, wants_class)
+        self._asked.update(tracks.id[asks].tolist())
+        return asks
+
+    def first_asked(self, alive: set[int]) -> int:
+        """Number of tracks that asked since the last call and never before; the others than alive are forgotten."""
+        number = len(self._asked - self._known)
+        self._known = (self._known | self._asked) & alive
+        self._asked = set()
+        return number
 
 
 @dataclass

@@ -45,11 +45,6 @@ class RunCosts:
         frames = np.arange(len(middle))
         return cls(counts[middle, frames], cost[middle, frames])
 
-    @classmethod
-    def concatenated(cls, runs: Sequence[ModeRun]) -> Self:
-        """Runs whose counts differ, such as those of varied load: their frames one after another."""
-        return cls(np.concatenate([run.counts() for run in runs]), np.concatenate([run.cpu_s() for run in runs]))
-
     def take(self, frames: Int) -> RunCosts:
         """The given frames."""
         return RunCosts(self.counts[frames], self.cost[frames])
@@ -77,14 +72,13 @@ def estimate_gamma(
 ) -> GammaEstimate:
     """Reconciled and measured gamma of a run on the F frames of tracking-by-detection.
 
-    The unit costs come from a third run, over the same frames once or several times, whose load was varied.
+    The unit costs come from a third run over the same frames, whose load was varied.
     """
     n = len(baseline.counts)
-    passes = len(load_varied_run.counts) // n
 
     def reconciled_and_measured(frames: Int) -> tuple[Reconciliation, float]:
         a, b = baseline.take(frames), run.take(frames)
-        costs = unit_costs(load_varied_run.take((frames + n * np.arange(passes)[:, None]).ravel()))
+        costs = unit_costs(load_varied_run.take(frames))
         reconciled = reconcile(total(a.counts), total(b.counts), costs, other_costs(a), other_costs(b))
         return reconciled, float(a.cost.sum() / b.cost.sum())
 

@@ -22,61 +22,89 @@ from modt.types import Float64, Int
 Runs = dict[str, RunCosts]
 """A stream's runs: tracking-by-detection first, the run of varied load last, the modes between."""
 OBSERVED = ("sweep_points", "proposals", "alive", "tracks", "points")
-"""Columns of what tracking alone sees of a frame; the last are the network's if it classified every proposal."""
+"""First columns of what tracking alone sees of a frame: `tracks` are new, `points` the network's if it classified
+every proposal. Then, for each mode between, the tracks that ask for a class for the first time, none being given."""
 _RESAMPLES = 300
 _VARIED = 0.2
 """Relative spread of the points of sweeps above which segmentation has a constant beside its cost a point."""
 _PARTS = 4
 """Parts of the only stream of a calibration that are left out in turn."""
+_START = 8
+"""Frames at the start of a stream in which all that is there is new."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """A stream on which the modes did run."""
+
+    runs: Runs
+    observed: Int  # (F, 7) OBSERVED
+
+    def take(self, frames: Int) -> Stream:
+        """The given frames."""
+        return Stream({name: run.take(frames) for name, run in self.runs.items()}, self.observed[frames])
 
 
 @dataclass(frozen=True, slots=True)
 class Views:
     """How a mode selects what it classifies."""
 
-    per_track: float  # classifications
-    size: float  # network's points of a selected proposal over those of any proposal
+    each: float  # classifications of a track that asks
+    size: float  # network's points of such a proposal over those of any that is seen
     calls: float  # rate of calls over the rate of classifications; below 1 where these come together
 
     @classmethod
-    def of(cls, run: RunCosts, base: RunCosts) -> Self:
-        """Of a mode's run, against tracking-by-detection on the same frames."""
+    def of(cls, run: RunCosts, asking: Float64, size: float) -> Self:
+        """Of a mode's run.
+
+        Args:
+            run: of the mode.
+            asking: (F,) tracks that ask.
+            size: network's points of a proposal that is seen.
+        """
         each = _column(run, "classified").mean()
         if not each:
             return cls(0.0, 1.0, 1.0)
         frames_with_calls = min(_column(run, "calls").mean(), 1.0 - 0.5 / len(run.counts))
-        every = _column(base, "points").sum() / max(_column(base, "classified").sum(), 1.0)
-        size = _column(run, "points").sum() / _column(run, "classified").sum() / max(every, 1e-9)
-        return cls(each / max(_column(run, "tracks").mean(), 1e-9), size, -np.log1p(-frames_with_calls) / each)
+        relative = _column(run, "points").sum() / _column(run, "classified").sum() / max(size, 1e-9)
+        return cls(each / max(float(asking.mean()), 1e-9), relative, -np.log1p(-frames_with_calls) / each)
 
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """What units of work cost [CPU s], and how the modes select."""
+    """What units of work cost [CPU s], and how the modes select.
+
+    Tracking, scheduling and fusion are by what tracking alone sees: known classes regroup proposals, so that a mode
+    has others than are seen without.
+    """
 
     segmentation: Float64  # (2,) a frame, a point of the sweep
     classification: Float64  # (3,) a call, a proposal, a point of the network
     tracking: dict[str, Float64]  # of each mode: (3,) a frame, a proposal, a track
     scheduling: dict[str, Float64]  # of each mode, with fusion: (2,) a frame, a track
-    views: dict[str, Views]  # of the modes but tracking-by-detection
+    views: dict[str, Views]  # of each mode; of tracking-by-detection, in which every proposal asks
 
     @classmethod
-    def fit(cls, streams: Sequence[Runs]) -> Self:
+    def fit(cls, streams: Sequence[Stream]) -> Self:
         """Over all frames of the calibration's streams."""
-        runs = {name: _joined([stream[name] for stream in streams]) for name in streams[0]}
+        runs = {name: _joined([stream.runs[name] for stream in streams]) for name in streams[0].runs}
+        observed = np.concatenate([stream.observed for stream in streams]).astype(float)
         *modes, _ = runs
-        base, *others = modes
+        _, n, alive, _, all_points = observed.T[: len(OBSERVED)]
+        asking, size = [n, *observed.T[len(OBSERVED) :]], float(all_points.sum() / max(n.sum(), 1.0))
+        every_frame = np.ones(len(n))
         every = _joined([*runs.values()])
         points = _column(every, "sweep_points")
         segmentation = np.array([0.0, every.cost[:, SEG].sum() / max(points.sum(), 1.0)])
         if points.std() > _VARIED * points.mean():
-            segmentation = _fit(every, ("sweep_points",), [SEG])
+            segmentation = _fit((np.ones(len(points)), points), every.cost[:, [SEG]])
+        load = [_column(every, name) for name in ("calls", "classified", "points")]
         return cls(
             segmentation=segmentation,
-            classification=_fit(every, ("calls", "classified", "points"), [CLASS], constant=False),
-            tracking={mode: _fit(runs[mode], ("proposals", "alive"), TRACK) for mode in modes},
-            scheduling={mode: _fit(runs[mode], ("alive",), SCHEDULE) for mode in modes},
-            views={mode: Views.of(runs[mode], runs[base]) for mode in others},
+            classification=_fit(load, every.cost[:, [CLASS]]),
+            tracking={mode: _fit((every_frame, n, alive), runs[mode].cost[:, TRACK]) for mode in modes},
+            scheduling={mode: _fit((every_frame, alive), runs[mode].cost[:, SCHEDULE]) for mode in modes},
+            views={mode: Views.of(runs[mode], asks, size) for mode, asks in zip(modes, asking, strict=True)},
         )
 
 
@@ -94,26 +122,25 @@ class Expected:
 
 
 def expect(rates: Rates, observed: Int, frames: int) -> Expected:
-    """Costs of a stream of so many frames, of which (F, 5) OBSERVED were seen, the first among them."""
-    points, n, alive, _, all_points = observed.mean(axis=0).tolist()
-    started = observed[:, OBSERVED.index("tracks")]
-    tracks = (started[0] + (frames - 1) * float(started[1:].mean() if len(started) > 1 else 0.0)) / frames
-    e_seg = float(rates.segmentation @ [1.0, points])
-    cost = {}
-    for mode in rates.tracking:
-        load = np.array([float(n > 0), n, all_points])
-        if mode in rates.views:
-            views = rates.views[mode]
-            items = min(views.per_track * tracks, n)
-            size = views.size * all_points / max(n, 1e-9)
-            load = np.array([1.0 - np.exp(-views.calls * items), items, size * items])
+    """Costs of a stream of so many frames, of which (F, 7) OBSERVED were seen, the first among them."""
+    sweep_points, n, alive, _, all_points, *_ = observed.mean(axis=0).tolist()
+    tracks, *asked = _whole(observed[:, [OBSERVED.index("tracks"), *range(len(OBSERVED), observed.shape[1])]], frames)
+    e_seg = float(rates.segmentation @ [1.0, sweep_points])
+    asking = dict(zip(rates.views, [n, *asked], strict=True))
+    most = n * next(iter(rates.views.values())).each
+    cost, loads = {}, {}
+    for mode, views in rates.views.items():
+        items = min(views.each * asking[mode], most)
+        points = items * views.size * all_points / max(n, 1e-9)
+        loads[mode] = [1.0 - np.exp(-views.calls * items), items, points]
         cost[mode] = float(
             e_seg
             + rates.tracking[mode] @ [1.0, n, alive]
             + rates.scheduling[mode] @ [1.0, alive]
-            + rates.classification @ load
+            + rates.classification @ loads[mode]
         )
-    e_class = float(rates.classification @ [1.0, n, all_points]) / max(n, 1e-9)
+    base = next(iter(loads.values()))
+    e_class = float(rates.classification @ base) / max(base[1], 1e-9)
     return Expected(cost, EnergyModel(e_seg, e_class, n, n / tracks if tracks else 1.0))
 
 
@@ -127,8 +154,16 @@ class Forecast:
     copied: Float64  # the calibration's own, geometric mean over its streams
 
 
-def forecast(streams: Sequence[Runs], observed: Int, frames: int, random: np.random.Generator) -> Forecast:
-    """Prediction for a stream of so many frames from (F, 5) OBSERVED of its first ones.
+def _whole(started: Int, frames: int) -> list[float]:
+    """Mean a frame of a stream of so many frames, of columns (F, k) of its first ones: all is new at the start."""
+    start = min(_START, len(started) // 2)
+    later = started[start:].mean(axis=0) if len(started) else np.zeros(started.shape[1])
+    found: list[float] = ((started[:start].sum(axis=0) + (frames - start) * later) / frames).tolist()
+    return found
+
+
+def forecast(streams: Sequence[Stream], observed: Int, frames: int, random: np.random.Generator) -> Forecast:
+    """Prediction for a stream of so many frames from (F, 7) OBSERVED of its first ones.
 
     The interval is over resampled frames of the calibration and of those seen, and over how far the calibration is
     off on one of its streams when fitted to the others (on a quarter of its only stream, when fitted to the rest).
@@ -142,32 +177,26 @@ def forecast(streams: Sequence[Runs], observed: Int, frames: int, random: np.ran
     return Forecast(expected, expected.values * np.exp(-margin), expected.values * np.exp(margin), copied)
 
 
-def measured(stream: Runs) -> Float64:
+def measured(stream: Stream) -> Float64:
     """The same values as of Expected, by the runs themselves."""
-    *modes, _ = stream.values()
+    *modes, _ = stream.runs.values()
     return _with_gamma([float(run.cost.sum(axis=1).mean()) for run in modes])
 
 
-def observed_of(stream: Runs) -> Int:
-    """(F, 5) OBSERVED of a stream on which the modes did run."""
-    base = next(iter(stream.values()))
-    seen: Int = base.counts[:, [COUNTS.index(name) for name in OBSERVED]]
-    return seen
-
-
-def _errors(streams: Sequence[Runs]) -> Iterator[Float64]:
+def _errors(streams: Sequence[Stream]) -> Iterator[Float64]:
     """Logarithmic errors of the values for streams left out."""
     if len(streams) == 1:
-        quarters = np.array_split(np.arange(len(observed_of(streams[0]))), _PARTS)
-        streams = [{name: run.take(part) for name, run in streams[0].items()} for part in quarters]
+        quarters = np.array_split(np.arange(len(streams[0].observed)), _PARTS)
+        streams = [streams[0].take(part) for part in quarters]
     for k, left_out in enumerate(streams):
-        rates, seen = Rates.fit([*streams[:k], *streams[k + 1 :]]), observed_of(left_out)
+        rates, seen = Rates.fit([*streams[:k], *streams[k + 1 :]]), left_out.observed
         yield np.log(expect(rates, seen, len(seen)).values / measured(left_out))
 
 
-def _resampled(streams: Sequence[Runs], observed: Int, frames: int, random: np.random.Generator) -> Float64:
-    drawn = [{name: run.take(blocks(len(run.counts), random)) for name, run in stream.items()} for stream in streams]
-    seen = np.concatenate([observed[:1], observed[1:][blocks(len(observed) - 1, random)]])
+def _resampled(streams: Sequence[Stream], observed: Int, frames: int, random: np.random.Generator) -> Float64:
+    drawn = [stream.take(blocks(len(stream.observed), random)) for stream in streams]
+    start = min(_START, len(observed) // 2)
+    seen = np.concatenate([observed[:start], observed[start:][blocks(len(observed) - start, random)]])
     return expect(Rates.fit(drawn), seen, frames).values
 
 
@@ -183,7 +212,7 @@ def _column(run: RunCosts, name: str) -> Float64:
     return run.counts[:, COUNTS.index(name)].astype(float)
 
 
-def _fit(run: RunCosts, names: Sequence[str], stages: list[int], *, constant: bool = True) -> Float64:
-    columns = [_column(run, name) for name in names]
-    X = np.stack([np.ones(len(run.counts)), *columns] if constant else columns, axis=1)
-    return nonnegative_fit(X.T @ X, X.T @ run.cost[:, stages].sum(axis=1))
+def _fit(columns: Sequence[Float64], cost: Float64) -> Float64:
+    """(k,) costs of k columns of (F,) counts, of (F, S) stages together."""
+    X = np.stack(columns, axis=1)
+    return nonnegative_fit(X.T @ X, X.T @ cost.sum(axis=1))

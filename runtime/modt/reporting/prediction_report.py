@@ -15,8 +15,9 @@ from modt.reporting.compare_report import SCHEMA as COMPARE_SCHEMA
 from modt.reporting.comparison import COUNTS
 from modt.reporting.document import Document, Table
 from modt.reporting.gamma import RunCosts
-from modt.reporting.prediction import Forecast, Runs
+from modt.reporting.prediction import OBSERVED, Forecast, Stream
 from modt.reporting.quantity import Quantity, estimate
+from modt.types import Int
 
 SCHEMA = "modt.prediction/1"
 _MIN_FRAMES = 8
@@ -27,7 +28,7 @@ _OVER = (
 )
 
 
-def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tuple[str, Runs]:
+def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tuple[str, Stream]:
     """Stream and runs of a comparison that was saved as JSON; not of the stream itself, by its name and path.
 
     Raises:
@@ -41,13 +42,20 @@ def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tup
         raise MisuseError(path, f"its field of view is {tree['fov']}, not {fov}", f"{remedy} with --fov {fov}")
     if tree["frames"] < _MIN_FRAMES:
         raise MisuseError(path, f"{tree['frames']} frames tell no unit costs", f"{remedy} of {_MIN_FRAMES} or more")
-    return tree["stream"], {
+    runs = {
         name: RunCosts(
             np.array([table["counts"][column] for column in COUNTS], np.int64).T,
             1e-3 * np.array([table["cpu_ms"][stage] for stage in STAGES], float).T,
         )
         for name, table in tree["calibration"].items()
     }
+    return tree["stream"], Stream(runs, np.array([*tree["observed"].values()], np.int64).T)
+
+
+def observed_tree(observed: Int) -> dict[str, list[int]]:
+    """Of every frame (F, 7), by column, what tracking alone sees."""
+    asked = [f"asked_{k}" for k in range(observed.shape[1] - len(OBSERVED))]
+    return dict(zip((*OBSERVED, *asked), observed.T.tolist(), strict=True))
 
 
 def prediction_tree(found: Forecast, net_W: float, about: dict[str, Any]) -> dict[str, Any]:

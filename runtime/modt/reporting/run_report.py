@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from modt import profile
-from modt.config import ProfileConfig
+from modt.config import ClassificationConfig, ProfileConfig
+from modt.energy.instrumentation import padded_size
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.meters.meter import Kind
 from modt.energy.nonnegative import nonnegative_fit
@@ -27,6 +28,7 @@ from modt.types import Float64
 
 SCHEMA = "modt.report/2"
 _CONVENTIONAL = "conventional"
+_LIMITS = ("max_points", "min_points", "batch")
 
 
 def run_tree(run: Path) -> dict[str, Any]:
@@ -40,7 +42,7 @@ def run_tree(run: Path) -> dict[str, Any]:
     metered, modelled = EnergySums(board), EnergySums(board)
     for window in read_records(run / LEDGER, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}):
         metered.add_window(window)
-    sums = FrameSums(limits["max_points"], limits["batch"])
+    sums = FrameSums(padded_size(ClassificationConfig(**{key: limits[key] for key in _LIMITS})))
     lines = read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})
     for line, record in zip(lines, read_records(run / TRACKS, FRAME_SCHEMA), strict=False):
         sums.add(line, record)

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.energy.attribution import split_by_coefficients, split_by_cpu_time, usable_windows
-from modt.energy.instrumentation import padded_points
 from modt.energy.meters.meter import Kind
 from modt.energy.meters.model import model_name
 from modt.energy.savings import Counts
 from modt.pipeline import CLASSIFICATION, STAGES
 from modt.reporting.frame_series import FrameSeries
 from modt.reporting.histogram import Histogram
+from modt.types import Int
 
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
 COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")
@@ -80,8 +80,8 @@ class FrameSums:
     Of the tracks only those alive are held.
     """
 
-    def __init__(self, max_points: int, batch: int) -> None:
-        self._max_points, self._batch = max_points, batch  # as in the classifier's configuration
+    def __init__(self, size: Callable[[Int], int]) -> None:
+        self._size = size  # points that the network processes for proposals of (R,) points
         self.series = FrameSeries(len(COLUMNS))
         self.stages: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger's columns
         self.overhead_ns = self.cpu_ns = 0
@@ -145,7 +145,7 @@ class FrameSums:
         self.classified_tracks += len(viewed - self._viewed)
         self._viewed = (self._viewed | viewed) & alive
         sizes = np.array([track["points"] for track in seen], np.int64)
-        return padded_points(sizes, self._max_points, self._batch)
+        return self._size(sizes)
 
     def _end(self, ids: Iterable[int]) -> None:
         for id_ in tuple(ids):

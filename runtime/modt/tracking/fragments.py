@@ -23,6 +23,14 @@ _PERSON = np.array([spec.person for spec in CLASSES.values()])
 _PERSON_M = CLASSES[ObjectClass.PEDESTRIAN].max_length_m
 
 
+class NoReunion:
+    """Every track keeps its proposal."""
+
+    def reunite(self, tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
+        """The matches."""
+        return matches
+
+
 class Reunion:
     """Gives the larger part of an object to its oldest track.
 

@@ -10,30 +10,54 @@ from modt.observations import Observations
 from modt.tracking.assignment import assign
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
-from modt.types import Float64, Int
+from modt.types import Bool, Float64, Int
 
 _NO_PARTNER = 1e6
-"""Cost of leaving a row without a partner: the paper gates before the assignment only."""
+"""Cost of leaving a row without a partner."""
+
+
+class GateBefore:
+    """A pair above T_DA does not compete with others."""
+
+    def __init__(self, t_da: float) -> None:
+        self._t_da = t_da
+
+    def assign(self, rows: Int, columns: Int, cost: Float64) -> Int:
+        """Indices of the pairs (K,) that are kept."""
+        low = (cost <= self._t_da).nonzero()[0]
+        return low[assign(rows[low], columns[low], cost[low], _NO_PARTNER)]
+
+
+class GateAfter(GateBefore):
+    """All pairs compete; of those assigned, the ones above T_DA are rejected (section III-B)."""
+
+    def assign(self, rows: Int, columns: Int, cost: Float64) -> Int:
+        """Indices of the pairs (K,) that are kept."""
+        kept = assign(rows, columns, cost, _NO_PARTNER)
+        return kept[cost[kept] <= self._t_da]
+
+
+GATES = {"before": GateBefore, "after": GateAfter}
+SIGNS = {"added": 1.0, "subtracted": -1.0}
 
 
 class PaperAssociation:
     """The paper's cost (section III-B), gated by T_DA; the position of a proposal is its centroid.
 
     The paper writes the cost as alpha (1 - I) - beta N - gamma S with N and S *differences* of point number and
-    size: taken literally, a worse match would cost less. Both are read as penalties here. I is the intersection
-    over union of the boxes' volumes, S the sum of the differences of length, width and height [m].
+    size: taken literally, a worse match would cost less. Both are read as penalties here, unless `differences` are
+    to be subtracted. I is the intersection over union of the boxes' volumes, S the sum of the differences of length,
+    width and height [m].
     """
 
     def __init__(self, config: PaperAssociationConfig) -> None:
         self.config = config
+        self._gate, self._sign = GATES[config.gate](config.t_da), SIGNS[config.differences]
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs whose cost is at most T_DA."""
-        rows, columns = self._near(tracks, observations)
-        cost = self.cost(tracks, observations, rows, columns)
-        low = cost <= self.config.t_da
-        rows, columns, cost = rows[low], columns[low], cost[low]
-        keep = assign(rows, columns, cost, _NO_PARTNER)
+        rows, columns = np.indices((len(tracks), len(observations))).reshape(2, -1)
+        keep = self._gate.assign(rows, columns, self.cost(tracks, observations, rows, columns))
         covariance = np.square(self.config.position_sigma_m) * np.eye(2)[None].repeat(len(keep), axis=0)
         rows, columns = rows[keep], columns[keep]
         return Matches(rows, columns, observations.centroid[columns], covariance, np.zeros((len(keep), 4)))
@@ -44,24 +68,21 @@ class PaperAssociation:
         a[:, :2] += tracks.x[rows, :2] - tracks.anchor[rows]  # the last box, carried along the prediction
         points = np.abs(tracks.points[rows] - observations.count[columns])
         size = np.abs(a[:, 3:6] - b[:, 3:6]).sum(axis=1)
-        penalty: Float64 = (
-            self.config.alpha * (1 - iou_3d(a, b)) + self.config.beta * points + self.config.gamma * size
-        )
-        return penalty
+        apart = np.ones(len(rows))
+        near = _may_touch(a, b).nonzero()[0]
+        apart[near] -= iou_3d(a[near], b[near])
+        differences = self.config.beta * points + self.config.gamma * size
+        cost: Float64 = self.config.alpha * apart + self._sign * differences
+        return cost
 
     def initial_position(self, observations: Observations) -> Float64:
         """Mean of the points."""
         return observations.centroid
 
-    def _near(self, tracks: TrackTable, observations: Observations) -> tuple[Int, Int]:
-        """Pairs whose boxes could touch: without overlap no pair can pass, unless alpha is below T_DA."""
-        centre = tracks.box[:, :2] + tracks.x[:, :2] - tracks.anchor
-        offset = centre[:, None] - observations.box[None, :, :2]
-        if self.config.alpha <= self.config.t_da:
-            near = np.ones(offset.shape[:2], np.bool_)
-        else:
-            reach = np.hypot(tracks.box[:, 3], tracks.box[:, 4])[:, None]
-            reach = (reach + np.hypot(observations.box[:, 3], observations.box[:, 4])) / 2
-            near = (offset**2).sum(axis=2) < reach**2
-        rows, columns = np.nonzero(near)
-        return rows, columns
+
+def _may_touch(a: Float64, b: Float64) -> Bool:
+    """(K,) whether the circles around boxes a and b (K, 7) overlap."""
+    reach = np.hypot(a[:, 3], a[:, 4]) + np.hypot(b[:, 3], b[:, 4])
+    offset = a[:, :2] - b[:, :2]
+    touch: Bool = np.hypot(offset[:, 0], offset[:, 1]) < reach / 2
+    return touch

@@ -12,13 +12,14 @@ from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
 from modt.tracking.background_map import BackgroundMap
-from modt.tracking.fragments import Reunion
+from modt.tracking.fragments import NoReunion, Reunion
 from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.merging import CarMerging
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.splitting import ExpectedSplitting
+from modt.tracking.standstill import standstill_of
 from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
@@ -65,7 +66,9 @@ class Tracker:
         none = BackgroundMapConfig(capacity=0)  # the paper classifies every new proposal
         self.background_map = BackgroundMap(none if config.association == "paper" else config.background_map)
         self._period_s = period_s
-        self._reunion = Reunion(config.fragments, config.min_hits)
+        apart = config.fragments.min_coverage >= 1.0
+        self._reunion = NoReunion() if apart else Reunion(config.fragments, config.min_hits)
+        self._standstill = standstill_of(config.filter.stationary_sigma_mps)
         position, speed = config.filter.initial_position_sigma_m, config.filter.initial_speed_sigma_mps
         self._P_new = np.diag(np.square([position, position, np.pi, speed]))  # a heading of pi: unknown
         self._tracks = TrackTable.blank()
@@ -211,7 +214,7 @@ class Tracker:
         return about
 
     def _observe_rest(self, rows: Int) -> None:
-        """Zero-velocity update of tracks near their rest position; a track that stopped rests where it is."""
+        """Which tracks are near their rest position; a track that stopped rests where it is."""
         t, rest = self._tracks, self.config.filter
         x, position, hits = t.x.take(rows, axis=0), t.rest_position.take(rows, axis=0), t.hits[rows]
         stopped = ((x[:, SPEED] < rest.stopped_mps) & ~t.stationary[rows] & (hits > 3)).nonzero()[0]
@@ -220,9 +223,7 @@ class Tracker:
         near = np.hypot(step[:, 0], step[:, 1]) < rest.stationary_radius_m
         t.stationary[rows] = near & (hits > 2)
         t.rest_position[rows] = position + rest.rest_gain * near[:, None] * step
-        at_rest = rows[near]
-        x, P = components_first(x.compress(near, axis=0), t.P.take(at_rest, axis=0))
-        t.x[at_rest], t.P[at_rest] = tracks_first(*kalman.observe_speed(x, P, 0.0, rest.stationary_sigma_mps))
+        self._standstill.observe(t, rows[near])
 
     def _coast(self, matched: Int) -> None:
         """Tracks without a proposal go on as predicted."""

@@ -1,0 +1,162 @@
+"""Train and export the networks of the paper's experiments (extra [train]).
+
+    python -m tools.train.train_textbook MODELS_DIR CROPS.npz [--dear]
+
+Writes pointnet-paper-40 and pointnet-paper, the network of section V-A after 40 and after 100 epochs of one training;
+with --dear pointnet-dear, one that costs eight times as much, after 4. They are networks alone, without calibration,
+class frequency or box classifier. One drive in five is held out; the card has its scores. An epoch is as many crops
+as the scans show under the default segmentation, drawn by class among all.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from scipy.special import softmax
+
+from modt.classes import CLASS_NAMES
+from modt.evaluation.class_score import average_precision
+from tools.options import make_torch_deterministic, parser
+from tools.train.augment import augment, subsample
+from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools
+from tools.train.build_models import KITTI_LICENCE
+from tools.train.dataset import SHIPPED, Dataset, folds, load
+from tools.train.held_out import Validation
+from tools.train.network import PointNet, TransformedPointNet
+from tools.train.textbook_graph import textbook_graph
+from tools.train.train_pointnet import MAX_POINTS, POINTS, logits, tensors
+
+EPOCHS = {"pointnet-paper-40": 40, "pointnet-paper": 100}
+DEAR = {"pointnet-dear": 4}
+FOLDS, HELD_OUT = 5, 4
+RATE, DECAY, DECAY_EPOCHS = 1e-3, 0.7, 20
+"""Of the optimiser Adam, as PointNet's authors have it."""
+KINDS = {
+    PointNet: "PointNet of section V-A of the paper (400 x 3; 32, 64, 512 shared; maximum; 256, 128, 4)",
+    TransformedPointNet: "PointNet of full width with input transform (64, 64, 64, 128, 1024 shared; 256, 128, 4)",
+}
+
+
+def crops_of_epoch(data: Dataset) -> int:
+    """As many as the scans show."""
+    return int((data.trainable & (data.variant == SHIPPED)).sum())
+
+
+def trained(net: torch.nn.Module, data: Dataset, epochs: int, seed: int) -> Iterator[tuple[int, float]]:
+    """Trains a network; epochs done, and mean loss of the last one."""
+    rng, fold = np.random.default_rng(seed), folds(data, FOLDS)
+    pools = sampling_pools(data, np.flatnonzero(data.trainable & (fold[data.drive] != HELD_OUT)))
+    optimiser = torch.optim.Adam(net.parameters(), RATE)
+    schedule = torch.optim.lr_scheduler.StepLR(optimiser, DECAY_EPOCHS, DECAY)
+    steps = -(-crops_of_epoch(data) // BATCH_SIZE)
+    for epoch in range(1, epochs + 1):
+        total = 0.0
+        for _ in range(steps):
+            drawn = draw_batch(pools, rng)
+            few, sensors = augment(subsample(data.take(drawn), MAX_POINTS, rng), data.sensors.take(drawn), rng)
+            scores = net.train()(*tensors(subsample(few, POINTS, rng), sensors))
+            loss = torch.nn.functional.cross_entropy(scores, torch.from_numpy(data.label[drawn]))
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+            total += float(loss.detach())
+        schedule.step()
+        yield epoch, total / steps
+
+
+def exported(net: torch.nn.Module) -> onnx.ModelProto:
+    """In the textbook order."""
+    if isinstance(net, TransformedPointNet):
+        classifier, transform = net.classifier, net.transform
+        return textbook_graph(classifier.layers(), len(classifier.shared), transform.layers(), len(transform.shared))
+    assert isinstance(net, PointNet)
+    return textbook_graph(net.layers(), len(net.shared))
+
+
+def held_out_scores(net: torch.nn.Module, data: Dataset) -> dict[str, tuple[list[int], dict[str, float]]]:
+    """Objects and average precision by class, by sensor, of the drives that are held out."""
+    valid, fold = Validation.of(data), folds(data, FOLDS)
+    rows = np.flatnonzero(fold[data.drive[valid.rows]] == HELD_OUT)
+    probability = softmax(logits(net.eval(), data, valid.rows[rows]), axis=1)
+    scores = {}
+    for s in np.unique(valid.sensor[rows]).tolist():
+        mine, truth = valid.sensor[rows] == s, valid.truth
+        objects = truth.label[(truth.sensor == s) & (fold[truth.drive] == HELD_OUT)]
+        number = np.bincount(objects, minlength=len(CLASS_NAMES))
+        precision = average_precision(probability[mine], valid.label[rows][mine], number)
+        scores[valid.sensor_names[s]] = number[1:].tolist(), precision
+    return scores
+
+
+def card(name: str, model: bytes, net: torch.nn.Module, facts: dict[str, Any]) -> str:
+    """Model card in Markdown."""
+    rows = []
+    for sensor, (objects, precision) in facts["scores"].items():
+        ap = " / ".join(f"{100 * precision[c]:.0f}" for c in CLASS_NAMES[1:])
+        rows.append(f"| {sensor} | {' / '.join(map(str, objects))} | {ap} |")
+    return "\n".join(
+        [
+            f"# {name}",
+            "",
+            f"{KINDS[type(net)]}, in the textbook order, ONNX, weights in half precision.",
+            "For the paper's experiments (profile `paper`): the network alone, not calibrated, no box classifier.",
+            "",
+            f"- sha256: {hashlib.sha256(model).hexdigest()}",
+            f"- licence: {KITTI_LICENCE}",
+            f"- classes: {', '.join(CLASS_NAMES)}",
+            "- input and output: as pointnet-kitti",
+            f"- data: crops {', '.join(facts['sha256'])} (see the card of pointnet-kitti), one drive in {FOLDS} held "
+            "out; nothing of drive 0005",
+            f"- training: tools.train.train_textbook, seed {facts['seed']}, {facts['epochs']} epochs of "
+            f"{facts['crops']} crops drawn by class, loss {facts['loss']:.3f}, torch {torch.__version__}, "
+            f"{facts['cpu_s']} s on one core",
+            "",
+            "## Drives held out, by sensor",
+            "",
+            "| sensor | objects car / pedestrian / cyclist | AP [%] |",
+            "|---|---|---|",
+            *rows,
+            "",
+        ]
+    )
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("out", type=Path, help="folder of the models")
+    options.add_argument("data", type=Path, help="data set of crops (.npz)")
+    options.add_argument("--dear", action="store_true", help="the dearer network")
+    options.add_argument("--seed", type=int, default=1)
+    args = options.parse_args()
+    make_torch_deterministic()
+    torch.manual_seed(args.seed)
+    data, started = load(args.data), time.process_time()
+    net: torch.nn.Module = TransformedPointNet() if args.dear else PointNet()
+    names = {epoch: name for name, epoch in (DEAR if args.dear else EPOCHS).items()}
+    for epoch, loss in trained(net, data, max(names), args.seed):
+        print(epoch, round(loss, 4), round(time.process_time() - started), flush=True)
+        if epoch not in names:
+            continue
+        facts = {
+            "epochs": epoch,
+            "loss": loss,
+            "crops": crops_of_epoch(data),
+            "seed": args.seed,
+            "sha256": data.sha256,
+        }
+        facts |= {"cpu_s": round(time.process_time() - started), "scores": held_out_scores(net, data)}
+        model = exported(net.eval()).SerializeToString(deterministic=True)
+        (args.out / f"{names[epoch]}.onnx").write_bytes(model)
+        text = card(names[epoch], model, net, facts)
+        (args.out / f"{names[epoch]}.md").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
