@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from modt import profile
+    from modt import assembly, profile
     from modt.classification.pointnet import PointNet
     from modt.cli import assemble, metering
     from modt.cli.chosen_profile import choose
@@ -48,7 +48,6 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.energy.ledger import Ledger
     from modt.energy.window_fit_calibration import Workload
     from modt.geometry import FieldOfView
-    from modt.segmentation.segmenter import Segmenter
     from modt.sinks.output import writing
 
     request = assemble.Request.of(arguments)
@@ -60,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, padded_size(limits))
-    segmenter = Segmenter(loaded.segmentation, loaded.sensor, FieldOfView())
+    segmenter = assembly.segmenter(loaded, FieldOfView())
     windows = metering.windows(meters, pinned, WindowConfig(min_s=1e9))
     workload = Workload(scans, segmenter.segment, network.classify, ledger, windows)
     try:
