@@ -43,15 +43,15 @@ def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) ->
     Neighbours with a vertical gap below (C,) max_gap_m are connected. Components are numbered in the order of their
     first cells.
     """
-    rows = np.flatnonzero(use)
-    low, high, gap_m = cells.low.take(rows), cells.high.take(rows), max_gap_m.take(rows)
-    one, other = grid.neighbour_pairs(grid.flat_index(cells.row.take(rows), cells.column.take(rows)))
+    rows = slice(None) if use.all() else np.flatnonzero(use)
+    low, high, gap_m = cells.low[rows], cells.high[rows], max_gap_m[rows]
+    one, other = grid.neighbour_pairs(grid.flat_index(cells.row[rows], cells.column[rows]))
     gap = np.maximum(low.take(one), low.take(other))
     gap -= np.minimum(high.take(one), high.take(other))
     near = np.flatnonzero(gap < gap_m.take(one))
-    ends = np.zeros(len(rows) + 1, np.int32)
-    np.cumsum(np.bincount(one.take(near), minlength=len(rows)), out=ends[1:])
-    graph = csr_array((np.ones(len(near)), other.take(near), ends), shape=(len(rows), len(rows)))
+    ends = np.zeros(len(low) + 1, np.int32)
+    np.cumsum(np.bincount(one.take(near), minlength=len(low)), out=ends[1:])
+    graph = csr_array((np.ones(len(near)), other.take(near), ends), shape=(len(low), len(low)))
     component = np.full(len(cells), NONE)
     component[rows] = connected_components(graph, directed=False)[1]
     return component

@@ -96,18 +96,19 @@ class Clusters:
 
 def cluster_bounds(cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
     """Bounds of n clusters, given (C,) the cluster of each cell, NONE where it has none, and a point of each cell."""
-    rows, cell = np.flatnonzero(cluster != NONE), np.zeros(n, np.int64)
-    label = cluster.take(rows)
-    cell[label] = rows
-    x, y = points.x.take(rows), points.y.take(rows)
+    has = cluster != NONE
+    rows = slice(None) if has.all() else np.flatnonzero(has)
+    label, cell = cluster[rows], np.zeros(n, np.int64)
+    cell[label] = np.arange(len(cluster))[rows]
+    x, y = points.x[rows], points.y[rows]
     return ClusterBounds(
         min_x=label_min(x, label, n),
         max_x=label_max(x, label, n),
         min_y=label_min(y, label, n),
         max_y=label_max(y, label, n),
-        bottom=label_min(cells.low.take(rows), label, n),
-        top=label_max(cells.high.take(rows), label, n),
-        points=np.bincount(label, cells.entries.take(rows), n).astype(np.int64),
+        bottom=label_min(cells.low[rows], label, n),
+        top=label_max(cells.high[rows], label, n),
+        points=np.bincount(label, cells.entries[rows], n).astype(np.int64),
         cell=cell,
     )
 

@@ -28,10 +28,13 @@ def reflectance_sums(points: Float32, index: Int, offsets: Int) -> tuple[Float64
     """
     reflectance = points[index, 3]
     starts, measured = offsets[:-1], reflectance >= 0.0
-    own = np.where(measured, reflectance, np.float32(0.0))
-    rows = (measured, own, own * own, own > BRIGHT, measured & (own < DARK))
     greatest: Float32 = np.maximum.reduceat(np.where(measured, reflectance, np.float32(-np.inf)), starts)
-    return np.stack([np.add.reduceat(row, starts, dtype=np.float64) for row in rows]), greatest
+    own = np.where(measured, reflectance, np.float32(0.0))
+    number, bright, dark = (
+        np.add.reduceat(mask.astype(np.float32), starts) for mask in (measured, own > BRIGHT, measured & (own < DARK))
+    )
+    total, squares = (np.add.reduceat(v, starts, dtype=np.float64) for v in (own, own * own))
+    return np.stack([number, total, squares, bright, dark]), greatest
 
 
 def reflectance_statistics(sums: Float64, greatest: Float32) -> Float64:
