@@ -21,6 +21,7 @@ from modt.sinks.output import LineFile, writing
 from modt.sources.live.sweep_reader import Sweep
 from modt.types import Budget, Frame, FrameResult
 
+LATE_MS = 5.0
 HOG = """
 import time
 while True:
@@ -160,6 +161,13 @@ def _hangup(_world: World, on: bool) -> None:
         os.kill(os.getpid(), signal.SIGHUP)
 
 
+def _late_frames(session: LiveSession) -> int:
+    """Frames that began late, and steps of the ladder; a hog need not cost a deadline."""
+    lateness = session.loop.timing.lateness.beyond()
+    late = max((n for ms, n in zip(lateness["ms"], lateness["frames"], strict=True) if ms > LATE_MS), default=0)
+    return int(late) + session.loop.changes.total()
+
+
 FAULTS = (
     Fault("silence", 4.0, lambda s: s.source.silences, lambda sweep, rng: ()),
     Fault("not finite", 2.0, lambda s: s.source.faults.count, _nan),
@@ -173,6 +181,6 @@ FAULTS = (
     Fault(FULL_DISK, 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
     Fault("meter lost", 3.0, lambda s: s.power.unread, switch=_switch("meter_lost")),
     Fault("failing stage", 1.0, lambda s: s.loop.failures.counts.total(), switch=_switch("stage_broken")),
-    Fault("hog", 4.0, lambda s: s.loop.timing.missed + s.loop.changes.total(), switch=World.set_hogs),
+    Fault("hog", 4.0, _late_frames, switch=World.set_hogs),
     Fault("reload", 0.2, lambda s: s.loop.reloads, switch=_hangup),
 )
