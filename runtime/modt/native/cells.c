@@ -148,9 +148,10 @@ typedef struct {
     i64 *points, *cell;
 } Bounds;
 
-/* cluster_bounds: bounds of n clusters of cells, some of them of none, sums of their points, and
- * the last cell of each. */
-EXPORT void modt_cluster_bounds(const Cells *cells, const float *x, const float *y, const i64 *cluster, i64 n_cells, i64 n, Bounds *bounds)
+/* cluster_bounds: bounds of n clusters of cells, sums of their points, and the last cell of each; a cell may have no
+ * cluster. */
+EXPORT void modt_cluster_bounds(const Cells *cells, const float *x, const float *y, const i64 *cluster, i64 n_cells,
+                                i64 n, Bounds *bounds)
 {
     for (i64 g = 0; g < n; g++) {
         bounds->min_x[g] = bounds->min_y[g] = bounds->bottom[g] = INFINITY;

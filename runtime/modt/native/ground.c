@@ -19,7 +19,8 @@ enum { BLOCK = 512 }; /* points that stay in the first-level cache */
 
 /* PointColumns.from_array and PolarGrid.cell, of up to BLOCK points; those that are not finite, or as far as far_m,
  * are taken to the sensor. */
-static ALWAYS_INLINE void place_points(const Ground *g, const float *points, i64 n, i64 width, float *z, float *sqrt_range, i32 *cell)
+static ALWAYS_INLINE void place_points(const Ground *g, const float *points, i64 n, i64 width, float *z,
+                                       float *sqrt_range, i32 *cell)
 {
     float x[BLOCK], y[BLOCK];
     float last = (float)(g->rings - 1);

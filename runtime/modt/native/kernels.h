@@ -1,7 +1,7 @@
 /* Passes over points, cells and groups of segmentation.
  *
  * Each function does what the NumPy function named beside it does, to the byte: single precision throughout, no
- * contraction, sums in double precision. Arrays are contiguous and do not overlap, but where said; lengths and
+ * contraction; sums in double precision, which may differ in their last bit. Arrays are contiguous and do not overlap, but where said; lengths and
  * indices are proven by the caller, and asserted in a build with -DMODT_CHECKED.
  */
 #ifndef MODT_KERNELS_H

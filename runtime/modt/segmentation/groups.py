@@ -8,9 +8,8 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import NONE, Bool, Float32, Float64, Int
+from modt.types import NONE, Bool, Float32, Int
 
-Real = NDArray[np.floating[Any]]
 T = TypeVar("T", bound=np.generic)
 
 
@@ -59,11 +58,6 @@ class Groups:
         """(..., G) maximum of each group, given (..., K) in the order of rows."""
         most: NDArray[T] = np.maximum.reduceat(values, self.offsets[:-1], axis=-1)
         return most
-
-    def mean(self, values: Real) -> Float64:
-        """(G,) mean of each group, given (K,) in the order of rows."""
-        total: Float64 = np.add.reduceat(values, self.offsets[:-1], dtype=np.float64)
-        return total / self.count
 
 
 def consecutive(mask: Bool) -> Int:
