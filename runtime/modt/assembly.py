@@ -108,7 +108,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     fusion = profile.fusion
     if network.class_frequency is not None:
         fusion = replace(fusion, prior=network.class_frequency)
-    prior = make_prior(network.boxes, network.reflectance, fusion.prior, profile.sensor)
+    prior = make_prior(network.box_scores, fusion.prior)
     _check_budget(mode.budget(profile), cost)
     counting = CountingClassifier(network, ledger, size)
     return Pipeline(

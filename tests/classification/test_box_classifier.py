@@ -24,7 +24,7 @@ def test_features_of_crops_and_proposals_agree() -> None:
     frame = next(iter(SyntheticStream("street", "hdl-64e", 0.1, seed=4)))
     proposals = Segmenter(SegmentationConfig(), sensor, FieldOfView()).segment(frame.points)
     crops = gather(frame.points, proposals, np.arange(len(proposals)), 100_000)
-    expected = proposal_features(proposals, slice(None), sensor)
+    expected = proposal_features(proposals, sensor)
     assert len(crops) > 50
     off = np.abs(
         crop_features(crops, Sensors.of(sensor, proposals.box, ground_z_m(proposals, slice(None), sensor))) - expected

@@ -120,7 +120,7 @@ def test_the_network_alone(shipped: PointNet) -> None:
     bare = network(shipped.path)
     bare._pooled = lambda out, *_: out  # type: ignore[method-assign]
     np.testing.assert_allclose(alone.classify(points, proposals, rows), bare.classify(points, proposals, rows))
-    assert isinstance(alone.boxes, NoBoxClassifier)
+    assert isinstance(alone.box_scores.boxes, NoBoxClassifier)
     assert np.abs(alone.classify(points, proposals, rows) - shipped.classify(points, proposals, rows)).max() > 1e-3
 
 

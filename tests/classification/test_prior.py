@@ -17,6 +17,7 @@ from modt.classification.box_classifier import (
     from_metadata,
     to_metadata,
 )
+from modt.classification.box_scores import BoxScores
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import BoxPrior, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
@@ -28,6 +29,7 @@ RNG = np.random.default_rng(5)
 LAYERS = [(RNG.normal(size=(N_FEATURES, 5)), RNG.normal(size=5)), (RNG.normal(size=(5, 4)), RNG.normal(size=4))]
 BOXES = MlpBoxClassifier(LAYERS, 0.4)
 NO_REFLECTANCE = NoReflectanceClassifier()
+SCORES = BoxScores(BOXES, NO_REFLECTANCE, SensorConfig())
 SHIPPED = ("pointnet-kitti", "pointnet-synthetic")
 
 
@@ -41,18 +43,18 @@ def standing(points: int, distance_m: float, length_m: float, width_m: float, he
 
 def test_box_prior_excludes_proposals_below_the_threshold() -> None:
     probability = np.array([[0.995, 0.005, 0.0, 0.0], [0.97, 0.01, 0.01, 0.01], [0.1, 0.9, 0.0, 0.0]])
-    prior = BoxPrior(BOXES, NO_REFLECTANCE, SensorConfig())
+    prior = BoxPrior(SCORES)
     assert prior.may_be_object(probability, 0.02).tolist() == [False, True, True]
 
 
 def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
     _, proposals = blobs([10, 20], np.random.default_rng(0))
-    prior = make_prior(NoBoxClassifier(), NO_REFLECTANCE, (0.08, 0.02, 0.01), SensorConfig())
+    prior = make_prior(BoxScores(NoBoxClassifier(), NO_REFLECTANCE, SensorConfig()), (0.08, 0.02, 0.01))
     np.testing.assert_allclose(prior.probability(proposals), [[0.89, 0.08, 0.02, 0.01]] * 2)
     assert prior.may_be_object(prior.probability(proposals), 1.0).all()
     assert isinstance(prior, FrequencyPrior)
     boxes = from_metadata({METADATA_KEY: to_metadata(LAYERS, 0.4)})
-    by_box = make_prior(boxes, NO_REFLECTANCE, (0.1, 0.1, 0.1), SensorConfig())
+    by_box = make_prior(BoxScores(boxes, NO_REFLECTANCE, SensorConfig()), (0.1, 0.1, 0.1))
     assert isinstance(by_box, BoxPrior)
     assert (prior.pool_weight, by_box.pool_weight) == (0.0, 0.4)
 
@@ -65,7 +67,8 @@ def test_features_are_independent_of_the_resolution() -> None:
 
 
 def test_ground_of_the_proposals_overrides_the_profile() -> None:
-    low, high = (BoxPrior(BOXES, NO_REFLECTANCE, SensorConfig(height_m=height_m)) for height_m in (1.0, 2.0))
+    sensors = (SensorConfig(height_m=height_m) for height_m in (1.0, 2.0))
+    low, high = (BoxPrior(BoxScores(BOXES, NO_REFLECTANCE, sensor)) for sensor in sensors)
     unknown = standing(40, 20.0, 4.0, 1.6, 1.4)
     measured = dataclasses.replace(unknown, ground_z_m=np.array([-2.0]))
     assert (low.probability(measured) == high.probability(unknown)).all()
@@ -76,7 +79,7 @@ def test_ground_of_the_proposals_overrides_the_profile() -> None:
 def test_box_priors_of_the_shipped_models(name: str) -> None:
     sensor = SensorConfig()
     model = PointNet(ClassificationConfig(model=name), sensor)
-    prior = make_prior(model.boxes, model.reflectance, (0.08, 0.02, 0.02), sensor)
+    prior = make_prior(model.box_scores, (0.08, 0.02, 0.02))
     car = prior.probability(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
     person = prior.probability(standing(120, 12.0, 0.6, 0.5, 1.4))[0]
     wall = prior.probability(standing(600, 15.0, 12.0, 0.5, 2.3))[0]
@@ -87,7 +90,7 @@ def test_box_priors_of_the_shipped_models(name: str) -> None:
 
 
 def test_no_proposals_give_no_priors() -> None:
-    assert BoxPrior(BOXES, NO_REFLECTANCE, SensorConfig()).probability(Proposals.empty()).shape == (0, 4)
+    assert BoxPrior(SCORES).probability(Proposals.empty()).shape == (0, 4)
     assert FrequencyPrior((0.1, 0.1, 0.1)).probability(Proposals.empty()).shape == (0, 4)
 
 

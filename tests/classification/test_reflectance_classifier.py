@@ -13,6 +13,7 @@ import pytest
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, proposal_features
+from modt.classification.box_scores import BoxScores
 from modt.classification.mlp import logits
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import BoxPrior, make_prior
@@ -34,7 +35,7 @@ BOXES = MlpBoxClassifier(BOX_LAYERS, 0.0)
 LAYERS = [(RNG.normal(size=(N_FEATURES + N_REFLECTANCE, 4)), RNG.normal(size=4))]
 REFLECTANCE = RNG.uniform(0, 1, (3, N_REFLECTANCE))
 SENSOR = SensorConfig(reflectance="hdl-64e")
-WITHOUT = BoxPrior(BOXES, NoReflectanceClassifier(), SENSOR)
+WITHOUT = BoxPrior(BoxScores(BOXES, NoReflectanceClassifier(), SENSOR))
 """The prior without reflectance."""
 METADATA = {METADATA_KEY: to_metadata(LAYERS, 0.0, 0.5, "hdl-64e")}
 
@@ -47,11 +48,11 @@ def measured() -> Proposals:
 
 def test_prior_is_box_probability_times_reflectance_likelihood() -> None:
     proposals = measured()
-    boxes = proposal_features(proposals, slice(None), SENSOR)
+    boxes = proposal_features(proposals, SENSOR)
     score = logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE])
     expected = np.exp(score) / np.exp(score).sum(axis=1, keepdims=True)
     reflectance = from_metadata(METADATA, SENSOR)
-    prior = make_prior(BOXES, reflectance, (0.1, 0.1, 0.1), SENSOR)
+    prior = make_prior(BoxScores(BOXES, reflectance, SENSOR), (0.1, 0.1, 0.1))
     np.testing.assert_allclose(prior.probability(proposals), expected)
 
 
@@ -68,7 +69,7 @@ def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.
     bare = dataclasses.replace(measured(), reflectance=None)
     with caplog.at_level(logging.WARNING):
         for _ in range(3):
-            probability = BoxPrior(BOXES, reflectance, SENSOR).probability(bare)
+            probability = BoxPrior(BoxScores(BOXES, reflectance, SENSOR)).probability(bare)
             np.testing.assert_array_equal(probability, WITHOUT.probability(bare))
     assert len(caplog.records) == 1
     assert "sensor.reflectance" in caplog.text
@@ -76,7 +77,7 @@ def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.
 
 def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
     reflectance = from_metadata(METADATA, SENSOR)
-    prior, whole = BoxPrior(BOXES, reflectance, SENSOR), measured()
+    prior, whole = BoxPrior(BoxScores(BOXES, reflectance, SENSOR)), measured()
     statistics = REFLECTANCE.copy()
     statistics[1] = np.nan
     probability = prior.probability(dataclasses.replace(whole, reflectance=statistics))
@@ -86,7 +87,7 @@ def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
 
 def test_no_warning_for_an_empty_frame(caplog: pytest.LogCaptureFixture) -> None:
     reflectance = from_metadata(METADATA, SENSOR)
-    assert BoxPrior(BOXES, reflectance, SENSOR).probability(Proposals.empty()).shape == (0, 4)
+    assert BoxPrior(BoxScores(BOXES, reflectance, SENSOR)).probability(Proposals.empty()).shape == (0, 4)
     assert not caplog.records
 
 
@@ -121,7 +122,7 @@ def test_network_and_weighted_reflectance_likelihood_are_multiplied(tmp_path: Pa
     shape_only = PointNet(_with_metadata(tmp_path / "shape_only.onnx", {}), SENSOR)
     with_reflectance = PointNet(_with_metadata(tmp_path / "with_reflectance.onnx", METADATA), SENSOR)
     shape, both = (network.classify(points, proposals, which) for network in (shape_only, with_reflectance))
-    added = logits(LAYERS, np.c_[proposal_features(proposals, which, SENSOR), REFLECTANCE[which]])
+    added = logits(LAYERS, np.c_[proposal_features(proposals, SENSOR)[which], REFLECTANCE[which]])
     expected = shape * np.exp(0.5 * added)
     np.testing.assert_allclose(both, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
     bare = dataclasses.replace(proposals, reflectance=None)
@@ -137,7 +138,7 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     }
     alone = PointNet(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
     model = _with_metadata(tmp_path / "pooled.onnx", metadata)
-    shape, feature = alone.classify(points, proposals, which), proposal_features(proposals, which, SENSOR)
+    shape, feature = alone.classify(points, proposals, which), proposal_features(proposals, SENSOR)[which]
     box, likelihood = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
     for sensor, expected in (
         (SENSOR, shape**0.7 * box**0.3 * likelihood**0.5),
@@ -146,7 +147,7 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
         network = PointNet(model, sensor)
         probability = network.classify(points, proposals, which)
         np.testing.assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
-        prior = make_prior(network.boxes, network.reflectance, (0.1, 0.1, 0.1), sensor)
+        prior = make_prior(network.box_scores, (0.1, 0.1, 0.1))
         assert prior.pool_weight == (0.3 if sensor is SENSOR else 0.2)
 
 
@@ -158,13 +159,13 @@ def test_model_with_malformed_metadata_is_misuse(tmp_path: Path, key: str) -> No
 
 def test_shipped_model_separates_number_plates_from_leaves() -> None:
     model = PointNet(ClassificationConfig(), SENSOR)
-    reflectance = model.reflectance
+    reflectance = model.box_scores.reflectance
     assert isinstance(reflectance, MlpReflectanceClassifier)
     _, proposals = blobs([150], np.random.default_rng(0))
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
     proposals = dataclasses.replace(proposals, box=box)
     plates, leaves = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]]), np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
-    prior = make_prior(model.boxes, reflectance, (0.08, 0.02, 0.02), SENSOR)
+    prior = make_prior(model.box_scores, (0.08, 0.02, 0.02))
     car, bush = (
         prior.probability(dataclasses.replace(proposals, reflectance=statistics))[0]
         for statistics in (plates, leaves)

@@ -168,7 +168,7 @@ def real(path: Path, config: ProfileConfig, network: PointNet, *, ideal: bool, c
 
 
 def _prior(config: ProfileConfig, network: PointNet) -> Prior:
-    return make_prior(network.boxes, network.reflectance, config.fusion.prior, config.sensor)
+    return make_prior(network.box_scores, config.fusion.prior)
 
 
 def trial(setting: Setting, drives: Sequence[Recording], checks: Sequence[Recording]) -> Trial:

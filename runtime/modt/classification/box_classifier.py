@@ -84,11 +84,10 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
     )
 
 
-def proposal_features(proposals: Proposals, which: Int | slice, sensor: SensorConfig) -> Float64:
-    """(R, 7) box features of the given proposals."""
-    box = proposals.box[which]
-    beam_sr = beam_solid_angle_sr(sensor, box)
-    return box_features(proposals.count[which], box, ground_z_m(proposals, which, sensor), beam_sr)
+def proposal_features(proposals: Proposals, sensor: SensorConfig) -> Float64:
+    """(P, 7) box features of the proposals."""
+    beam_sr = beam_solid_angle_sr(sensor, proposals.box)
+    return box_features(proposals.count, proposals.box, ground_z_m(proposals, slice(None), sensor), beam_sr)
 
 
 def to_metadata(layers: Layers, pool_weight: float) -> str:

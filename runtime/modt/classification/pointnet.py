@@ -17,9 +17,9 @@ from scipy.special import softmax
 from modt import assets
 from modt.classes import N_CLASSES
 from modt.classification import box_classifier, reflectance_classifier
+from modt.classification.box_scores import BoxScores
 from modt.classification.crops import canonical, gather, ground_z_m
 from modt.classification.model_file import REMEDY, read_model
-from modt.classification.prior import box_pool_weight
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Int, Proposals
@@ -54,8 +54,7 @@ class PointNet:
     Attributes:
         path: model file.
         sha256: its hash, equal to that in its card (the file beside it that ends in .md).
-        boxes: box classifier of the model.
-        reflectance: reflectance classifier of the model for this sensor.
+        box_scores: of its box classifier, and of its reflectance classifier for this sensor.
         class_frequency: of the objects' classes among proposals, which the posteriors assume; None where not stated.
 
     Raises:
@@ -73,8 +72,8 @@ class PointNet:
         metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
         pooled = metadata if config.likelihood == "pooled" else {}
         try:
-            self.boxes = box_classifier.from_metadata(pooled)
-            self.reflectance = reflectance_classifier.from_metadata(pooled, sensor)
+            boxes = box_classifier.from_metadata(pooled)
+            self.box_scores = BoxScores(boxes, reflectance_classifier.from_metadata(pooled, sensor), sensor)
             self.class_frequency = _class_frequency(metadata)
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
@@ -100,14 +99,12 @@ class PointNet:
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) P(class | points)^(1 - w) P(class | box)^w P(reflectance | class, box)^v, normalised."""
-        box_weight, weight = box_pool_weight(self.boxes, self.reflectance), self.reflectance.weight
+        box_weight, weight = self.box_scores.pool_weight, self.box_scores.reflectance_weight
         if not box_weight and not weight:
             return network
-        features = box_classifier.proposal_features(proposals, which, self._sensor)
-        returns = None if proposals.reflectance is None else proposals.reflectance[which]
+        boxes, reflectance = self.box_scores.of(proposals).take(which, axis=1)
         score = (1.0 - box_weight) * np.log(np.maximum(network, _MIN_PROBABILITY))
-        score += box_weight * self.boxes.log_probability(features)
-        score += weight * self.reflectance.log_likelihood(features, returns)
+        score += box_weight * boxes + weight * reflectance
         probability: Float64 = softmax(score, axis=1)
         return probability
 

@@ -9,9 +9,8 @@ import numpy as np
 from scipy.special import softmax
 
 from modt.classes import ObjectClass
-from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, proposal_features
-from modt.classification.reflectance_classifier import ReflectanceClassifier
-from modt.config import SensorConfig
+from modt.classification.box_classifier import NoBoxClassifier
+from modt.classification.box_scores import BoxScores
 from modt.types import Bool, Float64, Proposals
 
 
@@ -53,16 +52,13 @@ class FrequencyPrior:
 class BoxPrior:
     """P(class | box, reflectance)."""
 
-    def __init__(self, boxes: BoxClassifier, reflectance: ReflectanceClassifier, sensor: SensorConfig) -> None:
-        self.pool_weight = box_pool_weight(boxes, reflectance)
-        self._boxes, self._reflectance, self._sensor = boxes, reflectance, sensor
+    def __init__(self, scores: BoxScores) -> None:
+        self.pool_weight = scores.pool_weight
+        self._scores = scores
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) of each proposal of a frame."""
-        features = proposal_features(proposals, slice(None), self._sensor)
-        score = self._boxes.log_probability(features)
-        score += self._reflectance.log_likelihood(features, proposals.reflectance)
-        probability: Float64 = softmax(score, axis=1)
+        probability: Float64 = softmax(self._scores.of(proposals).sum(axis=0), axis=1)
         return probability
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
@@ -81,13 +77,6 @@ def object_probability_reaches(probability: Float64, threshold: float) -> Bool:
     return reaches
 
 
-def box_pool_weight(boxes: BoxClassifier, reflectance: ReflectanceClassifier) -> float:
-    """Exponent of P(class | box) in the classifier's log-linear pool."""
-    return boxes.pool_weight if reflectance.pool_weight is None else reflectance.pool_weight
-
-
-def make_prior(
-    boxes: BoxClassifier, reflectance: ReflectanceClassifier, frequency: Sequence[float], sensor: SensorConfig
-) -> Prior:
+def make_prior(scores: BoxScores, frequency: Sequence[float]) -> Prior:
     """BoxPrior; FrequencyPrior where the model has no box classifier."""
-    return FrequencyPrior(frequency) if isinstance(boxes, NoBoxClassifier) else BoxPrior(boxes, reflectance, sensor)
+    return FrequencyPrior(frequency) if isinstance(scores.boxes, NoBoxClassifier) else BoxPrior(scores)
