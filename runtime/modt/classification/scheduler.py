@@ -12,7 +12,8 @@ from modt.classes import N_CLASSES
 from modt.config import CallWorthConfig, CostModelConfig
 from modt.types import NONE, Bool, Budget, Float64, Int, Proposals, Tracks
 
-_UNITS = np.array([1.0, 1.0, 100.0])  # a frame, a call, a hundred points, which conditions the fit
+_POINTS = 100.0  # the unit of points, which conditions the fit
+_DIAGONAL = np.eye(3)
 _LEAST_MS = 1e-3  # what takes less was not measured
 _WARM_UP_WEIGHT = 0.2  # of a measurement before the first frame, over that of a frame's
 _UNDERESTIMATES = 0.005  # share accepted: half of the hundredth in which a frame may exceed its budget
@@ -49,21 +50,22 @@ class LinearCost:
 
     def added_ms(self, points: Int) -> Float64:
         """(R,) what each proposal of (R,) points adds to that at least, without padding [ms]."""
-        _, call_ms, point_ms = self._terms_ms() / _UNITS
-        added: Float64 = call_ms + point_ms * np.minimum(points, self._max_points)
+        _, call_ms, points_ms = self._terms_ms()
+        added: Float64 = call_ms + points_ms / _POINTS * np.minimum(points, self._max_points)
         return added
 
     def warmed_up(self, points: Int, cpu_ms: float) -> None:
         """Add the CPU time that classifying proposals of (R,) points together took before the first frame."""
         if cpu_ms >= _LEAST_MS:
-            self._learn(points, cpu_ms, _WARM_UP_WEIGHT)
+            self._learn(self._terms(points), cpu_ms, _WARM_UP_WEIGHT)
 
     def update(self, points: Int, cpu_ms: float) -> None:
         """Add the measured CPU time of classifying proposals of (R,) points together."""
         if len(points) and _LEAST_MS <= cpu_ms < math.inf:
-            self._adapt(cpu_ms > self.cost_ms(points))
+            terms = self._terms(points)
+            self._adapt(cpu_ms > terms @ self._terms_ms())
             self._equations *= self._config.forgetting ** (1 + self._starved)
-            self._learn(points, cpu_ms, 1.0)
+            self._learn(terms, cpu_ms, 1.0)
             self._starved = 0
 
     def starve(self) -> None:
@@ -75,21 +77,21 @@ class LinearCost:
         step = self._config.margin_step * (underestimated - _UNDERESTIMATES)
         self._margin = max(1.0, self._margin * math.exp(step))
 
-    def _learn(self, points: Int, cpu_ms: float, weight: float) -> None:
+    def _learn(self, terms: Float64, cpu_ms: float, weight: float) -> None:
         """Add to the normal equations of terms_ms @ x = 1."""
-        x = self._terms(points) / cpu_ms
-        self._equations += weight * np.outer(x, np.append(x, 1.0))
+        row = np.ones(4)
+        row[:3] = terms / cpu_ms
+        self._equations += weight * row[:3, None] * row
         self._fitted_ms = None
 
     def _terms(self, points: Int) -> Float64:
-        terms: Float64 = np.array([1.0, len(points), self._size(points)]) / _UNITS
-        return terms
+        return np.array([1.0, len(points), self._size(points) / _POINTS])
 
     def _terms_ms(self) -> Float64:
         """(3,) upper estimate of each term's CPU time [ms]."""
         if self._fitted_ms is None:
             normal, right = self._equations[:, :3], self._equations[:, 3]
-            little = np.eye(3) * (1e-9 + 1e-6 * np.trace(normal))
+            little = _DIAGONAL * (1e-9 + 1e-6 * normal.trace())
             self._fitted_ms = np.maximum(np.linalg.solve(normal + little, right), 0.0)
         return self._margin * self._fitted_ms
 
