@@ -100,6 +100,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
         MisuseError: the model cannot be used.
     """
     host.keep_freed_pages()
+    kernels = kernel_choice.choose(profile.segmentation.kernels)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
     size = padded_size(limits)
@@ -113,8 +114,8 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     counting = CountingClassifier(network, ledger, size)
     return Pipeline(
         segmenter=segmenter(profile, fov),
-        odometry=Odometry(profile.odometry),
-        tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s),
+        odometry=Odometry(profile.odometry, kernels),
+        tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
         fusion=mode.fusion(fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost),
         classifier=TimedClassifier(counting, cost, time.thread_time_ns),

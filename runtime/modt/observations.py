@@ -8,6 +8,7 @@ import numpy as np
 
 from modt.geometry import transform, transform_boxes
 from modt.geometry.kdop import DIRECTIONS, centres, kdops
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.placement import Placement
 from modt.types import Bool, Float64, Int, Proposals
 
@@ -82,13 +83,13 @@ class Observations:
         self.range_m[rows], self.partial[rows] = few.range_m, few.partial
 
 
-def observe(proposals: Proposals, T_world_sensor: Float64) -> Observations:
+def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Observations:
     """Proposals of a frame taken to the world by T_world_sensor (4, 4)."""
     box = transform_boxes(T_world_sensor, proposals.box)
     return Observations(
         box=box,
         centroid=transform(T_world_sensor, proposals.centroid)[:, :2],
-        kdop=kdops(proposals, T_world_sensor),
+        kdop=kdops(proposals, T_world_sensor, kernels.kdop_ends),
         bottom=box[:, 2] - box[:, 5] / 2,
         top=box[:, 2] + box[:, 5] / 2,
         count=proposals.count,

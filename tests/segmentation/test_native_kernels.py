@@ -181,6 +181,27 @@ def test_groups(kernels, seed, sizes, extra):
     assert same(*(k.reflectance_sums(points, groups.rows, groups.offsets) for k in (NUMPY, kernels)))
 
 
+@given(seed=st.integers(0, 10_000), sizes=st.lists(st.integers(1, 60), min_size=1, max_size=8))
+@settings(max_examples=60, deadline=None)
+def test_ends_of_kdops(kernels, seed, sizes):
+    rng = np.random.default_rng(seed)
+    offsets = np.cumsum([0, *sizes])
+    xyz, axes = rng.normal(0, 30, (3, offsets[-1])).astype(np.float32), rng.normal(0, 1, (3, 4)).astype(np.float32)
+    assert same(*(k.kdop_ends(xyz, offsets, axes) for k in (NUMPY, kernels)))
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 40), k=st.integers(0, 40), spread=st.integers(0, 60))
+@settings(max_examples=100, deadline=None)
+def test_reaching_pairs(kernels, seed, n, k, spread):
+    rng = np.random.default_rng(seed)
+    ends, opposite = (rng.integers(-spread, spread + 1, (4, m)).astype(np.int16) for m in (n, k))
+    for kind in (np.int16, np.float64):
+        one, other = (each.reaching_pairs(ends.astype(kind), opposite.astype(kind)) for each in (NUMPY, kernels))
+        assert same(one, other)
+    if spread == 0:
+        assert len(one[0]) == n * k, "all reach one another: more pairs than there was room for at first"
+
+
 def test_another_kind_of_array_is_refused(kernels):
     with pytest.raises(TypeError, match="contiguous array of float32"):
         kernels.group_sums(np.zeros((1, 4)), np.array([0, 4]))

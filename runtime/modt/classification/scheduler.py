@@ -63,7 +63,7 @@ class LinearCost:
         """Add the measured CPU time of classifying proposals of (R,) points together."""
         if len(points) and _LEAST_MS <= cpu_ms < math.inf:
             terms = self._terms(points)
-            self._adapt(cpu_ms > terms @ self._terms_ms())
+            self._adapt(cpu_ms > float(terms @ self._terms_ms()))
             self._equations *= self._config.forgetting ** (1 + self._starved)
             self._learn(terms, cpu_ms, 1.0)
             self._starved = 0

@@ -7,9 +7,14 @@ Many are an (8, n) array, a contiguous row a direction.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from modt.types import Bool, Float64, Int, Int16, Proposals
+from modt.types import Bool, Float32, Float64, Int, Int16, Proposals
+
+Ends = Callable[[Float32, Int, Float32], Float32]
+Reaching = Callable[[Int16 | Float64, Int16 | Float64], tuple[Int, Int]]
 
 _BEARINGS_RAD = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 AXES = np.stack([np.cos(_BEARINGS_RAD), np.sin(_BEARINGS_RAD)])
@@ -24,14 +29,29 @@ _FEW_PAIRS = 4_000
 """Up to so many pairs, exact comparison costs less than cells."""
 
 
-def kdops(proposals: Proposals, T_world_sensor: Float64) -> Float64:
-    """(8, P) k-DOPs of the proposals in the world [m]."""
+def kdop_ends(xyz: Float32, offsets: Int, axes: Float32) -> Float32:
+    """(8, G) greatest coordinates of groups of points along axes, then against them.
+
+    Args:
+        xyz: (3, K) points sorted by group [m].
+        offsets: (G + 1,) group i owns the columns from offsets[i] to offsets[i + 1]; none is empty.
+        axes: (3, 4) unit vectors.
+    """
+    along = axes[0][:, None] * xyz[0]
+    along += axes[1][:, None] * xyz[1]
+    along += axes[2][:, None] * xyz[2]
+    ahead, behind = (f.reduceat(along, offsets[:-1], axis=1) for f in (np.maximum, np.minimum))
+    return np.concatenate([ahead, -behind])
+
+
+def kdops(proposals: Proposals, T_world_sensor: Float64, ends: Ends = kdop_ends) -> Float64:
+    """(8, P) k-DOPs of the proposals in the world [m]; `ends` is `kdop_ends`, or what does the same."""
     if not len(proposals):
         return np.zeros((8, 0))
-    along = (AXES.T @ T_world_sensor[:2, :3]).astype(np.float32) @ proposals.coordinates
-    starts = proposals.offsets[:-1]
-    ahead, behind = np.maximum.reduceat(along, starts, axis=1), np.minimum.reduceat(along, starts, axis=1)
-    reach: Float64 = np.concatenate([ahead, -behind]) + (T_world_sensor[:2, 3] @ DIRECTIONS)[:, None]
+    axes = np.ascontiguousarray(T_world_sensor[:2, :3].T @ AXES, np.float32)
+    reach: Float64 = (
+        ends(proposals.coordinates, proposals.offsets, axes) + (T_world_sensor[:2, 3] @ DIRECTIONS)[:, None]
+    )
     return reach
 
 
@@ -61,30 +81,29 @@ def coverage(kdop: Float64, other: Float64) -> Float64:
     return least
 
 
-def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
+def reaching_pairs(ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
+    """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
+    near: Bool = ends[0][:, None] >= opposite[2]
+    for side in (1, 2, 3):
+        near &= ends[side][:, None] >= opposite[side - 2]
+    pair = near.ravel().nonzero()[0]
+    one = pair // near.shape[1]
+    return one, pair - one * near.shape[1]
+
+
+def overlapping_pairs(a: Float64, b: Float64, reaching: Reaching = reaching_pairs) -> tuple[Int, Int]:
     """Pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
 
     Of many, pairs less than a cell of 2 cm apart may count as overlapping, and so may all that lie more than 655 m
     from the first of b, on the same side. k-DOPs b are finite; an infinitely small one of a overlaps nothing.
+    `reaching` is `reaching_pairs`, or what does the same.
     """
-    n, k = a.shape[1], b.shape[1]
-    if n * k <= _FEW_PAIRS:
-        pair = _compare(a[::2], -b[::2])
-    else:
-        origin = (b[:4:2, 0] @ DIRECTIONS[:, ::2])[:, None]
-        pair = _compare(_cells(a[::2] - origin), _cells(-b[::2] + origin))
-    i = pair // k
-    return i, pair - i * k
+    if a.shape[1] * b.shape[1] <= _FEW_PAIRS:
+        return reaching(a[::2], -b[::2])
+    origin = (b[:4:2, 0] @ DIRECTIONS[:, ::2])[:, None]
+    return reaching(_cells(a[::2] - origin), _cells(-b[::2] + origin))
 
 
 def _cells(coordinate: Float64) -> Int16:
     """Coordinates about the same origin [m], in cells."""
     return np.minimum(np.maximum(coordinate / _CELL_M, -_FARTHEST), _FARTHEST).astype(np.int16)
-
-
-def _compare(ends: Int16 | Float64, opposite: Int16 | Float64) -> Int:
-    """Pairs i * k + j, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
-    near: Bool = ends[0][:, None] >= opposite[2]
-    for side in (1, 2, 3):
-        near &= ends[side][:, None] >= opposite[side - 2]
-    return near.ravel().nonzero()[0]

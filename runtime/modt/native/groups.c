@@ -1,4 +1,4 @@
-/* Points and cells by cluster: grouping, sums, headings and boxes. A group i has the rows from offsets[i] to
+/* Points and cells by cluster: grouping, sums and headings. A group i has the rows from offsets[i] to
  * offsets[i + 1]; none is empty. */
 #include "kernels.h"
 
@@ -110,27 +110,6 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
         for (i32 a = 1; a < headings; a++)
             if (closeness[a] > closeness[best[g]])
                 best[g] = a;
-    }
-}
-
-/* bounds_along: bounds of each group along its axes, three low and three high rows of n. */
-EXPORT void modt_bounds_along(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
-                            const float *cosine, const float *sine, float *low, float *high)
-{
-    for (i64 g = 0; g < n; g++) {
-        float c = cosine[g], s = sine[g];
-        float min_u = INFINITY, min_v = min_u, min_z = min_u, max_u = -min_u, max_v = -min_u, max_z = -min_u;
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
-            float u = x[i] * c + y[i] * s, v = y[i] * c - x[i] * s;
-            min_u = least(u, min_u);
-            max_u = most(u, max_u);
-            min_v = least(v, min_v);
-            max_v = most(v, max_v);
-            min_z = least(z[i], min_z);
-            max_z = most(z[i], max_z);
-        }
-        low[g] = min_u, low[n + g] = min_v, low[2 * n + g] = min_z;
-        high[g] = max_u, high[n + g] = max_v, high[2 * n + g] = max_z;
     }
 }
 

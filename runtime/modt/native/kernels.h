@@ -1,4 +1,4 @@
-/* Passes over points, cells and groups of segmentation.
+/* Passes over points, cells and groups, and over pairs of k-DOPs.
  *
  * Each function does what the NumPy function named beside it does, to the byte: single precision throughout, no
  * contraction; sums in double precision, which may differ in their last bit. Arrays are contiguous and do not overlap, but where said; lengths and
@@ -21,6 +21,7 @@
 #define NONE (-1)
 #define INFINITY __builtin_inff()
 
+typedef int16_t i16;
 typedef int32_t i32;
 typedef int64_t i64;
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from modt.config import OdometryConfig
 from modt.geometry import inverse, se3
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks, observe
 from modt.odometry.deskew import SweepSkew, skews_alike
 from modt.odometry.landmarks import LandmarkMap
@@ -24,10 +25,12 @@ class Odometry:
 
     Args:
         config: of the registration and its landmarks.
+        kernels: passes over points and pairs.
     """
 
-    def __init__(self, config: OdometryConfig) -> None:
-        self._registration = Registration(config.registration)
+    def __init__(self, config: OdometryConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self._kernels = kernels
+        self._registration = Registration(config.registration, kernels)
         self._landmarks = LandmarkMap(config.landmarks)
         self._stamp_s: float | None = None
         self._before = self._last = Placement(np.eye(4))
@@ -64,7 +67,7 @@ class Odometry:
             return Placement(T_world_sensor, PlanarMotion.between(before, T_world_sensor, dt_s), frame.turn_s)
 
         def observed(placement: Placement) -> Observations:
-            observations = observe(proposals, placement.T_world_sensor)
+            observations = observe(proposals, placement.T_world_sensor, self._kernels)
             if skew is None or first:
                 return observations
             return observations.moved(skew.step(placement.motion, placement.T_world_sensor))

@@ -13,6 +13,7 @@ from modt.config import RegistrationConfig
 from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS, centres, overlapping_pairs
 from modt.geometry.kdop_displacement import shape_similarity, shift_between
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.odometry.landmarks import Landmarks
 from modt.types import Float64, Int
@@ -49,10 +50,11 @@ class Registration:
 
     Args:
         config: reach, scales of the errors and thresholds of support.
+        kernels: passes over pairs.
     """
 
-    def __init__(self, config: RegistrationConfig) -> None:
-        self.config = config
+    def __init__(self, config: RegistrationConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self.config, self._kernels = config, kernels
         self._initialised = self._motion_known = False
         self._inliers = 0
 
@@ -120,7 +122,7 @@ class Registration:
         """Motion fitted to pairs within reach of a first one, matched anew in each round."""
         config = self.config
         near = observations.kdop + np.tensordot(motion, jacobian, 1)
-        i, j = _pairs(landmarks.kdop, near, reach_m)
+        i, j = self._pairs(landmarks.kdop, near, reach_m)
         if len(i) < _MIN_LANDMARKS:
             return None
         if not self._initialised:
@@ -145,11 +147,10 @@ class Registration:
         inliers = int((np.hypot(shift[:, 0], shift[:, 1]) < config.inlier_m).sum())
         return Fit(motion, inliers, len(best))
 
-
-def _pairs(a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
-    """Indices of k-DOPs a and b whose centres are within reach of one another, along x and along y."""
-    middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (centres(a), centres(b)))
-    return overlapping_pairs(middle_a + reach, middle_b)
+    def _pairs(self, a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
+        """Indices of k-DOPs a and b whose centres are within reach of one another, along x and along y."""
+        middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (centres(a), centres(b)))
+        return overlapping_pairs(middle_a + reach, middle_b, self._kernels.reaching_pairs)
 
 
 def _jacobian(observations: Observations) -> Float64:

@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.geometry.boxes import bounds_along
+from modt.geometry.kernels import GeometryKernels, NumpyGeometryKernels
 from modt.segmentation.box_fitting import best_headings
 from modt.segmentation.cells import Cells, connect, occupied_cells
 from modt.segmentation.clusters import ClusterBounds, Clusters, Members, cluster_bounds, members_of
@@ -18,8 +18,8 @@ from modt.segmentation.reflectance_statistics import reflectance_sums
 from modt.types import Bool, Float32, Float64, Int
 
 
-class Kernels(Protocol):
-    """The passes; every implementation gives the same bytes for the same input.
+class Kernels(GeometryKernels, Protocol):
+    """The passes, with those of geometry; every implementation gives the same bytes for the same input.
 
     Sums alone may differ in their last bit, since NumPy adds in another order: in double precision the sum of single
     precision numbers is exact in any order, unless one of them is 2^29 times smaller than another.
@@ -63,14 +63,11 @@ class Kernels(Protocol):
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
 
-    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
-        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
-
     def reflectance_sums(self, points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
         """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
 
 
-class NumpyKernels:
+class NumpyKernels(NumpyGeometryKernels):
     """The passes in NumPy: the reference."""
 
     name = "numpy"
@@ -80,7 +77,6 @@ class NumpyKernels:
     group = staticmethod(Groups.from_labels)
     members_of = staticmethod(members_of)
     best_headings = staticmethod(best_headings)
-    bounds_along = staticmethod(bounds_along)
     reflectance_sums = staticmethod(reflectance_sums)
 
     def above_ground(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
 
+from modt.geometry.native_kernels import NativeGeometryKernels
+from modt.native.arrays import Signatures, address, at, declare, pointers
 from modt.segmentation.box_fitting import AXES, HEADINGS
 from modt.segmentation.cells import Cells
 from modt.segmentation.clusters import ClusterBounds, Clusters, Members
@@ -20,7 +20,7 @@ from modt.segmentation.reflectance_statistics import BRIGHT, DARK
 from modt.types import NONE, Bool, Float32, Float64, Int
 
 _F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
-_SIGNATURES: dict[str, tuple[Any, Sequence[Any]]] = {
+_SIGNATURES: Signatures = {
     "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
     "modt_row_column": (None, (_P, _P, _P, _L, _F, _I, _P, _P)),
     "modt_occupied_cells": (_L, (_P, _P, _P, _P, _L, _I, _P, _P, _P, _P)),
@@ -30,35 +30,8 @@ _SIGNATURES: dict[str, tuple[Any, Sequence[Any]]] = {
     "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
     "modt_group_sums": (None, (_P, _P, _L, _P)),
     "modt_best_headings": (None, (_P, _P, _P, _P, _L, _L, _P, _P, _I, _F, _P)),
-    "modt_bounds_along": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
     "modt_reflectance_sums": (None, (_P, _L, _P, _P, _L, _F, _F, _P, _P)),
 }
-"""Result and arguments of every function."""
-
-
-def _at(array: NDArray[Any], kind: DTypeLike = np.float32) -> int:
-    """Address of a contiguous array of this kind."""
-    if array.dtype != kind or not array.flags.c_contiguous:
-        raise TypeError(f"a contiguous array of {np.dtype(kind)} is needed, not of {array.dtype}")
-    return _address(array)
-
-
-def _address(array: NDArray[Any]) -> int:
-    """Address of a contiguous array; `from_buffer` is twenty times faster than what NumPy offers for it."""
-    try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))
-    except (TypeError, ValueError):  # read-only, or empty
-        address: int = array.__array_interface__["data"][0]
-        return address
-
-
-def _pointers(*arrays: NDArray[Any]) -> Any:
-    """A C structure of pointers to contiguous arrays, and to each row of those of two dimensions."""
-    addresses: list[int] = []
-    for array in arrays:
-        first, rows = _address(array), 1 if array.ndim == 1 else len(array)
-        addresses += (first + i * array.strides[0] for i in range(rows))
-    return (_P * len(addresses))(*addresses)
 
 
 class _Ground(ctypes.Structure):
@@ -94,17 +67,17 @@ class _GroundBuffers:
         self.cells = np.empty((3, grid.size), np.float32), np.empty((2, grid.size), np.uint8)
         self.points = np.empty((3, 0), np.float32)
         self.rays = np.empty((4, SECTORS), np.float32)
-        self._scratch = _pointers(*self.cells, self.points)
+        self._scratch = pointers(*self.cells, self.points)
 
     def scratch(self, n: int) -> Any:
         """Scratch of ground.c, for n points."""
         if n > self.points.shape[1]:
             self.points = np.empty((3, n), np.float32)
-            self._scratch = _pointers(*self.cells, self.points)
+            self._scratch = pointers(*self.cells, self.points)
         return self._scratch
 
 
-class NativeKernels:
+class NativeKernels(NativeGeometryKernels):
     """The passes in C.
 
     Args:
@@ -113,11 +86,9 @@ class NativeKernels:
     """
 
     def __init__(self, library: ctypes.CDLL, instructions: str) -> None:
+        super().__init__(library)
+        declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
-        for name, (result, arguments) in _SIGNATURES.items():
-            function = getattr(library, name)
-            function.restype, function.argtypes = result, arguments
-        self._library = library
         self._ground: dict[GroundEstimator, _GroundBuffers] = {}
 
     def above_ground(
@@ -128,10 +99,10 @@ class NativeKernels:
         points = np.ascontiguousarray(points, np.float32)
         n, width = points.shape
         rows, kept = np.empty(n + 1, np.int64), np.empty((5, n + 1), np.float32)
-        scratch, out = buffers.scratch(n), _pointers(kept)
+        scratch, out = buffers.scratch(n), pointers(kept)
         k = self._library.modt_above_ground(
-            ctypes.addressof(buffers.constants), _at(ground.grid.range_m), _at(buffers.flat_m), sensor_height_m,
-            _at(points), n, width, ctypes.addressof(scratch), _at(buffers.rays), _at(bounds), _at(rows, np.int64),
+            ctypes.addressof(buffers.constants), at(ground.grid.range_m), at(buffers.flat_m), sensor_height_m,
+            at(points), n, width, ctypes.addressof(scratch), at(buffers.rays), at(bounds), at(rows, np.int64),
             ctypes.addressof(out),
         )  # fmt: skip
         x, y, z, sqrt_range, height = kept[:, :k]
@@ -140,8 +111,8 @@ class NativeKernels:
     def row_column(self, grid: SqrtRangeGrid, points: PointColumns) -> tuple[Int32, Int32]:
         """(K,) row and (K,) column of each point."""
         row, column = np.empty((2, len(points)), np.int32)
-        at = _at(points.x), _at(points.y), _at(points.sqrt_range), len(points)
-        self._library.modt_row_column(*at, 1 / grid.step, grid.centre, _at(row, np.int32), _at(column, np.int32))
+        given = at(points.x), at(points.y), at(points.sqrt_range), len(points)
+        self._library.modt_row_column(*given, 1 / grid.step, grid.centre, at(row, np.int32), at(column, np.int32))
         return row, column
 
     def occupied_cells(
@@ -151,10 +122,10 @@ class NativeKernels:
         k = len(row)
         places, heights, entries = np.empty((2, k), np.int32), np.empty((2, k), np.float32), np.empty(k, np.int64)
         sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
-        out = _pointers(places, heights, entries)
+        out = pointers(places, heights, entries)
         n = self._library.modt_occupied_cells(
-            _at(row, np.int32), _at(column, np.int32), _at(low), _at(high), k, grid.side, _at(grid.number, np.int32),
-            _at(sample, np.int64), _at(cell, np.int64), ctypes.addressof(out),
+            at(row, np.int32), at(column, np.int32), at(low), at(high), k, grid.side, at(grid.number, np.int32),
+            at(sample, np.int64), at(cell, np.int64), ctypes.addressof(out),
         )  # fmt: skip
         (row, column), (low, high) = places[:, k - n :], heights[:, k - n :]
         return Cells(row, column, low, high, entries[k - n :]), sample[k - n :], cell
@@ -163,19 +134,19 @@ class NativeKernels:
         """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
         n = len(cells)
         next_, scratch, spans = np.empty(grid.side, np.int32), np.empty(3 * n, np.int32), np.empty(4 * n, np.int32)
-        component, pointers = np.empty(n, np.int64), self._cells(cells)
+        component, own = np.empty(n, np.int64), self._cells(cells)
         self._library.modt_connect(
-            ctypes.addressof(pointers), _at(max_gap_m), _at(use, np.bool_), n, grid.side, _address(next_),
-            _address(scratch), _address(spans), _at(component, np.int64),
+            ctypes.addressof(own), at(max_gap_m), at(use, np.bool_), n, grid.side, address(next_),
+            address(scratch), address(spans), at(component, np.int64),
         )  # fmt: skip
         return component
 
     def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
         """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
         bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
-        own, out = self._cells(cells), _pointers(bounds, counts)
+        own, out = self._cells(cells), pointers(bounds, counts)
         self._library.modt_cluster_bounds(
-            ctypes.addressof(own), _at(points.x), _at(points.y), _at(cluster, np.int64), len(cells), n,
+            ctypes.addressof(own), at(points.x), at(points.y), at(cluster, np.int64), len(cells), n,
             ctypes.addressof(out),
         )  # fmt: skip
         return ClusterBounds(*bounds, *counts)
@@ -183,58 +154,51 @@ class NativeKernels:
     def group(self, labels: Int, n: int) -> Groups:
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
         rows, offsets = np.empty(len(labels), np.int64), np.empty(n + 1, np.int64)
-        at = _at(labels, np.int64), len(labels), n, _at(rows, np.int64), _at(offsets, np.int64)
-        return Groups(rows[: self._library.modt_group(*at)], offsets)
+        given = at(labels, np.int64), len(labels), n, at(rows, np.int64), at(offsets, np.int64)
+        return Groups(rows[: self._library.modt_group(*given)], offsets)
 
     def members_of(self, clusters: Clusters, index: Int) -> Members:
         """Points of each cluster, given (K,) the row of each point in the sweep."""
         points, cells, of_cell = clusters.points, clusters.cells, clusters.of_cell
         m = int(cells.entries.sum(where=of_cell != NONE))
         offsets, rows, own = np.empty(clusters.n + 1, np.int64), np.empty(m, np.int64), np.empty((4, m), np.float32)
-        columns = [_at(column) for column in (points.x, points.y, points.z, clusters.height)]
-        given, out = (_P * 5)(*columns, _at(index, np.int64)), _pointers(offsets, rows, own)
+        columns = [at(column) for column in (points.x, points.y, points.z, clusters.height)]
+        given, out = (_P * 5)(*columns, at(index, np.int64)), pointers(offsets, rows, own)
         self._library.modt_members(
-            ctypes.addressof(given), _at(clusters.cell, np.int64), len(index), _at(of_cell, np.int64),
-            _at(cells.entries, np.int64), len(cells), clusters.n, ctypes.addressof(out),
+            ctypes.addressof(given), at(clusters.cell, np.int64), len(index), at(of_cell, np.int64),
+            at(cells.entries, np.int64), len(cells), clusters.n, ctypes.addressof(out),
         )  # fmt: skip
         return Members(offsets, rows, own)
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""
         n = len(offsets) - 1
-        sums, at = np.empty((len(values), n), np.float64), _at(offsets, np.int64)
+        sums, owned = np.empty((len(values), n), np.float64), at(offsets, np.int64)
         for row, out in zip(values, sums, strict=True):
-            self._library.modt_group_sums(_at(row), at, n, _at(out, np.float64))
+            self._library.modt_group_sums(at(row), owned, n, at(out, np.float64))
         return sums
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
         best = np.empty(len(groups), np.int64)
         self._library.modt_best_headings(
-            _at(x), _at(y), _at(groups.rows, np.int64), _at(groups.offsets, np.int64), len(groups), limit,
-            _at(AXES[0]), _at(AXES[1]), len(HEADINGS), noise_m, _at(best, np.int64),
+            at(x), at(y), at(groups.rows, np.int64), at(groups.offsets, np.int64), len(groups), limit,
+            at(AXES[0]), at(AXES[1]), len(HEADINGS), noise_m, at(best, np.int64),
         )  # fmt: skip
         return best
-
-    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
-        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
-        low, high = np.empty((2, 3, len(cosine)), np.float32)
-        at = *map(_at, xyz), _at(offsets, np.int64), len(cosine), _at(cosine), _at(sine), _at(low), _at(high)
-        self._library.modt_bounds_along(*at)
-        return low, high
 
     def reflectance_sums(self, points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
         """(5, G) number, sum, sum of squares, bright and dark ones of the measured values, (G,) greatest."""
         points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
         sums, greatest = np.empty((5, n), np.float64), np.empty(n, np.float32)
         self._library.modt_reflectance_sums(
-            _at(points), points.shape[1], _at(index, np.int64), _at(offsets, np.int64), n, BRIGHT, DARK,
-            _at(sums, np.float64), _at(greatest),
+            at(points), points.shape[1], at(index, np.int64), at(offsets, np.int64), n, BRIGHT, DARK,
+            at(sums, np.float64), at(greatest),
         )  # fmt: skip
         return sums, greatest
 
     @staticmethod
     def _cells(cells: Cells) -> Any:
         for column, kind in ((cells.row, np.int32), (cells.low, np.float32), (cells.entries, np.int64)):
-            _at(column, kind)
-        return _pointers(cells.row, cells.column, cells.low, cells.high, cells.entries)
+            at(column, kind)
+        return pointers(cells.row, cells.column, cells.low, cells.high, cells.entries)

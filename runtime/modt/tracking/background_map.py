@@ -6,6 +6,7 @@ import numpy as np
 
 from modt.config import BackgroundMapConfig
 from modt.geometry.kdop import coverage, overlapping_pairs
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
 from modt.types import Bool, Int
@@ -14,8 +15,8 @@ from modt.types import Bool, Int
 class BackgroundMap:
     """k-DOPs and tops of deleted background in the world; of capacity 0, a map that recalls nothing."""
 
-    def __init__(self, config: BackgroundMapConfig) -> None:
-        self.config = config
+    def __init__(self, config: BackgroundMapConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self.config, self._kernels = config, kernels
         self.clear()
 
     def clear(self) -> None:
@@ -35,7 +36,7 @@ class BackgroundMap:
             place = np.concatenate([self._kdop, tracks.known_kdops(rows)], axis=1)
             top = np.concatenate([self._top, tracks.top[rows]])
             kdop = observations.kdop.take(which, axis=1)
-            i, j = overlapping_pairs(kdop, place)
+            i, j = overlapping_pairs(kdop, place, self._kernels.reaching_pairs)
             within = coverage(kdop.take(i, axis=1), place.take(j, axis=1)) >= config.min_coverage
             known[i[within & (observations.top[which[i]] < top[j] + config.rise_m)]] = True
         return known

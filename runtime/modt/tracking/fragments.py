@@ -13,6 +13,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.config import FragmentConfig
 from modt.geometry.kdop import coverage, overlapping_pairs, width_sum
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
@@ -37,10 +38,11 @@ class Reunion:
     Args:
         config: what counts as a part.
         min_hits: of an established track.
+        kernels: passes over pairs.
     """
 
-    def __init__(self, config: FragmentConfig, min_hits: int) -> None:
-        self.config, self.min_hits = config, min_hits
+    def __init__(self, config: FragmentConfig, min_hits: int, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self.config, self.min_hits, self._kernels = config, min_hits, kernels
 
     def reunite(self, tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
         """The matches after older tracks have swapped their proposals for larger parts of their objects."""
@@ -68,7 +70,7 @@ class Reunion:
         if not len(row):
             return row, row
         known = tracks.known_kdops(row)
-        i, part = overlapping_pairs(known, observations.kdop)
+        i, part = overlapping_pairs(known, observations.kdop, self._kernels.reaching_pairs)
         older, other = row[i], track_of_proposal[part]
         size = np.where(proposal_of_track == NONE, 0, observations.count[proposal_of_track])
         younger = (other == NONE) | (tracks.id[other] > tracks.id[older])

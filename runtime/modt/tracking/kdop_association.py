@@ -7,6 +7,7 @@ import numpy as np
 from modt.config import KdopAssociationConfig
 from modt.geometry.kdop import AXES, DIRECTIONS, overlapping_pairs, width_sum
 from modt.geometry.kdop_displacement import least, measured, shape_similarity
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking import kalman
 from modt.tracking.assignment import assign
@@ -24,10 +25,11 @@ class KdopAssociation:
 
     Args:
         config: gate, weights of the cost and noise of the positions.
+        kernels: passes over pairs.
     """
 
-    def __init__(self, config: KdopAssociationConfig) -> None:
-        self.config = config
+    def __init__(self, config: KdopAssociationConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self.config, self._kernels = config, kernels
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs within the gate; then, among the rest, those that overlap although they changed their shape."""
@@ -35,7 +37,7 @@ class KdopAssociation:
         expected = tracks.predicted_kdops()
         variance = self.noise(observations)
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
-        rows, columns = overlapping_pairs(expected + reach, observations.kdop)
+        rows, columns = overlapping_pairs(expected + reach, observations.kdop, self._kernels.reaching_pairs)
         a, b = expected.take(rows, axis=1), observations.kdop.take(columns, axis=1)
         size, overlap, coverage = shape_similarity(a, b)
         S = tracks.P[:, :2, :2].transpose(1, 2, 0).copy().take(rows, axis=2)

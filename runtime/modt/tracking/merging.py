@@ -16,6 +16,7 @@ from modt.classes import CLASSES, ObjectClass
 from modt.config import MergeConfig
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.placement import Placement
 from modt.tracking.regrouping import Associated, Grouping, contiguous_runs
 from modt.tracking.track_table import TrackTable
@@ -30,10 +31,11 @@ class CarMerging:
     Args:
         config: what fits into a car.
         min_hits: of a track that merges.
+        kernels: passes over points and pairs.
     """
 
-    def __init__(self, config: MergeConfig, min_hits: int) -> None:
-        self.config, self.min_hits = config, min_hits
+    def __init__(self, config: MergeConfig, min_hits: int, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self.config, self.min_hits, self._kernels = config, min_hits, kernels
 
     def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
         """The frame with one proposal in place of the parts of each car."""
@@ -51,7 +53,7 @@ class CarMerging:
         runs = contiguous_runs(into.argsort(kind="stable"), frame.proposals.offsets)
         changed = number[np.unique(hosts)]
         grouping = Grouping(runs, count, source, changed, yaw[source[changed]], partial=changed)
-        proposals, observations = grouping.apply(frame, placement)
+        proposals, observations = grouping.apply(frame, placement, self._kernels)
         matched = number[frame.matches.proposals]
         of_kept = (matched != NONE).nonzero()[0]
         return Associated(proposals, observations, frame.matches.take(of_kept, matched[of_kept]))
@@ -65,7 +67,7 @@ class CarMerging:
         if not len(rows):
             return rows, hosts, hosts
         known = tracks.envelope.take(rows, axis=0).T + DIRECTIONS.T @ matches.position.take(cars, axis=0).T
-        k, parts = overlapping_pairs(known, kdops)
+        k, parts = overlapping_pairs(known, kdops, self._kernels.reaching_pairs)
         other = (parts != hosts[k]).nonzero()[0]
         k, parts = k[other], parts[other]
         part, whole = kdops.take(parts, axis=1), known.take(k, axis=1)

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from modt.geometry import upright_boxes
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations, observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
@@ -65,16 +66,18 @@ class Grouping:
     yaw: Float64
     partial: Int
 
-    def apply(self, frame: Associated, placement: Placement) -> tuple[Proposals, Observations]:
+    def apply(
+        self, frame: Associated, placement: Placement, kernels: GeometryKernels = NUMPY_GEOMETRY
+    ) -> tuple[Proposals, Observations]:
         """Proposals and observations in the new grouping; boxes and k-DOPs of what changed come from its points."""
         proposals = frame.proposals.regrouped(self.runs, self.count, self.source)
         few = proposals.take(self.changed)
-        box = upright_boxes(few.coordinates, few.offsets, self.yaw)
+        box = upright_boxes(few.coordinates, few.offsets, self.yaw, kernels.bounds_along)
         sums = np.add.reduceat(few.coordinates, few.offsets[:-1], axis=1, dtype=np.float64)
         few.box[:], few.centroid[:] = box, (sums / few.count).T
         proposals.box[self.changed], proposals.centroid[self.changed] = few.box, few.centroid
         observations = frame.observations.take(self.source)
-        changed = observe(few, placement.T_world_sensor)
+        changed = observe(few, placement.T_world_sensor, kernels)
         observations.put(self.changed, changed.moved(placement.deskew(changed.centroid)))
         observations.partial[self.partial] = True
         return proposals, observations

@@ -14,6 +14,7 @@ from modt.classes import ObjectClass
 from modt.config import SplitConfig
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.placement import Placement
 from modt.tracking.association import Matches
@@ -28,10 +29,11 @@ class ExpectedSplitting:
     Args:
         config: what is split off.
         min_hits: of a track that splits.
+        kernels: passes over points and pairs.
     """
 
-    def __init__(self, config: SplitConfig, min_hits: int) -> None:
-        self.config, self.min_hits = config, min_hits
+    def __init__(self, config: SplitConfig, min_hits: int, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self.config, self.min_hits, self._kernels = config, min_hits, kernels
 
     def regroup(self, tracks: TrackTable, frame: Associated, placement: Placement) -> Associated:
         """The frame with one more proposal for each track that is split off a larger one."""
@@ -63,7 +65,7 @@ class ExpectedSplitting:
         if not len(rows):
             return rows, rows
         expected = tracks.predicted_kdops(rows)
-        i, j = overlapping_pairs(expected, observations.kdop)
+        i, j = overlapping_pairs(expected, observations.kdop, self._kernels.reaching_pairs)
         kdop, expected = observations.kdop.take(j, axis=1), expected.take(i, axis=1)
         covered = coverage(expected, kdop)
         longer = widths(kdop).max(axis=0) > widths(expected).max(axis=0) + self.config.longer_m
@@ -130,7 +132,7 @@ class ExpectedSplitting:
             np.append(old.box[changed_hosts, 6], yaw),
             partial=new,
         )
-        proposals, observations = grouping.apply(frame, placement)
+        proposals, observations = grouping.apply(frame, placement, self._kernels)
         if proposals.reflectance is not None:
             proposals.reflectance[new] = np.nan
         # A piece shows nothing new of its track, least of all where too much was taken.

@@ -8,6 +8,7 @@ from modt.classes import CLASSES, N_CLASSES, ObjectClass
 from modt.config import BackgroundMapConfig, TrackingConfig
 from modt.geometry.kdop import DIRECTIONS, widths
 from modt.geometry.kdop_displacement import AGREE_M
+from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
@@ -29,16 +30,17 @@ CREEPING = 0.1
 _MAX_LENGTH_M = np.array([spec.max_length_m for spec in CLASSES.values()])
 
 
-def association_of(config: TrackingConfig) -> Association:
+def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
     """The association that a configuration names."""
-    return PaperAssociation(config.paper) if config.association == "paper" else KdopAssociation(config.kdop)
+    return PaperAssociation(config.paper) if config.association == "paper" else KdopAssociation(config.kdop, kernels)
 
 
-def regroupings_of(config: TrackingConfig) -> tuple[Regrouping, ...]:
+def regroupings_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> tuple[Regrouping, ...]:
     """The regroupings of a configuration; the paper takes proposals as they are."""
     if config.association == "paper":
         return ()
-    return ExpectedSplitting(config.split, config.min_hits), CarMerging(config.merge, config.min_hits)
+    splitting = ExpectedSplitting(config.split, config.min_hits, kernels)
+    return splitting, CarMerging(config.merge, config.min_hits, kernels)
 
 
 class Tracker:
@@ -50,6 +52,7 @@ class Tracker:
         association: how proposals find their tracks; by default as the configuration says.
         regroupings: how proposals are corrected; by default as the configuration says.
         period_s: of the sensor; what the configuration gives in frames of coasting is this many times as long.
+        kernels: passes over points and pairs.
     """
 
     def __init__(
@@ -59,15 +62,16 @@ class Tracker:
         association: Association | None = None,
         regroupings: tuple[Regrouping, ...] | None = None,
         period_s: float = 0.1,
+        kernels: GeometryKernels = NUMPY_GEOMETRY,
     ) -> None:
         self.config, self.machine = config, machine
-        self.association = association_of(config) if association is None else association
-        self.regroupings = regroupings_of(config) if regroupings is None else regroupings
+        self.association = association_of(config, kernels) if association is None else association
+        self.regroupings = regroupings_of(config, kernels) if regroupings is None else regroupings
         none = BackgroundMapConfig(capacity=0)  # the paper classifies every new proposal
-        self.background_map = BackgroundMap(none if config.association == "paper" else config.background_map)
+        self.background_map = BackgroundMap(none if config.association == "paper" else config.background_map, kernels)
         self._period_s = period_s
         apart = config.fragments.min_coverage >= 1.0
-        self._reunion = NoReunion() if apart else Reunion(config.fragments, config.min_hits)
+        self._reunion = NoReunion() if apart else Reunion(config.fragments, config.min_hits, kernels)
         self._standstill = standstill_of(config.filter.stationary_sigma_mps)
         position, speed = config.filter.initial_position_sigma_m, config.filter.initial_speed_sigma_mps
         self._P_new = np.diag(np.square([position, position, np.pi, speed]))  # a heading of pi: unknown

@@ -1,0 +1,33 @@
+"""The passes over points and over pairs of k-DOPs, as one interface."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from modt.geometry.boxes import bounds_along
+from modt.geometry.kdop import kdop_ends, reaching_pairs
+from modt.types import Float32, Float64, Int, Int16
+
+
+class GeometryKernels(Protocol):
+    """The passes; every implementation gives the same bytes for the same input."""
+
+    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
+        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
+
+    def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
+        """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
+
+    def reaching_pairs(self, ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
+        """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
+
+
+class NumpyGeometryKernels:
+    """The passes in NumPy: the reference."""
+
+    bounds_along = staticmethod(bounds_along)
+    kdop_ends = staticmethod(kdop_ends)
+    reaching_pairs = staticmethod(reaching_pairs)
+
+
+NUMPY_GEOMETRY = NumpyGeometryKernels()

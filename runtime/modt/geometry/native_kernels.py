@@ -1,0 +1,63 @@
+"""The passes of geometry in C (`modt.native`)."""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from modt.geometry.kdop import reaching_pairs
+from modt.native.arrays import Signatures, at, declare
+from modt.types import Float32, Float64, Int, Int16
+
+_L, _P = ctypes.c_int64, ctypes.c_void_p
+_SIGNATURES: Signatures = {
+    "modt_bounds_along": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
+    "modt_kdop_ends": (None, (_P, _P, _P, _P, _L, _P, _P, _P)),
+    "modt_reaching_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
+}
+_PAIRS_EACH = 8
+"""Pairs that there is room for at first, of each k-DOP."""
+
+
+class NativeGeometryKernels:
+    """The passes in C.
+
+    Args:
+        library: that of `modt.native.library`.
+    """
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        declare(library, _SIGNATURES)
+        self._library = library
+
+    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
+        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
+        low, high = np.empty((2, 3, len(cosine)), np.float32)
+        given = *map(at, xyz), at(offsets, np.int64), len(cosine), at(cosine), at(sine)
+        self._library.modt_bounds_along(*given, at(low), at(high))
+        return low, high
+
+    def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
+        """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
+        n = len(offsets) - 1
+        ends = np.empty((8, n), np.float32)
+        given = *map(at, xyz), at(offsets, np.int64), n, at(axes)
+        self._library.modt_kdop_ends(*given, at(ends[:4]), at(ends[4:]))
+        np.negative(ends[4:], out=ends[4:])
+        return ends
+
+    def reaching_pairs(self, ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
+        """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
+        if ends.dtype != np.int16:  # few
+            return reaching_pairs(ends, opposite)
+        n, k = ends.shape[1], opposite.shape[1]
+        near, limit = np.empty(k + 4, np.int16), _PAIRS_EACH * (n + k)
+        given = at(ends, np.int16), n, at(opposite, np.int16), k, at(near, np.int16)
+        while True:
+            one, other = np.empty((2, limit), np.int64)
+            pairs = at(one, np.int64), at(other, np.int64)
+            count = self._library.modt_reaching_pairs(*given, limit, *pairs)
+            if count <= limit:
+                return one[:count], other[:count]
+            limit = count
