@@ -12,8 +12,7 @@ from modt.types import Float32, Float64, Int, Int16
 
 _L, _P = ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
-    "modt_bounds_along": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
-    "modt_kdop_ends": (None, (_P, _P, _P, _P, _L, _P, _P, _P)),
+    "modt_ends_along": (None, (_P, _P, _P, _P, _L, _P, _L, _P, _P)),
     "modt_reaching_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
 }
 _PAIRS_EACH = 8
@@ -33,24 +32,34 @@ class NativeGeometryKernels:
 
     def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
         """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
-        low, high = np.empty((2, 3, len(cosine)), np.float32)
-        given = *map(at, xyz), at(offsets, np.int64), len(cosine), at(cosine), at(sine)
-        self._library.modt_bounds_along(*given, at(low), at(high))
-        return low, high
+        axes = np.zeros((len(cosine), 3, 4), np.float32)
+        axes[:, 0, 0] = axes[:, 1, 1] = cosine
+        axes[:, 1, 0], axes[:, 2, 2] = sine, 1.0
+        np.negative(sine, out=axes[:, 0, 1])
+        ahead, behind = self._ends_along(xyz, offsets, axes, 12)
+        return behind.T[:3], ahead.T[:3]
 
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
         """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
-        n = len(offsets) - 1
-        ends = np.empty((8, n), np.float32)
-        given = *map(at, xyz), at(offsets, np.int64), n, at(axes)
-        self._library.modt_kdop_ends(*given, at(ends[:4]), at(ends[4:]))
-        np.negative(ends[4:], out=ends[4:])
+        ahead, behind = self._ends_along(xyz, offsets, axes, 0)
+        ends = np.empty((8, len(ahead)), np.float32)
+        ends[:4] = ahead.T
+        np.negative(behind.T, out=ends[4:])
         return ends
+
+    def _ends_along(self, xyz: Float32, offsets: Int, axes: Float32, stride: int) -> tuple[Float32, Float32]:
+        """(G, 4) greatest and (G, 4) least coordinates along four axes, those of a group `stride` numbers on."""
+        n = len(offsets) - 1
+        ahead, behind = np.empty((2, n, 4), np.float32)
+        given = *map(at, xyz), at(offsets, np.int64), n, at(axes), stride
+        self._library.modt_ends_along(*given, at(ahead), at(behind))
+        return ahead, behind
 
     def reaching_pairs(self, ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
         """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
         if ends.dtype != np.int16:  # few
             return reaching_pairs(ends, opposite)
+        ends, opposite = np.ascontiguousarray(ends), np.ascontiguousarray(opposite)
         n, k = ends.shape[1], opposite.shape[1]
         near, limit = np.empty(k + 4, np.int16), _PAIRS_EACH * (n + k)
         given = at(ends, np.int16), n, at(opposite, np.int16), k, at(near, np.int16)

@@ -1,49 +1,39 @@
-/* Extents of groups of points along axes, and pairs of extents that reach one another. A group i has the points from
- * offsets[i] to offsets[i + 1]; none is empty. */
+/* Extents of groups of points along axes, and pairs of extents that reach one another. */
 #include "kernels.h"
 
-/* bounds_along: bounds of each group along its axes, three low and three high rows of n. */
-EXPORT void modt_bounds_along(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
-                              const float *cosine, const float *sine, float *low, float *high)
-{
-    for (i64 g = 0; g < n; g++) {
-        float c = cosine[g], s = sine[g];
-        float min_u = INFINITY, min_v = min_u, min_z = min_u, max_u = -min_u, max_v = -min_u, max_z = -min_u;
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
-            float u = x[i] * c + y[i] * s, v = y[i] * c - x[i] * s;
-            min_u = least(u, min_u);
-            max_u = most(u, max_u);
-            min_v = least(v, min_v);
-            max_v = most(v, max_v);
-            min_z = least(z[i], min_z);
-            max_z = most(z[i], max_z);
-        }
-        low[g] = min_u, low[n + g] = min_v, low[2 * n + g] = min_z;
-        high[g] = max_u, high[n + g] = max_v, high[2 * n + g] = max_z;
-    }
-}
+typedef float f4 __attribute__((vector_size(16)));
+typedef i32 i4 __attribute__((vector_size(16)));
 
-/* kdop_ends: greatest and least coordinate of each group along AXES axes of three numbers each, as so many rows of n */
-EXPORT void modt_kdop_ends(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
-                           const float *axes, float *ahead, float *behind)
+static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
+static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
+static inline f4 spread(float a) { return (f4){a, a, a, a}; }
+
+/* kdop_ends and bounds_along: greatest and least coordinates of groups of points along four axes. A group i has the
+ * points from offsets[i] to offsets[i + 1]; none is empty. `axes` has their x, then their y, then their z; those of the
+ * next group are `stride` numbers on. */
+EXPORT void modt_ends_along(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
+                            const float *axes, i64 stride, float *ahead, float *behind)
 {
-    enum { AXES = 4 };
-    for (i64 g = 0; g < n; g++) {
-        float low[AXES], high[AXES];
-        for (int a = 0; a < AXES; a++) {
-            low[a] = INFINITY;
-            high[a] = -INFINITY;
+    for (i64 g = 0; g < n; g++, axes += stride) {
+        f4 u, v, w, low[2] = {spread(INFINITY), spread(INFINITY)}, high[2] = {-low[0], -low[0]};
+        __builtin_memcpy(&u, axes, sizeof u);
+        __builtin_memcpy(&v, axes + 4, sizeof v);
+        __builtin_memcpy(&w, axes + 8, sizeof w);
+        i64 i = offsets[g], end = offsets[g + 1];
+        if ((end - i) & 1) { /* then two at a time, which do not wait for one another */
+            low[0] = high[0] = u * spread(x[i]) + v * spread(y[i]) + w * spread(z[i]);
+            i++;
         }
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i++)
-            for (int a = 0; a < AXES; a++) {
-                float along = axes[a] * x[i] + axes[AXES + a] * y[i] + axes[2 * AXES + a] * z[i];
-                low[a] = least(along, low[a]);
-                high[a] = most(along, high[a]);
+        for (; i < end; i += 2)
+            for (int k = 0; k < 2; k++) {
+                f4 along = u * spread(x[i + k]) + v * spread(y[i + k]) + w * spread(z[i + k]);
+                low[k] = least4(along, low[k]);
+                high[k] = most4(along, high[k]);
             }
-        for (int a = 0; a < AXES; a++) {
-            ahead[a * n + g] = high[a];
-            behind[a * n + g] = low[a];
-        }
+        low[0] = least4(low[0], low[1]);
+        high[0] = most4(high[0], high[1]);
+        __builtin_memcpy(behind + 4 * g, &low[0], sizeof low[0]);
+        __builtin_memcpy(ahead + 4 * g, &high[0], sizeof high[0]);
     }
 }
 
