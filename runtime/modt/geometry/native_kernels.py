@@ -59,10 +59,10 @@ class NativeGeometryKernels:
         """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
         if ends.dtype != np.int16:  # few
             return reaching_pairs(ends, opposite)
-        ends, opposite = np.ascontiguousarray(ends), np.ascontiguousarray(opposite)
         n, k = ends.shape[1], opposite.shape[1]
         near, limit = np.empty(k + 4, np.int16), _PAIRS_EACH * (n + k)
-        given = at(ends, np.int16), n, at(opposite, np.int16), k, at(near, np.int16)
+        first, second = np.ascontiguousarray(ends), np.ascontiguousarray(opposite)
+        given = at(first, np.int16), n, at(second, np.int16), k, at(near, np.int16)
         while True:
             one, other = np.empty((2, limit), np.int64)
             pairs = at(one, np.int64), at(other, np.int64)
