@@ -20,8 +20,8 @@ typedef struct {
 
 /* occupied_cells: cells in the order of their last entries. `number` is a table of side * side, NONE throughout
  * before and after. Returns how many; they are the last of the n places of `sample` and of `cells`. */
-EXPORT i64 modt_occupied_cells(const i32 *row, const i32 *column, const float *low, const float *high, i64 n, i32 side,
-                               i32 *number, i64 *sample, i64 *cell, Cells *cells)
+EXPORT i64 modt_occupied_cells(const i32 *row, const i32 *column, const float *low, const float *high, i64 n,
+                               i32 side, i32 *number, i64 *sample, i64 *cell, Cells *cells)
 {
     i32 first = (i32)n;
     for (i64 i = n - 1; i >= 0; i--) { /* backwards: the last entry of a cell comes first */

@@ -9,8 +9,8 @@ static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more)
 static inline f4 spread(float a) { return (f4){a, a, a, a}; }
 
 /* kdop_ends and bounds_along: greatest and least coordinates of groups of points along four axes. A group i has the
- * points from offsets[i] to offsets[i + 1]; none is empty. `axes` has their x, then their y, then their z; those of the
- * next group are `stride` numbers on. */
+ * points from offsets[i] to offsets[i + 1]; none is empty. `axes` has their x, then their y, then their z; those of
+ * the next group are `stride` numbers on. */
 EXPORT void modt_ends_along(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
                             const float *axes, i64 stride, float *ahead, float *behind)
 {

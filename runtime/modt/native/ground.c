@@ -31,12 +31,13 @@ static ALWAYS_INLINE void place_points(const Ground *g, const float *points, i64
         z[i] = points[i * width + 2];
     }
     for (i64 i = 0; i < n; i++) {
-        int near = (__builtin_fabsf(x[i]) < g->far_m) & (__builtin_fabsf(y[i]) < g->far_m) & (__builtin_fabsf(z[i]) < g->far_m); /* not for NaN */
+        float far = g->far_m;
+        int near = (magnitude(x[i]) < far) & (magnitude(y[i]) < far) & (magnitude(z[i]) < far); /* not for NaN */
         float here_x = near ? x[i] : 0.0f, here_y = near ? y[i] : 0.0f;
         z[i] = near ? z[i] : 0.0f;
         sqrt_range[i] = __builtin_sqrtf(__builtin_sqrtf(here_x * here_x + here_y * here_y));
         i32 ring = (i32)least(sqrt_range[i] * g->ring_scale, last);
-        float turn = here_y / most(__builtin_fabsf(here_x) + __builtin_fabsf(here_y), 1e-6f);
+        float turn = here_y / most(magnitude(here_x) + magnitude(here_y), 1e-6f);
         turn = (here_x < 0.0f ? 2.0f - turn : turn) + 1.0f;
         cell[i] = (ring << bits) + ((i32)(turn * g->sector_scale) & mask);
     }
@@ -49,7 +50,7 @@ static void find_lowest(const Ground *g, float height_m, const float *z, const f
     float candidate[BLOCK];
     for (i64 i = 0; i < n; i++) {
         float reach = sqrt_range[i] * sqrt_range[i] * g->max_slope + g->noise_m;
-        int plausible = (__builtin_fabsf(z[i] + height_m) < reach) & (sqrt_range[i] > g->min_sqrt_range);
+        int plausible = (magnitude(z[i] + height_m) < reach) & (sqrt_range[i] > g->min_sqrt_range);
         candidate[i] = plausible ? z[i] : INFINITY;
     }
     for (i64 i = 0; i < n; i++) {
@@ -152,8 +153,8 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
     for (i64 i = 0; i < n; i += BLOCK) {
         i64 m = n - i < BLOCK ? n - i : BLOCK;
         float *z = s->z + i, *sqrt_range = s->sqrt_range + i;
-        if (width == 4)
-            place_points(g, points + i * 4, m, 4, z, sqrt_range, s->cell + i); /* inlined for this width, and vectorised */
+        if (width == 4) /* inlined for this width, and vectorised */
+            place_points(g, points + i * 4, m, 4, z, sqrt_range, s->cell + i);
         else
             place_points(g, points + i * width, m, width, z, sqrt_range, s->cell + i);
         find_lowest(g, height_m, z, sqrt_range, s->cell + i, m, s->lowest);

@@ -64,19 +64,34 @@ EXPORT void modt_members(const Points *points, const i64 *cell, i64 n_points, co
     }
 }
 
-/* group_sums of one row of values */
-EXPORT void modt_group_sums(const float *values, const i64 *offsets, i64 n, double *sum)
+/* Sums of the values from `first` to `end` of each of a fixed number of rows of k; they do not wait for one another. */
+static ALWAYS_INLINE void sum_rows(const float *values, int rows, i64 k, i64 first, i64 end, double *total)
 {
-    for (i64 g = 0; g < n; g++) {
-        double total = 0.0;
-        for (i64 i = offsets[g]; i < offsets[g + 1]; i++)
-            total += values[i];
-        sum[g] = total;
-    }
+    for (int v = 0; v < rows; v++)
+        total[v] = 0.0;
+    for (i64 i = first; i < end; i++)
+        for (int v = 0; v < rows; v++)
+            total[v] += values[v * k + i];
 }
 
-/* best_headings: index of the best of `headings` directions for at most `limit` of the points at `rows`; cosines and sines are those of the directions, then of
- * the ones across them. */
+/* group_sums: of rows of k values each, as so many rows of n. */
+EXPORT void modt_group_sums(const float *values, i64 rows, i64 k, const i64 *offsets, i64 n, double *sums)
+{
+    enum { TOGETHER = 4 };
+    double total[TOGETHER];
+    for (; rows >= TOGETHER; rows -= TOGETHER, values += TOGETHER * k, sums += TOGETHER * n)
+        for (i64 g = 0; g < n; g++) {
+            sum_rows(values, TOGETHER, k, offsets[g], offsets[g + 1], total);
+            for (int v = 0; v < TOGETHER; v++)
+                sums[v * n + g] = total[v];
+        }
+    for (; rows > 0; rows--, values += k, sums += n)
+        for (i64 g = 0; g < n; g++)
+            sum_rows(values, 1, k, offsets[g], offsets[g + 1], sums + g);
+}
+
+/* best_headings: index of the best of `headings` directions for at most `limit` of the points at `rows`; cosines and
+ * sines are those of the directions, then of the ones across them. */
 EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, const i64 *offsets, i64 n, i64 limit,
                                const float *cosines, const float *sines, i32 headings, float noise_m, i64 *best)
 {
@@ -113,8 +128,8 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
     }
 }
 
-/* reflectance_sums: number, sum, sum of squares, bright and dark ones of the measured reflectances of each group, five
- * rows of n, and the greatest; points are rows of `width`. */
+/* reflectance_sums: number, sum, sum of squares, bright and dark ones of the measured reflectances of each group,
+ * five rows of n, and the greatest; points are rows of `width`. */
 EXPORT void modt_reflectance_sums(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
                                   float bright, float dark, double *sums, float *greatest)
 {

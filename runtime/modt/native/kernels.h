@@ -1,8 +1,8 @@
 /* Passes over points, cells and groups, and over pairs of k-DOPs.
  *
  * Each function does what the NumPy function named beside it does, to the byte: single precision throughout, no
- * contraction; sums in double precision, which may differ in their last bit. Arrays are contiguous and do not overlap, but where said; lengths and
- * indices are proven by the caller, and asserted in a build with -DMODT_CHECKED.
+ * contraction; sums in double precision, which may differ in their last bit. Arrays are contiguous and do not
+ * overlap, but where said; lengths and indices are proven by the caller, and asserted in a build with -DMODT_CHECKED.
  */
 #ifndef MODT_KERNELS_H
 #define MODT_KERNELS_H
@@ -27,5 +27,6 @@ typedef int64_t i64;
 
 static inline float least(float a, float b) { return a < b ? a : b; }
 static inline float most(float a, float b) { return a > b ? a : b; }
+static inline float magnitude(float a) { return __builtin_fabsf(a); }
 
 #endif

@@ -28,7 +28,7 @@ _SIGNATURES: Signatures = {
     "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
     "modt_group": (_L, (_P, _L, _L, _P, _P)),
     "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
-    "modt_group_sums": (None, (_P, _P, _L, _P)),
+    "modt_group_sums": (None, (_P, _L, _L, _P, _L, _P)),
     "modt_best_headings": (None, (_P, _P, _P, _P, _L, _L, _P, _P, _I, _F, _P)),
     "modt_reflectance_sums": (None, (_P, _L, _P, _P, _L, _F, _F, _P, _P)),
 }
@@ -172,10 +172,9 @@ class NativeKernels(NativeGeometryKernels):
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""
-        n = len(offsets) - 1
-        sums, owned = np.empty((len(values), n), np.float64), at(offsets, np.int64)
-        for row, out in zip(values, sums, strict=True):
-            self._library.modt_group_sums(at(row), owned, n, at(out, np.float64))
+        sums = np.empty((len(values), len(offsets) - 1), np.float64)
+        given = at(values), *values.shape, at(offsets, np.int64), sums.shape[1]
+        self._library.modt_group_sums(*given, at(sums, np.float64))
         return sums
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
