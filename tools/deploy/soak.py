@@ -4,13 +4,14 @@
 
 Every fault must be told by its counter and be recovered from within a second: the next result is there, and nothing
 is given up for it; no record is lost but on a full disk; between faults at most one deadline in 1,000 is missed, as
-the machine may do other work; memory stays flat. The exit status is 0 if all this holds. `--fifo` takes the priority
-of a service, and gives hogs a higher one.
+the machine may do other work; memory and open descriptors stay flat. The exit status is 0 if all this holds. `--fifo`
+takes the priority of a service, and gives hogs a higher one.
 """
 
 from __future__ import annotations
 
 import logging
+import os
 import resource
 import sys
 import time
@@ -54,7 +55,7 @@ class Episode:
 
 
 class Witness:
-    """A sink that notes when results come, what has been missed, and the memory."""
+    """A sink that notes when results come, what has been missed, the memory and the open descriptors."""
 
     def __init__(self) -> None:
         self.session: LiveSession | None = None
@@ -62,6 +63,7 @@ class Witness:
         self.full: list[bool] = []  # nothing was given up
         self.missed: list[int] = []
         self.resident_mb: list[float] = []
+        self.descriptors: list[int] = []
 
     def write(self, result: FrameResult) -> None:
         """Note a result."""
@@ -72,6 +74,7 @@ class Witness:
         self.missed.append(loop.timing.missed)
         if len(self.times_s) % 50 == 0:
             self.resident_mb.append(host.resident_mb())
+            self.descriptors.append(len(os.listdir("/proc/self/fd")))
 
     def health(self) -> Health:
         """Nothing to report."""
@@ -164,23 +167,32 @@ def judge(witness: Witness, episodes: list[Episode], session: LiveSession) -> li
     missed = int(np.diff(witness.missed, prepend=0)[clear].sum())
     recording = session.recording.health()
     lost = recording["lost_lines"] - sum(e.told - e.before for e in episodes if e.fault.name == FULL_DISK)
-    memory = np.array(witness.resident_mb)
-    third = max(len(memory) // 3, 1)
-    growth = float(np.median(memory[-third:]) / np.median(memory[third : 2 * third]) - 1) if len(memory) > 2 else 0.0
+    memory_mb, late_mb = _thirds(witness.resident_mb)
+    growth = late_mb / memory_mb - 1
+    descriptors, late = _thirds(witness.descriptors)
     gaps = LogHistogram()
     for gap_s in np.diff(times_s).tolist():
         gaps.add(gap_s)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
     share = missed / max(int(clear.sum()), 1)
     print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.loop.timing.report()}")
-    print(f"memory {memory.max():.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
+    print(f"memory {max(witness.resident_mb):.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
+    print(f"descriptors {max(witness.descriptors)} at most, {descriptors:.0f} midway, {late:.0f} at the end")
     if share > MAX_MISSED:
         wrong.append(f"{missed} deadlines missed between faults")
     if lost:
         wrong.append(f"{lost} records lost but on a full disk")
     if growth > MAX_GROWTH:
         wrong.append(f"memory grew by {100 * growth:.1f} %")
+    if late > descriptors:
+        wrong.append(f"{late - descriptors:.0f} descriptors leaked")
     return wrong
+
+
+def _thirds(values: Sequence[float]) -> tuple[float, float]:
+    """Medians of the second and of the last third."""
+    third = max(len(values) // 3, 1)
+    return float(np.median(values[third : 2 * third] or values)), float(np.median(values[-third:]))
 
 
 def main(arguments: list[str] | None = None) -> int:
