@@ -2,10 +2,10 @@
 
     sudo python -m tools.arm64 [FOLDER] [--tests tests/golden tests/tracking …]
 
-Needs root, debootstrap, qemu-user-static (apt install), uv and the extra "wheels" (pip install): the tests run on the
-kernels that an aarch64 wheel has. The userland in FOLDER is kept, so that a second run begins at once. The emulator is
-registered with the kernel while this runs. It is some 20 times slower than the machine: the default is the perception
-stages, the golden replays, the readers and the writers.
+Needs root, debootstrap, qemu-user-static (apt install), uv and the extra "wheels" (pip install): the tests run on
+the kernels that an aarch64 wheel has. The userland in FOLDER is kept, so that a second run begins at once. The
+emulator is registered with the kernel while this runs. It is some 20 times slower than the machine: the default is the
+perception stages, the golden replays, the readers and the writers.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
 LACKING = {"cyclonedds", "ruff", "mypy"}
 """Of the extra [test]: without a wheel for this platform, or of no use there."""
 TESTS = (
-    *("golden", "native", "segmentation", "odometry", "tracking", "box_tracking", "geometry", "classification", "energy"),
-    *("sources", "sinks", "ros2", "service", "profile", "crash", "test_library.py", "test_pipeline.py"),
+    *("golden", "segmentation", "odometry", "tracking", "box_tracking", "geometry", "classification", "energy"),
+    *("native", "sources", "sinks", "ros2", "service", "profile", "crash", "test_library.py", "test_pipeline.py"),
 )
 BEYOND = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
 """The emulator does not hand over the kernel's count of dropped datagrams."""

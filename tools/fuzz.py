@@ -3,8 +3,8 @@
     python -m tools.fuzz [TARGET ...] --seconds 60 --seed 1
 
 By atheris, which is led by coverage, where the extra [fuzz] is installed; else by random mutations. What should not
-have left a reader is written to --out with its input; then the exit status is 1. What covers more is kept there too: a
-later run goes on from it.
+have left a reader is written to --out with its input; then the exit status is 1. What covers more is kept there too,
+and a later run goes on from it.
 """
 
 from __future__ import annotations
@@ -119,9 +119,8 @@ def _supervise(job: Job) -> int:
         process.join()
     seconds = time.monotonic() - began
     findings = sorted(job.out.glob("*.txt"))
-    print(
-        f"{job.target.name}: {job.witness.executions} executions in {seconds:.0f} s, {len(findings)} findings", flush=True
-    )
+    done = f"{job.witness.executions} executions in {seconds:.0f} s"
+    print(f"{job.target.name}: {done}, {len(findings)} findings", flush=True)
     for text in findings:
         print("  " + text.read_text().partition("\n")[0])
     if ended != 0:
@@ -147,7 +146,6 @@ def _fuzz(job: Job) -> None:
             print(f"{job.target.name}: {skipped}")
             return
         with limits():
-
             ends = time.monotonic() + job.seconds
 
             def feed(raw: bytes) -> None:
