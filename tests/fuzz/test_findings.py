@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from modt.errors import ModtError
+from modt.experiments.store import Store, packed
 from modt.ros2.cdr import CdrWriter
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
@@ -74,6 +76,12 @@ FOUND = {
     "nested lines": ("ledger", "[" * 5000 + "\n"),
     "a frame without its tracks": ("tracks", '{"schema": "modt.frame/3"}\n'),
     "a status without its loop": ("service_status", '{"schema": "modt.status/1"}'),
+    "a nested prediction": ("predictions", "[" * 5000),
+    "a nested calibration": ("calibrations", "[" * 5000),
+    "a run whose costs have no frame": (
+        "viewed_run",
+        '{"schema": "modt.ledger/1"}\n---\n{"schema": "modt.frame/3"}\n',
+    ),
     "a nested status": ("service_status", "[" * 5000),
 }
 
@@ -111,6 +119,48 @@ def test_packets_that_do_not_make_a_frame_are_refused(tmp_path: Path) -> None:
     (seed,), call = TARGETS["ouster_metadata"].prepare(tmp_path)
     with limits(), pytest.raises(ModtError, match="512 columns in packets of 15"):
         call(seed.replace(b'"columns_per_packet":16', b'"columns_per_packet":15'))
+
+
+def test_a_format_of_packets_that_is_not_named_is_refused(tmp_path: Path) -> None:
+    (seed,), call = TARGETS["ouster_metadata"].prepare(tmp_path)
+    told = re.sub(rb'"config_params":{[^}]*}', b'"config_params":{}', seed).replace(b'"udp_profile_lidar"', b'"x"')
+    with limits(), pytest.raises(ModtError, match="no metadata of an Ouster"):
+        call(told)
+
+
+@pytest.mark.parametrize("compressed", [True, False])
+def test_a_stored_result_that_is_damaged_counts_as_missing(compressed: bool, tmp_path: Path) -> None:
+    store, arrays = Store(tmp_path), {"rows": np.arange(12.0)}
+    whole = packed(arrays, compressed=compressed)
+    for at in range(len(whole)):
+        store.put("ab", whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        found = store.get("ab")
+        assert found is None or next(iter(found.values())).tolist() == arrays["rows"].tolist()
+
+
+@pytest.mark.parametrize("without", [b'"asked"', b'"accurate"', b'"gamma"', b'"value"'])
+def test_a_prediction_that_lacks_something_is_refused(without: bytes, tmp_path: Path) -> None:
+    (seed,), call = TARGETS["predictions"].prepare(tmp_path)
+    call(seed)
+    with limits(), pytest.raises(ModtError, match=r"blind\.json: holds a record that modt did not write"):
+        call(seed.replace(without, b'"x"'))
+
+
+@pytest.mark.parametrize(
+    ("instead", "said"),
+    [
+        ((b'"accurate"', b'"exact"'), "of the modes"),
+        ((b'"asked_1"', b'"x"'), "asked_1"),
+        ((b'"segmentation": [', b'"segmentation": [-'), "negative"),
+    ],
+)
+def test_a_calibration_of_other_modes_or_numbers_is_refused(
+    instead: tuple[bytes, bytes], said: str, tmp_path: Path
+) -> None:
+    (seed,), call = TARGETS["calibrations"].prepare(tmp_path)
+    call(seed)
+    with limits(), pytest.raises(ModtError, match=said):
+        call(seed.replace(*instead))
 
 
 def test_a_chunk_of_2_to_the_63_bytes_is_refused(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
 from modt.profile import from_yaml
 from modt.profile.yaml_text import to_yaml
-from modt.sinks.records import read_records
+from modt.sinks.records import read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.types import Float64, Int
@@ -57,19 +57,22 @@ class RecordedRun:
             _ = facts["stream"]["path"], facts["stream"]["name"], facts["mode"]
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        costs, states = _costs(run / LEDGER), list[str]()
+        states = list[str]()
+        with records_of(run / LEDGER):
+            costs = _costs(run / LEDGER)
         frames, rows = list[dict[str, Any]](), list[list[list[float]]]()
         for number, record in enumerate(read_records(run / TRACKS, SCHEMA)):
             try:
                 counts = {name: record[name] for name in COUNTS}
                 rows.append(frame_rows(number, record, states))
+                frames.append({**counts, **costs.get(counts["frame"], {})})
             except (KeyError, TypeError, ValueError) as error:
                 place = f"{run / TRACKS}:{number + 1}"
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
-            frames.append({**counts, **costs.get(counts["frame"], {})})
         if not frames:
             raise MisuseError(run / TRACKS, "no frames are recorded", "give the directory of a longer run")
-        return cls(facts, config, frames, states, *track_table(rows))
+        with records_of(run / TRACKS):
+            return cls(facts, config, frames, states, *track_table(rows))
 
     @property
     def numbers(self) -> list[int]:

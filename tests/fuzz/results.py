@@ -1,0 +1,91 @@
+"""What the package has written itself, and others may have changed: comparisons, predictions, stored results."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from modt import assembly
+from modt.experiments.store import Store, packed
+from modt.pipeline import STAGES
+from modt.reporting.compare_report import SCHEMA as COMPARE_SCHEMA
+from modt.reporting.comparison import COUNTS
+from modt.reporting.prediction import forecast
+from modt.reporting.prediction_report import (
+    against,
+    observed_tree,
+    prediction_tree,
+    read_calibration,
+    read_prediction,
+)
+from modt.reporting.quantity import estimate, to_json
+from modt.viewer.recorded_run import RecordedRun
+from modt.viewer.track_page import rows_of, track_page
+from tests.fuzz.runs import described
+from tests.fuzz.target import Feed, of_file, target
+from tests.reporting.test_prediction import CALIBRATION, FRAMES, TEST
+from tests.reporting.test_run_report import write_run
+
+ITSELF = {"stream": "elsewhere", "path": "/elsewhere"}
+ABOUT = {**ITSELF, "fov": "full", "asked": [0, 8], "frames": 8}
+
+
+def comparison() -> bytes:
+    """Of nine frames."""
+    found = CALIBRATION[0].take(np.arange(9))
+    names = dict(zip(found.runs, (*assembly.MODES, "varied"), strict=True))
+    tables = {
+        names[name]: {
+            "counts": {column: run.counts[:, k].tolist() for k, column in enumerate(COUNTS)},
+            "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
+        }
+        for name, run in found.runs.items()
+    }
+    facts = {"schema": COMPARE_SCHEMA, "stream": "street", "path": None, "fov": "full", "frames": 9}
+    return json.dumps({**facts, "calibration": tables, "observed": observed_tree(found.observed)}).encode()
+
+
+@target()
+def calibrations(folder: Path) -> Feed:
+    path = folder / "other.json"
+    return of_file(path, lambda: read_calibration(path, ITSELF, "full"), comparison())
+
+
+@target()
+def predictions(folder: Path) -> Feed:
+    path = folder / "blind.json"
+    found = forecast(CALIBRATION, TEST.observed[:80], FRAMES, np.random.default_rng(0))
+    tree = to_json(prediction_tree(found, 3.0, {**ABOUT, "seen": 8, "calibration": ["street"], "core": 0}))
+    modes = {name: {"cpu_ms": estimate(7.0, "ms")} for name in assembly.MODES}
+    savings = {name: {"gamma_measured_cpu": estimate(1.5)} for name in assembly.MODES}
+    return of_file(path, lambda: against(read_prediction(path, ABOUT), modes, savings), json.dumps(tree))
+
+
+@target()
+def stored_results(folder: Path) -> Feed:
+    store, arrays = Store(folder), {"rows": np.arange(12.0).reshape(3, 4), "names": np.array(["car", "cyclist"])}
+    seeds = [packed(arrays, compressed=compressed) for compressed in (True, False)]
+    store.put("ab", seeds[0])
+    (path,) = folder.rglob("*.npz")
+    return of_file(path, lambda: store.get("ab"), *seeds)
+
+
+@target()
+def viewed_run(folder: Path) -> Feed:
+    """What is seen by its ledger and its tracks, parted by a line `---`."""
+    run = described(write_run(folder / "run", frames=2))
+    ledger, tracks = run / "ledger.jsonl", run / "tracks.jsonl"
+
+    def call(raw: bytes) -> None:
+        first, _, second = raw.partition(b"---\n")
+        ledger.write_bytes(first)
+        tracks.write_bytes(second)
+        found = RecordedRun.read(run)
+        track_page(found, rows_of(found, 0), {})
+
+    return [ledger.read_bytes() + b"---\n" + tracks.read_bytes()], call
+
+
+TARGETS = (calibrations, predictions, stored_results, viewed_run)
