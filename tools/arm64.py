@@ -4,8 +4,8 @@
 
 Needs root, debootstrap, qemu-user-static (apt install), uv and the extra "wheels" (pip install): the tests run on
 the kernels that an aarch64 wheel has. The userland in FOLDER is kept, so that a second run begins at once. The
-emulator is registered with the kernel while this runs. It is some 20 times slower than the machine: the default is the
-perception stages, the golden replays, the readers and the writers.
+emulator is registered with the kernel while this runs. It is some 20 times slower than the machine: the default is
+the perception stages, the golden replays, the readers and the writers.
 """
 
 from __future__ import annotations
