@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from argparse import Namespace
 from pathlib import Path
 
 import numpy as np
 
 from modt import assembly
+from modt.cli.export import FORMS, Export
+from modt.evaluation.run_record import RunRecord
 from modt.experiments.store import Store, packed
 from modt.pipeline import STAGES
 from modt.reporting.compare_report import SCHEMA as COMPARE_SCHEMA
@@ -21,12 +24,13 @@ from modt.reporting.prediction_report import (
     read_prediction,
 )
 from modt.reporting.quantity import estimate, to_json
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.viewer.recorded_run import RecordedRun
 from modt.viewer.track_page import rows_of, track_page
-from tests.fuzz.runs import described
+from tests.fuzz.runs import DESCRIPTION, described
 from tests.fuzz.target import Feed, of_file, target
 from tests.reporting.test_prediction import CALIBRATION, FRAMES, TEST
-from tests.reporting.test_run_report import write_run
+from tests.reporting.test_run_report import track, write_run
 
 ITSELF = {"stream": "elsewhere", "path": "/elsewhere"}
 ABOUT = {**ITSELF, "fov": "full", "asked": [0, 8], "frames": 8}
@@ -88,4 +92,24 @@ def viewed_run(folder: Path) -> Feed:
     return [ledger.read_bytes() + b"---\n" + tracks.read_bytes()], call
 
 
-TARGETS = (calibrations, predictions, stored_results, viewed_run)
+@target()
+def exported_run(folder: Path) -> Feed:
+    """Its tracks as a table, and as KITTI's results."""
+    run, out = folder / "run", folder / "out"
+    run.mkdir()
+    (run / "run.yaml").write_text(DESCRIPTION + "recognition: {used: vlp-16}\nservice: true\n")
+    seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
+    lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
+    facts = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
+    lines = [{**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]} for k in range(2)]
+    asked = Namespace(no_points=True, frames=(0, None), capture=())
+
+    def read() -> None:
+        recorded = RunRecord.open(run)
+        for form in ("csv", "kitti"):
+            FORMS[form](Export(recorded, asked), out)
+
+    return of_file(run / "tracks.jsonl", read, "".join(json.dumps(line) + "\n" for line in lines))
+
+
+TARGETS = (calibrations, predictions, stored_results, viewed_run, exported_run)

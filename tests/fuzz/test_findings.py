@@ -128,6 +128,16 @@ def test_a_format_of_packets_that_is_not_named_is_refused(tmp_path: Path) -> Non
         call(told)
 
 
+@pytest.mark.parametrize(
+    "instead", [(b'"age": 1', b'"age": 1e999'), (b'"proposals": 1', b'"proposals": 1000000000000')]
+)
+def test_a_record_of_impossible_numbers_is_refused(instead: tuple[bytes, bytes], tmp_path: Path) -> None:
+    (seed,), call = TARGETS["exported_run"].prepare(tmp_path)
+    call(seed)
+    with limits(), pytest.raises(ModtError, match=r"tracks\.jsonl:1"):
+        call(seed.replace(*instead))
+
+
 @pytest.mark.parametrize("compressed", [True, False])
 def test_a_stored_result_that_is_damaged_counts_as_missing(compressed: bool, tmp_path: Path) -> None:
     store, arrays = Store(tmp_path), {"rows": np.arange(12.0)}

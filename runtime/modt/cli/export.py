@@ -120,7 +120,7 @@ class Export:
             try:
                 wanted = first <= record["frame"] < (math.inf if last is None else last)
                 made = made_of(record) if wanted else None
-            except (KeyError, TypeError, ValueError, IndexError) as error:
+            except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
                 raise broken(place, error) from None
             if made is not None:
                 self.n_frames += 1
