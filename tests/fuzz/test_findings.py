@@ -78,6 +78,11 @@ FOUND = {
     "a status without its loop": ("service_status", '{"schema": "modt.status/1"}'),
     "a nested prediction": ("predictions", "[" * 5000),
     "a nested calibration": ("calibrations", "[" * 5000),
+    "a run of infinite proposals": (
+        "judged_run",
+        "stream: {path: here}\nfov: full\nrecognition: {used: vlp-16}\n---\n"
+        '{"schema": "modt.frame/3", "frame": 1, "proposals": 1e999, "classifications": 1, "tracks": []}\n',
+    ),
     "a run whose costs have no frame": (
         "viewed_run",
         '{"schema": "modt.ledger/1"}\n---\n{"schema": "modt.frame/3"}\n',

@@ -23,7 +23,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     estimated from the positions of all tracks in view. Points, covariances and the views of the fusion stay blank.
 
     Raises:
-        ArithmeticError, AttributeError, LookupError, TypeError, ValueError: the record is broken.
+        one of modt.sinks.records.BROKEN: the record lacks something.
     """
     rows = record["tracks"]
     names = tuple(sorted({row["state"] for row in rows}))

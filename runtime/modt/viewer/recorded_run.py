@@ -14,7 +14,7 @@ from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
 from modt.profile import from_yaml
 from modt.profile.yaml_text import to_yaml
-from modt.sinks.records import read_records, records_of
+from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.types import Float64, Int
@@ -66,7 +66,7 @@ class RecordedRun:
                 counts = {name: record[name] for name in COUNTS}
                 rows.append(frame_rows(number, record, states))
                 frames.append({**counts, **costs.get(counts["frame"], {})})
-            except (KeyError, TypeError, ValueError) as error:
+            except BROKEN as error:
                 place = f"{run / TRACKS}:{number + 1}"
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
         if not frames:
