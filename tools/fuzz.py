@@ -13,6 +13,7 @@ import logging
 import mmap
 import multiprocessing
 import os
+import random
 import struct
 import sys
 import tempfile
@@ -167,14 +168,22 @@ def _fuzz(job: Job) -> None:
 
 
 def _by_coverage(job: Job, seeds: Any, feed: Feed) -> None:
+    """Mutations of atheris, and as many of ours, which know of texts."""
     import atheris
+
+    from tests.fuzz.mutation import mutated
+
+    def mutate(raw: bytes, most: int, seed: int) -> bytes:
+        chance = random.Random(seed)
+        return atheris.Mutate(raw, most) if chance.random() < 0.5 else mutated(raw, seeds, chance)[:most]
 
     corpus = job.out / "corpus"
     corpus.mkdir(exist_ok=True)
     for number, seed in enumerate(seeds):
         (corpus / f"seed-{number}").write_bytes(seed)
     limits = ["-rss_limit_mb=0", "-timeout=3600", f"-max_len={max(map(len, seeds)) + 4096}"]
-    atheris.Setup(["fuzz", str(corpus), *limits, f"-seed={job.seed}", "-verbosity=0"], feed)
+    quiet = ["-verbosity=0", f"-artifact_prefix={job.out}/"]
+    atheris.Setup(["fuzz", str(corpus), *limits, *quiet, f"-seed={job.seed}"], feed, custom_mutator=mutate)
     atheris.Fuzz()
 
 

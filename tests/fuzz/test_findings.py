@@ -72,6 +72,10 @@ FOUND = {
     "a run without its mode": ("run_description", "schema: modt.run/1\nprofile: {}\n"),
     "a run with a profile of text": ("run_description", "schema: modt.run/1\nprofile: {classification: {batch: x}}"),
     "a line without its stages": ("ledger", json.dumps({**ledger_line(0, 0), "stages": None}) + "\n"),
+    "a frame whose squares overflow": (
+        "ledger",
+        json.dumps(ledger_line(0, 3)).replace('"points": 120', '"points": 1e200') + "\n",
+    ),
     "a number of 5,000 digits": ("ledger", "9" * 5000 + "\n"),
     "nested lines": ("ledger", "[" * 5000 + "\n"),
     "a frame without its tracks": ("tracks", '{"schema": "modt.frame/3"}\n'),
@@ -141,6 +145,12 @@ def test_a_record_of_impossible_numbers_is_refused(instead: tuple[bytes, bytes],
     call(seed)
     with limits(), pytest.raises(ModtError, match=r"tracks\.jsonl:1"):
         call(seed.replace(*instead))
+
+
+def test_a_weight_of_400_digits_is_refused(tmp_path: Path) -> None:
+    (seed,), call = TARGETS["model_metadata"].prepare(tmp_path)
+    with limits(), pytest.raises(ModtError, match="malformed box or reflectance classifier"):
+        call(seed.replace(b"0.1", b"1" + b"0" * 400, 1))
 
 
 @pytest.mark.parametrize("compressed", [True, False])
