@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from argparse import Namespace
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +32,7 @@ from modt.viewer.track_page import rows_of, track_page
 from tests.fuzz.runs import DESCRIPTION, described
 from tests.fuzz.target import Feed, of_file, target
 from tests.reporting.test_prediction import CALIBRATION, FRAMES, TEST
-from tests.reporting.test_run_report import track, write_run
+from tests.reporting.test_run_report import ledger_line, track, window, write_run
 
 ITSELF = {"stream": "elsewhere", "path": "/elsewhere"}
 ABOUT = {**ITSELF, "fov": "full", "asked": [0, 8], "frames": 8}
@@ -76,20 +78,34 @@ def stored_results(folder: Path) -> Feed:
     return of_file(path, lambda: store.get("ab"), *seeds)
 
 
+def frames() -> list[dict[str, Any]]:
+    """Two records of a track that is seen and one that is lost."""
+    seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
+    lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
+    facts = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
+    return [{**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]} for k in range(2)]
+
+
+def json_lines(records: Iterable[dict[str, Any]]) -> bytes:
+    """A line a record."""
+    return "".join(json.dumps(record) + "\n" for record in records).encode()
+
+
 @target()
 def viewed_run(folder: Path) -> Feed:
     """What is seen by its ledger and its tracks, parted by a line `---`."""
     run = described(write_run(folder / "run", frames=2))
-    ledger, tracks = run / "ledger.jsonl", run / "tracks.jsonl"
+    ledger, tracks, costs = run / "ledger.jsonl", run / "tracks.jsonl", [ledger_line(k, 1) for k in range(2)]
+    seed = [*costs, window(0, costs, 1.5)]
 
     def call(raw: bytes) -> None:
         first, _, second = raw.partition(b"---\n")
         ledger.write_bytes(first)
         tracks.write_bytes(second)
         found = RecordedRun.read(run)
-        track_page(found, rows_of(found, 0), {})
+        track_page(found, rows_of(found, 3), {})
 
-    return [ledger.read_bytes() + b"---\n" + tracks.read_bytes()], call
+    return [b"---\n".join([json_lines(seed), json_lines(frames())])], call
 
 
 @target()
@@ -98,10 +114,6 @@ def exported_run(folder: Path) -> Feed:
     run, out = folder / "run", folder / "out"
     run.mkdir()
     (run / "run.yaml").write_text(DESCRIPTION + "recognition: {used: vlp-16}\nservice: true\n")
-    seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
-    lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
-    facts = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
-    lines = [{**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]} for k in range(2)]
     asked = Namespace(no_points=True, frames=(0, None), capture=())
 
     def read() -> None:
@@ -109,7 +121,7 @@ def exported_run(folder: Path) -> Feed:
         for form in ("csv", "kitti"):
             FORMS[form](Export(recorded, asked), out)
 
-    return of_file(run / "tracks.jsonl", read, "".join(json.dumps(line) + "\n" for line in lines))
+    return of_file(run / "tracks.jsonl", read, json_lines(frames()))
 
 
 TARGETS = (calibrations, predictions, stored_results, viewed_run, exported_run)

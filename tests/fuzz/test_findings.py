@@ -147,6 +147,15 @@ def test_a_record_of_impossible_numbers_is_refused(instead: tuple[bytes, bytes],
         call(seed.replace(*instead))
 
 
+@pytest.mark.parametrize(
+    "instead", [(b'"classifications": 1', b'"classifications": []'), (b'"w": 1.5', b'"w": 1e308')]
+)
+def test_a_view_of_impossible_numbers_is_refused(instead: tuple[bytes, bytes], tmp_path: Path) -> None:
+    (seed,), call = TARGETS["viewed_run"].prepare(tmp_path)
+    with limits(), pytest.raises(ModtError, match=r"tracks\.jsonl"):
+        call(seed.replace(*instead))
+
+
 def test_a_weight_of_400_digits_is_refused(tmp_path: Path) -> None:
     (seed,), call = TARGETS["model_metadata"].prepare(tmp_path)
     with limits(), pytest.raises(ModtError, match="malformed box or reflectance classifier"):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from modt import profile
 from modt.config import ProfileConfig
@@ -20,7 +23,11 @@ from modt.sinks.tracks import SCHEMA
 from modt.types import Float64, Int
 from modt.viewer.track_rows import frame_rows, track_table
 
-COUNTS = ("frame", "stamp_s", "proposals", "classifications", "deferred")
+COUNTS: dict[str, Callable[[Any], float]] = {
+    "frame": int,
+    "stamp_s": float,
+    **dict.fromkeys(("proposals", "classifications", "deferred"), int),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +70,7 @@ class RecordedRun:
         frames, rows = list[dict[str, Any]](), list[list[list[float]]]()
         for number, record in enumerate(read_records(run / TRACKS, SCHEMA)):
             try:
-                counts = {name: record[name] for name in COUNTS}
+                counts = {name: kind(record[name]) for name, kind in COUNTS.items()}
                 rows.append(frame_rows(number, record, states))
                 frames.append({**counts, **costs.get(counts["frame"], {})})
             except BROKEN as error:
@@ -71,7 +78,7 @@ class RecordedRun:
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
         if not frames:
             raise MisuseError(run / TRACKS, "no frames are recorded", "give the directory of a longer run")
-        with records_of(run / TRACKS):
+        with records_of(run / TRACKS), np.errstate(over="raise", invalid="raise"):
             return cls(facts, config, frames, states, *track_table(rows))
 
     @property
