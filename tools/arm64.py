@@ -2,9 +2,10 @@
 
     sudo python -m tools.arm64 [FOLDER] [--tests tests/golden tests/tracking …]
 
-Needs root, debootstrap, qemu-user-static (apt install) and uv (pip install). The userland in FOLDER is kept, so that
-a second run begins at once. The emulator is registered with the kernel while this runs. It is some 20 times slower
-than the machine: the default is the perception stages, the golden replays, the readers and the writers.
+Needs root, debootstrap, qemu-user-static (apt install), uv and the extra "wheels" (pip install): the tests run on
+the kernels that an aarch64 wheel has. The userland in FOLDER is kept, so that a second run begins at once. The
+emulator is registered with the kernel while this runs. It is some 20 times slower than the machine: the default is
+the perception stages, the golden replays, the readers and the writers.
 """
 
 from __future__ import annotations
@@ -18,17 +19,18 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from modt.native import build
 from tools.options import parser
 
 ROOT = Path(__file__).resolve().parents[1]
-SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates"
+SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates,gcc,libc6-dev"
 PLATFORM = "aarch64-manylinux_2_28"
 LIBRARIES = f"usr/local/lib/python{PYTHON}/dist-packages"
 LACKING = {"cyclonedds", "ruff", "mypy"}
 """Of the extra [test]: without a wheel for this platform, or of no use there."""
 TESTS = (
     *("golden", "segmentation", "odometry", "tracking", "box_tracking", "geometry", "classification", "energy"),
-    *("sources", "sinks", "ros2", "service", "profile", "crash", "test_library.py", "test_pipeline.py"),
+    *("native", "sources", "sinks", "ros2", "service", "profile", "crash", "test_library.py", "test_pipeline.py"),
 )
 BEYOND = "tests/sources/test_pose_socket.py::test_what_the_kernel_drops_is_counted"
 """The emulator does not hand over the kernel's count of dropped datagrams."""
@@ -96,6 +98,16 @@ def install(root: Path) -> None:
     run(uv, "--no-config", "pip", "install", "--quiet", *form, "--target", root / LIBRARIES, *wanted)
 
 
+def compile_kernels(folder: Path) -> Path:
+    """A copy of modt.native with the libraries of this platform, by the compiler of the wheels."""
+    shutil.copytree(build.FOLDER, folder, ignore=shutil.ignore_patterns("*.so", "__pycache__"), dirs_exist_ok=True)
+    try:
+        build.compile_all(folder, "aarch64")
+    except build.NoCompilerError as error:
+        raise SystemExit(f"arm64: {error}") from None
+    return folder
+
+
 def main() -> int:
     options = parser(__doc__)
     options.add_argument("folder", type=Path, nargs="?", default=Path("/var/tmp/modt-arm64"), metavar="FOLDER")
@@ -111,12 +123,14 @@ def main() -> int:
         cores = root / "opt/cpuinfo"
         cores.write_text("".join(CORE.format(number=number) for number in range(os.cpu_count() or 1)))
         stack.enter_context(mounted(ROOT, root / "opt/modt", "--bind", "-o", "ro"))
+        native = compile_kernels(root / "opt/native")
+        stack.enter_context(mounted(native, root / "opt/modt" / build.FOLDER.relative_to(ROOT), "--bind", "-o", "ro"))
         stack.enter_context(mounted("/dev", root / "dev", "--rbind"))
         stack.enter_context(mounted("proc", root / "proc", "-t", "proc"))
         stack.enter_context(mounted(cores, root / "proc/cpuinfo", "--bind"))
         environment = {"QEMU_CPU": CPU, "HOME": "/root", "PATH": "/usr/sbin:/usr/bin", "PYTHONDONTWRITEBYTECODE": "1"}
         environment["PYTHONPATH"] = "/opt/modt/runtime"
-        chosen = ["-m", "not slow and not install and not kitti", "--deselect", BEYOND]
+        chosen = ["-m", "not slow and not install and not kitti", "--durations", "10", "--deselect", BEYOND]
         tests = [*chosen, "-p", "no:cacheprovider", *given.tests]
         inside = f"cd /opt/modt && exec python3 -m pytest {' '.join(map(repr, tests))}"
         return subprocess.run(["chroot", str(root), "sh", "-c", inside], check=False, env=environment).returncode

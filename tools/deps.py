@@ -115,7 +115,9 @@ RESOLUTIONS = {"oldest": OLDEST, "newest": NEWEST}
 def main() -> int:
     options = parser(__doc__)
     options.add_argument("action", choices=[*RESOLUTIONS, *ACTIONS])
-    options.add_argument("--python", default="3.11", help="of oldest and newest (default: %(default)s)")
+    options.add_argument(
+        "--python", default="3.11", help="version or path, for oldest and newest (default: %(default)s)"
+    )
     given = options.parse_args()
     if given.action in RESOLUTIONS:
         return tested(RESOLUTIONS[given.action], given.python)

@@ -3,17 +3,23 @@
     python -m tools.fuzz [TARGET ...] --seconds 60 --seed 1
 
 By atheris, which is led by coverage, where the extra [fuzz] is installed; else by random mutations. What should not
-have left a reader is written to --out with its input; then the exit status is 1.
+have left a reader is written to --out with its input; then the exit status is 1. What covers more is kept there too,
+and a later run goes on from it.
 """
 
 from __future__ import annotations
 
+import logging
+import mmap
 import multiprocessing
-import shutil
+import os
+import random
+import struct
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,19 +29,47 @@ from tools.options import parser
 
 PATIENCE_S = 60.0
 """After its seconds, until a process that does not answer is ended."""
-LAST = "last-input"
+MEMORY = Path("/dev/shm")
+"""Where the files are that an input is written to, if there is such a file system."""
 Feed = Callable[[bytes], None]
+
+
+class Witness:
+    """How many inputs a process has read, and the last one, in memory that outlives it."""
+
+    HEAD, MOST_BYTES = struct.Struct("<QQ"), 1 << 24
+
+    def __init__(self) -> None:
+        self._memory = mmap.mmap(-1, self.HEAD.size + self.MOST_BYTES)
+
+    def see(self, raw: bytes) -> None:
+        """An input is about to be read."""
+        kept = raw[: self.MOST_BYTES]
+        self.HEAD.pack_into(self._memory, 0, self.executions + 1, len(kept))
+        self._memory[self.HEAD.size : self.HEAD.size + len(kept)] = kept
+
+    @property
+    def executions(self) -> int:
+        """Inputs that were seen."""
+        return int(self.HEAD.unpack_from(self._memory)[0])
+
+    @property
+    def last(self) -> bytes:
+        """The last of them."""
+        return self._memory[self.HEAD.size :][: self.HEAD.unpack_from(self._memory)[1]]
 
 
 @dataclass(frozen=True)
 class Job:
     """What a process is to do."""
 
-    target: str
+    target: Any
     seconds: float
     seed: int
     out: Path
+    folder: Path
     coverage: bool
+    witness: Witness
 
 
 def main() -> None:
@@ -46,28 +80,38 @@ def main() -> None:
     options.add_argument("--out", type=Path, default=Path("runs/fuzz"), help="folder (default: %(default)s)")
     options.add_argument("--random", action="store_true", help="mutations at random even with atheris")
     arguments = options.parse_args()
-    from tests.fuzz.targets import TARGETS
-
+    coverage = find_spec("atheris") is not None and not arguments.random
+    with _instrumented(coverage):  # once: the processes are forks of this one
+        from tests.fuzz.targets import TARGETS
     unknown = set(arguments.targets) - set(TARGETS)
     if unknown:
         options.error(f"no target {', '.join(sorted(unknown))}; there are {', '.join(TARGETS)}")
-    coverage = find_spec("atheris") is not None and not arguments.random
     print("led by coverage (atheris)" if coverage else "at random")
     found = 0
     for name in arguments.targets or TARGETS:
         out = arguments.out / name
-        shutil.rmtree(out, ignore_errors=True)
-        out.mkdir(parents=True)
-        found += _supervise(Job(name, arguments.seconds, arguments.seed, out, coverage))
+        out.mkdir(parents=True, exist_ok=True)
+        for old in (*out.glob("*.txt"), *out.glob("*.input")):
+            old.unlink()
+        with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
+            job = Job(TARGETS[name], arguments.seconds, arguments.seed, out, Path(folder), coverage, Witness())
+            found += _supervise(job)
     sys.exit(1 if found else 0)
+
+
+def _instrumented(coverage: bool) -> AbstractContextManager[object]:
+    """Within it, what is imported of the package tells what it covers."""
+    if not coverage:
+        return nullcontext()
+    import atheris
+
+    return atheris.instrument_imports(include=["modt"])
 
 
 def _supervise(job: Job) -> int:
     """Run a job, tell of it, and return the number of its findings."""
-    context = multiprocessing.get_context("spawn")
-    executions = context.Value("Q", 0)
     began = time.monotonic()
-    process = context.Process(target=_run, args=(job, executions))
+    process = multiprocessing.get_context("fork").Process(target=_fuzz, args=(job,))
     process.start()
     process.join(job.seconds + PATIENCE_S)
     ended = process.exitcode
@@ -76,46 +120,40 @@ def _supervise(job: Job) -> int:
         process.join()
     seconds = time.monotonic() - began
     findings = sorted(job.out.glob("*.txt"))
-    print(f"{job.target}: {executions.value} executions in {seconds:.0f} s, {len(findings)} findings", flush=True)
+    done = f"{job.witness.executions} executions in {seconds:.0f} s"
+    print(f"{job.target.name}: {done}, {len(findings)} findings", flush=True)
     for text in findings:
         print("  " + text.read_text().partition("\n")[0])
     if ended != 0:
-        how = "did not answer" if ended is None else f"ended by {ended}"
-        print(f"  the process {how}; its last input is {job.out / LAST}")
+        last = job.out / "last.input"
+        last.write_bytes(job.witness.last)
+        print(f"  the process {'did not answer' if ended is None else f'ended by {ended}'}; its last input is {last}")
     return len(findings) + (ended != 0)
 
 
-def _run(job: Job, executions: Any) -> None:
+def _fuzz(job: Job) -> None:
     """The process of a target."""
-    if job.coverage:
-        import atheris
-
-        with atheris.instrument_imports(include=["modt"]):
-            _fuzz(job, executions)
-    else:
-        _fuzz(job, executions)
-
-
-def _fuzz(job: Job, executions: Any) -> None:
     import pytest
 
     from tests.fuzz.execution import execute, limits
     from tests.fuzz.mutation import mutations
-    from tests.fuzz.targets import TARGETS
 
-    target, places, last = TARGETS[job.target], set[str](), job.out / LAST
-    with tempfile.TemporaryDirectory() as folder:
+    logging.basicConfig(handlers=[logging.NullHandler()])
+    places = set[str]()
+    with _instrumented(job.coverage):
         try:
-            seeds, call = target.prepare(Path(folder))
+            seeds, call = job.target.prepare(job.folder)
         except pytest.skip.Exception as skipped:
-            print(f"{job.target}: {skipped}")
+            print(f"{job.target.name}: {skipped}")
             return
         with limits():
+            ends = time.monotonic() + job.seconds
 
             def feed(raw: bytes) -> None:
-                executions.value += 1
-                last.write_bytes(raw)
-                found = execute(call, raw, target.refusals)
+                if time.monotonic() > ends:
+                    os._exit(0)  # at once: what libraries do at an exit may wait for threads that a fork has not
+                job.witness.see(raw)
+                found = execute(call, raw, job.target.refusals)
                 if found is not None and found.place not in places:
                     places.add(found.place)
                     name = found.place.replace(":", "-")
@@ -125,24 +163,27 @@ def _fuzz(job: Job, executions: Any) -> None:
             if job.coverage:
                 _by_coverage(job, seeds, feed)
             else:
-                ends = time.monotonic() + job.seconds
                 for raw in mutations(seeds, sys.maxsize, job.seed):
-                    if time.monotonic() > ends:
-                        break
                     feed(raw)
-    last.unlink(missing_ok=True)
 
 
 def _by_coverage(job: Job, seeds: Any, feed: Feed) -> None:
-    """Ends the process."""
+    """Mutations of atheris, and as many of ours, which know of texts."""
     import atheris
+
+    from tests.fuzz.mutation import mutated
+
+    def mutate(raw: bytes, most: int, seed: int) -> bytes:
+        chance = random.Random(seed)
+        return atheris.Mutate(raw, most) if chance.random() < 0.5 else mutated(raw, seeds, chance)[:most]
 
     corpus = job.out / "corpus"
     corpus.mkdir(exist_ok=True)
     for number, seed in enumerate(seeds):
         (corpus / f"seed-{number}").write_bytes(seed)
-    limits = [f"-max_total_time={job.seconds:.0f}", f"-seed={job.seed}", "-rss_limit_mb=0", "-timeout=3600"]
-    atheris.Setup(["fuzz", str(corpus), *limits, f"-max_len={max(map(len, seeds)) + 4096}", "-verbosity=0"], feed)
+    limits = ["-rss_limit_mb=0", "-timeout=3600", f"-max_len={max(map(len, seeds)) + 4096}"]
+    quiet = ["-verbosity=0", f"-artifact_prefix={job.out}/"]
+    atheris.Setup(["fuzz", str(corpus), *limits, *quiet, f"-seed={job.seed}"], feed, custom_mutator=mutate)
     atheris.Fuzz()
 
 

@@ -3,29 +3,19 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Iterator, Sequence
 
 MOST_BYTES = 65_536
 EXTREMES = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF, 2**63 - 1, 2**64 - 1)
 WORDS = (
-    *(
-        b"nan",
-        b"inf",
-        b"-inf",
-        b"-1",
-        b"0",
-        b"1e999",
-        b"-0.0",
-        b"9" * 30,
-        b"1" * 5000,
-        b"null",
-        b"true",
-        b'""',
-        b"[]",
-    ),
-    *(b"[]", b"{}", b"\n", b"\0", b" ", b"\xff\xfe", b"[" * 5000, b"{a: " * 2000, b"<a>" * 2000, b"..", b"\xc2\xb2"),
+    *(b"nan", b"inf", b"-inf", b"-1", b"0", b"1", b"1.5", b"1e308", b"1e999", b"-0.0", b"9" * 30, b"1" * 5000),
+    *(b"null", b"true", b'""', b'"a"', b"[]", b"[1]", b"[[]]", b"{}", b'{"a": 1}', b"\n", b"\0", b" ", b".."),
+    *(b"\xff\xfe", b"\xc2\xb2", b"[" * 5000, b"{a: " * 2000, b"<a>" * 2000, b"-9223372036854775809"),
 )
 """Text that readers of numbers and of nested formats have trouble with."""
+
+VALUE = re.compile(rb'(?<=[\s,:\[{(>])(?:"[^"\n]{0,64}"|[^\s,:\]})<"]{1,64})')
 
 
 def mutations(seeds: Sequence[bytes], n: int, seed: int) -> Iterator[bytes]:
@@ -33,10 +23,15 @@ def mutations(seeds: Sequence[bytes], n: int, seed: int) -> Iterator[bytes]:
     chance = random.Random(seed)
     yield from seeds
     for _ in range(n):
-        raw = bytearray(chance.choice(seeds))
-        for _ in range(chance.choice((1, 1, 2, 4, 16))):
-            chance.choice(KINDS)(raw, seeds, chance)
-        yield bytes(raw[: max(MOST_BYTES, *map(len, seeds))])
+        yield mutated(chance.choice(seeds), seeds, chance)
+
+
+def mutated(one: bytes, seeds: Sequence[bytes], chance: random.Random) -> bytes:
+    """An input made of one, with parts of the seeds."""
+    raw = bytearray(one)
+    for _ in range(chance.choice((1, 1, 2, 4, 16))):
+        chance.choice(KINDS)(raw, seeds, chance)
+    return bytes(raw[: max(MOST_BYTES, *map(len, seeds))])
 
 
 def _place(raw: bytearray, chance: random.Random) -> int:
@@ -82,4 +77,10 @@ def _word(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
     raw[at : chance.choice((at, min(ends, default=at)))] = chance.choice(WORDS)
 
 
-KINDS = (_flip, _cut, _remove, _extreme, _repeat, _splice, _word)
+def _value(raw: bytearray, _: Sequence[bytes], chance: random.Random) -> None:
+    """A whole value of a text, with its quotes."""
+    if found := VALUE.search(raw, chance.randrange(len(raw) or 1)):
+        raw[found.start() : found.end()] = chance.choice(WORDS)
+
+
+KINDS = (_flip, _cut, _remove, _extreme, _repeat, _splice, _word, _value, _value)

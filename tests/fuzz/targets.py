@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from tests.fuzz import files, runs, streams
+from tests.fuzz import files, live, results, runs, streams
 
-TARGETS = {target.name: target for target in (*files.TARGETS, *streams.TARGETS, *runs.TARGETS)}
+_GROUPS = (files, streams, runs, results, live)
+TARGETS = {target.name: target for group in _GROUPS for target in group.TARGETS}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from modt.errors import ModtError
+from modt.experiments.store import Store, packed
 from modt.ros2.cdr import CdrWriter
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
@@ -70,10 +72,25 @@ FOUND = {
     "a run without its mode": ("run_description", "schema: modt.run/1\nprofile: {}\n"),
     "a run with a profile of text": ("run_description", "schema: modt.run/1\nprofile: {classification: {batch: x}}"),
     "a line without its stages": ("ledger", json.dumps({**ledger_line(0, 0), "stages": None}) + "\n"),
+    "a frame whose squares overflow": (
+        "ledger",
+        json.dumps(ledger_line(0, 3)).replace('"points": 120', '"points": 1e200') + "\n",
+    ),
     "a number of 5,000 digits": ("ledger", "9" * 5000 + "\n"),
     "nested lines": ("ledger", "[" * 5000 + "\n"),
     "a frame without its tracks": ("tracks", '{"schema": "modt.frame/3"}\n'),
     "a status without its loop": ("service_status", '{"schema": "modt.status/1"}'),
+    "a nested prediction": ("predictions", "[" * 5000),
+    "a nested calibration": ("calibrations", "[" * 5000),
+    "a run of infinite proposals": (
+        "judged_run",
+        "stream: {path: here}\nfov: full\nrecognition: {used: vlp-16}\n---\n"
+        '{"schema": "modt.frame/3", "frame": 1, "proposals": 1e999, "classifications": 1, "tracks": []}\n',
+    ),
+    "a run whose costs have no frame": (
+        "viewed_run",
+        '{"schema": "modt.ledger/1"}\n---\n{"schema": "modt.frame/3"}\n',
+    ),
     "a nested status": ("service_status", "[" * 5000),
 }
 
@@ -111,6 +128,73 @@ def test_packets_that_do_not_make_a_frame_are_refused(tmp_path: Path) -> None:
     (seed,), call = TARGETS["ouster_metadata"].prepare(tmp_path)
     with limits(), pytest.raises(ModtError, match="512 columns in packets of 15"):
         call(seed.replace(b'"columns_per_packet":16', b'"columns_per_packet":15'))
+
+
+def test_a_format_of_packets_that_is_not_named_is_refused(tmp_path: Path) -> None:
+    (seed,), call = TARGETS["ouster_metadata"].prepare(tmp_path)
+    told = re.sub(rb'"config_params":{[^}]*}', b'"config_params":{}', seed).replace(b'"udp_profile_lidar"', b'"x"')
+    with limits(), pytest.raises(ModtError, match="no metadata of an Ouster"):
+        call(told)
+
+
+@pytest.mark.parametrize(
+    "instead", [(b'"age": 1', b'"age": 1e999'), (b'"proposals": 1', b'"proposals": 1000000000000')]
+)
+def test_a_record_of_impossible_numbers_is_refused(instead: tuple[bytes, bytes], tmp_path: Path) -> None:
+    (seed,), call = TARGETS["exported_run"].prepare(tmp_path)
+    call(seed)
+    with limits(), pytest.raises(ModtError, match=r"tracks\.jsonl:1"):
+        call(seed.replace(*instead))
+
+
+@pytest.mark.parametrize(
+    "instead", [(b'"classifications": 1', b'"classifications": []'), (b'"w": 1.5', b'"w": 1e308')]
+)
+def test_a_view_of_impossible_numbers_is_refused(instead: tuple[bytes, bytes], tmp_path: Path) -> None:
+    (seed,), call = TARGETS["viewed_run"].prepare(tmp_path)
+    with limits(), pytest.raises(ModtError, match=r"tracks\.jsonl"):
+        call(seed.replace(*instead))
+
+
+def test_a_weight_of_400_digits_is_refused(tmp_path: Path) -> None:
+    (seed,), call = TARGETS["model_metadata"].prepare(tmp_path)
+    with limits(), pytest.raises(ModtError, match="malformed box or reflectance classifier"):
+        call(seed.replace(b"0.1", b"1" + b"0" * 400, 1))
+
+
+@pytest.mark.parametrize("compressed", [True, False])
+def test_a_stored_result_that_is_damaged_counts_as_missing(compressed: bool, tmp_path: Path) -> None:
+    store, arrays = Store(tmp_path), {"rows": np.arange(12.0)}
+    whole = packed(arrays, compressed=compressed)
+    for at in range(len(whole)):
+        store.put("ab", whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
+        found = store.get("ab")
+        assert found is None or next(iter(found.values())).tolist() == arrays["rows"].tolist()
+
+
+@pytest.mark.parametrize("without", [b'"asked"', b'"accurate"', b'"gamma"', b'"value"'])
+def test_a_prediction_that_lacks_something_is_refused(without: bytes, tmp_path: Path) -> None:
+    (seed,), call = TARGETS["predictions"].prepare(tmp_path)
+    call(seed)
+    with limits(), pytest.raises(ModtError, match=r"blind\.json: holds a record that modt did not write"):
+        call(seed.replace(without, b'"x"'))
+
+
+@pytest.mark.parametrize(
+    ("instead", "said"),
+    [
+        ((b'"accurate"', b'"exact"'), "of the modes"),
+        ((b'"asked_1"', b'"x"'), "asked_1"),
+        ((b'"segmentation": [', b'"segmentation": [-'), "negative"),
+    ],
+)
+def test_a_calibration_of_other_modes_or_numbers_is_refused(
+    instead: tuple[bytes, bytes], said: str, tmp_path: Path
+) -> None:
+    (seed,), call = TARGETS["calibrations"].prepare(tmp_path)
+    call(seed)
+    with limits(), pytest.raises(ModtError, match=said):
+        call(seed.replace(*instead))
 
 
 def test_a_chunk_of_2_to_the_63_bytes_is_refused(tmp_path: Path) -> None:

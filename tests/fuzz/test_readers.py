@@ -23,6 +23,12 @@ def findings(target: Target, folder: Path, n: int, seed: int) -> list[Finding]:
 
 
 @READERS
+def test_valid_bytes_are_read(target: Target, tmp_path: Path) -> None:
+    seeds, call = target.prepare(tmp_path)
+    call(seeds[0])
+
+
+@READERS
 def test_broken_bytes_are_refused(target: Target, tmp_path: Path) -> None:
     assert [f"{f.error} ({f.place})" for f in findings(target, tmp_path, FEW, 1)] == []
 

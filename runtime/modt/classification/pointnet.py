@@ -75,7 +75,7 @@ class PointNet:
             boxes = box_classifier.from_metadata(pooled)
             self.box_scores = BoxScores(boxes, reflectance_classifier.from_metadata(pooled, sensor), sensor)
             self.class_frequency = _class_frequency(metadata)
-        except (KeyError, TypeError, ValueError, RecursionError) as error:
+        except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
             raise MisuseError(self.path, cause, "export the model again") from None
         self._try(config.batch, config.max_points)

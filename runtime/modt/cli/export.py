@@ -114,13 +114,14 @@ class Export:
             MisuseError: there are none, or one lacks something.
         """
         from modt.evaluation.run_record import broken
+        from modt.sinks.records import BROKEN
 
         first, last = self._frames
         for place, record in self.run.records():
             try:
                 wanted = first <= record["frame"] < (math.inf if last is None else last)
                 made = made_of(record) if wanted else None
-            except (KeyError, TypeError, ValueError, IndexError) as error:
+            except BROKEN as error:
                 raise broken(place, error) from None
             if made is not None:
                 self.n_frames += 1

@@ -19,6 +19,8 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Report."""
+    import numpy as np
+
     from modt.reporting.lateness_plot import lateness_plots
     from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
@@ -26,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.reporting.run_view import run_document, run_plots
     from modt.sinks.records import records_of
 
-    with records_of(arguments.run_directory):
+    with records_of(arguments.run_directory), np.errstate(over="raise", invalid="raise"):
         tree = run_tree(arguments.run_directory)
         document = run_document(tree)
         text = json.dumps(to_json(tree), indent=2, allow_nan=False) if arguments.json else document.text()

@@ -11,6 +11,8 @@ from modt.geometry import wrap
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import NONE, Float32, Float64, Frame, FrameResult, Proposals, Tracks
 
+MOST_PROPOSALS = 100_000
+"""Of a record that is believed: sweeps have some hundreds."""
 NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
 
 
@@ -21,7 +23,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     estimated from the positions of all tracks in view. Points, covariances and the views of the fusion stay blank.
 
     Raises:
-        KeyError, TypeError, ValueError, IndexError: the record lacks something.
+        one of modt.sinks.records.BROKEN: the record lacks something.
     """
     rows = record["tracks"]
     names = tuple(sorted({row["state"] for row in rows}))
@@ -40,6 +42,8 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     boxes = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
     tracks.box[seen] = _in_the_world(boxes, tracks.x[seen])
     n_proposals = int(record["proposals"])
+    if n_proposals > MOST_PROPOSALS:
+        raise ValueError(f"{n_proposals} proposals")
     proposals = _proposals(n_proposals)
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)

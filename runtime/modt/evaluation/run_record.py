@@ -17,7 +17,7 @@ from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.truth import Truth
 from modt.geometry import FieldOfView
 from modt.profile import from_yaml
-from modt.sinks.records import read_records
+from modt.sinks.records import BROKEN, read_records
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.sources.scan_file import read_scan
@@ -98,7 +98,7 @@ class RunRecord:
             try:
                 index = int(record["frame"])
                 found = _found(record)
-            except (KeyError, TypeError, ValueError, IndexError) as error:
+            except BROKEN as error:
                 raise broken(place, error) from None
             labels, scan = truth.frames.get(index), scans.get(index)
             if labels is None or scan is None:

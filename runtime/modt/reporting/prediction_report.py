@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from modt.assembly import MODES
 from modt.errors import MisuseError
 from modt.pipeline import STAGES
 from modt.reporting.compare_report import SCHEMA as COMPARE_SCHEMA
@@ -17,9 +18,12 @@ from modt.reporting.document import Document, Table
 from modt.reporting.gamma import RunCosts
 from modt.reporting.prediction import OBSERVED, Forecast, Stream
 from modt.reporting.quantity import Quantity, estimate
+from modt.sinks.records import records_of
 from modt.types import Int
 
 SCHEMA = "modt.prediction/1"
+_SEEN = (*OBSERVED, *(f"asked_{k}" for k in range(len(MODES) - 1)))
+_ENDS = ("low", "high")
 _MIN_FRAMES = 8
 """Of a comparison that is used as a calibration."""
 _OVER = (
@@ -36,26 +40,43 @@ def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tup
     """
     remedy = "give the output of modt-profile compare --json of another stream"
     tree = _read(path, COMPARE_SCHEMA, remedy)
-    if {key: tree[key] for key in itself} == itself:
-        raise MisuseError(path, f"it was measured on {itself['stream']} itself", remedy)
-    if tree["fov"] != fov:
-        raise MisuseError(path, f"its field of view is {tree['fov']}, not {fov}", f"{remedy} with --fov {fov}")
-    if tree["frames"] < _MIN_FRAMES:
-        raise MisuseError(path, f"{tree['frames']} frames tell no unit costs", f"{remedy} of {_MIN_FRAMES} or more")
-    runs = {
-        name: RunCosts(
-            np.array([table["counts"][column] for column in COUNTS], np.int64).T,
-            1e-3 * np.array([table["cpu_ms"][stage] for stage in STAGES], float).T,
-        )
-        for name, table in tree["calibration"].items()
-    }
-    return tree["stream"], Stream(runs, np.array([*tree["observed"].values()], np.int64).T)
+    with records_of(path):
+        if {key: tree[key] for key in itself} == itself:
+            raise MisuseError(path, f"it was measured on {itself['stream']} itself", remedy)
+        if tree["fov"] != fov:
+            raise MisuseError(path, f"its field of view is {tree['fov']}, not {fov}", f"{remedy} with --fov {fov}")
+        if tree["frames"] < _MIN_FRAMES:
+            few = f"{tree['frames']} frames tell no unit costs"
+            raise MisuseError(path, few, f"{remedy} of {_MIN_FRAMES} or more")
+        runs = {
+            name: RunCosts(
+                np.array([table["counts"][column] for column in COUNTS], np.int64).T,
+                1e-3 * np.array([table["cpu_ms"][stage] for stage in STAGES], float).T,
+            )
+            for name, table in tree["calibration"].items()
+        }
+        stream = Stream(runs, np.array([tree["observed"][column] for column in _SEEN], np.int64).T)
+        _check(stream)
+    return str(tree["stream"]), stream
+
+
+def _check(stream: Stream) -> None:
+    """Raises ValueError where the modes, their frames or their costs cannot be those of a comparison."""
+    *modes, _ = stream.runs
+    if modes != [*MODES]:
+        raise ValueError(f"it is of the modes {modes}")
+    tables = [table for run in stream.runs.values() for table in (run.counts, run.cost)] + [stream.observed]
+    if len({len(table) for table in tables}) > 1:
+        raise ValueError("its modes saw different frames")
+    if not all((np.isfinite(table) & (table >= 0)).all() for table in tables):
+        raise ValueError("a number is negative or not finite")
+    if not all(run.cost.sum() > 0 for run in stream.runs.values()):
+        raise ValueError("a mode took no time")
 
 
 def observed_tree(observed: Int) -> dict[str, list[int]]:
     """Of every frame (F, 7), by column, what tracking alone sees."""
-    asked = [f"asked_{k}" for k in range(observed.shape[1] - len(OBSERVED))]
-    return dict(zip((*OBSERVED, *asked), observed.T.tolist(), strict=True))
+    return dict(zip(_SEEN, observed.T.tolist(), strict=True))
 
 
 def prediction_tree(found: Forecast, net_W: float, about: dict[str, Any]) -> dict[str, Any]:
@@ -111,9 +132,14 @@ def read_prediction(path: Path, about: dict[str, Any]) -> dict[str, Any]:
         MisuseError: no prediction, or one of another stream, frames or field of view than in about.
     """
     tree = _read(path, SCHEMA, "give a file written by modt-profile predict")
-    for key, value in about.items():
-        if tree[key] != value:
-            raise MisuseError(path, f"its {key} is {tree[key]!r}, not {value!r}", "compare what was predicted")
+    with records_of(path):
+        for key, value in about.items():
+            if tree[key] != value:
+                raise MisuseError(path, f"its {key} is {tree[key]!r}, not {value!r}", "compare what was predicted")
+        if ([*tree["cpu_ms"]], [*tree["gamma"]]) != ([*MODES], [*MODES][1:]):
+            raise ValueError(f"it is of the modes {[*tree['cpu_ms']]}")
+        for plain in (*tree["cpu_ms"].values(), *(value for row in tree["gamma"].values() for value in row.values())):
+            _predicted(plain)
     return tree
 
 
@@ -147,12 +173,16 @@ def against_table(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def _row(name: str, plain: dict[str, Any], measured: Quantity, unit: str = "") -> dict[str, Any]:
-    low, high = plain.get("low"), plain.get("high")
-    bounds = None if low is None or high is None else (low, high)
-    predicted, true = estimate(plain["value"], unit, bounds), measured.value
+    predicted, true = _predicted(plain, unit), measured.value
     off = None if predicted.value is None or not true else predicted.value / true - 1.0
-    within = None if bounds is None or true is None else bounds[0] <= true <= bounds[1]
+    low, high = predicted.low, predicted.high
+    within = None if low is None or high is None or true is None else low <= true <= high
     return {"name": name, "predicted": predicted, "measured": measured, "off": estimate(off), "within": within}
+
+
+def _predicted(plain: dict[str, Any], unit: str = "") -> Quantity:
+    value, low, high = (None if found is None else float(found) for found in (plain["value"], *map(plain.get, _ENDS)))
+    return estimate(value, unit, None if low is None or high is None else (low, high))
 
 
 def _saved(tree: dict[str, Any], mode: str) -> str:
@@ -163,7 +193,7 @@ def _saved(tree: dict[str, Any], mode: str) -> str:
 def _read(path: Path, schema: str, remedy: str) -> dict[str, Any]:
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, RecursionError, ValueError) as error:
         raise MisuseError(path, f"cannot be read ({error})", remedy) from None
     if not isinstance(tree, dict) or tree.get("schema") != schema:
         raise MisuseError(path, f"it is no {schema}", remedy)

@@ -27,7 +27,7 @@ try:
 
     from modt.ros2.message_types import message_type
 except ImportError:
-    raise MisuseError("ROS 2", "needs Cyclone DDS", "pip install 'modt[ros2]'") from None
+    raise MisuseError("ROS 2", "needs Cyclone DDS", "pip install 'modt[ros2]', or build cyclonedds") from None
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")

@@ -14,6 +14,8 @@ from modt.errors import MisuseError
 log = logging.getLogger(__name__)
 
 MAX_QUOTED = 100
+BROKEN = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
+"""What using a record raises that lacks a value, or has one of another kind."""
 
 
 def line(record: dict[str, Any]) -> str:
@@ -63,6 +65,6 @@ def records_of(path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError) as error:
+    except BROKEN as error:
         cause = f"holds a record that modt did not write ({type(error).__name__}: {str(error)[:MAX_QUOTED]!r})"
         raise MisuseError(path, cause, "give what a run of this version wrote") from error

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from modt import profile
 from modt.config import ProfileConfig
@@ -14,13 +17,17 @@ from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
 from modt.profile import from_yaml
 from modt.profile.yaml_text import to_yaml
-from modt.sinks.records import read_records
+from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
 from modt.types import Float64, Int
 from modt.viewer.track_rows import frame_rows, track_table
 
-COUNTS = ("frame", "stamp_s", "proposals", "classifications", "deferred")
+COUNTS: dict[str, Callable[[Any], float]] = {
+    "frame": int,
+    "stamp_s": float,
+    **dict.fromkeys(("proposals", "classifications", "deferred"), int),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +64,22 @@ class RecordedRun:
             _ = facts["stream"]["path"], facts["stream"]["name"], facts["mode"]
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        costs, states = _costs(run / LEDGER), list[str]()
+        states = list[str]()
+        with records_of(run / LEDGER):
+            costs = _costs(run / LEDGER)
         frames, rows = list[dict[str, Any]](), list[list[list[float]]]()
         for number, record in enumerate(read_records(run / TRACKS, SCHEMA)):
             try:
-                counts = {name: record[name] for name in COUNTS}
+                counts = {name: kind(record[name]) for name, kind in COUNTS.items()}
                 rows.append(frame_rows(number, record, states))
-            except (KeyError, TypeError, ValueError) as error:
+                frames.append({**counts, **costs.get(counts["frame"], {})})
+            except BROKEN as error:
                 place = f"{run / TRACKS}:{number + 1}"
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None
-            frames.append({**counts, **costs.get(counts["frame"], {})})
         if not frames:
             raise MisuseError(run / TRACKS, "no frames are recorded", "give the directory of a longer run")
-        return cls(facts, config, frames, states, *track_table(rows))
+        with records_of(run / TRACKS), np.errstate(over="raise", invalid="raise"):
+            return cls(facts, config, frames, states, *track_table(rows))
 
     @property
     def numbers(self) -> list[int]:

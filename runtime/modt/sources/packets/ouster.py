@@ -34,10 +34,10 @@ class OusterDecoder:
         Raises:
             MisuseError: ouster-sdk is missing, or the metadata cannot be read.
         """
-        self._sdk = sdk = extra("ouster.sdk.core", "ouster")
+        self._sdk = extra("ouster.sdk.core", "ouster")
         self.name = name
-        self._info = info = self._read(metadata)
-        self._format, self._project = sdk.PacketFormat(info), sdk.XYZLutFloat(info, False)
+        self._info, self._format, self._project = self._read(metadata)
+        info = self._info
         self._width, self._columns = info.format.columns_per_frame, info.format.columns_per_packet
         self._awaited = _awaited(info.format.column_window, self._width, self._columns)
         self.elevations_deg: tuple[float, ...] | None = tuple(map(float, info.beam_altitude_angles))
@@ -81,10 +81,12 @@ class OusterDecoder:
         self._clock = DeviceClock()
         self._last_id: int | None = None
 
-    def _read(self, metadata: Path) -> Any:
-        remedy = "save what the sensor says at /api/v1/sensor/metadata"
+    def _read(self, metadata: Path) -> tuple[Any, Any, Any]:
+        """What the SDK makes of the metadata: the sensor, the format of its packets, its directions."""
+        sdk, remedy = self._sdk, "save what the sensor says at /api/v1/sensor/metadata"
         try:
-            info = self._sdk.SensorInfo(metadata.read_text("utf-8"))
+            info = sdk.SensorInfo(metadata.read_text("utf-8"))
+            made = info, sdk.PacketFormat(info), sdk.XYZLutFloat(info, False)
         except OSError as error:
             raise MisuseError(metadata, f"cannot be read ({error.strerror})", remedy) from None
         except Exception as error:  # of the SDK's parser, of no common type
@@ -92,7 +94,7 @@ class OusterDecoder:
         width, columns = info.format.columns_per_frame, info.format.columns_per_packet
         if columns < 1 or width % columns:
             raise MisuseError(metadata, f"no metadata of an Ouster ({width} columns in packets of {columns})", remedy)
-        return info
+        return made
 
     def _flaw(self, payload: bytes) -> str | None:
         """Why a payload is no packet of points that fits the metadata; None if it is one."""

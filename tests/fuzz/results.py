@@ -1,0 +1,127 @@
+"""What the package has written itself, and others may have changed: comparisons, predictions, stored results."""
+
+from __future__ import annotations
+
+import json
+from argparse import Namespace
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modt import assembly
+from modt.cli.export import FORMS, Export
+from modt.evaluation.run_record import RunRecord
+from modt.experiments.store import Store, packed
+from modt.pipeline import STAGES
+from modt.reporting.compare_report import SCHEMA as COMPARE_SCHEMA
+from modt.reporting.comparison import COUNTS
+from modt.reporting.prediction import forecast
+from modt.reporting.prediction_report import (
+    against,
+    observed_tree,
+    prediction_tree,
+    read_calibration,
+    read_prediction,
+)
+from modt.reporting.quantity import estimate, to_json
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
+from modt.viewer.recorded_run import RecordedRun
+from modt.viewer.track_page import rows_of, track_page
+from tests.fuzz.runs import DESCRIPTION, described
+from tests.fuzz.target import Feed, of_file, target
+from tests.reporting.test_prediction import CALIBRATION, FRAMES, TEST
+from tests.reporting.test_run_report import ledger_line, track, window, write_run
+
+ITSELF = {"stream": "elsewhere", "path": "/elsewhere"}
+ABOUT = {**ITSELF, "fov": "full", "asked": [0, 8], "frames": 8}
+
+
+def comparison() -> bytes:
+    """Of nine frames."""
+    found = CALIBRATION[0].take(np.arange(9))
+    names = dict(zip(found.runs, (*assembly.MODES, "varied"), strict=True))
+    tables = {
+        names[name]: {
+            "counts": {column: run.counts[:, k].tolist() for k, column in enumerate(COUNTS)},
+            "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
+        }
+        for name, run in found.runs.items()
+    }
+    facts = {"schema": COMPARE_SCHEMA, "stream": "street", "path": None, "fov": "full", "frames": 9}
+    return json.dumps({**facts, "calibration": tables, "observed": observed_tree(found.observed)}).encode()
+
+
+@target()
+def calibrations(folder: Path) -> Feed:
+    path = folder / "other.json"
+    return of_file(path, lambda: read_calibration(path, ITSELF, "full"), comparison())
+
+
+@target()
+def predictions(folder: Path) -> Feed:
+    path = folder / "blind.json"
+    found = forecast(CALIBRATION, TEST.observed[:80], FRAMES, np.random.default_rng(0))
+    tree = to_json(prediction_tree(found, 3.0, {**ABOUT, "seen": 8, "calibration": ["street"], "core": 0}))
+    modes = {name: {"cpu_ms": estimate(7.0, "ms")} for name in assembly.MODES}
+    savings = {name: {"gamma_measured_cpu": estimate(1.5)} for name in assembly.MODES}
+    return of_file(path, lambda: against(read_prediction(path, ABOUT), modes, savings), json.dumps(tree))
+
+
+@target()
+def stored_results(folder: Path) -> Feed:
+    store, arrays = Store(folder), {"rows": np.arange(12.0).reshape(3, 4), "names": np.array(["car", "cyclist"])}
+    seeds = [packed(arrays, compressed=compressed) for compressed in (True, False)]
+    store.put("ab", seeds[0])
+    (path,) = folder.rglob("*.npz")
+    return of_file(path, lambda: store.get("ab"), *seeds)
+
+
+def frames() -> list[dict[str, Any]]:
+    """Two records of a track that is seen and one that is lost."""
+    seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
+    lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
+    facts = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
+    return [{**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]} for k in range(2)]
+
+
+def json_lines(records: Iterable[dict[str, Any]]) -> bytes:
+    """A line a record."""
+    return "".join(json.dumps(record) + "\n" for record in records).encode()
+
+
+@target()
+def viewed_run(folder: Path) -> Feed:
+    """What is seen by its ledger and its tracks, parted by a line `---`."""
+    run = described(write_run(folder / "run", frames=2))
+    ledger, tracks, costs = run / "ledger.jsonl", run / "tracks.jsonl", [ledger_line(k, 1) for k in range(2)]
+    seed = [*costs, window(0, costs, 1.5)]
+
+    def call(raw: bytes) -> None:
+        first, _, second = raw.partition(b"---\n")
+        ledger.write_bytes(first)
+        tracks.write_bytes(second)
+        found = RecordedRun.read(run)
+        track_page(found, rows_of(found, 3), {})
+
+    return [b"---\n".join([json_lines(seed), json_lines(frames())])], call
+
+
+@target()
+def exported_run(folder: Path) -> Feed:
+    """Its tracks as a table, and as KITTI's results."""
+    run, out = folder / "run", folder / "out"
+    run.mkdir()
+    (run / "run.yaml").write_text(DESCRIPTION + "recognition: {used: vlp-16}\nservice: true\n")
+    asked = Namespace(no_points=True, frames=(0, None), capture=())
+
+    def read() -> None:
+        recorded = RunRecord.open(run)
+        for form in ("csv", "kitti"):
+            FORMS[form](Export(recorded, asked), out)
+
+    return of_file(run / "tracks.jsonl", read, json_lines(frames()))
+
+
+TARGETS = (calibrations, predictions, stored_results, viewed_run, exported_run)
