@@ -16,7 +16,7 @@ from modt.reporting.comparison import COUNTS
 from modt.reporting.document import Document, Table
 from modt.reporting.gamma import RunCosts
 from modt.reporting.prediction import OBSERVED, Forecast, Stream
-from modt.reporting.quantity import Quantity, estimate
+from modt.reporting.quantity import Quantity, estimate, from_json
 from modt.types import Int
 
 SCHEMA = "modt.prediction/1"
@@ -35,7 +35,7 @@ def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tup
         MisuseError: no comparison, or one of the stream to be predicted, or of another field of view.
     """
     remedy = "give the output of modt-profile compare --json of another stream"
-    tree = _read(path, COMPARE_SCHEMA, remedy)
+    tree = read_tree(path, COMPARE_SCHEMA, remedy)
     if {key: tree[key] for key in itself} == itself:
         raise MisuseError(path, f"it was measured on {itself['stream']} itself", remedy)
     if tree["fov"] != fov:
@@ -110,7 +110,7 @@ def read_prediction(path: Path, about: dict[str, Any]) -> dict[str, Any]:
     Raises:
         MisuseError: no prediction, or one of another stream, frames or field of view than in about.
     """
-    tree = _read(path, SCHEMA, "give a file written by modt-profile predict")
+    tree = read_tree(path, SCHEMA, "give a file written by modt-profile predict")
     for key, value in about.items():
         if tree[key] != value:
             raise MisuseError(path, f"its {key} is {tree[key]!r}, not {value!r}", "compare what was predicted")
@@ -147,11 +147,10 @@ def against_table(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def _row(name: str, plain: dict[str, Any], measured: Quantity, unit: str = "") -> dict[str, Any]:
-    low, high = plain.get("low"), plain.get("high")
-    bounds = None if low is None or high is None else (low, high)
-    predicted, true = estimate(plain["value"], unit, bounds), measured.value
+    predicted, true = from_json(plain | {"unit": unit}), measured.value
+    low, high = predicted.low, predicted.high
     off = None if predicted.value is None or not true else predicted.value / true - 1.0
-    within = None if bounds is None or true is None else bounds[0] <= true <= bounds[1]
+    within = None if low is None or high is None or true is None else low <= true <= high
     return {"name": name, "predicted": predicted, "measured": measured, "off": estimate(off), "within": within}
 
 
@@ -160,7 +159,12 @@ def _saved(tree: dict[str, Any], mode: str) -> str:
     return estimate(1e3 * (e1 - e2), "mJ").marked()
 
 
-def _read(path: Path, schema: str, remedy: str) -> dict[str, Any]:
+def read_tree(path: Path, schema: str, remedy: str) -> dict[str, Any]:
+    """A report that was saved as JSON.
+
+    Raises:
+        MisuseError: it cannot be read, or is of another schema.
+    """
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -69,6 +69,15 @@ def estimate(value: float | None, unit: str = "", interval: tuple[float, float] 
     return quantity(value, unit, Kind.ESTIMATED, interval)
 
 
+def from_json(plain: dict[str, Any]) -> Quantity:
+    """A quantity from what its `json` has returned.
+
+    Raises:
+        KeyError, ValueError: it is none.
+    """
+    return Quantity(plain["value"], plain["unit"], Kind(plain["kind"]), plain.get("low"), plain.get("high"))
+
+
 def format_number(value: float | None, digits: int = 3) -> str:
     """A number in that many significant digits, without exponent from 1e-4 to 1e6; a count with all of them."""
     if value is None:
