@@ -92,6 +92,23 @@ def test_everything_can_be_read(run, chromium, width, dark):
     assert shown["pixels"] > 1000
 
 
+def test_stamps_from_1970_are_times_and_fit_a_narrow_page(run, records, tmp_path, chromium):
+    dated = shutil.copytree(run, tmp_path / "dated")
+    lines = [json.dumps(record | {"stamp_s": record["stamp_s"] + 1_400_000_000}) for record in records]
+    (dated / "tracks.jsonl").write_text("\n".join(lines) + "\n")
+    for more in ([], ["--frame", 9]):
+        done = modt("view", dated, *more, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    with chromium.tab((dated / "view.html").as_uri(), width=390) as tab:
+        assert tab.value("element('time').textContent").startswith("16:53:20.00, 1 / ")
+        assert not tab.value(WIDE)
+        right = "document.querySelector('footer').lastElementChild.getBoundingClientRect().right"
+        assert tab.value(right) <= 390
+        round_ = "Math.abs(canvas.width / canvas.clientWidth - canvas.height / canvas.clientHeight)"
+        assert tab.value(round_) < 0.01
+    assert "frame 9, 2014-05-13 16:53:20.90, mode" in (dated / "view-9.svg").read_text()
+
+
 def test_playing_ends_at_the_last_frame(run, chromium):
     with chromium.tab((run / "view.html").as_uri()) as tab:
         tab.value("speed.value = 4")
