@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -14,8 +12,9 @@ from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64, Int
 from modt.viewer import look
 from modt.viewer.canvas import REACH_M, SIDE_M, Canvas
+from modt.viewer.caption import caption
 from modt.viewer.extent import RINGS_M, reach_m
-from modt.viewer.labels import LETTER_M, Labels
+from modt.viewer.labels import Labels
 from modt.viewer.point_cells import SIDE, Cells
 from modt.viewer.recorded_run import RecordedRun
 from modt.viewer.track_rows import COLUMNS, SCALE, SCALED
@@ -29,10 +28,6 @@ Label = tuple[float, float, str, str]
 _LEAST_M = 0.1
 _GAP_M = 0.3
 """Between a box and its label."""
-_DATES_S = 1e8
-"""Stamps from here on count from 1970."""
-_LINE_M = 1.5
-"""From one line of text to the next."""
 
 
 def draw(canvas: Canvas, run: RecordedRun, at: int, step_cm: int, cells: Cells | None) -> None:
@@ -47,11 +42,15 @@ def draw(canvas: Canvas, run: RecordedRun, at: int, step_cm: int, cells: Cells |
     """
     reach = reach_m(run.tracks)
     scene, labels = Zoomed(canvas, REACH_M / reach), Labels(canvas)
-    _rings(scene, reach, labels)
+    rings = np.arange(RINGS_M[reach], math.hypot(reach, reach * SIDE_M / REACH_M), RINGS_M[reach]).tolist()
+    for radius in rings:
+        scene.circle(0, 0, radius, "line", 0.1)
     if cells is not None:
         _points(scene, cells, step_cm)
+    for radius in rings:
+        labels.write(0.0, -scene.factor * radius, f"{radius:g} m", "soft")
     canvas.polygon(np.array([[1, 0], [-0.7, 0.6], [-0.7, -0.6]]), "ink", 1.0, "ink", 0.05)
-    labels.keep_free(-_LINE_M, _LINE_M, 0.6)
+    labels.keep_free(-1.0, 1.0, 0.6)
     rows = run.tracks[run.tracks[:, COLUMNS.index("at")] == at]
     false = set(run.frames[at].get("false", ()))
     said = []
@@ -59,19 +58,9 @@ def draw(canvas: Canvas, run: RecordedRun, at: int, step_cm: int, cells: Cells |
         said += _track(scene, run, at, row, int(row[0]) in false)
     for labelled in run.frames[at].get("truth", ()):
         said += _truth(scene, labelled)
+    caption(canvas, labels, run, at)
     for u, v, text, colour in reversed(said):
         labels.write(scene.factor * u, scene.factor * v - _GAP_M, text, colour)
-    _text(canvas, run, at)
-
-
-def _rings(scene: Zoomed, reach: float, labels: Labels) -> None:
-    """Of range, with their radii."""
-    step = RINGS_M[reach]
-    for radius in np.arange(step, math.hypot(reach, reach * SIDE_M / REACH_M), step).tolist():
-        scene.circle(0, 0, radius, "line", 0.1)
-        text, top = f"{radius:g} m", -scene.factor * radius
-        if -top < SIDE_M - _LINE_M:
-            labels.write(len(text) * LETTER_M, top, text, "soft")
 
 
 def _points(scene: Zoomed, cells: Cells, step_cm: int) -> None:
@@ -143,40 +132,3 @@ def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
     dx, dy = (rows[:, world : world + 2] / 100 - [x, y]).T
     c, s = np.cos(yaw), np.sin(yaw)
     return np.stack([c * dx + s * dy, s * dx - c * dy], axis=1)
-
-
-def _text(canvas: Canvas, run: RecordedRun, at: int) -> None:
-    """What the frame was and cost, and the legends."""
-    frame = run.frames[at]
-    facts = [f"frame {frame['frame']}, {_time(frame['stamp_s'])}, mode {run.facts['mode']}"]
-    facts.append(f"{frame['proposals']} proposals, budget {run.budget}")
-    facts.append(f"{frame['classifications']} classified, {frame['deferred']} deferred")
-    if "cpu_ms" in frame:
-        facts.append(f"{sum(frame['cpu_ms'].values()):.1f} ms of CPU time")
-    if "energy_mJ" in frame:
-        facts.append(f"{frame['energy_mJ']:.0f} mJ ({frame['kind']})")
-    _panel(canvas, facts, -SIDE_M)
-    for k, fact in enumerate(facts):
-        canvas.text(1 - REACH_M, 2.2 - SIDE_M + _LINE_M * k, fact, "ink")
-    legend = [(entry, 1.0) for entry in look.classes()] + [(entry, 0.0) for entry in look.states(run.states)]
-    legend += [(entry, 0.0) for entry in look.truth().values()] if "truth" in frame else []
-    _panel(canvas, [f"-- {entry['name']}" for entry, _ in legend], SIDE_M - _LINE_M * (len(legend) + 0.6))
-    for k, (entry, opacity) in enumerate(legend):
-        u, v = 1 - REACH_M, SIDE_M - 1 - _LINE_M * k
-        square = np.array([[u, v - 0.8], [u + 0.8, v - 0.8], [u + 0.8, v], [u, v]])
-        canvas.polygon(square, entry["colour"], opacity, entry["colour"], 0.2)
-        canvas.text(u + 1.4, v, entry["name"].replace("_", " "), "soft")
-
-
-def _panel(canvas: Canvas, lines: Sequence[str], top: float) -> None:
-    """Paper below lines of text at the left edge, so that they can be read."""
-    right, foot = 1.5 - REACH_M + LETTER_M * max(map(len, lines)), top + _LINE_M * (len(lines) + 0.6)
-    corners = np.array([[-REACH_M, top], [right, top], [right, foot], [-REACH_M, foot]])
-    canvas.polygon(corners, "paper", 0.85, "paper", 0.0)
-
-
-def _time(stamp_s: float) -> str:
-    """Seconds from the begin of a recording, or a date."""
-    if stamp_s < _DATES_S:
-        return f"{stamp_s:.2f} s"
-    return f"{datetime.fromtimestamp(stamp_s, UTC):%Y-%m-%d %H:%M:%S.%f}"[:-4]
