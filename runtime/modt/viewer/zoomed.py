@@ -29,7 +29,3 @@ class Zoomed:
     def circle(self, u: float, v: float, radius: float, colour: str, width: float) -> None:
         """A circle."""
         self._canvas.circle(self.factor * u, self.factor * v, self.factor * radius, colour, width)
-
-    def text(self, u: float, v: float, text: str, colour: str) -> None:
-        """Text of the same size."""
-        self._canvas.text(self.factor * u, self.factor * v, text, colour)

@@ -148,7 +148,7 @@ const middleOf = (box) => box.reduce((sum, corner) => sum + corner[0] / box.leng
 function drawRings() {
   context.font = `${11 * dot}px system-ui,sans-serif`;
   context.fillStyle = colours.soft;
-  const step = [1, 2, 5, 10, 20].find((metres) => metres * state.metre > 80 * dot) || 50;
+  const step = [1, 2, 5, 10, 20].find((metres) => metres * state.metre > 110 * dot) || 50;
   for (let range = step; range <= 10 * step; range += step) {
     context.beginPath();
     context.arc(state.x, state.y, range * state.metre, 0, 7);
