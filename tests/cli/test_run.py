@@ -9,6 +9,7 @@ import sys
 import time
 
 import numpy as np
+import psutil
 import pytest
 import yaml
 
@@ -131,6 +132,18 @@ def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):
     assert "the profile before stays in use" in said
     loop = json.loads((service.out / "status.json").read_text())["loop"]
     assert (loop["reloads"], loop["refused_reloads"]) == (1, 1)
+
+
+@pytest.mark.parametrize(("options", "hosts"), [([], []), (["--view", ":0"], ["127.0.0.1"])])
+def test_nothing_listens_but_the_page_that_is_asked_for_and_none_beyond_this_machine(scans, start, options, hosts):
+    service = start(f"{scans}?loop=yes", "--profile", "vlp-16", *options)
+    service.hear("READY=1")
+    process = psutil.Process(service.process.pid)
+    assert process.children() == []
+    opened = getattr(process, "net_connections", None) or process.connections  # the name before psutil 6
+    assert [(found.status, found.laddr.ip) for found in opened("inet")] == [("LISTEN", host) for host in hosts]
+    assert [found for found in opened("unix") if found.laddr] == []
+    assert service.end()[0] == 0
 
 
 def test_the_run_is_seen_in_a_browser_while_it_goes_on(scans, start, chromium):

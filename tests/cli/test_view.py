@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 from modt.classes import CLASS_NAMES
+from modt.ros2.point_cloud2 import write_cloud
+from modt.sources.recognise import open_scans
+from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.viewer.chromium import LOADED, WIDE
 from tests.viewer.pages import Page
 
@@ -87,6 +90,23 @@ def test_everything_can_be_read(run, chromium, width, dark):
     shown = chromium.opened(run / "view.html", "slide:9", width=width, dark=dark)
     assert (shown["wide"], shown["small"]) == (False, [])
     assert shown["pixels"] > 1000
+
+
+def test_stamps_from_1970_are_times_and_fit_a_narrow_page(run, records, tmp_path, chromium):
+    dated = shutil.copytree(run, tmp_path / "dated")
+    lines = [json.dumps(record | {"stamp_s": record["stamp_s"] + 1_400_000_000}) for record in records]
+    (dated / "tracks.jsonl").write_text("\n".join(lines) + "\n")
+    for more in ([], ["--frame", 9]):
+        done = modt("view", dated, *more, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    with chromium.tab((dated / "view.html").as_uri(), width=390) as tab:
+        assert tab.value("element('time').textContent").startswith("16:53:20.00, 1 / ")
+        assert not tab.value(WIDE)
+        right = "document.querySelector('footer').lastElementChild.getBoundingClientRect().right"
+        assert tab.value(right) <= 390
+        round_ = "Math.abs(canvas.width / canvas.clientWidth - canvas.height / canvas.clientHeight)"
+        assert tab.value(round_) < 0.01
+    assert "frame 9, 2014-05-13 16:53:20.90, mode" in (dated / "view-9.svg").read_text()
 
 
 def test_playing_ends_at_the_last_frame(run, chromium):
@@ -237,27 +257,81 @@ def test_a_drive_of_full_sweeps_fits_a_page(drive_0005, tmp_path, chromium):
     assert chromium.opened(tmp_path / "run" / "view.html", "slide:153")["frame"] == 153
 
 
-def test_truth_beside_the_source_is_marked_and_drawn(tmp_path, chromium):
-    def done(*command):
-        finished = modt(*command, cwd=tmp_path)
-        assert (finished.returncode, finished.stderr) == (0, "")
+@pytest.fixture(scope="module")
+def labelled(tmp_path_factory):
+    """A simulated drive with its labels, and below `exact` a run on it with those of its points."""
+    folder = tmp_path_factory.mktemp("labelled")
+    done(folder, "simulate", "--sensor", "vlp-16", "--seconds", 1.5, "--all-around", "--out", "sim")
+    (drive,) = (folder / "sim").glob("*/*_sync")
+    done(folder, "replay", drive, "--profile", "vlp-16", "--quiet", "--out", "exact", "--labels")
+    return drive
 
-    done("simulate", "--sensor", "vlp-16", "--seconds", 1.5, "--all-around", "--out", "sim")
-    (drive,) = (tmp_path / "sim").glob("*/*_sync")
-    marks = {}
-    for name, more in (("exact", ["--labels"]), ("boxes", [])):
-        done("replay", drive, "--profile", "vlp-16", "--quiet", "--out", name, *more)
-        done("view", name)
-        marks[name] = Page(tmp_path / name / "view.html").run["frames"]
-    outcomes = {name: [o["outcome"] for f in frames for o in f["truth"]] for name, frames in marks.items()}
-    assert {"found", "missed"} <= set(outcomes["exact"])
-    assert np.mean([a == b for a, b in zip(*outcomes.values(), strict=True)]) > 0.95
-    shown = chromium.opened(tmp_path / "exact" / "view.html", "slide:14")
-    frame = marks["exact"][14]
+
+def done(folder, *command):
+    finished = modt(*command, cwd=folder)
+    assert (finished.returncode, finished.stderr) == (0, "")
+
+
+def marks(run):
+    return Page(run / "view.html").run["frames"]
+
+
+def outcomes(run):
+    return [o["outcome"] for frame in marks(run) for o in frame["truth"]]
+
+
+def test_truth_beside_the_source_is_marked_and_drawn(labelled, tmp_path, chromium):
+    exact = labelled.parents[2] / "exact"
+    done(tmp_path, "replay", labelled, "--profile", "vlp-16", "--quiet", "--out", "boxes")
+    for run in (exact, tmp_path / "boxes"):
+        done(tmp_path, "view", run)
+    assert {"found", "missed"} <= set(outcomes(exact))
+    assert np.mean([a == b for a, b in zip(outcomes(exact), outcomes(tmp_path / "boxes"), strict=True)]) > 0.95
+    shown = chromium.opened(exact / "view.html", "slide:14")
+    frame = marks(exact)[14]
     found, missed = (sum(o["outcome"] == name for o in frame["truth"]) for name in ("found", "missed"))
     assert f"found, missed, false {found}, {missed}, {len(frame['false'])}" in shown["facts"]
     assert "foundmissednot judgedfalse" in shown["legends"]
-    (tmp_path / "other").mkdir()
-    refused = modt("view", "exact", "--truth", "other", cwd=tmp_path)
+
+
+def test_truth_of_a_recording_is_given_by_its_frame_numbers(labelled, tmp_path):
+    recorded = [
+        ("/points", CLOUD, BEGAN_S + frame.stamp_s, write_cloud(BEGAN_S + frame.stamp_s, "lidar", frame.points))
+        for frame in open_scans(labelled)
+    ]
+    write_mcap(tmp_path / "drive", recorded)
+    done(tmp_path, "replay", "drive.mcap", "--profile", "vlp-16", "--quiet", "--labels", "--out", "run")
+    done(tmp_path, "view", "run", "--truth", labelled)
+    assert [len(frame["truth"]) > 0 for frame in marks(tmp_path / "run")] == [True] * 15
+    assert np.mean([o == "found" for o in outcomes(tmp_path / "run")]) > 0.2
+
+
+def test_truth_of_a_live_run_is_given_by_its_stamps_and_has_the_points(labelled, tmp_path):
+    live = shutil.copytree(labelled.parents[2] / "exact", tmp_path / "live")
+    shutil.rmtree(live / "labels")
+    text = re.sub(r"path: .*\n(  .*\n)*", "path: null\n", (live / "run.yaml").read_text(), count=1)
+    (live / "run.yaml").write_text(f"{text}service: true\n")
+    lines = [json.loads(line) for line in (live / "tracks.jsonl").read_text().splitlines()]
+    moved = [line | {"frame": line["frame"] + 100, "stamp_s": line["stamp_s"] + 1e9} for line in lines]
+    (live / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in moved))
+    without = modt("view", "live", cwd=tmp_path)
+    assert "a live source cannot be read again" in without.stderr
+    done(tmp_path, "view", "live", "--truth", labelled)
+    copy = shutil.copytree(labelled.parents[2] / "exact", tmp_path / "exact")
+    done(tmp_path, "view", copy)
+    assert np.mean([a == b for a, b in zip(outcomes(live), outcomes(copy), strict=True)]) > 0.95
+    assert min(len(cell) for cell, _ in Page(live / "view.html").points) > 1000
+
+
+@pytest.mark.parametrize(
+    ("truth", "said"), [("empty", "holds no labels"), ("another", "none of its frames is in the truth, which has 2")]
+)
+def test_truth_that_does_not_fit_is_one_error(labelled, tmp_path, truth, said):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "another").mkdir()
+    (tmp_path / "another" / "poses.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 2)
+    (tmp_path / "another" / "truth.csv").write_text("frame,track,label,x,y,z,l,w,h,yaw\n1,3,Car,9,1,0.5,4,2,1.5,0\n")
+    done(tmp_path, "replay", labelled, "--frames", "5:8", "--profile", "vlp-16", "--quiet", "--out", "run")
+    refused = modt("view", "run", "--truth", truth, cwd=tmp_path)
     assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
-    assert "holds no labels" in refused.stderr
+    assert said in refused.stderr

@@ -58,8 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(out, "no kind of picture", f"give a name that ends with {', '.join(FORMS)}")
     recorded = RecordedRun.read(directory)
     at = 0 if arguments.frame is None else recorded.position(arguments.frame)
-    mark_truth(recorded, directory, arguments.truth)
-    FORMS[out.suffix](View(recorded, at, source(recorded, arguments.capture), Grid(recorded.config), out))
+    stream = mark_truth(recorded, directory, arguments.truth, source(recorded, arguments.capture))
+    if stream is None and recorded.live:
+        print("modt: without points: a live source cannot be read again; --truth may have scans", file=sys.stderr)
+    FORMS[out.suffix](View(recorded, at, stream, Grid(recorded.config), out))
     print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
     return 0
 
@@ -91,12 +93,16 @@ def default_name(frame: int | None, animate: bool) -> str:
     return f"view{PLAYER}" if frame is None else f"view-{frame}{PICTURE}"
 
 
-def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None) -> None:
+def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None, stream: Stream | None) -> Stream | None:
     """Add to the frames what is true of them, by labels or by those that lie with the source of the run.
+
+    Returns:
+        the stream, of a live run the scans of its truth.
 
     Raises:
         MisuseError: labels are given that cannot be used.
     """
+    from modt.evaluation.by_stamp import by_stamp
     from modt.evaluation.run_record import RunRecord
     from modt.evaluation.truth_files import labels_beside, open_truth
     from modt.viewer.truth_marks import truth_marks
@@ -104,20 +110,29 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None) -> N
     try:
         run = RunRecord.open(directory)
         found = labels or (labels_beside(run.stream) if run.stream else None)
-        marks = {} if found is None else truth_marks(run, open_truth(found, run.stream))
+        if found is None:
+            return stream
+        truth = open_truth(found, run.stream)
+        if recorded.live:
+            truth = by_stamp(truth, {frame["frame"]: frame["stamp_s"] for frame in recorded.frames})
+            stream = truth.scans
+        marks = truth_marks(run, truth, stream)
     except ModtError as error:
         if labels is not None:
             raise
         print(f"modt: without truth: {error}", file=sys.stderr)
-        return
+        return stream
     for frame in recorded.frames:
         frame.update(marks.get(frame["frame"], {}))
+    return stream
 
 
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:
-    """The stream that a run was made of, None where it is not found any more."""
+    """The stream that a run was made of, None where it was live or is not found any more."""
     from modt.cli import assemble
 
+    if recorded.live:
+        return None
     facts = recorded.facts["stream"]
     try:
         path = Path(facts["path"]) if facts["path"] else None

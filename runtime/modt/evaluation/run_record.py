@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES
 from modt.energy import ledger, windows
-from modt.errors import MisuseError, ModtError
+from modt.errors import MisuseError
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.truth import Truth
 from modt.geometry import FieldOfView
@@ -20,10 +20,13 @@ from modt.profile import from_yaml
 from modt.sinks.records import BROKEN, read_records
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
-from modt.sources.scan_file import read_scan
+from modt.sources.frames_by_number import FramesByNumber
+from modt.sources.stream import Stream
 from modt.types import Float32, Float64, Int
 
 LABELS = "labels"
+Record = tuple[str, dict[str, Any]]
+"""Of a frame, after the place where it stands."""
 Proposed = Callable[[dict[str, Any], Float32], Int]
 """(N,) proposal of each point, NONE where it belongs to none, by the record of a frame and its (N, 4) points."""
 
@@ -55,8 +58,8 @@ class RunRecord:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
         return cls(path, stream, fov, sensor, live)
 
-    def records(self) -> Iterator[tuple[str, dict[str, Any]]]:
-        """The record of every frame, and where it stands.
+    def records(self) -> Iterator[Record]:
+        """The record of every frame.
 
         Raises:
             MisuseError: the run is empty.
@@ -77,37 +80,47 @@ class RunRecord:
                 lines[line["frames"][1]].append(line)
         return lines
 
-    def frames(self, truth: Truth, proposed: Proposed | None = None) -> Iterator[JudgedFrame]:
+    def frames(
+        self,
+        truth: Truth,
+        proposed: Proposed | None = None,
+        stream: Stream | None = None,
+        records: Iterable[Record] | None = None,
+    ) -> Iterator[JudgedFrame]:
         """Every recorded frame beside its truth.
 
         Args:
             truth: of the run's recording.
             proposed: says which points are of which proposal; None: the labels that replay --labels has written.
+            stream: the recording; None: the scans of the truth.
+            records: those of frames that are labelled; None: all.
 
         Raises:
             MisuseError: the run is of another recording, empty or without labels, or a record is broken.
         """
-        if truth.scans is None:
+        stream = truth.scans if stream is None else stream
+        if stream is None:
             raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
-        camera = truth.scans.info.camera
+        camera = stream.info.camera
         if self.fov == "camera" and camera is None:
             raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
         fov = FieldOfView.of_camera(camera) if self.fov == "camera" and camera is not None else FieldOfView()
-        scans = {scan.index: scan.path for scan in truth.scans.scans}
-        for place, record in self.records():
+        sweeps = FramesByNumber(stream)
+        for place, record in self.records() if records is None else records:
             try:
                 index = int(record["frame"])
                 found = _found(record)
             except BROKEN as error:
                 raise broken(place, error) from None
-            labels, scan = truth.frames.get(index), scans.get(index)
-            if labels is None or scan is None:
+            labels = truth.frames.get(index)
+            if labels is None:
                 cause = f"frame {index} is not in the truth, which has {len(truth.frames)} frames"
                 raise MisuseError(place, cause, "give the truth of the run's own recording")
-            try:
-                points, _ = read_scan(scan)
-            except ModtError as error:
-                raise MisuseError(scan, error.cause, "restore the scan") from None
+            sweep = sweeps.get(index)
+            if sweep is None:
+                cause = f"{stream.info.name} has no sweep {index} that can be read"
+                raise MisuseError(place, cause, "restore it, or give the truth of the run's own recording")
+            points = sweep.points
             proposals = self.proposals(index) if proposed is None else proposed(record, points)
             if len(proposals) != len(points):
                 cause = f"{len(proposals)} labels for a scan of {len(points)} points"

@@ -40,7 +40,7 @@ break-inside:avoid;overflow-x:auto}
 .plots section{margin:0}
 table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 th,td{padding:4px 10px;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
-th:first-child,td:first-child{text-align:left;white-space:normal}
+th:first-child,td:first-child{text-align:left;white-space:normal;min-width:7.5rem}
 th{color:var(--soft);font-weight:600}
 em{font-style:normal;color:var(--soft);font-size:.8em}.tile em{font-size:.8rem;font-weight:400}
 svg{width:100%;height:auto;display:block}

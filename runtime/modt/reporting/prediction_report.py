@@ -17,13 +17,12 @@ from modt.reporting.comparison import COUNTS
 from modt.reporting.document import Document, Table
 from modt.reporting.gamma import RunCosts
 from modt.reporting.prediction import OBSERVED, Forecast, Stream
-from modt.reporting.quantity import Quantity, estimate
+from modt.reporting.quantity import Quantity, estimate, from_json
 from modt.sinks.records import records_of
 from modt.types import Int
 
 SCHEMA = "modt.prediction/1"
 _SEEN = (*OBSERVED, *(f"asked_{k}" for k in range(len(MODES) - 1)))
-_ENDS = ("low", "high")
 _MIN_FRAMES = 8
 """Of a comparison that is used as a calibration."""
 _OVER = (
@@ -39,7 +38,7 @@ def read_calibration(path: Path, itself: dict[str, str | None], fov: str) -> tup
         MisuseError: no comparison, or one of the stream to be predicted, or of another field of view.
     """
     remedy = "give the output of modt-profile compare --json of another stream"
-    tree = _read(path, COMPARE_SCHEMA, remedy)
+    tree = read_tree(path, COMPARE_SCHEMA, remedy)
     with records_of(path):
         if {key: tree[key] for key in itself} == itself:
             raise MisuseError(path, f"it was measured on {itself['stream']} itself", remedy)
@@ -131,7 +130,7 @@ def read_prediction(path: Path, about: dict[str, Any]) -> dict[str, Any]:
     Raises:
         MisuseError: no prediction, or one of another stream, frames or field of view than in about.
     """
-    tree = _read(path, SCHEMA, "give a file written by modt-profile predict")
+    tree = read_tree(path, SCHEMA, "give a file written by modt-profile predict")
     with records_of(path):
         for key, value in about.items():
             if tree[key] != value:
@@ -139,7 +138,7 @@ def read_prediction(path: Path, about: dict[str, Any]) -> dict[str, Any]:
         if ([*tree["cpu_ms"]], [*tree["gamma"]]) != ([*MODES], [*MODES][1:]):
             raise ValueError(f"it is of the modes {[*tree['cpu_ms']]}")
         for plain in (*tree["cpu_ms"].values(), *(value for row in tree["gamma"].values() for value in row.values())):
-            _predicted(plain)
+            from_json(plain)
     return tree
 
 
@@ -173,16 +172,11 @@ def against_table(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def _row(name: str, plain: dict[str, Any], measured: Quantity, unit: str = "") -> dict[str, Any]:
-    predicted, true = _predicted(plain, unit), measured.value
-    off = None if predicted.value is None or not true else predicted.value / true - 1.0
+    predicted, true = from_json(plain | {"unit": unit}), measured.value
     low, high = predicted.low, predicted.high
+    off = None if predicted.value is None or not true else predicted.value / true - 1.0
     within = None if low is None or high is None or true is None else low <= true <= high
     return {"name": name, "predicted": predicted, "measured": measured, "off": estimate(off), "within": within}
-
-
-def _predicted(plain: dict[str, Any], unit: str = "") -> Quantity:
-    value, low, high = (None if found is None else float(found) for found in (plain["value"], *map(plain.get, _ENDS)))
-    return estimate(value, unit, None if low is None or high is None else (low, high))
 
 
 def _saved(tree: dict[str, Any], mode: str) -> str:
@@ -190,7 +184,12 @@ def _saved(tree: dict[str, Any], mode: str) -> str:
     return estimate(1e3 * (e1 - e2), "mJ").marked()
 
 
-def _read(path: Path, schema: str, remedy: str) -> dict[str, Any]:
+def read_tree(path: Path, schema: str, remedy: str) -> dict[str, Any]:
+    """A report that was saved as JSON.
+
+    Raises:
+        MisuseError: it cannot be read, or is of another schema.
+    """
     try:
         tree = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, RecursionError, ValueError) as error:

@@ -69,6 +69,18 @@ def estimate(value: float | None, unit: str = "", interval: tuple[float, float] 
     return quantity(value, unit, Kind.ESTIMATED, interval)
 
 
+def from_json(plain: dict[str, Any]) -> Quantity:
+    """A quantity from what its `json` has returned.
+
+    Raises:
+        KeyError, ValueError: it is none.
+    """
+    value, *bounds = numbers = plain["value"], plain.get("low"), plain.get("high")
+    if not all(number is None or isinstance(number, int | float) for number in numbers):
+        raise ValueError(f"{numbers} for a number and its bounds")
+    return Quantity(value, plain["unit"], Kind(plain["kind"]), *bounds)
+
+
 def format_number(value: float | None, digits: int = 3) -> str:
     """A number in that many significant digits, without exponent from 1e-4 to 1e6; a count with all of them."""
     if value is None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -16,6 +16,8 @@ WIDTH, HEIGHT = 520, 230
 LEFT, RIGHT, TOP, BOTTOM = 58, 14, 12, 44
 _MAX_POINTS = 400
 """Points drawn of a line at most, to keep the page small."""
+_LEAST_TICKS = 3
+"""Of a logarithmic axis, where there are so many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,25 +30,40 @@ class Trace:
     dots: bool = False  # marks instead of a line
     dashed: bool = False
     colour: str = ""  # instead of that of its place
+    names: Sequence[str] = ()  # of each mark, instead of that of the trace
+    span: Float64 | None = None  # (n, 2) interval of the y of each mark
+
+    @property
+    def all_y(self) -> Float64:
+        """With the ends of intervals."""
+        return self.y if self.span is None else np.append(self.y, self.span)
 
 
 def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = False) -> str:
     """Lines and marks over common axes, both logarithmic if log."""
     scale = _Scale.around(traces, log)
-    body = []
+    body: list[str] = []
     for k, trace in enumerate(traces):
         x, y = scale.x(_thin(trace.x)), scale.y(_thin(trace.y))
         if trace.dots:
-            body += [
-                f'<circle class="c{k}" cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{escape(trace.name)}: '
-                f"{format_number(float(u))}, {format_number(float(v))}</title></circle>"
-                for a, b, u, v in zip(x, y, trace.x, trace.y, strict=True)
-            ]
+            body += _marks(scale, k, trace)
         else:
             dash = ' stroke-dasharray="6 4"' if trace.dashed else ""
             style = f' style="stroke:{trace.colour}"' if trace.colour else ""
             body.append(f'<polyline class="l{k}"{style}{dash} points="{_points(x, y)}"/>')
     return _frame(scale, "".join(body), x_label, y_label, [t.name for t in traces], [t.colour for t in traces])
+
+
+def _marks(scale: _Scale, k: int, trace: Trace) -> Iterator[str]:
+    """Circles over their intervals."""
+    x, y = scale.x(trace.x), scale.y(trace.y)
+    spans = np.zeros((0, 2)) if trace.span is None else scale.y(trace.span)
+    for at, (low, high) in zip(x, spans, strict=False):
+        yield f'<line class="l{k}" x1="{at:.1f}" x2="{at:.1f}" y1="{low:.1f}" y2="{high:.1f}"/>'
+    names = trace.names or [trace.name] * len(x)
+    for name, a, b, u, v in zip(names, x, y, trace.x, trace.y, strict=True):
+        said = f"{escape(name)}: {format_number(float(u))}, {format_number(float(v))}"
+        yield f'<circle class="c{k}" cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{said}</title></circle>'
 
 
 def areas(x: Float64, parts: dict[str, Float64], x_label: str, y_label: str) -> str:
@@ -88,7 +105,7 @@ class _Scale:
     @classmethod
     def around(cls, traces: Sequence[Trace], log: bool) -> _Scale:
         xs = np.concatenate([t.x for t in traces]) if traces else np.zeros(1)
-        ys = np.concatenate([t.y for t in traces]) if traces else np.zeros(1)
+        ys = np.concatenate([t.all_y for t in traces]) if traces else np.zeros(1)
         if log:
             x0, x1 = _limits(xs[xs > 0], 1.0, 10.0)
             y0, y1 = _limits(ys[ys > 0], 1.0, 10.0)
@@ -111,8 +128,11 @@ class _Scale:
     def ticks(self, low: float, high: float) -> list[float]:
         if self.log:
             decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-            steps = [m * 10.0**d for d in decades for m in (1, 2, 5)]
-            return [s for s in steps if low <= s <= high]
+            for multiples in ((1, 2, 5), (1, 1.5, 2, 3, 5, 7), (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 6, 7, 8, 9)):
+                steps = [m * 10.0**d for d in decades for m in multiples if low <= m * 10.0**d <= high]
+                if len(steps) >= _LEAST_TICKS:
+                    break
+            return steps
         step = 10.0 ** math.floor(math.log10((high - low) / 3))
         step *= next(m for m in (1, 2, 5, 10) if (high - low) / (m * step) <= 6)
         first = math.ceil(low / step)

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from collections.abc import Iterator
 from functools import cache
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +16,12 @@ from modt.errors import MisuseError, ModtError
 from modt.reporting.page import LIGHT
 from modt.sinks.output import writing
 from modt.viewer import look
+from modt.viewer.gif import COLOURS, write_gif
 
 _MIXED = (1.0, 0.75, 0.5, 0.35, 0.2, 0.1)
 """Parts of a colour over paper: edges, and what shines through."""
+_APART = 8
+"""Least difference to paper of an entry of the palette, for Pillow takes colours that are nearer for each other."""
 
 
 @cache
@@ -27,9 +31,10 @@ def _palette() -> Image.Image:
     drawn = dict.fromkeys([*LIGHT.values(), *(entry["colour"] for entry in entries)])
     colours = np.array([list(bytes.fromhex(colour[1:])) for colour in drawn])
     paper = np.array(list(bytes.fromhex(LIGHT["paper"][1:])))
-    mixed = [np.rint(paper + part * (colours - paper)).astype(np.uint8) for part in _MIXED]
+    mixed = np.concatenate([np.rint(paper + part * (colours - paper)) for part in _MIXED])
+    told_apart = mixed[np.abs(mixed - paper).max(axis=1) >= _APART]
     image = Image.new("P", (1, 1))
-    image.putpalette(np.concatenate(mixed)[:256].tobytes())
+    image.putpalette(np.concatenate([[paper], told_apart])[:COLOURS].astype(np.uint8).tobytes())
     return image
 
 
@@ -44,9 +49,8 @@ def save_gif(path: Path, first: Image.Image, rest: Iterator[Image.Image], period
     Raises:
         ModtError: it cannot be written.
     """
-    others, period_ms = map(few_colours, rest), round(1e3 * period_s)
-    with writing(path):
-        few_colours(first).save(path, save_all=True, append_images=others, duration=period_ms, loop=0)
+    with writing(path), path.open("wb") as file:
+        write_gif(file, map(few_colours, chain([first], rest)), period_s)
 
 
 def save_mp4(path: Path, first: Image.Image, rest: Iterator[Image.Image], period_s: float) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,13 @@ from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64, Int
 from modt.viewer import look
 from modt.viewer.canvas import REACH_M, SIDE_M, Canvas
+from modt.viewer.caption import caption
+from modt.viewer.extent import RINGS_M, reach_m
 from modt.viewer.labels import Labels
 from modt.viewer.point_cells import SIDE, Cells
 from modt.viewer.recorded_run import RecordedRun
 from modt.viewer.track_rows import COLUMNS, SCALE, SCALED
+from modt.viewer.zoomed import Zoomed
 
 TRAIL = 30
 """Frames."""
@@ -22,8 +26,8 @@ MOST_CELLS = 50_000
 """Of a sweep, to keep an SVG file below a megabyte or so."""
 Label = tuple[float, float, str, str]
 _LEAST_M = 0.1
-_LINE_M = 1.5
-"""From one line of text to the next."""
+_GAP_M = 0.3
+"""Between a box and its label."""
 
 
 def draw(canvas: Canvas, run: RecordedRun, at: int, step_cm: int, cells: Cells | None) -> None:
@@ -36,40 +40,46 @@ def draw(canvas: Canvas, run: RecordedRun, at: int, step_cm: int, cells: Cells |
         step_cm: width of a cell.
         cells: of the sweep, None without points.
     """
-    for radius in (20, 40, 60):
-        canvas.circle(0, 0, radius, "line", 0.1)
+    reach = reach_m(run.tracks)
+    scene, labels = Zoomed(canvas, REACH_M / reach), Labels(canvas)
+    rings = np.arange(RINGS_M[reach], math.hypot(reach, reach * SIDE_M / REACH_M), RINGS_M[reach]).tolist()
+    for radius in rings:
+        scene.circle(0, 0, radius, "line", 0.1)
     if cells is not None:
-        _points(canvas, cells, step_cm)
+        _points(scene, cells, step_cm)
+    for radius in rings:
+        labels.write(0.0, -scene.factor * radius, f"{radius:g} m", "soft")
     canvas.polygon(np.array([[1, 0], [-0.7, 0.6], [-0.7, -0.6]]), "ink", 1.0, "ink", 0.05)
+    labels.keep_free(-1.0, 1.0, 0.6)
     rows = run.tracks[run.tracks[:, COLUMNS.index("at")] == at]
     false = set(run.frames[at].get("false", ()))
-    labels = Labels(canvas)
     said = []
     for row in rows[np.argsort(rows[:, COLUMNS.index("class")], kind="stable")]:
-        said += _track(canvas, run, at, row, int(row[0]) in false)
+        said += _track(scene, run, at, row, int(row[0]) in false)
     for labelled in run.frames[at].get("truth", ()):
-        said += _truth(canvas, labelled)
-    for label in reversed(said):
-        labels.write(*label)
-    _text(canvas, run, at)
+        said += _truth(scene, labelled)
+    caption(canvas, labels, run, at)
+    for u, v, text, colour in reversed(said):
+        labels.write(scene.factor * u, scene.factor * v - _GAP_M, text, colour)
 
 
-def _points(canvas: Canvas, cells: Cells, step_cm: int) -> None:
+def _points(scene: Zoomed, cells: Cells, step_cm: int) -> None:
     x, y = ((v + 0.5 - SIDE / 2) * step_cm / 100 for v in (cells.cell % SIDE, cells.cell // SIDE))
-    shown = (np.abs(x) < REACH_M) & (np.abs(y) < SIDE_M)
+    shown = (np.abs(x) < REACH_M / scene.factor) & (np.abs(y) < SIDE_M / scene.factor)
     for colour, group in (("line", cells.level == 0), ("soft", cells.level > 0)):
         which = shown & group
-        canvas.dots(np.stack([x[which], -y[which]], axis=1), colour, max(_LEAST_M, step_cm / 100))
+        width = max(_LEAST_M / scene.factor, step_cm / 100)
+        scene.dots(np.stack([x[which], -y[which]], axis=1), colour, width)
 
 
-def _track(canvas: Canvas, run: RecordedRun, at: int, row: Int, false: bool) -> list[Label]:
+def _track(scene: Zoomed, run: RecordedRun, at: int, row: Int, false: bool) -> list[Label]:
     """Box, trail and ring of a row of the table; its label."""
     value = dict(zip(COLUMNS, row.tolist(), strict=True)) | _scaled(row)
     name, colour = look.classes()[int(value["class"])].values()
     state = look.states(run.states)[int(value["state"])]
     is_object, wrong = value["class"] > 0, look.truth()["false"]["colour"]
     box = _outline([value[key] for key in BOX_KEYS])
-    canvas.polygon(
+    scene.polygon(
         box,
         colour,
         0.35 if is_object else 0.1,
@@ -80,28 +90,28 @@ def _track(canvas: Canvas, run: RecordedRun, at: int, row: Int, false: bool) -> 
     )
     x, y = value["x"], -value["y"]
     if value["classified"]:
-        canvas.circle(x, y, max(1.0, 0.7 * value["l"]), "ink", 0.12)
+        scene.circle(x, y, max(1.0 / scene.factor, 0.7 * value["l"]), "ink", 0.12)
     if not is_object:
         return []
-    canvas.line(_trail(run, at, int(value["id"])), colour, 0.15)
+    scene.line(_trail(run, at, int(value["id"])), colour, 0.15)
     if value["world_speed_mps"] > 0.5:
         heading, reach = value["world_heading"] - run.poses[at, 2], value["world_speed_mps"]
         ahead = [x + reach * np.cos(heading), y - reach * np.sin(heading)]
-        canvas.line(np.array([[x, y], ahead]), state["colour"], 0.15)
+        scene.line(np.array([[x, y], ahead]), state["colour"], 0.15)
     said = f"{'false: ' if false else ''}#{value['id']:g} {name} {100 * value[f'p_{name}']:.0f} %"
     return [(x, _top(box), said, wrong if false else "ink")]
 
 
-def _truth(canvas: Canvas, labelled: dict[str, Any]) -> list[Label]:
+def _truth(scene: Zoomed, labelled: dict[str, Any]) -> list[Label]:
     colour, missed = look.truth()[labelled["outcome"]]["colour"], labelled["outcome"] == "missed"
     box = _outline([labelled["x"], labelled["y"], 0.0, labelled["l"], labelled["w"], 0.0, labelled["yaw"]])
-    canvas.polygon(box, colour, 0.0, colour, 0.3 if missed else 0.12, dash=0.25)
+    scene.polygon(box, colour, 0.0, colour, 0.3 if missed else 0.12, dash=0.25)
     text = f"missed {look.classes()[labelled['class']]['name']}"
     return [(labelled["x"], _top(box), text, colour)] if missed else []
 
 
 def _top(box: Float64) -> float:
-    return float(box[:, 1].min()) - 0.3
+    return float(box[:, 1].min())
 
 
 def _outline(box: list[float]) -> Float64:
@@ -122,24 +132,3 @@ def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
     dx, dy = (rows[:, world : world + 2] / 100 - [x, y]).T
     c, s = np.cos(yaw), np.sin(yaw)
     return np.stack([c * dx + s * dy, s * dx - c * dy], axis=1)
-
-
-def _text(canvas: Canvas, run: RecordedRun, at: int) -> None:
-    """What the frame was and cost, and the legends."""
-    frame = run.frames[at]
-    facts = [f"frame {frame['frame']}, {frame['stamp_s']:.2f} s, mode {run.facts['mode']}"]
-    facts.append(f"{frame['proposals']} proposals, budget {run.budget}")
-    facts.append(f"{frame['classifications']} classified, {frame['deferred']} deferred")
-    if "cpu_ms" in frame:
-        facts.append(f"{sum(frame['cpu_ms'].values()):.1f} ms of CPU time")
-    if "energy_mJ" in frame:
-        facts.append(f"{frame['energy_mJ']:.0f} mJ ({frame['kind']})")
-    for k, fact in enumerate(facts):
-        canvas.text(1 - REACH_M, 2.2 - SIDE_M + _LINE_M * k, fact, "ink")
-    legend = [(entry, 1.0) for entry in look.classes()] + [(entry, 0.0) for entry in look.states(run.states)]
-    legend += [(entry, 0.0) for entry in look.truth().values()] if "truth" in frame else []
-    for k, (entry, opacity) in enumerate(legend):
-        u, v = 1 - REACH_M, SIDE_M - 1 - _LINE_M * k
-        square = np.array([[u, v - 0.8], [u + 0.8, v - 0.8], [u + 0.8, v], [u, v]])
-        canvas.polygon(square, entry["colour"], opacity, entry["colour"], 0.2)
-        canvas.text(u + 1.4, v, entry["name"].replace("_", " "), "soft")

@@ -11,6 +11,8 @@ from typing import Any
 from modt.reporting.page import THEME
 from modt.sinks.output import writing
 from modt.viewer import look
+from modt.viewer.canvas import REACH_M
+from modt.viewer.extent import reach_m
 from modt.viewer.packed import packed_cells, packed_table
 from modt.viewer.point_cells import SIDE, Cells
 from modt.viewer.recorded_run import RecordedRun
@@ -64,6 +66,7 @@ def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any
     return content(look.states(run.states), run.budget, step_cm) | {
         "frames": frames,
         "truth": look.truth() if judged else None,
+        "reach_m": reach_m(run.tracks),
         "start": start,
     }
 
@@ -78,6 +81,7 @@ def content(states: list[look.Entry], budget: str | None, step_cm: int | None) -
         "stages": look.stages(),
         "budget": budget,
         "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},
+        "reach_m": REACH_M,
         "frames": [],
     }
 

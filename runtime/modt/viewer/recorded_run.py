@@ -103,6 +103,11 @@ class RecordedRun:
         """Name of its profile."""
         return " + ".join(self.facts.get("profiles", ()))
 
+    @property
+    def live(self) -> bool:
+        """Of a live source, which no one can open again."""
+        return self.facts["stream"]["path"] is None and bool(self.facts.get("service", False))
+
     def call_mJ(self, frame: dict[str, Any]) -> dict[str, float]:
         """`call_mJ` of a frame: estimated energy of each classification in it, by its CPU time."""
         cpu_ms, calls = frame.get("cpu_ms", {}).get(CLASSIFICATION), frame["classifications"]

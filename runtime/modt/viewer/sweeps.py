@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from modt.sources.frames_by_number import FramesByNumber
 from modt.sources.stream import Stream
 from modt.viewer.point_cells import Cells, Grid
 
@@ -14,12 +15,7 @@ NO_CELLS = Cells(np.zeros(0, np.int64), np.zeros(0, np.int64))
 
 def sweeps(numbers: Sequence[int], stream: Stream, grid: Grid, most: int) -> Iterator[Cells]:
     """Cells of each frame, by ascending number, at most so many; none where the stream lacks the frame."""
-    frames = iter(stream.between(numbers[0], numbers[-1] + 1))
-    frame = next(frames, None)
+    frames = FramesByNumber(stream.between(0, numbers[-1] + 1))
     for number in numbers:
-        while frame is not None and frame.index < number:
-            frame = next(frames, None)
-        if frame is None or frame.index > number:
-            yield NO_CELLS
-        else:
-            yield grid.cells(frame.points).thinned(most)
+        frame = frames.get(number)
+        yield NO_CELLS if frame is None else grid.cells(frame.points).thinned(most)

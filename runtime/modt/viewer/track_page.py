@@ -50,13 +50,16 @@ def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32])
     classified = [row for row in rows if row["classified"]]
     spent_mJ = sum(_call_mJ(run, row) for row in classified)
     final = next((row for row in rows if row["final"]), None)
+    certain = (
+        (f"{number[int(final['at'])]}", "its class is settled") if final else ("never", "its class is not settled")
+    )
     name = CLASS_NAMES[int(last["class"])]
     facts = [
         ("said at the end", name, f"posterior {100 * last[f'p_{name}']:.1f} %"),
         ("followed", f"{len(rows)} frames", f"{number[int(first['at'])]} to {number[int(last['at'])]}"),
         ("classifications", f"{len(classified)}", f"{sum(r['seen'] > 0 for r in rows)} by tracking by detection"),
         ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated, by CPU time"),
-        ("certain from frame", "never" if final is None else f"{number[int(final['at'])]}", "asked for no more"),
+        ("certain from frame", *certain),
     ]
     blocks = [tiles(facts), plots(_plots(run, rows)), *_events(run, rows, sweeps)]
     about = f"{run.facts['stream']['name']}, mode {run.facts['mode']}: from proposal to class"

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from modt.errors import MisuseError
 from modt.evaluation.matching import judge
 from modt.evaluation.overlap import inside
 from modt.evaluation.rows import Rows
@@ -13,6 +14,7 @@ from modt.evaluation.run_record import LABELS, RunRecord
 from modt.evaluation.truth import FrameTruth, Truth
 from modt.geometry import inverse, transform_boxes
 from modt.sinks.tracks import BOX_KEYS
+from modt.sources.stream import Stream
 from modt.types import NONE, Float32, Int
 
 MARGIN_M = 0.02
@@ -20,21 +22,30 @@ MARGIN_M = 0.02
 DRAWN = [BOX_KEYS.index(key) for key in ("x", "y", "l", "w", "yaw")]
 
 
-def truth_marks(run: RunRecord, truth: Truth) -> dict[int, dict[str, Any]]:
-    """By number of a frame: `truth`, its labelled objects, and `false`, ids of tracks said to be what they are not.
+def truth_marks(run: RunRecord, truth: Truth, stream: Stream | None) -> dict[int, dict[str, Any]]:
+    """By number of a labelled frame: `truth`, its objects, and `false`, ids of tracks said to be what they are not.
 
     Judged as by modt evaluate; where the run was made without --labels, a proposal has the points in its box.
+
+    Args:
+        run: what is judged.
+        truth: in the numbers of its frames.
+        stream: that it is of, None where it is not found: then by the scans of the truth.
 
     Raises:
         MisuseError: the labels are not those of the run's recording.
     """
     exact = (run.path / LABELS).is_dir()
     marks = {}
-    for frame in run.frames(truth, None if exact else points_in_boxes):
+    labelled = ((place, record) for place, record in run.records() if record["frame"] in truth.frames)
+    for frame in run.frames(truth, None if exact else points_in_boxes, stream, labelled):
         objects, proposals, _ = judge(frame, truth.rules)
         called = proposals[proposals["to_call"] & (proposals["said"] > 0)]
         false = called["track"][called["said"] != called["owner"]]
         marks[frame.index] = {"truth": _objects(frame.truth, objects), "false": false.tolist()}
+    if not marks:
+        cause = f"none of its frames is in the truth, which has {len(truth.frames)}"
+        raise MisuseError(run.path, cause, "give the truth of the run's own recording")
     return marks
 
 

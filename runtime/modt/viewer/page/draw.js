@@ -93,6 +93,10 @@ function write(text, x, y, colour, needed) {
     const box = [left, y - (k + 1) * height, left + width, y - k * height];
     if (!needed && taken.some((t) => box[0] < t[2] && t[0] < box[2] && box[1] < t[3] && t[1] < box[3])) continue;
     taken.push(box);
+    if (k) {
+      path([[x, y], [x, box[3]]], false);
+      stroke(colours.soft, 1);
+    }
     context.lineWidth = 3 * dot;
     context.strokeStyle = colours.paper;
     context.fillStyle = colour;
@@ -144,13 +148,15 @@ const middleOf = (box) => box.reduce((sum, corner) => sum + corner[0] / box.leng
 function drawRings() {
   context.font = `${11 * dot}px system-ui,sans-serif`;
   context.fillStyle = colours.soft;
-  for (let range = 20; range <= 100; range += 20) {
+  const step = [1, 2, 5, 10, 20].find((metres) => metres * state.metre > 110 * dot) || 50;
+  for (let range = step; range <= 10 * step; range += step) {
     context.beginPath();
     context.arc(state.x, state.y, range * state.metre, 0, 7);
     stroke(colours.line, 1);
     context.fillText(`${range} m`, state.x + 4 * dot, state.y - range * state.metre - 3 * dot);
   }
-  path([[1, 0], [-0.7, 0.6], [-0.7, -0.6]].map(([x, y]) => screen(x, y)), true);
+  const size = (10 * dot) / state.metre;
+  path([[1, 0], [-0.7, 0.6], [-0.7, -0.6]].map(([x, y]) => screen(size * x, size * y)), true);
   context.fillStyle = colours.ink;
   context.fill();
 }
@@ -165,7 +171,7 @@ function draw() {
   shown.sort((a, b) => a.class - b.class || a.seen - b.seen);
   for (const row of shown) drawTrack(row, wrong.has(row.id));
   context.font = `${12 * dot}px system-ui,sans-serif`;
-  taken = [];
+  taken = [[state.x - 10 * dot, state.y - 8 * dot, state.x + 10 * dot, state.y + 8 * dot]]; // the sensor
   if (state.truth) (frame.truth || []).forEach(drawTruth);
   for (const row of shown.reverse())
     if ((state.labels && row.class) || row.id === chosen) {

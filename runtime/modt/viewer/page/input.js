@@ -42,7 +42,7 @@ function fit() {
 function reset() {
   fit();
   state.up = canvas.height > canvas.width;
-  state.metre = Math.min(canvas.width, canvas.height) / 70;
+  state.metre = Math.min(canvas.width, canvas.height) / (1.55 * run.reach_m);
   state.x = canvas.width * (state.up ? 0.5 : 0.35);
   state.y = canvas.height * (state.up ? 0.65 : 0.5);
 }
@@ -126,7 +126,7 @@ document.onkeydown = (event) => {
 
 slider.oninput = () => go(Number(slider.value));
 element("play").onclick = (event) => { event.currentTarget.blur(); play(); }; // or Space would press it, too
-onresize = () => { fit(); redraw(); };
+new ResizeObserver(() => { fit(); if (canvas.dataset.frame) redraw(); }).observe(canvas);
 matchMedia("(prefers-color-scheme: dark)").onchange = () => { theme(); redraw(); };
 theme();
 reset();

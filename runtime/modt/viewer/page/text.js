@@ -6,6 +6,9 @@ const add = (parent, tag, text = "", more = {}) => {
   return made;
 };
 
+// Seconds from the begin of a recording, or the time of day of a stamp that counts from 1970.
+const time = (stamp) => stamp < 1e8 ? `${stamp.toFixed(2)} s` : new Date(1000 * stamp).toISOString().slice(11, 22);
+
 function showFrame() {
   const frame = frames[state.at], rows = rowsAt[state.at] || [], list = element("frame");
   const cpu = Object.values(frame.cpu_ms || {}).reduce((a, b) => a + b, 0);
@@ -31,7 +34,7 @@ function showFrame() {
     add(element("stages"), "i", "", { title: `${name} ${part.toFixed(1)} ms` })
       .style.cssText = `width:${100 * part / (cpu || 1)}%;background:${colour}`;
   }
-  element("time").textContent = `${frame.stamp_s.toFixed(2)} s, ${state.at + 1} / ${last + 1}`;
+  element("time").textContent = `${time(frame.stamp_s)}, ${state.at + 1} / ${last + 1}`;
   slider.value = state.at;
 }
 
