@@ -9,6 +9,8 @@ from typing import Self
 import numpy as np
 
 from modt.classes import ObjectClass
+from modt.config import ClassificationConfig
+from modt.energy.instrumentation import padded_each
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.matching import judge
 from modt.evaluation.rows import OBJECT, PROPOSAL, Rows, table
@@ -22,7 +24,7 @@ _PLAIN_OBJECT = np.dtype([(name, "U32" if name == "type" else OBJECT[name]) for 
 """Rows of objects that can be stored."""
 FRAME = np.dtype([("drive", int), ("frame", int), ("proposals", int)])
 CALL = np.dtype([("drive", int), ("frame", int), ("track", int), ("points", int)])
-"""A row a classification: points that the network saw."""
+"""A row a classification: points that the network processed, padding included."""
 CENTRE = np.dtype(
     [
         ("drive", int),
@@ -64,7 +66,11 @@ class Judged:
 
     @classmethod
     def of_results(
-        cls, results: Iterable[tuple[FrameResult, FrameTruth]], fov: FieldOfView, rules: Rules, max_points: int
+        cls,
+        results: Iterable[tuple[FrameResult, FrameTruth]],
+        fov: FieldOfView,
+        rules: Rules,
+        limits: ClassificationConfig,
     ) -> Self:
         """Of a drive's results beside its labels."""
         frames, objects, proposals, calls, centres = [], [], [], [], []
@@ -75,7 +81,7 @@ class Judged:
             frames.append((0, index, len(result.proposals)))
             objects.append(seen.astype(_PLAIN_OBJECT))
             proposals.append(tracked)
-            calls.append(_calls(result, max_points))
+            calls.append(_calls(result, limits))
             if pose is not None:
                 start = pose[:2, 3] if start is None else start
                 centres.append(_centres(result, truth, seen, pose, start))
@@ -113,10 +119,10 @@ class Judged:
         return Judged(**tables)
 
 
-def _calls(result: FrameResult, max_points: int) -> Rows:
+def _calls(result: FrameResult, limits: ClassificationConfig) -> Rows:
     tracks = result.tracks
     rows = np.flatnonzero(np.isin(tracks.id, result.classified))
-    points = np.minimum(result.proposals.count[tracks.proposal[rows]], max_points)
+    points = padded_each(result.proposals.count[tracks.proposal[rows]], limits)
     return table(CALL, len(rows), frame=result.frame.index, track=tracks.id[rows], points=points)
 
 

@@ -76,9 +76,7 @@ class NetworkReplay:
         """Step by step."""
         known = segmented(drive, digest, self.config, store)
         pipeline = self._pipeline(known, store)
-        return Judged.of_results(
-            self._results(pipeline, known), known.fov, known.rules, self.config.classification.max_points
-        )
+        return Judged.of_results(self._results(pipeline, known), known.fov, known.rules, self.config.classification)
 
     def _pipeline(self, known: SegmentedDrive, store: Store) -> Pipeline:
         parts = assembly.pipeline(assembly.MODES[self.mode], self.config, known.fov, NullLedger())
