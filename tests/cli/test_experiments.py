@@ -32,6 +32,16 @@ def test_results_are_written_in_every_form(results):
     assert "## Where this falls short" in page
 
 
+def test_charts_are_pictures_too_with_the_extra(results):
+    pytest.importorskip("resvg_py", reason="extra 'report' is not installed")
+    image = pytest.importorskip("PIL.Image", reason="extra 'view' is not installed")
+    with image.open(results / "budget-2-simulated-drives-average-precision.png") as picture:
+        width, height = picture.size
+        legend = picture.convert("L").crop((160, height - 30, width, height))
+    assert width > height > 400
+    assert len(legend.getcolors()) > 2, "there is text"
+
+
 def test_energy_needs_a_calibration(results, tmp_path):
     board = tmp_path / "board.yaml"
     board.write_text(
