@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.evaluation.frame import JudgedFrame
-from modt.evaluation.overlap import Overlap, in_box_frame, inside
+from modt.evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
 from modt.evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
 from modt.evaluation.rules import Rules
 from modt.evaluation.truth import Role
@@ -19,9 +19,14 @@ PARKED_PAD_M = 0.4
 """A proposal is of a parked car if it lies in its box or up to this beyond."""
 
 
-def judge(frame: JudgedFrame, rules: Rules, drive: int = 0) -> tuple[Rows, Rows, tuple[Association, ...]]:
-    """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class."""
-    overlap = Overlap.of(frame)
+def judge(
+    frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None
+) -> tuple[Rows, Rows, tuple[Association, ...]]:
+    """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class.
+
+    points: of the labelled objects, where they are known.
+    """
+    overlap = Overlap.of(frame, points)
     row = np.full(len(overlap.size), NONE, np.int64)
     row[frame.of_track] = np.arange(len(frame.track))
     track, said = (np.append(column, NONE)[row] for column in (frame.track, frame.said))

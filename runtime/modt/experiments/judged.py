@@ -16,6 +16,7 @@ from modt.evaluation.matching import judge
 from modt.evaluation.rows import OBJECT, PROPOSAL, Rows, table
 from modt.evaluation.rules import Rules
 from modt.evaluation.truth import FrameTruth, Role
+from modt.experiments.segmented import SegmentedFrame
 from modt.experiments.store import Arrays
 from modt.geometry import FieldOfView, inverse, transform
 from modt.types import NONE, Float64, FrameResult
@@ -67,7 +68,7 @@ class Judged:
     @classmethod
     def of_results(
         cls,
-        results: Iterable[tuple[FrameResult, FrameTruth]],
+        results: Iterable[tuple[FrameResult, SegmentedFrame]],
         fov: FieldOfView,
         rules: Rules,
         limits: ClassificationConfig,
@@ -75,8 +76,9 @@ class Judged:
         """Of a drive's results beside its labels."""
         frames, objects, proposals, calls, centres = [], [], [], [], []
         start: Float64 | None = None
-        for result, truth in results:
-            seen, tracked, _ = judge(JudgedFrame.of_result(result, truth, fov), rules)
+        for result, known in results:
+            truth = known.truth
+            seen, tracked, _ = judge(JudgedFrame.of_result(result, truth, fov), rules, points=known.objects)
             index, pose = result.frame.index, result.frame.T_world_sensor
             frames.append((0, index, len(result.proposals)))
             objects.append(seen.astype(_PLAIN_OBJECT))

@@ -126,10 +126,10 @@ class Cluster:
 def _in_two_rounds(
     units: Sequence[Unit], submit: Callable[[Unit], Any], completed: Callable[[list[Any]], Iterable[Any]]
 ) -> Iterator[tuple[Unit, bytes]]:
-    """One unit of each drive, whose segmentation the others then find in the store; then the others."""
-    first: dict[tuple[str, type], Unit] = {}
+    """One unit of each drive and basis, which the others then find in the store; then the others."""
+    first: dict[tuple[str, str], Unit] = {}
     for unit in units:
-        first.setdefault((unit.digest, type(unit.replay)), unit)
+        first.setdefault((unit.digest, unit.replay.basis()), unit)
     early = {unit.key for unit in first.values()}
     for chosen in ([*first.values()], [unit for unit in units if unit.key not in early]):
         of = {submit(unit): unit for unit in chosen}
