@@ -51,9 +51,15 @@ def judge(
 def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
     truth, cut_counts = frame.truth, "cut" not in rules.ignored
     range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
-    shown = [frame.points[points] for points in overlap.own]
-    in_view = np.array([_most(frame.fov.contains(points)) for points in shown], np.bool_)
-    in_sector = np.array([_most(_in_sector(points, rules)) for points in shown], np.bool_)
+    shown = frame.points[np.concatenate([np.zeros(0, np.int64), *overlap.own])]
+    of = np.repeat(np.arange(len(overlap.own)), overlap.count)
+
+    def most(which: Bool) -> Bool:
+        """(n,) whether most points of each object are so; nothing is said of one without points."""
+        found: Bool = np.bincount(of[which], minlength=len(overlap.own)) > 0.5 * overlap.count
+        return found | (overlap.count == 0)
+
+    in_view, in_sector = most(frame.fov.contains(shown)), most(_in_sector(shown, rules))
     wanted = (truth.role != Role.IGNORED) & (range_m <= rules.max_range_m)
     to_follow = wanted & (truth.object_class > 0) & (overlap.count >= rules.min_points_followed)
     whole = cut_counts | (in_view & in_sector)
@@ -129,11 +135,6 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules
         to_call=to_call,
         to_associate=to_call & ~(neutral & no_object),
     )
-
-
-def _most(which: Bool) -> bool:
-    """Whether most points are; nothing is said of an object without points."""
-    return not len(which) or bool(which.mean() > 0.5)
 
 
 def _in_sector(points: Float32, rules: Rules) -> Bool:
