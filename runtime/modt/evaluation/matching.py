@@ -56,8 +56,9 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
 
     def most(which: Bool) -> Bool:
         """(n,) whether most points of each object are so; nothing is said of one without points."""
-        found: Bool = np.bincount(of[which], minlength=len(overlap.own)) > 0.5 * overlap.count
-        return found | (overlap.count == 0)
+        times = np.bincount(of[which], minlength=len(overlap.own))
+        found: Bool = (times > 0.5 * overlap.count) | (overlap.count == 0)
+        return found
 
     in_view, in_sector = most(frame.fov.contains(shown)), most(_in_sector(shown, rules))
     wanted = (truth.role != Role.IGNORED) & (range_m <= rules.max_range_m)
