@@ -20,7 +20,7 @@ from modt.experiments.ideal_tracker import IdealTracking, viewed
 from modt.experiments.judged import Judged
 from modt.experiments.played_back import PlayedBack, likelihoods
 from modt.experiments.segmented import SegmentedDrive, SegmentedFrame, segmented
-from modt.experiments.store import Store, key_of
+from modt.experiments.store import Store
 from modt.pipeline import Pipeline, Segmenter
 from modt.profile import dump
 from modt.types import FrameResult
@@ -32,8 +32,8 @@ class Replay(Protocol):
     def described(self) -> dict[str, Any]:
         """All that its outcome follows from, but for drive and code."""
 
-    def basis(self) -> str:
-        """What it has in common with other replays of a drive, which the first of them makes."""
+    def basis(self) -> dict[str, Any]:
+        """All that its first stages follow from: what replays have in common, the first of them makes."""
 
     def judged(self, drive: Drive, digest: str, store: Store) -> Judged:
         """What becomes of a drive of this digest; the store holds what replays share."""
@@ -47,9 +47,9 @@ class LabelReplay:
         """Nothing but its kind."""
         return {"replay": "labels"}
 
-    def basis(self) -> str:
-        """The labels."""
-        return "labels"
+    def basis(self) -> dict[str, Any]:
+        """None but the labels."""
+        return {}
 
     def judged(self, drive: Drive, digest: str, store: Store) -> Judged:
         """The labelled objects, each followed by itself."""
@@ -80,10 +80,9 @@ class NetworkReplay:
         facts = {"mode": self.mode, "ideal": self.ideal, "range_m": self.range_m, "poses": self.poses}
         return {"replay": "network", "profile": kept, "model": self._network.facts(), **facts}
 
-    def basis(self) -> str:
+    def basis(self) -> dict[str, Any]:
         """Segmentation and network."""
-        described = dump(self.config)
-        return key_of([described[name] for name in ("sensor", "segmentation", "classification")])
+        return {k: v for k, v in dump(self.config).items() if k in ("sensor", "segmentation", "classification")}
 
     def judged(self, drive: Drive, digest: str, store: Store) -> Judged:
         """Step by step."""

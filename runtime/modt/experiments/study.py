@@ -107,10 +107,10 @@ class Study:
 
     @property
     def units(self) -> list[Unit]:
-        """All that are needed, each once, drive by drive."""
+        """All that are needed, each once, drive by drive, and what has a basis in common together."""
         found = {unit.key: unit for units in self._units.values() for unit in units.values()}
         order = list(self._digests)
-        return sorted(found.values(), key=lambda unit: order.index(unit.drive))
+        return sorted(found.values(), key=lambda unit: (order.index(unit.drive), unit.basis))
 
     def complete(self, executor: Executor, tick: Callable[[Unit], None]) -> None:
         """Work off the units whose outcomes are missing; those that are ready stay, should it be interrupted."""
