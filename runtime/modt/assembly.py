@@ -17,7 +17,7 @@ from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import FusionConfig, ProfileConfig
-from modt.energy.instrumentation import CountingClassifier, padded_size
+from modt.energy.instrumentation import Classifier, CountingClassifier, padded_size
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
 from modt.geometry.blind_sectors import BlindSectors
@@ -100,25 +100,37 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
         MisuseError: the model cannot be used.
     """
     host.keep_freed_pages()
-    kernels = kernel_choice.choose(profile.segmentation.kernels)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
     size = padded_size(limits)
     cost = LinearCost(limits.max_points, size, profile.scheduler.cost)
     warm_up(network, cost, limits.max_points, limits.batch, time.thread_time_ns)
-    fusion = profile.fusion
+    _check_budget(mode.budget(profile), cost)
+    timed = TimedClassifier(CountingClassifier(network, ledger, size), cost, time.thread_time_ns)
+    return stages(mode, profile, network, segmenter(profile, fov), timed, cost, ledger)
+
+
+def stages(
+    mode: Mode,
+    profile: ProfileConfig,
+    network: PointNet,
+    segmenter: SegmenterStage,
+    classifier: Classifier,
+    cost: LinearCost,
+    ledger: StageLedger,
+) -> Pipeline:
+    """A pipeline around a given segmenter and classifier: the network, or what stands for it at this cost."""
+    kernels, fusion = kernel_choice.choose(profile.segmentation.kernels), profile.fusion
     if network.class_frequency is not None:
         fusion = replace(fusion, prior=network.class_frequency)
     prior = make_prior(network.box_scores, fusion.prior)
-    _check_budget(mode.budget(profile), cost)
-    counting = CountingClassifier(network, ledger, size)
     return Pipeline(
-        segmenter=segmenter(profile, fov),
+        segmenter=segmenter,
         odometry=Odometry(profile.odometry, kernels),
         tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
         fusion=mode.fusion(fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost),
-        classifier=TimedClassifier(counting, cost, time.thread_time_ns),
+        classifier=classifier,
         decision=Decision(profile.decision, with_background(fusion.prior)),
         ledger=ledger,
     )

@@ -32,6 +32,39 @@ def test_results_are_written_in_every_form(results):
     assert "## Where this falls short" in page
 
 
+def test_charts_are_pictures_too_with_the_extra(results):
+    pytest.importorskip("resvg_py", reason="extra 'report' is not installed")
+    image = pytest.importorskip("PIL.Image", reason="extra 'view' is not installed")
+    with image.open(results / "budget-2-simulated-drives-average-precision.png") as picture:
+        width, height = picture.size
+        legend = picture.convert("L").crop((160, height - 30, width, height))
+    assert width > height > 400
+    assert len(legend.getcolors()) > 2, "there is text"
+
+
+def test_energy_needs_a_calibration(results, tmp_path):
+    board = tmp_path / "board.yaml"
+    board.write_text(
+        "energy: {board: desk, meter: INA (integrated), seg_J: 0.05, class_J: 1.0e-3, point_J: 1.0e-5}\n"
+    )
+    words = ["evaluate", "--experiment", "budget", "--simulated", "2", "--seconds", "0.3"]
+    cache = results / "cache"
+    before = sorted(cache.rglob("*.npz"))
+    assert main([*words, "--calibration", str(board), "--out", str(tmp_path), "--cache", str(cache)]) == 0
+    made = json.loads((tmp_path / "results.json").read_text())
+    row = {(r["variant"], r["at"], r["quantity"]): r["value"] for r in made["rows"]}
+    for at in (0.0, 3.0):
+        calls, points, energy = (
+            row["accurate", at, name]
+            for name in ("calls a frame", "points classified a frame", "energy of classification a frame [mJ]")
+        )
+        assert energy == pytest.approx(calls + 0.01 * points, rel=1e-4)
+    assert energy > 0
+    assert len(sorted(cache.rglob("*.npz"))) == len(before) + 1, "replays are those of before"
+    assert made["about"]["energy"] == ["desk, INA (integrated)"]
+    assert "desk, INA (integrated)" in (tmp_path / "results.md").read_text()
+
+
 def test_simulated_drives_stand_apart_and_beside_no_figure_of_the_paper(results):
     found = json.loads((results / "results.json").read_text())["rows"]
     assert {row["kind"] for row in found} == {"simulated"}
@@ -43,6 +76,8 @@ def test_simulated_drives_stand_apart_and_beside_no_figure_of_the_paper(results)
     [
         (["--experiment", "table9", "--simulated", "1"], "table3"),
         (["--experiment", "table4"], "no drives"),
+        (["--experiment", "budget", "--simulated", "1", "--calibration", "hdl-64e"], "calibrate"),
+        (["--experiment", "budget", "--simulated", "1", "--calibration", "a", "--calibration", "b"], "more of them"),
         (["RUN", "--experiment", "table4"], "takes no runs"),
         (["--experiment", "table3", "--simulated", "1"], "none of the drives"),
     ],

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from modt import assembly
 from modt.energy.ledger import NullLedger
@@ -30,8 +31,9 @@ def test_a_stored_drive_is_the_one_that_was_segmented(tmp_path):
         assert len(made.frame.points) < len(frame.points)
 
 
-def test_a_replay_of_the_points_that_matter_is_judged_as_the_whole_sweeps_are(tmp_path):
-    config = load("hdl-64e")
+@pytest.mark.parametrize("name", ["hdl-64e", "paper"])
+def test_a_replay_of_the_points_that_matter_is_judged_as_the_whole_sweeps_are(name, tmp_path):
+    config = load(name)
     found = NetworkReplay(config).judged(DRIVE, DRIVE.digest(), Store(tmp_path))
     mode = assembly.MODES["accurate"]
     pipeline = assembly.pipeline(mode, config, DRIVE.fov(), NullLedger())

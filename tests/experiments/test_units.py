@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from itertools import groupby
 
 import pytest
 
@@ -52,6 +53,11 @@ def test_the_key_of_a_unit_follows_drive_replay_and_profile():
         for unit in Study([experiment], [drive], [profiles], Store(None)).units
     }
     assert len(keys) == 3 * len(Study([experiment], [one], [()], Store(None)).units)
+
+
+def test_units_with_the_same_segmentation_and_network_follow_one_another():
+    units = Study(chosen(["table5", "fig11"]), short_drives(2), [(), ("paper",)], Store(None)).units
+    assert len(list(groupby(units, lambda unit: unit.basis))) == 4
 
 
 def test_a_worker_with_other_code_is_refused(tmp_path):

@@ -66,7 +66,7 @@ def _range(metres: float) -> str:
 
 PAPER, DEAR = _network("pointnet-paper-40"), _network("pointnet-dear")
 HDL, VLP = (
-    tuple(f"{scene}-{sensor}-{seed}" for seed, scene in enumerate(("street", "crossing") * 2, 1))
+    tuple(f"{scene}-{sensor}-{seed}" for seed, scene in enumerate(("street", "crossing") * 3, 1))
     for sensor in ("hdl-64e", "vlp-16")
 )
 REAL = "kitti-0005"

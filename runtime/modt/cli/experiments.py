@@ -6,11 +6,15 @@ import argparse
 import shlex
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from modt import host
 from modt.cli import options
 from modt.cli.progress import bar
 from modt.errors import MisuseError
+
+if TYPE_CHECKING:
+    from modt.config import EnergyConfig
 
 
 def add_options(p: argparse.ArgumentParser) -> None:
@@ -27,6 +31,8 @@ def add_options(p: argparse.ArgumentParser) -> None:
     options.add_profile_option(g, "on top of each drive's sensor; later ones win key by key")
     beside = "the same again with this profile on top; repeatable"
     g.add_argument("--beside", action="append", default=[], metavar="NAME|FILE", help=beside)
+    board = "from modt-profile calibrate, for the energy of the first profile; then of each beside; repeatable"
+    g.add_argument("--calibration", action="append", default=[], metavar="FILE", help=board)
     g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: %(default)s")
     g.add_argument("--cache", type=Path, metavar="DIR", help="of intermediate results (default: OUT/cache)")
     where = g.add_mutually_exclusive_group()
@@ -59,13 +65,16 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path = arguments.out
     base = tuple(arguments.profile)
     profiles = [base, *((*base, name) for name in arguments.beside)]
-    study = Study(experiments, drives, profiles, Store((arguments.cache or out / "cache").resolve()))
+    if len(arguments.calibration) > len(profiles):
+        raise MisuseError("--calibration", "more of them than profiles", "give one, and one for each --beside")
+    boards = dict(zip(profiles, map(_board, arguments.calibration), strict=False))
+    study = Study(experiments, drives, profiles, Store((arguments.cache or out / "cache").resolve()), boards)
     executor: Executor = Here() if arguments.jobs == 1 else Processes(arguments.jobs)
     if arguments.scheduler:
         executor = Cluster(arguments.scheduler)
     with bar(study.missing, "replay", shown=not arguments.quiet and sys.stderr.isatty()) as tick:
         study.complete(executor, lambda unit: tick(unit.drive.name))
-    about = About.of(_command(arguments), profiles)
+    about = About.of(_command(arguments), profiles, boards.values())
     rows = study.rows()
     if not rows:
         raise MisuseError(
@@ -76,6 +85,21 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _board(file: str) -> EnergyConfig:
+    """Coefficients of a calibration.
+
+    Raises:
+        MisuseError: the file has none.
+    """
+    from modt import profile
+
+    energy = profile.load((profile.DEFAULT, file)).energy
+    if energy.coefficients is None:
+        cause, remedy = "no energy of a classification", "write it by modt-profile calibrate"
+        raise MisuseError(f"--calibration {file}", cause, remedy)
+    return energy
+
+
 def _command(arguments: argparse.Namespace) -> str:
     """As another user would write it."""
     words = ["modt", "evaluate", "--experiment", *arguments.experiment]
@@ -84,4 +108,5 @@ def _command(arguments: argparse.Namespace) -> str:
     words += ["--seconds", f"{arguments.seconds:g}"] if arguments.simulated else []
     words += [word for name in arguments.profile for word in ("--profile", name)]
     words += [word for name in arguments.beside for word in ("--beside", name)]
+    words += [word for name in arguments.calibration for word in ("--calibration", name)]
     return shlex.join(words)

@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.evaluation.frame import JudgedFrame
-from modt.evaluation.overlap import Overlap, in_box_frame, inside
+from modt.evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
 from modt.evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
 from modt.evaluation.rules import Rules
 from modt.evaluation.truth import Role
@@ -19,9 +19,14 @@ PARKED_PAD_M = 0.4
 """A proposal is of a parked car if it lies in its box or up to this beyond."""
 
 
-def judge(frame: JudgedFrame, rules: Rules, drive: int = 0) -> tuple[Rows, Rows, tuple[Association, ...]]:
-    """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class."""
-    overlap = Overlap.of(frame)
+def judge(
+    frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None
+) -> tuple[Rows, Rows, tuple[Association, ...]]:
+    """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class.
+
+    points: of the labelled objects, where they are known.
+    """
+    overlap = Overlap.of(frame, points)
     row = np.full(len(overlap.size), NONE, np.int64)
     row[frame.of_track] = np.arange(len(frame.track))
     track, said = (np.append(column, NONE)[row] for column in (frame.track, frame.said))
@@ -46,9 +51,16 @@ def judge(frame: JudgedFrame, rules: Rules, drive: int = 0) -> tuple[Rows, Rows,
 def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
     truth, cut_counts = frame.truth, "cut" not in rules.ignored
     range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
-    shown = [frame.points[points] for points in overlap.own]
-    in_view = np.array([_most(frame.fov.contains(points)) for points in shown], np.bool_)
-    in_sector = np.array([_most(_in_sector(points, rules)) for points in shown], np.bool_)
+    shown = frame.points[np.concatenate([np.zeros(0, np.int64), *overlap.own])]
+    of = np.repeat(np.arange(len(overlap.own)), overlap.count)
+
+    def most(which: Bool) -> Bool:
+        """(n,) whether most points of each object are so; nothing is said of one without points."""
+        times = np.bincount(of[which], minlength=len(overlap.own))
+        found: Bool = (times > 0.5 * overlap.count) | (overlap.count == 0)
+        return found
+
+    in_view, in_sector = most(frame.fov.contains(shown)), most(_in_sector(shown, rules))
     wanted = (truth.role != Role.IGNORED) & (range_m <= rules.max_range_m)
     to_follow = wanted & (truth.object_class > 0) & (overlap.count >= rules.min_points_followed)
     whole = cut_counts | (in_view & in_sector)
@@ -124,11 +136,6 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules
         to_call=to_call,
         to_associate=to_call & ~(neutral & no_object),
     )
-
-
-def _most(which: Bool) -> bool:
-    """Whether most points are; nothing is said of an object without points."""
-    return not len(which) or bool(which.mean() > 0.5)
 
 
 def _in_sector(points: Float32, rules: Rules) -> Bool:

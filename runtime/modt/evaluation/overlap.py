@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,31 @@ from modt.types import NONE, Bool, Float32, Float64, Int
 
 PAD_M, FOOT_M = 0.15, 0.25
 """Points of an object: up to PAD_M beyond its box, and FOOT_M above its foot."""
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectPoints:
+    """Indices of the points of each of n labelled objects: clear of the ground, and all in its box."""
+
+    own: list[Int]
+    whole: list[Int]
+
+    @classmethod
+    def of(cls, points: Float32, truth: FrameTruth) -> Self:
+        """Among (N, 4) points of the sensor frame."""
+        centre = transform(inverse(truth.T_box_sensor), truth.box[:, :3])
+        reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
+        reach += 0.05 * truth.box[:, 5]  # sensors are tilted by a few degrees at most
+        across = np.ascontiguousarray(points[:, :2].T)
+        own, whole = [], []
+        for box, (x, y), r in zip(truth.box, centre[:, :2].tolist(), reach.tolist(), strict=True):
+            k = np.flatnonzero((np.abs(across[0] - x) < r) & (np.abs(across[1] - y) < r))
+            moved = in_box_frame(points[k], truth)
+            within = inside(moved, box, foot_m=-PAD_M)
+            clear = within & (moved[:, 2] > float(box[2] - box[5] / 2) + FOOT_M)
+            own.append(k[clear])
+            whole.append(k[within])
+        return cls(own, whole)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +58,13 @@ class Overlap:
     most_of_proposal: Bool  # (n,) whether they share more than half of the proposal
 
     @classmethod
-    def of(cls, frame: JudgedFrame) -> Overlap:
-        """Of a frame."""
+    def of(cls, frame: JudgedFrame, objects: ObjectPoints | None = None) -> Overlap:
+        """Of a frame; objects: those of its points and truth, where they are known."""
         p = max(frame.n_proposals, int(frame.proposal.max(initial=NONE)) + 1) + 1
         size = np.bincount(frame.proposal + 1, minlength=p + 1)[1:]
-        own, whole = _points_of(frame.points, frame.truth)
-        shared, held = (_shared(points, frame.proposal, p) for points in (own, whole))
+        objects = objects or ObjectPoints.of(frame.points, frame.truth)
+        own = objects.own
+        shared, held = (_shared(points, frame.proposal, p) for points in (own, objects.whole))
         count = np.array([len(points) for points in own], np.int64)
         best, most = shared.argmax(axis=1), shared.max(axis=1)
         iou = most / np.maximum(size[best] + count - most, 1)
@@ -59,23 +85,6 @@ def in_box_frame(points: Float32, truth: FrameTruth) -> NDArray[Any]:
     """(N, 3 or more) points in the frame in which boxes are upright."""
     T = truth.T_box_sensor
     return points if np.array_equal(T, np.eye(4)) else transform(T, points[:, :3].astype(np.float64))
-
-
-def _points_of(points: Float32, truth: FrameTruth) -> tuple[list[Int], list[Int]]:
-    """Points of each object, clear of the ground; and all in its box."""
-    centre = transform(inverse(truth.T_box_sensor), truth.box[:, :3])
-    reach = np.hypot(truth.box[:, 3], truth.box[:, 4]) / 2 + 2 * PAD_M
-    reach += 0.05 * truth.box[:, 5]  # sensors are tilted by a few degrees at most
-    across = np.ascontiguousarray(points[:, :2].T)
-    own, whole = [], []
-    for box, (x, y), r in zip(truth.box, centre[:, :2].tolist(), reach.tolist(), strict=True):
-        k = np.flatnonzero((np.abs(across[0] - x) < r) & (np.abs(across[1] - y) < r))
-        moved = in_box_frame(points[k], truth)
-        within = inside(moved, box, foot_m=-PAD_M)
-        clear = within & (moved[:, 2] > float(box[2] - box[5] / 2) + FOOT_M)
-        own.append(k[clear])
-        whole.append(k[within])
-    return own, whole
 
 
 def _shared(objects: list[Int], proposal: Int, p: int) -> Int:

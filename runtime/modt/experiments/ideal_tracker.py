@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modt.classification.pointnet import PointNet
 from modt.config import ProfileConfig
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.overlap import Overlap
+from modt.experiments.played_back import within
 from modt.experiments.segmented import SegmentedDrive, SegmentedFrame
 from modt.experiments.store import Store, key_of
 from modt.observations import Located, StaticTracks, observe
@@ -37,17 +35,15 @@ class ViewedFrame:
     track: Int  # (P,) row of the ideal track of each
 
 
-def viewed(drive: SegmentedDrive, config: ProfileConfig, store: Store) -> list[ViewedFrame]:
-    """Every proposal of a drive with its likelihood and its ideal track; from the store where it was before."""
-    network, described = PointNet(config.classification, config.sensor), dump(config)
-    parts = [described[name] for name in ("classification", "tracking", "odometry", "sensor")]
-    key = key_of("viewed", drive.key, network.facts(), parts)
-    arrays = store.made(key, lambda: dict(_arrays(drive, network, config)))
-    pairs = enumerate(drive.frames)
-    return [ViewedFrame(frame, arrays[f"{k} likelihood"], arrays[f"{k} track"]) for k, frame in pairs]
+def viewed(drive: SegmentedDrive, found: list[Float64], config: ProfileConfig, store: Store) -> list[ViewedFrame]:
+    """Every proposal of a drive with the likelihood found and its ideal track; from the store where it was before."""
+    described = dump(config)
+    key = key_of("ideal tracks", drive.key, [described[name] for name in ("tracking", "odometry", "sensor")])
+    tracks = store.made(key, lambda: dict(_tracks(drive, config)))
+    return [ViewedFrame(*of, tracks[str(k)]) for k, of in enumerate(zip(drive.frames, found, strict=True))]
 
 
-def _arrays(drive: SegmentedDrive, network: PointNet, config: ProfileConfig) -> Iterator[tuple[str, NDArray[Any]]]:
+def _tracks(drive: SegmentedDrive, config: ProfileConfig) -> Iterator[tuple[str, Int]]:
     odometry = Odometry(config.odometry)
     tracker = Tracker(config.tracking, ACCURATE, regroupings=(), period_s=config.sensor.period_s)
     rows: dict[tuple[str, int], int] = {}
@@ -59,8 +55,7 @@ def _arrays(drive: SegmentedDrive, network: PointNet, config: ProfileConfig) -> 
         keys = [
             ("object", owner) if owner != NONE else ("other", i) for owner, i in zip(_owner(made), own, strict=True)
         ]
-        yield f"{k} likelihood", network.classify(frame.points, proposals, np.arange(len(proposals)))
-        yield f"{k} track", np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
+        yield str(k), np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
 
 
 def _owner(made: SegmentedFrame) -> list[int]:
@@ -71,7 +66,7 @@ def _owner(made: SegmentedFrame) -> list[int]:
     blank = JudgedFrame(
         made.frame.index, made.frame.points, of_points, n, 0, none, none, none, np.zeros((0, 4)), truth
     )
-    overlap = Overlap.of(blank)
+    overlap = Overlap.of(blank, made.objects)
     found = np.flatnonzero((overlap.most > 0) & overlap.most_of_proposal)
     owner = np.full(n + 1, NONE, np.int64)
     owner[overlap.best[found]] = truth.id[found]
@@ -137,9 +132,3 @@ class IdealTracking:
     def facts(self) -> dict[str, str]:
         """None: no model runs."""
         return {}
-
-
-def within(proposals: Proposals, range_m: float) -> Bool:
-    """(P,) proposals within a range."""
-    near: Bool = np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]) <= range_m
-    return near

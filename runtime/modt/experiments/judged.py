@@ -9,11 +9,14 @@ from typing import Self
 import numpy as np
 
 from modt.classes import ObjectClass
+from modt.config import ClassificationConfig
+from modt.energy.instrumentation import padded_each
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.matching import judge
 from modt.evaluation.rows import OBJECT, PROPOSAL, Rows, table
 from modt.evaluation.rules import Rules
 from modt.evaluation.truth import FrameTruth, Role
+from modt.experiments.segmented import SegmentedFrame
 from modt.experiments.store import Arrays
 from modt.geometry import FieldOfView, inverse, transform
 from modt.types import NONE, Float64, FrameResult
@@ -22,7 +25,7 @@ _PLAIN_OBJECT = np.dtype([(name, "U32" if name == "type" else OBJECT[name]) for 
 """Rows of objects that can be stored."""
 FRAME = np.dtype([("drive", int), ("frame", int), ("proposals", int)])
 CALL = np.dtype([("drive", int), ("frame", int), ("track", int), ("points", int)])
-"""A row a classification: points that the network saw."""
+"""A row a classification: points that the network processed, padding included."""
 CENTRE = np.dtype(
     [
         ("drive", int),
@@ -64,18 +67,23 @@ class Judged:
 
     @classmethod
     def of_results(
-        cls, results: Iterable[tuple[FrameResult, FrameTruth]], fov: FieldOfView, rules: Rules, max_points: int
+        cls,
+        results: Iterable[tuple[FrameResult, SegmentedFrame]],
+        fov: FieldOfView,
+        rules: Rules,
+        limits: ClassificationConfig,
     ) -> Self:
         """Of a drive's results beside its labels."""
         frames, objects, proposals, calls, centres = [], [], [], [], []
         start: Float64 | None = None
-        for result, truth in results:
-            seen, tracked, _ = judge(JudgedFrame.of_result(result, truth, fov), rules)
+        for result, known in results:
+            truth = known.truth
+            seen, tracked, _ = judge(JudgedFrame.of_result(result, truth, fov), rules, points=known.objects)
             index, pose = result.frame.index, result.frame.T_world_sensor
             frames.append((0, index, len(result.proposals)))
             objects.append(seen.astype(_PLAIN_OBJECT))
             proposals.append(tracked)
-            calls.append(_calls(result, max_points))
+            calls.append(_calls(result, limits))
             if pose is not None:
                 start = pose[:2, 3] if start is None else start
                 centres.append(_centres(result, truth, seen, pose, start))
@@ -113,10 +121,10 @@ class Judged:
         return Judged(**tables)
 
 
-def _calls(result: FrameResult, max_points: int) -> Rows:
+def _calls(result: FrameResult, limits: ClassificationConfig) -> Rows:
     tracks = result.tracks
     rows = np.flatnonzero(np.isin(tracks.id, result.classified))
-    points = np.minimum(result.proposals.count[tracks.proposal[rows]], max_points)
+    points = padded_each(result.proposals.count[tracks.proposal[rows]], limits)
     return table(CALL, len(rows), frame=result.frame.index, track=tracks.id[rows], points=points)
 
 

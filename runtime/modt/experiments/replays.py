@@ -11,17 +11,19 @@ import numpy as np
 
 from modt import assembly
 from modt.classification.pointnet import PointNet
+from modt.classification.scheduler import LinearCost
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
+from modt.energy.instrumentation import Classifier, padded_size
 from modt.energy.ledger import NullLedger
-from modt.evaluation.truth import FrameTruth
 from modt.experiments.drives import Drive
-from modt.experiments.ideal_tracker import IdealTracking, viewed, within
+from modt.experiments.ideal_tracker import IdealTracking, viewed
 from modt.experiments.judged import Judged
-from modt.experiments.segmented import SegmentedDrive, segmented
+from modt.experiments.played_back import PlayedBack, likelihoods
+from modt.experiments.segmented import SegmentedDrive, SegmentedFrame, segmented
 from modt.experiments.store import Store
-from modt.pipeline import Pipeline
+from modt.pipeline import Pipeline, Segmenter
 from modt.profile import dump
-from modt.types import Float32, FrameResult, Proposals
+from modt.types import FrameResult
 
 
 class Replay(Protocol):
@@ -29,6 +31,9 @@ class Replay(Protocol):
 
     def described(self) -> dict[str, Any]:
         """All that its outcome follows from, but for drive and code."""
+
+    def basis(self) -> dict[str, Any]:
+        """All that its first stages follow from: what replays have in common, the first of them makes."""
 
     def judged(self, drive: Drive, digest: str, store: Store) -> Judged:
         """What becomes of a drive of this digest; the store holds what replays share."""
@@ -42,6 +47,10 @@ class LabelReplay:
         """Nothing but its kind."""
         return {"replay": "labels"}
 
+    def basis(self) -> dict[str, Any]:
+        """None but the labels."""
+        return {}
+
     def judged(self, drive: Drive, digest: str, store: Store) -> Judged:
         """The labelled objects, each followed by itself."""
         return Judged.of_labels(sorted(drive.labels().items()))
@@ -49,7 +58,7 @@ class LabelReplay:
 
 @dataclass(frozen=True, slots=True)
 class NetworkReplay:
-    """The real detector: segmentation and network.
+    """The real detector: segmentation and network, without a budget of CPU time, which no two machines fill alike.
 
     Attributes:
         config: of the stages.
@@ -69,47 +78,43 @@ class NetworkReplay:
         """Model and resolved profile."""
         kept = {k: v for k, v in dump(self.config).items() if k not in ("energy", "loop", "recording")}
         facts = {"mode": self.mode, "ideal": self.ideal, "range_m": self.range_m, "poses": self.poses}
-        model = _model(self.config.classification, self.config.sensor)
-        return {"replay": "network", "profile": kept, "model": model, **facts}
+        return {"replay": "network", "profile": kept, "model": self._network.facts(), **facts}
+
+    def basis(self) -> dict[str, Any]:
+        """Segmentation and network."""
+        return {k: v for k, v in dump(self.config).items() if k in ("sensor", "segmentation", "classification")}
 
     def judged(self, drive: Drive, digest: str, store: Store) -> Judged:
         """Step by step."""
         known = segmented(drive, digest, self.config, store)
         pipeline = self._pipeline(known, store)
-        return Judged.of_results(
-            self._results(pipeline, known), known.fov, known.rules, self.config.classification.max_points
-        )
+        return Judged.of_results(self._results(pipeline, known), known.fov, known.rules, self.config.classification)
 
     def _pipeline(self, known: SegmentedDrive, store: Store) -> Pipeline:
-        parts = assembly.pipeline(assembly.MODES[self.mode], self.config, known.fov, NullLedger())
+        found = likelihoods(known, self._network, self.config, store)
         if not self.ideal:
-            return replace(parts, segmenter=_Segmented(known, self.range_m))
-        ideal = IdealTracking(viewed(known, self.config, store), self.range_m)
-        return replace(parts, segmenter=ideal, odometry=ideal, tracker=ideal, classifier=ideal)
+            played = PlayedBack(known, found, self._network, self.range_m)
+            return self._stages(played, played)
+        ideal = IdealTracking(viewed(known, found, self.config, store), self.range_m)
+        return replace(self._stages(ideal, ideal), odometry=ideal, tracker=ideal)
 
-    def _results(self, pipeline: Pipeline, known: SegmentedDrive) -> Iterator[tuple[FrameResult, FrameTruth]]:
-        budget = assembly.MODES[self.mode].budget(self.config)
+    def _stages(self, segmenter: Segmenter, classifier: Classifier) -> Pipeline:
+        config, limits = self.config, self.config.classification
+        cost = LinearCost(limits.max_points, padded_size(limits), config.scheduler.cost)
+        mode = assembly.MODES[self.mode]
+        return assembly.stages(mode, config, self._network, segmenter, classifier, cost, NullLedger())
+
+    @property
+    def _network(self) -> PointNet:
+        return _network(self.config.classification, self.config.sensor)
+
+    def _results(self, pipeline: Pipeline, known: SegmentedDrive) -> Iterator[tuple[FrameResult, SegmentedFrame]]:
+        budget = replace(assembly.MODES[self.mode].budget(self.config), cpu_ms=None)
         for made in known.frames:
             frame = made.frame if self.poses else replace(made.frame, T_world_sensor=None)
-            yield pipeline.step(frame, budget), made.truth
+            yield pipeline.step(frame, budget), made
 
 
 @cache
-def _model(config: ClassificationConfig, sensor: SensorConfig) -> dict[str, str]:
-    return PointNet(config, sensor).facts()
-
-
-class _Segmented:
-    """The segmentation of a drive, played back."""
-
-    def __init__(self, known: SegmentedDrive, range_m: float) -> None:
-        self._proposals, self._range_m = (frame.proposals for frame in known.frames), range_m
-
-    def facts(self) -> dict[str, str]:
-        """No kernels."""
-        return {"kernels": "none: played back"}
-
-    def segment(self, points: Float32) -> Proposals:
-        """Those of the next frame."""
-        proposals = next(self._proposals)
-        return proposals.take(np.flatnonzero(within(proposals, self._range_m)))
+def _network(config: ClassificationConfig, sensor: SensorConfig) -> PointNet:
+    return PointNet(config, sensor)

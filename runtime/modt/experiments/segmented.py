@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from modt import assembly
 from modt.config import ProfileConfig
-from modt.evaluation.overlap import PAD_M, in_box_frame, inside
+from modt.evaluation.overlap import PAD_M, ObjectPoints, in_box_frame, inside
 from modt.evaluation.rules import Rules
 from modt.evaluation.truth import FrameTruth, Regions
 from modt.experiments.drives import Drive
@@ -35,11 +35,12 @@ _lock = Lock()
 
 @dataclass(frozen=True, slots=True)
 class SegmentedFrame:
-    """A sweep: the points that matter, its proposals and what is true of it."""
+    """A sweep: the points that matter, its proposals, what is true of it, and the points of what is there."""
 
     frame: Frame
     proposals: Proposals
     truth: FrameTruth
+    objects: ObjectPoints
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ def segmented(drive: Drive, digest: str, config: ProfileConfig, store: Store) ->
         return _last[key]
 
 
-def _segment(drive: Drive, config: ProfileConfig) -> Iterator[SegmentedFrame]:
+def _segment(drive: Drive, config: ProfileConfig) -> Iterator[tuple[Frame, Proposals, FrameTruth]]:
     segmenter = assembly.segmenter(config, drive.fov())
     for frame, truth in drive.sweeps():
         proposals = segmenter.segment(frame.points)
@@ -81,7 +82,7 @@ def _segment(drive: Drive, config: ProfileConfig) -> Iterator[SegmentedFrame]:
         points = frame.points[kept]
         few = Frame(frame.index, frame.stamp_s, points, frame.T_world_sensor, frame.restarts, frame.turn_s)
         columns = {f.name: getattr(proposals, f.name) for f in fields(proposals)}
-        yield SegmentedFrame(few, Proposals(**columns | {"members": row[proposals.members]}), truth)
+        yield few, Proposals(**columns | {"members": row[proposals.members]}), truth
 
 
 def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
@@ -92,15 +93,14 @@ def _of_objects(points: Float32, truth: FrameTruth) -> Bool:
     return kept
 
 
-def _packed(frames: Iterator[SegmentedFrame]) -> Iterator[tuple[str, NDArray[Any]]]:
-    for k, made in enumerate(frames):
-        frame, truth = made.frame, made.truth
+def _packed(frames: Iterator[tuple[Frame, Proposals, FrameTruth]]) -> Iterator[tuple[str, NDArray[Any]]]:
+    for k, (frame, proposals, truth) in enumerate(frames):
         yield f"{k} time", np.array([frame.index, frame.stamp_s, frame.restarts, frame.turn_s])
         yield f"{k} points", frame.points
         if frame.T_world_sensor is not None:
             yield f"{k} pose", frame.T_world_sensor
-        for f in fields(made.proposals):
-            column = getattr(made.proposals, f.name)
+        for f in fields(proposals):
+            column = getattr(proposals, f.name)
             if column is not None and f.name != _COMPUTED:
                 yield f"{k} proposals {f.name}", column.astype(np.int32) if f.name in _WIDE else column
         for f in fields(truth):
@@ -133,4 +133,5 @@ def _unpacked(arrays: Arrays) -> Iterator[SegmentedFrame]:
         if f"{k} regions" in arrays:
             camera = Camera(arrays["camera P"], arrays["camera T"], *arrays["camera size"].tolist())
             labels["regions"] = Regions(arrays[f"{k} regions"], camera)
-        yield SegmentedFrame(frame, Proposals(**columns), FrameTruth(**labels))
+        truth = FrameTruth(**labels)
+        yield SegmentedFrame(frame, Proposals(**columns), truth, ObjectPoints.of(points, truth))

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from itertools import chain
+from types import MappingProxyType
 
 import numpy as np
 
 from modt import profile
+from modt.config import EnergyConfig
 from modt.experiments import paper
 from modt.experiments.catalogue.experiment import Experiment, Label
 from modt.experiments.catalogue.figures import Figure
@@ -76,12 +79,19 @@ class Study:
         profiles: each some names or files on top of that of a drive's sensor, compared with one another; labels
             alone follow from none of them.
         store: of results.
+        boards: calibrations, of the networks of such profiles.
     """
 
     def __init__(
-        self, experiments: Sequence[Experiment], drives: Sequence[Drive], profiles: Sequence[Profiles], store: Store
+        self,
+        experiments: Sequence[Experiment],
+        drives: Sequence[Drive],
+        profiles: Sequence[Profiles],
+        store: Store,
+        boards: Mapping[Profiles, EnergyConfig] = MappingProxyType({}),
     ) -> None:
         self._experiments, self._profiles, self._store = experiments, profiles, store
+        self._boards = boards
         self._digests = {drive: drive.digest() for drive in drives}
         sensors = {drive.sensor for drive in drives}
         configs = {(sensor, names): profile.load((sensor, *names)) for sensor in sensors for names in profiles}
@@ -97,10 +107,10 @@ class Study:
 
     @property
     def units(self) -> list[Unit]:
-        """All that are needed, each once, drive by drive."""
+        """All that are needed, each once, drive by drive, and what has a basis in common together."""
         found = {unit.key: unit for units in self._units.values() for unit in units.values()}
         order = list(self._digests)
-        return sorted(found.values(), key=lambda unit: order.index(unit.drive))
+        return sorted(found.values(), key=lambda unit: (order.index(unit.drive), unit.basis))
 
     def complete(self, executor: Executor, tick: Callable[[Unit], None]) -> None:
         """Work off the units whose outcomes are missing; those that are ready stay, should it be interrupted."""
@@ -142,7 +152,8 @@ class Study:
     def _rows(self, experiment: Experiment, streams: Streams, names: Profiles) -> list[Row]:
         units = [self._units[experiment.name, names, drive] for drive in streams.drives]
         keys = [[unit.key for unit in of_drive.values()] for of_drive in units]
-        key = key_of("figures", catalogue_digest(), experiment.name, streams.name, names, keys)
+        unit_J = self._board(names).coefficients
+        key = key_of("figures", catalogue_digest(), experiment.name, streams.name, names, keys, unit_J)
 
         def make() -> Arrays:
             return {
@@ -157,7 +168,11 @@ class Study:
         outcomes = {
             label: Judged.pooled([self._outcome(of_drive[label]) for of_drive in units]) for label in units[0]
         }
-        return [_row(experiment, streams, names, figure) for figure in experiment.figures(outcomes)]
+        figures = chain(experiment.figures(outcomes), experiment.energies(outcomes, self._board(names)))
+        return [_row(experiment, streams, names, figure) for figure in figures]
+
+    def _board(self, names: Profiles) -> EnergyConfig:
+        return self._boards.get(names, EnergyConfig())
 
     def _outcome(self, unit: Unit) -> Judged:
         """As stored; made again if that is broken."""

@@ -25,6 +25,7 @@ class Unit:
         drive, digest: what is replayed.
         replay: how.
         code: digest of the code that asked.
+        basis: hash of what it has in common with other units of the drive.
         key: hash of all that the outcome follows from.
     """
 
@@ -32,12 +33,14 @@ class Unit:
     digest: str
     replay: Replay
     code: str
+    basis: str
     key: str
 
     @classmethod
     def of(cls, drive: Drive, digest: str, replay: Replay) -> Unit:
         """With its key."""
-        return cls(drive, digest, replay, code_digest(), key_of(digest, replay.described()))
+        basis, key = (key_of(digest, part) for part in (replay.basis(), replay.described()))
+        return cls(drive, digest, replay, code_digest(), basis, key)
 
 
 def work(unit: Unit, folder: Path) -> bytes:
@@ -126,10 +129,10 @@ class Cluster:
 def _in_two_rounds(
     units: Sequence[Unit], submit: Callable[[Unit], Any], completed: Callable[[list[Any]], Iterable[Any]]
 ) -> Iterator[tuple[Unit, bytes]]:
-    """One unit of each drive, whose segmentation the others then find in the store; then the others."""
-    first: dict[tuple[str, type], Unit] = {}
+    """One unit of each basis, which the others then find in the store; then the others."""
+    first: dict[str, Unit] = {}
     for unit in units:
-        first.setdefault((unit.digest, type(unit.replay)), unit)
+        first.setdefault(unit.basis, unit)
     early = {unit.key for unit in first.values()}
     for chosen in ([*first.values()], [unit for unit in units if unit.key not in early]):
         of = {submit(unit): unit for unit in chosen}

@@ -213,6 +213,13 @@ def _column(run: RunCosts, name: str) -> Float64:
 
 
 def _fit(columns: Sequence[Float64], cost: Float64) -> Float64:
-    """(k,) costs of k columns of (F,) counts, of (F, S) stages together."""
-    X = np.stack(columns, axis=1)
-    return nonnegative_fit(X.T @ X, X.T @ cost.sum(axis=1))
+    """(k,) costs of k columns of (F,) counts, of (F, S) stages together.
+
+    Least squares of errors relative to what a first fit expects: noise is a share of the work, and many calls at once
+    would else decide what few cost.
+    """
+    X, y = np.stack(columns, axis=1), cost.sum(axis=1)
+    expected = X @ nonnegative_fit(X.T @ X, X.T @ y)
+    some = expected > 0
+    X, y = X[some] / expected[some, None], y[some] / expected[some]
+    return nonnegative_fit(X.T @ X, X.T @ y)

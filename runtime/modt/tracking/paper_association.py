@@ -64,13 +64,14 @@ class PaperAssociation:
 
     def cost(self, tracks: TrackTable, observations: Observations, rows: Int, columns: Int) -> Float64:
         """(K,) cost of the pairs."""
-        a, b = tracks.box[rows].copy(), observations.box[columns]
-        a[:, :2] += tracks.x[rows, :2] - tracks.anchor[rows]  # the last box, carried along the prediction
+        a, b = tracks.box.copy(), observations.box
+        a[:, :2] += tracks.x[:, :2] - tracks.anchor  # the last box, carried along the prediction
         points = np.abs(tracks.points[rows] - observations.count[columns])
-        size = np.abs(a[:, 3:6] - b[:, 3:6]).sum(axis=1)
+        length, width, height = (np.abs(a[:, k][rows] - b[:, k][columns]) for k in (3, 4, 5))
+        size = length + width + height
         apart = np.ones(len(rows))
-        near = _may_touch(a, b).nonzero()[0]
-        apart[near] -= iou_3d(a[near], b[near])
+        near = _may_touch(a, b, rows, columns).nonzero()[0]
+        apart[near] -= iou_3d(a[rows[near]], b[columns[near]])
         differences = self.config.beta * points + self.config.gamma * size
         cost: Float64 = self.config.alpha * apart + self._sign * differences
         return cost
@@ -80,9 +81,9 @@ class PaperAssociation:
         return observations.centroid
 
 
-def _may_touch(a: Float64, b: Float64) -> Bool:
-    """(K,) whether the circles around boxes a and b (K, 7) overlap."""
-    reach = np.hypot(a[:, 3], a[:, 4]) + np.hypot(b[:, 3], b[:, 4])
-    offset = a[:, :2] - b[:, :2]
-    touch: Bool = np.hypot(offset[:, 0], offset[:, 1]) < reach / 2
+def _may_touch(a: Float64, b: Float64, rows: Int, columns: Int) -> Bool:
+    """(K,) whether the circles around the pairs of boxes a (M, 7) and b (P, 7) overlap."""
+    reach = np.hypot(a[:, 3], a[:, 4])[rows] + np.hypot(b[:, 3], b[:, 4])[columns]
+    x, y = (a[:, k][rows] - b[:, k][columns] for k in (0, 1))
+    touch: Bool = np.hypot(x, y) < reach / 2
     return touch

@@ -72,7 +72,7 @@ class RecordedRun:
             try:
                 counts = {name: kind(record[name]) for name, kind in COUNTS.items()}
                 rows.append(frame_rows(number, record, states))
-                frames.append({**counts, **costs.get(counts["frame"], {})})
+                frames.append({**counts, **costs.get(int(counts["frame"]), {})})
             except BROKEN as error:
                 place = f"{run / TRACKS}:{number + 1}"
                 raise MisuseError(place, f"no record of a frame ({error!r})", "run it again") from None

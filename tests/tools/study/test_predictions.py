@@ -41,8 +41,8 @@ def test_predictions_are_written_before_any_mode_runs_on_their_streams(tmp_path,
     monkeypatch.setattr("sys.argv", ["predictions", str(tmp_path), "--regimes", "default", "VLP-16"])
     predictions.main()
     made = [what for what in asked if what[0] != "simulate"]
-    assert made == [("compare", 0)] * 4 + [("predict", 4)] * 4 + [("compare", 0)] * 4
-    assert "4 tests" in capsys.readouterr().out
+    assert made == [("compare", 0)] * 4 + [("predict", 4)] * 8 + [("compare", 0)] * 8
+    assert "8 tests" in capsys.readouterr().out
     asked.clear()
     predictions.main()  # of what is there
     assert not asked

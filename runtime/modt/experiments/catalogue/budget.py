@@ -6,15 +6,17 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from modt.config import ProfileConfig
+from modt.config import EnergyConfig, ProfileConfig
 from modt.experiments.catalogue.estimate import ratio
 from modt.experiments.catalogue.experiment import Chart, Experiment, Label, changed
 from modt.experiments.catalogue.figures import OBJECTS, Figure, TrackLives, latencies, precisions
 from modt.experiments.judged import Judged
 from modt.experiments.replays import NetworkReplay, Replay
+from modt.types import Float64
 
 BUDGETS = (0, 1, 2, 3, 4, 6, 8, 16)
 ACCURATE, CONVENTIONAL = "accurate", "conventional, no budget"
+ENERGY = "energy of classification a frame [mJ]"
 
 
 def _replays(config: ProfileConfig) -> dict[Label, Replay]:
@@ -28,10 +30,26 @@ def _figures(outcomes: Mapping[Label, Judged]) -> Iterator[Figure]:
     for (variant, at), judged in outcomes.items():
         yield from precisions(judged, variant, at)
         yield from latencies(judged, variant, at)
-        tracks = TrackLives.of(judged)
-        frames = np.full(len(tracks.calls), len(judged.frames) / max(len(tracks.calls), 1))
+        tracks, frames = _tracks(judged)
         yield Figure(variant, at, "calls a frame", ratio(tracks.calls, frames))
         yield Figure(variant, at, "points classified a frame", ratio(tracks.points, frames))
+
+
+def _energies(outcomes: Mapping[Label, Judged], board: EnergyConfig) -> Iterator[Figure]:
+    """By what a classification and a point cost: times would not be the same bytes twice."""
+    if board.coefficients is None:
+        return
+    _, class_J, point_J = board.coefficients
+    for (variant, at), judged in outcomes.items():
+        tracks, frames = _tracks(judged)
+        yield Figure(variant, at, ENERGY, ratio(1e3 * (class_J * tracks.calls + point_J * tracks.points), frames))
+
+
+def _tracks(judged: Judged) -> tuple[TrackLives, Float64]:
+    """All tracks, and the share of the frames that each stands for."""
+    tracks = TrackLives.of(judged)
+    n = len(tracks.calls)
+    return tracks, np.full(n, len(judged.frames) / max(n, 1))
 
 
 BUDGET = Experiment(
@@ -45,7 +63,9 @@ BUDGET = Experiment(
         ),
         Chart("latency", "most calls a frame", "frames to a correct class", ("frames to a correct class",)),
         Chart("work", "most calls a frame", "points classified a frame", ("points classified a frame",)),
+        Chart("energy", "most calls a frame", ENERGY, (ENERGY,)),
     ),
-    note="The energy of classification is that of its points times what a point costs on the machine at hand: "
-    "`modt-profile compare` measures it.",
+    note="Points with padding, as the network processes them. Energy above idling, where a calibration of the board "
+    "and this network is given (`--calibration`): classifications and their points times what each costs.",
+    energies=_energies,
 )

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from modt.config import ProfileConfig
+from modt.config import EnergyConfig, ProfileConfig
 from modt.experiments.catalogue.figures import Figure
 from modt.experiments.judged import Judged
 from modt.experiments.replays import Replay
@@ -37,6 +37,7 @@ class Experiment:
         charts: to draw.
         scans: whether sweeps are needed, not labels alone.
         note: what must be known to read it.
+        energies: further figures, by a calibration of the board.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Experiment:
     charts: tuple[Chart, ...] = ()
     scans: bool = True
     note: str = ""
+    energies: Callable[[Mapping[Label, Judged], EnergyConfig], Iterator[Figure]] = lambda _outcomes, _board: iter(())
 
 
 def changed(config: ProfileConfig, **values: Any) -> ProfileConfig:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import platform
 import re
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from modt import host, profile
 from modt.classification.pointnet import PointNet
+from modt.config import EnergyConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,18 +22,22 @@ class About:
     commit: str
     models: dict[str, str]  # hash by file
     processor: str
+    energy: tuple[str, ...]  # board and meter of each calibration, with its meter's kind
 
     @classmethod
-    def of(cls, command: str, profiles: Sequence[Sequence[str]]) -> About:
+    def of(cls, command: str, profiles: Sequence[Sequence[str]], boards: Iterable[EnergyConfig] = ()) -> About:
         """Of this program and machine, with each of the profiles."""
         configs = [profile.load(list(names)) for names in profiles]
         facts = [PointNet(config.classification, config.sensor).facts() for config in configs]
-        return cls(command, _commit(), {found["file"]: found["sha256"] for found in facts}, _processor())
+        models = {found["file"]: found["sha256"] for found in facts}
+        energy = tuple(f"{board.board}, {board.meter}" for board in boards)
+        return cls(command, _commit(), models, _processor(), energy)
 
     def sources(self) -> str:
         """In a line."""
         models = ", ".join(f"{file} ({sha256[:12]})" for file, sha256 in self.models.items())
-        return f"Commit {self.commit}, model {models}, {self.processor}"
+        energy = f"; energy of {'; '.join(self.energy)}" if self.energy else ""
+        return f"Commit {self.commit}, model {models}, {self.processor}{energy}"
 
 
 def _commit() -> str:

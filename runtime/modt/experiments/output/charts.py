@@ -13,8 +13,9 @@ from modt.reporting import svg
 from modt.reporting.page import COLOURS
 
 _LINE_PX = 16
-_STYLE = (
-    "text{font:11px system-ui,sans-serif;fill:#5d6876}.end{text-anchor:end}.mid{text-anchor:middle}"
+_STYLE = (  # fonts by name: what makes a PNG of it knows no system-ui
+    "text{font:11px system-ui,'DejaVu Sans','Liberation Sans','Noto Sans',Arial,Helvetica,sans-serif;fill:#5d6876}"
+    ".end{text-anchor:end}.mid{text-anchor:middle}"
     ".grid{stroke:#d8dde4}.axis{stroke:#5d6876}polyline{fill:none;stroke-width:2}"
     + "".join(f".l{k}{{stroke:{c}}}.c{k}{{fill:{c}}}" for k, c in enumerate(COLOURS))
 )

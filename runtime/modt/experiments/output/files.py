@@ -1,4 +1,4 @@
-"""Results as JSON, CSV, SVG and pages."""
+"""Results as JSON, CSV, SVG, PNG and pages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 
 from modt.experiments.catalogue.experiment import Experiment
-from modt.experiments.output import charts
+from modt.experiments.output import charts, png
 from modt.experiments.output.about import About
 from modt.experiments.output.html import html
 from modt.experiments.output.markdown import markdown
@@ -36,11 +36,12 @@ def write(out: Path, about: About, experiments: Sequence[Experiment], rows: Sequ
             texts[f"{name}.svg"] = charts.standalone(f"{experiment.title}: {streams}", chart, drawn)
     texts["results.md"] = markdown(about, experiments, rows)
     texts["index.html"] = html(about, experiments, rows)
-    for name, text in texts.items():
+    contents = {name: text.encode() for name, text in texts.items()} | dict(png.pictures(texts))
+    for name, content in contents.items():
         with writing(out / name):
             out.mkdir(parents=True, exist_ok=True)
-            (out / name).write_text(text, encoding="utf-8")
-    return [out / name for name in texts]
+            (out / name).write_bytes(content)
+    return [out / name for name in contents]
 
 
 def _json(about: About, rows: Sequence[Row]) -> str:
