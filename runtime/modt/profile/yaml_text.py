@@ -18,7 +18,7 @@ from modt.errors import MisuseError
 EXTENDS = "extends"
 """The key at a profile's head that names the profiles which it is based on."""
 
-MAX_CHARACTERS = 1_000_000
+MAX_CHARACTERS = 100_000
 """In a text; the longest that is shipped has 2,000."""
 
 

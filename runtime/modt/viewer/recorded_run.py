@@ -23,7 +23,7 @@ from modt.sinks.tracks import SCHEMA
 from modt.types import Float64, Int
 from modt.viewer.track_rows import frame_rows, track_table
 
-COUNTS: dict[str, Callable[[Any], float]] = {
+COUNTS: dict[str, Callable[[Any], Any]] = {
     "frame": int,
     "stamp_s": float,
     **dict.fromkeys(("proposals", "classifications", "deferred"), int),
