@@ -28,14 +28,15 @@ def frame_rows(at: int, record: dict[str, Any], states: list[str]) -> list[list[
     """Rows of a line of tracks.jsonl in units of the line; names of states are added to `states`."""
     classified, rows = set(record.get("classified", ())), []
     for track in record["tracks"]:
-        if track["state"] not in states:
-            states.append(track["state"])
+        state = str(track["state"])
+        if state not in states:
+            states.append(state)
         box = track["box"] or dict.fromkeys(BOX_KEYS, 0.0)
         rows.append(
             [
                 track["id"],
                 at,
-                states.index(track["state"]),
+                states.index(state),
                 CLASS_NAMES.index(track["class"]),
                 track["box"] is not None,
                 track["final"],
