@@ -1,4 +1,4 @@
-"""Parts of a car are merged where its track knows it whole."""
+"""Parts of a car, or of background that may be one, are merged where its track knows it whole."""
 
 from dataclasses import replace
 
@@ -70,8 +70,8 @@ def test_the_match_of_a_part_is_dropped_and_proposals_are_renumbered():
 @pytest.mark.parametrize(
     ("object_class", "columns", "why"),
     [
-        (BACKGROUND, {}, "it is no car"),
         (PEDESTRIAN, {}, "it is no car"),
+        (BACKGROUND, {"hits": 3}, "it was seen too few times"),
         (CAR, {"hits": 3}, "it was seen too few times"),
     ],
 )
@@ -110,6 +110,33 @@ def test_the_thresholds_are_those_of_the_configuration(option, value):
 def test_a_person_is_no_part(object_class, groups):
     tracks = tracks_at([WHOLE, FRONT], CAR, object_class)
     assert merged(tracks, [REAR, FRONT], [0, 1])[0] == groups
+
+
+@pytest.mark.parametrize(("length_m", "groups"), [(4.2, [[0, 1]]), (7.0, [[0], [1]])])
+def test_background_no_longer_than_a_car_is_made_whole(length_m, groups):
+    assert merged(tracks_at([box(10, 3, length_m, 1.8, 1.5)]), [REAR, FRONT], [0])[0] == groups
+
+
+@pytest.mark.parametrize(
+    ("classes", "groups"),
+    [
+        ((BACKGROUND, BACKGROUND), [[0, 1]]),
+        ((BACKGROUND, CAR), [[0], [1]]),
+        ((BACKGROUND, PEDESTRIAN), [[0], [1]]),
+    ],
+)
+def test_background_takes_from_younger_background_alone(classes, groups):
+    assert merged(tracks_at([WHOLE, FRONT], *classes), [REAR, FRONT], [0, 1])[0] == groups
+
+
+def test_background_takes_nothing_from_what_is_older():
+    assert merged(tracks_at([FRONT, WHOLE]), [FRONT, REAR], [0, 1])[0] == [[0], [1]]
+
+
+@pytest.mark.parametrize(("object_class", "groups"), [(CAR, [[0, 1]]), (BACKGROUND, [[0], [1]])])
+def test_what_may_be_a_person_becomes_a_part_of_known_cars_alone(object_class, groups):
+    part = box(11.1, 3, 0.6, 0.6, 1.5)
+    assert merged(tracks_at([WHOLE], object_class), [REAR, part], [0])[0] == groups
 
 
 def test_a_car_takes_all_its_parts():

@@ -55,6 +55,7 @@ def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:
     return np.array([[row[key] for key in keys] for row in rows], np.float64).reshape(-1, len(keys))
 
 
+@np.errstate(over="raise", invalid="raise")
 def _in_the_world(boxes: Float64, x: Float64) -> Float64:
     """(n, 7) boxes as they lie in the world: the turn that takes their centres to the positions x of their tracks."""
     if not len(boxes):

@@ -3,7 +3,8 @@
 A pole before a car, or the edge of a bush, splits it in frame after frame, and neither part looks like a car. What
 lies within the known extent of a classified car, beside the proposal matched with it, is merged with that proposal,
 unless a classified person or cyclist is matched with it, or an older classified car, or both together exceed the
-known extent.
+known extent. Many a car is background as long as it is seen in parts: what is background, and no longer than a car,
+is made whole as well, but takes nothing from cars and older tracks, nor what may be a person.
 
 The risk: a person who steps close to a parked car, and is not classified yet, becomes a part of it.
 """
@@ -17,16 +18,20 @@ from modt.config import MergeConfig
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
+from modt.observations import Observations
 from modt.placement import Placement
 from modt.tracking.regrouping import Associated, Grouping, contiguous_runs
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Int
 
 _PERSON = np.array([spec.person for spec in CLASSES.values()])
+_CAR_M, _PERSON_M = (CLASSES[c].max_length_m for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN))
+_PERSON_HEIGHT_M = 1.0
+"""Least height of a part that may be a person: a child of five."""
 
 
 class CarMerging:
-    """Merges the parts of cars that are known as such.
+    """Merges the parts of cars that are known as such, and of background that may be a car.
 
     Args:
         config: what fits into a car.
@@ -59,25 +64,32 @@ class CarMerging:
         return Associated(proposals, observations, frame.matches.take(of_kept, matched[of_kept]))
 
     def _parts(self, tracks: TrackTable, frame: Associated) -> tuple[Int, Int, Int]:
-        """Rows of cars, the proposal of each, and a further part of it; every part once."""
+        """Rows of tracks that merge, the proposal of each, and a further part of it; every part once."""
         matches, kdops = frame.matches, frame.observations.kdop
-        cars = (_cars(tracks, matches.rows) & (tracks.hits[matches.rows] >= self.min_hits)).nonzero()[0]
+        cars = (_may_be_car(tracks, matches.rows) & (tracks.hits[matches.rows] >= self.min_hits)).nonzero()[0]
         cars = cars[matches.rows[cars].argsort()]  # the oldest first: tracks are in the order of their birth
         rows, hosts = matches.rows[cars], matches.proposals[cars]
         if not len(rows):
             return rows, hosts, hosts
         known = tracks.envelope.take(rows, axis=0).T + DIRECTIONS.T @ matches.position.take(cars, axis=0).T
+        room = (known - kdops.take(hosts, axis=1)).max(axis=0) > self.config.longer_m
+        mergers = (room | _cars(tracks, rows)).nonzero()[0]  # background that reaches its ends lacks no part
+        rows, hosts, known = rows[mergers], hosts[mergers], known.take(mergers, axis=1)
         k, parts = overlapping_pairs(known, kdops, self._kernels.reaching_pairs)
         other = (parts != hosts[k]).nonzero()[0]
         k, parts = k[other], parts[other]
-        part, whole = kdops.take(parts, axis=1), known.take(k, axis=1)
-        both = np.maximum(part, kdops.take(hosts[k], axis=1))
         owner = np.full(kdops.shape[1], NONE)
         owner[matches.proposals] = matches.rows
-        fits = (widths(both) < widths(whole) + self.config.longer_m).all(axis=0)
-        fits &= (coverage(part, whole) > self.config.min_coverage) & _may_take(tracks, rows[k], owner[parts])
+        part, whole = kdops.take(parts, axis=1), known.take(k, axis=1)
+        both = np.maximum(part, kdops.take(hosts[k], axis=1))
+        in_length: Bool = (widths(both) < widths(whole) + self.config.longer_m).all(axis=0)
+        fits = in_length.nonzero()[0]
+        fits = fits[coverage(part.take(fits, axis=1), whole.take(fits, axis=1)) > self.config.min_coverage]
+        k, parts = k[fits], parts[fits]
+        free = _may_take(tracks, rows[k], owner[parts])
+        free &= _cars(tracks, rows[k]) | ~_person_like(frame.observations, parts)
         taker = np.full(len(owner), NONE)
-        taker[parts[fits][::-1]] = k[fits][::-1]  # the oldest is written last
+        taker[parts[free][::-1]] = k[free][::-1]  # the oldest is written last
         taker[hosts[taker[taker != NONE]]] = NONE  # a proposal that gains a part is no part itself
         parts = (taker != NONE).nonzero()[0]
         k = taker[parts]
@@ -90,9 +102,23 @@ def _cars(tracks: TrackTable, rows: Int) -> Bool:
     return cars
 
 
+def _may_be_car(tracks: TrackTable, rows: Int) -> Bool:
+    """(k,) which rows are cars, or background no longer than a car."""
+    short = widths(tracks.envelope.take(rows, axis=0).T).max(axis=0, initial=0.0) < _CAR_M
+    may: Bool = _cars(tracks, rows) | (short & (tracks.last_class[rows] == ObjectClass.BACKGROUND.value))
+    return may
+
+
+def _person_like(observations: Observations, parts: Int) -> Bool:
+    """(k,) which parts are as slim and as tall as a person."""
+    tall = observations.top[parts] - observations.bottom[parts] > _PERSON_HEIGHT_M
+    slim: Bool = widths(observations.kdop.take(parts, axis=1)).max(axis=0, initial=0.0) < _PERSON_M
+    return tall & slim
+
+
 def _may_take(tracks: TrackTable, rows: Int, owner: Int) -> Bool:
-    """(k,) whether cars may take what the owners (NONE: no track) are matched with."""
-    person = _PERSON[tracks.last_class[owner]]
-    older_car = _cars(tracks, owner) & (owner < rows)
-    free: Bool = (owner == NONE) | ~(person | older_car)
+    """(k,) whether cars and background may take what the owners (NONE: no track) are matched with."""
+    person, older, car = _PERSON[tracks.last_class[owner]], owner < rows, _cars(tracks, owner)
+    senior = np.where(_cars(tracks, rows), car & older, car | older)
+    free: Bool = (owner == NONE) | ~(person | senior)
     return free
