@@ -82,8 +82,7 @@ class CarMerging:
         owner[matches.proposals] = matches.rows
         part, whole = kdops.take(parts, axis=1), known.take(k, axis=1)
         both = np.maximum(part, kdops.take(hosts[k], axis=1))
-        in_length: Bool = (widths(both) < widths(whole) + self.config.longer_m).all(axis=0)
-        fits = in_length.nonzero()[0]
+        fits = np.flatnonzero((widths(both) < widths(whole) + self.config.longer_m).all(axis=0))
         fits = fits[coverage(part.take(fits, axis=1), whole.take(fits, axis=1)) > self.config.min_coverage]
         k, parts = k[fits], parts[fits]
         free = _may_take(tracks, rows[k], owner[parts])
