@@ -1,4 +1,4 @@
-"""Which kernels segmentation runs on."""
+"""Which kernels the pipeline runs on."""
 
 from __future__ import annotations
 
@@ -32,5 +32,5 @@ def choose(wanted: str) -> Kernels:
     except NotAvailableError as error:
         if name == NATIVE:
             raise MisuseError("segmentation.kernels", f"native: {error}", f"or use {NUMPY_NAME}") from None
-        log.warning("segmentation runs on NumPy, which takes about twice the time: %s", error)
+        log.warning("the passes over points run on NumPy: a frame takes about half as long again: %s", error)
         return NUMPY

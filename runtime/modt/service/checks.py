@@ -88,7 +88,7 @@ def kernels(choose: Callable[[], str]) -> Finding:
     except ModtError as error:
         return Finding(FAIL, error.subject, error.cause, error.remedy)
     if name == "numpy":
-        return Finding(WARN, "kernels", "NumPy: segmentation takes about twice the time", COMPILE)
+        return Finding(WARN, "kernels", "NumPy: a frame takes about half as long again", COMPILE)
     return Finding(OK, "kernels", name)
 
 
