@@ -1,7 +1,8 @@
 import http.client
 import json
 import socket
-from contextlib import closing
+import time
+from contextlib import ExitStack, closing
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from modt.errors import MisuseError
 from modt.sinks.schemes import SCHEMES
 from modt.viewer.live_frame import live_cells
 from modt.viewer.live_page import open_view
-from modt.viewer.live_server import MOST_CLIENTS
+from modt.viewer.live_server import MOST_CLIENTS, MOST_CONNECTIONS
 from modt.viewer.track_rows import COLUMNS, SCALED, result_rows
 from tests import results
 
@@ -69,6 +70,21 @@ def read(live):
     yield begin
     for reader in readers:
         reader.close()
+
+
+def test_connections_are_bounded(live, read):
+    with ExitStack() as idle:
+        for _ in range(MOST_CONNECTIONS):
+            idle.enter_context(socket.create_connection(("127.0.0.1", live.port), WAIT_S))
+        with socket.create_connection(("127.0.0.1", live.port), WAIT_S) as another:
+            assert another.recv(1) == b"", "it is closed"
+    until = time.monotonic() + WAIT_S
+    while True:  # those that left make room, each when its thread has seen it
+        try:
+            assert read("/").answer.status == 200
+            break
+        except (http.client.HTTPException, OSError):
+            assert time.monotonic() < until
 
 
 def test_a_frame_reaches_who_looks(live, read):

@@ -9,7 +9,10 @@ from http.server import BaseHTTPRequestHandler
 from ipaddress import ip_address
 from socketserver import ThreadingTCPServer
 
-MOST_CLIENTS = 8
+_Request = socket.socket | tuple[bytes, socket.socket]
+
+MOST_CLIENTS, MOST_CONNECTIONS = 8, 32
+"""Pages open, and connections with one each of their threads, at a time."""
 SEND_S = 5.0
 """A client that takes nothing for so long is left."""
 POLL_S = 0.1
@@ -68,7 +71,7 @@ class LiveServer(ThreadingTCPServer):
         local = ip_address(str(address[0])).is_loopback
         self.names = {"localhost", "127.0.0.1", "[::1]", host} if local else None
         self._clients: set[Client] = set()
-        self._lock = threading.Lock()
+        self._lock, self._free = threading.Lock(), threading.Semaphore(MOST_CONNECTIONS)
         threading.Thread(target=self.serve_forever, args=(POLL_S,), name="view", daemon=True).start()
 
     @property
@@ -104,6 +107,17 @@ class LiveServer(ThreadingTCPServer):
             for client in self._clients:
                 client.end()
         self.server_close()
+
+    def verify_request(self, request: object, client_address: object) -> bool:
+        """Whether there is room for another connection; it is closed where there is none."""
+        return self._free.acquire(blocking=False)
+
+    def process_request_thread(self, request: _Request, client_address: object) -> None:
+        """Answer one, and make room for the next."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
 
     def handle_error(self, request: object, client_address: object) -> None:
         """A client that has gone is no error."""
