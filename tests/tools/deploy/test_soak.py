@@ -27,13 +27,14 @@ def session(lost):
     return SimpleNamespace(loop=SimpleNamespace(timing=Timing()), recording=recording)
 
 
-def witness(full_from=0.0, missed_at=(), growth=0.0):
+def witness(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0):
     seen = Witness()
     for k in range(1, 2000):
         seen.times_s.append(0.1 * k)
         seen.full.append(not 50 < 0.1 * k < full_from)
         seen.missed.append(sum(at <= 0.1 * k for at in missed_at))
         seen.resident_mb.append(150.0 * (1 + growth * k / 1000))
+        seen.descriptors.append(12 + int(leaks * k / 1000))
     return seen
 
 
@@ -50,6 +51,7 @@ EPISODE = (FAULTS[0], 48.0, 3, 50.0, 4)
         (witness(missed_at=(30.0,)), EPISODE, None),
         (witness(missed_at=(30.0, 31.0)), EPISODE, "2 deadlines missed between faults"),
         (witness(growth=0.3), EPISODE, "memory grew"),
+        (witness(leaks=3), EPISODE, "descriptors leaked"),
     ],
 )
 def test_the_verdict_names_what_is_wrong(seen, episode, wrong, capsys):
