@@ -6,8 +6,10 @@ import logging
 
 import pytest
 
-from modt import kernel_choice
+from modt import assembly, kernel_choice, profile
+from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
+from modt.geometry import FieldOfView
 from modt.native.library import NotAvailableError
 from modt.segmentation.kernels import NUMPY
 from modt.service import checks
@@ -28,6 +30,13 @@ def test_numpy_takes_their_place_with_a_warning(none_compiled, caplog):
         assert kernel_choice.choose("auto") is NUMPY
     assert "run on NumPy" in caplog.text
     assert "not compiled for riscv64" in caplog.text
+
+
+def test_a_pipeline_warns_once(none_compiled, caplog):
+    config = profile.load("vlp-16")
+    with caplog.at_level(logging.WARNING):
+        assembly.pipeline(assembly.MODES["efficient"], config, FieldOfView(), NullLedger())
+    assert caplog.text.count("run on NumPy") == 1
 
 
 def test_numpy_where_it_is_asked_for_is_no_reason_to_warn(none_compiled, caplog):

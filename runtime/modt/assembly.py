@@ -21,9 +21,11 @@ from modt.energy.instrumentation import Classifier, CountingClassifier, padded_s
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
 from modt.geometry.blind_sectors import BlindSectors
+from modt.geometry.kernels import GeometryKernels
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Fusion, Pipeline
 from modt.pipeline import Segmenter as SegmenterStage
+from modt.segmentation.kernels import Kernels
 from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
 from modt.tracking.tracker import Tracker
@@ -77,9 +79,8 @@ class SightedSegmenter:
         return self.segmenter.segment(kept)
 
 
-def segmenter(profile: ProfileConfig, fov: FieldOfView) -> SegmenterStage:
+def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> SegmenterStage:
     """The first stage, the same in every mode."""
-    kernels = kernel_choice.choose(profile.segmentation.kernels)
     sensor, stage = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
     if sensor.blind_sectors_deg is None:
         return stage
@@ -100,6 +101,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
         MisuseError: the model cannot be used.
     """
     host.keep_freed_pages()
+    kernels = kernel_choice.choose(profile.segmentation.kernels)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
     size = padded_size(limits)
@@ -107,7 +109,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     warm_up(network, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost)
     timed = TimedClassifier(CountingClassifier(network, ledger, size), cost, time.thread_time_ns)
-    return stages(mode, profile, network, segmenter(profile, fov), timed, cost, ledger)
+    return stages(mode, profile, network, segmenter(profile, fov, kernels), timed, cost, ledger, kernels)
 
 
 def stages(
@@ -118,9 +120,10 @@ def stages(
     classifier: Classifier,
     cost: LinearCost,
     ledger: StageLedger,
+    kernels: GeometryKernels,
 ) -> Pipeline:
     """A pipeline around a given segmenter and classifier: the network, or what stands for it at this cost."""
-    kernels, fusion = kernel_choice.choose(profile.segmentation.kernels), profile.fusion
+    fusion = profile.fusion
     if network.class_frequency is not None:
         fusion = replace(fusion, prior=network.class_frequency)
     prior = make_prior(network.box_scores, fusion.prior)

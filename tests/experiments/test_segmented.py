@@ -11,6 +11,7 @@ from modt.experiments.replays import NetworkReplay
 from modt.experiments.segmented import segmented
 from modt.experiments.store import Store
 from modt.profile import load
+from modt.segmentation.kernels import NUMPY
 from tests.experiments.drives import short_drives
 
 DRIVE = short_drives(1)[0]
@@ -21,7 +22,7 @@ def test_a_stored_drive_is_the_one_that_was_segmented(tmp_path):
     first = segmented(DRIVE, DRIVE.digest(), config, store)
     stored = next(tmp_path.rglob("*.npz"))
     assert stored.stat().st_size > 0
-    segmenter = assembly.segmenter(config, DRIVE.fov())
+    segmenter = assembly.segmenter(config, DRIVE.fov(), NUMPY)
     for made, (frame, truth) in zip(first.frames, DRIVE.sweeps(), strict=True):
         whole = segmenter.segment(frame.points)
         np.testing.assert_array_equal(made.proposals.coordinates, whole.coordinates)

@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from modt import assembly, profile
+    from modt import assembly, kernel_choice, profile
     from modt.classification.pointnet import PointNet
     from modt.cli import assemble, metering
     from modt.cli.chosen_profile import choose
@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> int:
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, padded_size(limits))
-    segmenter = assembly.segmenter(loaded, FieldOfView())
+    segmenter = assembly.segmenter(loaded, FieldOfView(), kernel_choice.choose(loaded.segmentation.kernels))
     windows = metering.windows(meters, pinned, WindowConfig(min_s=1e9))
     workload = Workload(scans, segmenter.segment, network.classify, ledger, windows)
     try:

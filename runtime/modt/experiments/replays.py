@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from modt import assembly
+from modt import assembly, kernel_choice
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import LinearCost
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
@@ -101,8 +101,8 @@ class NetworkReplay:
     def _stages(self, segmenter: Segmenter, classifier: Classifier) -> Pipeline:
         config, limits = self.config, self.config.classification
         cost = LinearCost(limits.max_points, padded_size(limits), config.scheduler.cost)
-        mode = assembly.MODES[self.mode]
-        return assembly.stages(mode, config, self._network, segmenter, classifier, cost, NullLedger())
+        mode, kernels = assembly.MODES[self.mode], kernel_choice.choose(config.segmentation.kernels)
+        return assembly.stages(mode, config, self._network, segmenter, classifier, cost, NullLedger(), kernels)
 
     @property
     def _network(self) -> PointNet:

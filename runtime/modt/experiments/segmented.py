@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modt import assembly
+from modt import assembly, kernel_choice
 from modt.config import ProfileConfig
 from modt.evaluation.overlap import PAD_M, ObjectPoints, in_box_frame, inside
 from modt.evaluation.rules import Rules
@@ -73,7 +73,7 @@ def segmented(drive: Drive, digest: str, config: ProfileConfig, store: Store) ->
 
 
 def _segment(drive: Drive, config: ProfileConfig) -> Iterator[tuple[Frame, Proposals, FrameTruth]]:
-    segmenter = assembly.segmenter(config, drive.fov())
+    segmenter = assembly.segmenter(config, drive.fov(), kernel_choice.choose(config.segmentation.kernels))
     for frame, truth in drive.sweeps():
         proposals = segmenter.segment(frame.points)
         kept = _of_objects(frame.points, truth)
