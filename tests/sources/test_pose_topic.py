@@ -70,7 +70,7 @@ def test_poses_over_loopback(loopback):
     address = f"ros2:///odom?domain={NEAR}&base_to_sensor=0,0,1.5,0,0,0"
     topic = open_topic(address, OdometryConfig())
     sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
-    until(lambda: sent.receivers)
+    until(lambda: sent.receivers and topic._subscription.senders)
     sent.write(pose(10.0, 3.0))
     until(lambda: topic.place(frame(10.0)).T_world_sensor is not None)
     np.testing.assert_allclose(topic.place(frame(10.0)).T_world_sensor[:3, 3], [3.0, 0.0, 1.5])
