@@ -2,8 +2,11 @@
 
 A pole before a car, or the edge of a bush, splits it; each part has a track, and the larger part changes between
 frames. Two tracks of one class whose boxes fit together into one object of that class, one of them within the
-known extent of the other or around it, are one object: the older track takes the larger part, and the whole when only
-one is visible. A part that may be a person, and has an established track, stays with it.
+known extent of the other or around it, are one object: the senior track takes the larger part, and the whole when
+only one is visible. A part that may be a person, and has an established track, stays with it.
+
+The senior track is that of which more points were seen, not the older one: a fragment begins in the frame in which
+its car does, and a bush is older than the car that passes it; neither takes the car from the track that follows it.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ class NoReunion:
 
 
 class Reunion:
-    """Gives the larger part of an object to its oldest track.
+    """Gives the larger part of an object to its most senior track.
 
     Args:
         config: what counts as a part.
@@ -45,23 +48,23 @@ class Reunion:
         self.config, self.min_hits, self._kernels = config, min_hits, kernels
 
     def reunite(self, tracks: TrackTable, observations: Observations, matches: Matches) -> Matches:
-        """The matches after older tracks have swapped their proposals for larger parts of their objects."""
+        """The matches after senior tracks have swapped their proposals for larger parts of their objects."""
         if not len(observations):
             return matches
         proposal_of_track = np.full(len(tracks), NONE, np.int64)
         track_of_proposal = np.full(len(observations), NONE, np.int64)
         proposal_of_track[matches.rows], track_of_proposal[matches.proposals] = matches.proposals, matches.rows
         incomplete = self._incomplete(tracks, observations, proposal_of_track)
-        older, parts = self._parts(tracks, observations, incomplete, proposal_of_track, track_of_proposal)
-        rows, proposals = swap_proposals(older, parts, proposal_of_track, track_of_proposal)
+        senior, parts = self._parts(tracks, observations, incomplete, proposal_of_track, track_of_proposal)
+        rows, proposals = swap_proposals(senior, parts, proposal_of_track, track_of_proposal)
         return matches.reassigned(tracks, rows, proposals) if len(rows) else matches
 
     def _incomplete(self, tracks: TrackTable, observations: Observations, proposal_of_track: Int) -> Int:
-        """Rows, oldest first, of tracks seen more than once with no proposal, or one below the known extent."""
+        """Rows, most senior first, of tracks seen more than once with no proposal, or one below the known extent."""
         now, known = width_sum(observations.kdop)[proposal_of_track], width_sum(tracks.envelope.T.copy())
         incomplete = (proposal_of_track == NONE) | (known > self.config.shrink * now)
-        rows: Int = ((tracks.hits > 1) & incomplete).nonzero()[0]  # tracks are in the order of their birth
-        return rows
+        rows: Int = ((tracks.hits > 1) & incomplete).nonzero()[0]
+        return rows[(-_seniority(tracks)[rows]).argsort(kind="stable")]
 
     def _parts(
         self, tracks: TrackTable, observations: Observations, row: Int, proposal_of_track: Int, track_of_proposal: Int
@@ -71,34 +74,35 @@ class Reunion:
             return row, row
         known = tracks.known_kdops(row)
         i, part = overlapping_pairs(known, observations.kdop, self._kernels.reaching_pairs)
-        older, other = row[i], track_of_proposal[part]
+        senior, other = row[i], track_of_proposal[part]
+        seniority = _seniority(tracks)
         size = np.where(proposal_of_track == NONE, 0, observations.count[proposal_of_track])
-        younger = (other == NONE) | (tracks.id[other] > tracks.id[older])
-        larger = (younger & (other != older) & (observations.count[part] > size[older])).nonzero()[0]
-        bulky = (observations.box[part[larger], 3] > _PERSON_M) & (tracks.box[older[larger], 3] > _PERSON_M)
-        larger = larger[bulky | self._gives_way(tracks, older[larger], other[larger])]
-        i, older, part = i[larger], older[larger], part[larger]
-        box = tracks.box.take(older, axis=0)
-        box[:, :2] += tracks.x.take(older, axis=0)[:, :2] - tracks.anchor.take(older, axis=0)
-        related = _fit_together(box, observations.box.take(part, axis=0), _MAX_SIZE_M[tracks.last_class[older]])
+        junior = (other == NONE) | (seniority[other] < seniority[senior])
+        larger = (junior & (other != senior) & (observations.count[part] > size[senior])).nonzero()[0]
+        bulky = (observations.box[part[larger], 3] > _PERSON_M) & (tracks.box[senior[larger], 3] > _PERSON_M)
+        larger = larger[bulky | self._gives_way(tracks, senior[larger], other[larger])]
+        i, senior, part = i[larger], senior[larger], part[larger]
+        box = tracks.box.take(senior, axis=0)
+        box[:, :2] += tracks.x.take(senior, axis=0)[:, :2] - tracks.anchor.take(senior, axis=0)
+        related = _fit_together(box, observations.box.take(part, axis=0), _MAX_SIZE_M[tracks.last_class[senior]])
         kdop = observations.kdop.take(part, axis=1)
         within = coverage(kdop, known.take(i, axis=1)) > self.config.min_coverage
-        around = coverage(tracks.predicted_kdops(older), kdop) > self.config.min_coverage
-        related &= (within | around) & _may_be_one_class(tracks, older, track_of_proposal[part])
-        return older[related], part[related]
+        around = coverage(tracks.predicted_kdops(senior), kdop) > self.config.min_coverage
+        related &= (within | around) & _may_be_one_class(tracks, senior, track_of_proposal[part])
+        return senior[related], part[related]
 
-    def _gives_way(self, tracks: TrackTable, older: Int, other: Int) -> Bool:
-        """(k,) whether a part has no established track (other NONE: no track), or the older track is a car."""
-        car: Bool = tracks.last_class[older] == ObjectClass.CAR.value
+    def _gives_way(self, tracks: TrackTable, senior: Int, other: Int) -> Bool:
+        """(k,) whether a part has no established track (other NONE: no track), or the senior track is a car."""
+        car: Bool = tracks.last_class[senior] == ObjectClass.CAR.value
         gives_way: Bool = (other == NONE) | (tracks.hits[other] < self.min_hits) | car
         return gives_way
 
 
-def swap_proposals(older: Int, parts: Int, proposal_of_track: Int, track_of_proposal: Int) -> tuple[Int, Int]:
-    """Reassignment: an older track takes a part and leaves its own proposal to the part's former track, each once.
+def swap_proposals(senior: Int, parts: Int, proposal_of_track: Int, track_of_proposal: Int) -> tuple[Int, Int]:
+    """Reassignment: a senior track takes a part and leaves its own proposal to the part's former track, each once.
 
     Args:
-        older: (K,) rows that may take a part, the first in order served first.
+        senior: (K,) rows that may take a part, the first in order served first.
         parts: (K,) proposal that each may take.
         proposal_of_track: (M,) proposal of each track, NONE for none.
         track_of_proposal: (P,) track of each proposal, NONE for none.
@@ -108,7 +112,7 @@ def swap_proposals(older: Int, parts: Int, proposal_of_track: Int, track_of_prop
     """
     has: dict[int, int] = {}
     taken: set[int] = set()
-    for row, part in zip(older.tolist(), parts.tolist(), strict=True):
+    for row, part in zip(senior.tolist(), parts.tolist(), strict=True):
         former = int(track_of_proposal[part])
         if part in taken or row in has or former in has:
             continue
@@ -120,9 +124,15 @@ def swap_proposals(older: Int, parts: Int, proposal_of_track: Int, track_of_prop
     return np.array(rows, np.int64), np.array([has[row] for row in rows], np.int64)
 
 
-def _may_be_one_class(tracks: TrackTable, older: Int, other: Int) -> Bool:
+def _seniority(tracks: TrackTable) -> Int:
+    """(M,) about as many points as were seen of each track in its life."""
+    seniority: Int = tracks.hits * tracks.points
+    return seniority
+
+
+def _may_be_one_class(tracks: TrackTable, senior: Int, other: Int) -> Bool:
     """(k,) whether two tracks (other NONE: no track) may be of one class: background and cars are easily confused."""
-    a, b = tracks.last_class[older], tracks.last_class[other]
+    a, b = tracks.last_class[senior], tracks.last_class[other]
     one_class: Bool = (other == NONE) | (a == b) | ~(_PERSON[a] | _PERSON[b])
     return one_class
 
