@@ -6,6 +6,7 @@ import json
 import pytest
 
 from modt.cli.main import main
+from modt.experiments.output import png
 
 
 @pytest.fixture(scope="module")
@@ -35,11 +36,23 @@ def test_results_are_written_in_every_form(results):
 def test_charts_are_pictures_too_with_the_extra(results):
     pytest.importorskip("resvg_py", reason="extra 'report' is not installed")
     image = pytest.importorskip("PIL.Image", reason="extra 'view' is not installed")
+    if not png.draws_text():
+        pytest.skip("no fonts are installed")
     with image.open(results / "budget-2-simulated-drives-average-precision.png") as picture:
         width, height = picture.size
         legend = picture.convert("L").crop((160, height - 30, width, height))
     assert width > height > 400
     assert len(legend.getcolors()) > 2, "there is text"
+
+
+def test_charts_without_fonts_are_told(monkeypatch, caplog):
+    pytest.importorskip("resvg_py", reason="extra 'report' is not installed")
+    chart = {"a.svg": '<svg xmlns="http://www.w3.org/2000/svg" width="4" height="2"/>', "a.csv": ""}
+    assert [name for name, _ in png.pictures(chart)] == ["a.png"]
+    monkeypatch.setattr(png, "draws_text", lambda: False)
+    caplog.clear()
+    assert [name for name, _ in png.pictures(chart)] == ["a.png"]
+    assert "no fonts; install some" in caplog.text
 
 
 def test_energy_needs_a_calibration(results, tmp_path):
