@@ -105,6 +105,7 @@ class Fault:
         told: the counter that tells of it.
         sweeps: what becomes of a sweep meanwhile, by a random generator.
         switch: turns it on and off in the world.
+        silent_if_steady: nothing need tell of it while results come as ever: the loop has room for it.
     """
 
     name: str
@@ -112,6 +113,7 @@ class Fault:
     told: Callable[[LiveSession], int]
     sweeps: Callable[[Sweep, np.random.Generator], Sweeps] = lambda sweep, _: (sweep,)
     switch: Callable[[World, bool], None] = lambda world, on: None
+    silent_if_steady: bool = False
 
 
 def _with_points(sweep: Sweep, points: Any) -> Sweep:
@@ -181,6 +183,6 @@ FAULTS = (
     Fault(FULL_DISK, 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
     Fault("meter lost", 3.0, lambda s: s.power.unread, switch=_switch("meter_lost")),
     Fault("failing stage", 1.0, lambda s: s.loop.failures.counts.total(), switch=_switch("stage_broken")),
-    Fault("hog", 4.0, _late_frames, switch=World.set_hogs),
+    Fault("hog", 4.0, _late_frames, switch=World.set_hogs, silent_if_steady=True),
     Fault("reload", 0.2, lambda s: s.loop.reloads, switch=_hangup),
 )

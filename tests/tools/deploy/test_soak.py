@@ -64,3 +64,10 @@ def test_the_verdict_names_what_is_wrong(seen, episode, wrong, capsys):
 def test_records_may_be_lost_on_a_full_disk_alone(lost, wrong):
     disk = next(fault for fault in FAULTS if fault.name == FULL_DISK)
     assert judge(witness(), [Episode(disk, 48.0, 3, 50.0, 10)], session(lost)) == wrong
+
+
+@pytest.mark.parametrize(("stall_s", "wrong"), [(0.0, []), (0.3, ["hog: no counter told of 1 of 1"])])
+def test_a_hog_that_costs_nothing_need_not_be_told(stall_s, wrong):
+    hog, seen = next(fault for fault in FAULTS if fault.name == "hog"), witness()
+    seen.times_s = [t + stall_s * (t > 49.0) for t in seen.times_s]
+    assert judge(seen, [Episode(hog, 48.0, 3, 50.0, 3)], session(0)) == wrong
