@@ -127,6 +127,7 @@ def main() -> int:
         stack.enter_context(mounted(native, root / "opt/modt" / build.FOLDER.relative_to(ROOT), "--bind", "-o", "ro"))
         stack.enter_context(mounted("/dev", root / "dev", "--rbind"))
         stack.enter_context(mounted("proc", root / "proc", "-t", "proc"))
+        stack.enter_context(mounted("sysfs", root / "sys", "-t", "sysfs", "-o", "ro"))
         stack.enter_context(mounted(cores, root / "proc/cpuinfo", "--bind"))
         environment = {"QEMU_CPU": CPU, "HOME": "/root", "PATH": "/usr/sbin:/usr/bin", "PYTHONDONTWRITEBYTECODE": "1"}
         environment["PYTHONPATH"] = "/opt/modt/runtime"
