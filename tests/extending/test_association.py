@@ -5,14 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from modt import assembly
+from modt.config import FragmentConfig
 from modt.energy.ledger import NullLedger
-from modt.geometry import FieldOfView
+from modt.geometry import FieldOfView, transform
 from modt.profile import load
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.tracking.assignment import assign
 from modt.tracking.association import Matches
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
+from modt.types import NONE
 
 GATE_M, SIGMA_M = 2.0, 0.3
 
@@ -35,11 +37,13 @@ class NearestCentroid:
 def test_the_tracker_follows_by_the_association_it_is_given():
     profile = load("vlp-16")
     pipeline = assembly.pipeline(assembly.MODES["accurate"], profile, FieldOfView(), NullLedger())
-    tracker = Tracker(profile.tracking, ACCURATE, association=NearestCentroid())
+    config = replace(profile.tracking, fragments=FragmentConfig(min_coverage=1.0))  # every track keeps its proposal
+    tracker = Tracker(config, ACCURATE, association=NearestCentroid(), regroupings=())
     pipeline = replace(pipeline, tracker=tracker)
     for frame in SyntheticStream("street", "vlp-16", 1.0, seed=0):
         result = pipeline.step(frame)
-    followed = result.tracks.hits >= 9
-    assert followed.sum() > 0.5 * len(result.proposals)
-    offset = tracker.tracks.anchor - result.tracks.box[:, :2]
-    assert np.abs(offset[followed]).max() < GATE_M  # it measures centroids, not centres of k-DOPs
+    tracks = result.tracks
+    assert (tracks.hits >= 9).sum() > 0.5 * len(result.proposals)
+    seen = tracks.proposal != NONE
+    measured = transform(frame.T_world_sensor, result.proposals.centroid[tracks.proposal[seen]])[:, :2]
+    np.testing.assert_allclose(tracker.tracks.anchor[seen], measured, atol=1e-6)  # centroids, not centres of k-DOPs

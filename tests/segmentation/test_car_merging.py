@@ -10,6 +10,7 @@ from modt.segmentation.clusters import ClusterSizes
 from modt.segmentation.groups import Groups
 from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
+from modt.segmentation.strips import pairs
 from modt.segmentation.view_bounds import ViewBounds
 from tests.segmentation import reference, scans
 
@@ -64,7 +65,7 @@ def test_random_strips_are_merged():
         target = stage.targets(bounds)
         merged += np.count_nonzero(target != np.arange(24))
         chained += np.count_nonzero(np.bincount(target, minlength=24) > 2)
-        front, back = stage.pairs(bounds)
+        front, back = pairs(bounds, np.full(24, BEAM, np.float32), stage.config)
         refused += np.count_nonzero(target[front] != target[back])
     assert merged > 40
     assert chained > 5
@@ -149,7 +150,7 @@ def test_merged_cars_stay_within_the_size_of_an_object():
             merged = [np.flatnonzero(target == first) for first in np.unique(target) if np.sum(target == first) > 1]
             for own in merged:
                 car = bounds.take(own).union(Groups(np.arange(len(own)), np.array([0, len(own)])))
-                diagonal_m = float(car.diagonal_m[0])
+                diagonal_m = float(np.sqrt(car.diagonal_m2[0]))
                 assert diagonal_m < limit_m
                 larger += diagonal_m > 2.0
     assert larger > 5

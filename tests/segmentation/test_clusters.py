@@ -30,8 +30,8 @@ def clusterer(**config):
 
 
 def cells_of(grid, points, height):
-    cells, sample, cell = occupied_cells(grid, *grid.row_column(points), height, height)
-    return cells, cell, np.float32(BEAM_RAD) * np.square(points.sqrt_range[sample])
+    cells, _, sampled, cell = occupied_cells(grid, points, height)
+    return cells, cell, np.float32(BEAM_RAD) * np.square(sampled.sqrt_range)
 
 
 def components(grid, cells, beam_m):

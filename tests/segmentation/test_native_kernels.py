@@ -13,17 +13,21 @@ from hypothesis import strategies as st
 
 from modt import profile
 from modt.config import SegmentationConfig, SensorConfig
+from modt.config.segmentation import CarMergeConfig
 from modt.geometry import FieldOfView
 from modt.native import build
 from modt.native.library import NotAvailableError, load
+from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import SqrtRangeGrid
-from modt.segmentation.groups import Groups
+from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.point_columns import FAR_M, PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import NONE, UNRECORDED
+from tests.geometry.test_kdop_pairs import WEIGHTS, random_pairs
+from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_clusters import cloud
 
 SANITIZED = "MODT_SANITIZED" in os.environ
@@ -144,11 +148,9 @@ def test_cells_and_components(kernels, seed, n, sigma):
     if not len(points):
         return
     grid, height = SqrtRangeGrid(0.03, 80.0), points.z + 1.7
-    place = NUMPY.row_column(grid, points)
-    assert same(place, kernels.row_column(grid, points))
-    expected, found = (k.occupied_cells(grid, *place, height, height) for k in (NUMPY, kernels))
+    expected, found = (k.occupied_cells(grid, points, height) for k in (NUMPY, kernels))
     assert same(expected, found)
-    cells, sample, _ = expected
+    cells, sample, sampled, cell = expected
     rng = np.random.default_rng(seed)
     gap_m, use = (
         rng.uniform(0, 1, len(cells)).astype(np.float32),
@@ -158,8 +160,21 @@ def test_cells_and_components(kernels, seed, n, sigma):
     assert same(component, kernels.connect(grid, cells, gap_m, use))
     assert ((component == NONE) == ~use).all()
     assert (grid.number == NONE).all(), "the grid is empty again"
-    bounds = (k.cluster_bounds(cells, points.take(sample), component, component.max() + 1) for k in (NUMPY, kernels))
-    assert same(*bounds)
+    assert same(*(k.connect_coarse(SqrtRangeGrid(0.06, 80.0), cells, gap_m) for k in (NUMPY, kernels)))
+    n = int(component.max()) + 1
+    assert same(*(k.cluster_bounds(cells, sampled, component, n) for k in (NUMPY, kernels)))
+    used = np.where(use, component, n)
+    clusters = Clusters(points, height, cell, cells, sample, sampled, used, n + 1)
+    number = consecutive(np.append(rng.random(n) < 0.7, [False]))
+    assert same(*(k.view_bounds(clusters, number, number.max() + 1) for k in (NUMPY, kernels)))
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 60), beam_deg=st.floats(0.05, 2.0))
+@settings(max_examples=100, deadline=None)
+def test_strips(kernels, seed, n, beam_deg):
+    rng, config = np.random.default_rng(seed), CarMergeConfig()
+    bounds, beam_rad = strips(rng, n + 1), np.full(n + 1, np.deg2rad(beam_deg), np.float32)
+    assert same(*(k.merge_strips(bounds, beam_rad, config) for k in (NUMPY, kernels)))
 
 
 @given(
@@ -200,6 +215,22 @@ def test_reaching_pairs(kernels, seed, n, k, spread):
         assert same(one, other)
     if spread == 0:
         assert len(one[0]) == n * k, "all reach one another: more pairs than there was room for at first"
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 12))
+@settings(max_examples=100, deadline=None)
+def test_costs_of_pairs(kernels, seed, n):
+    given = random_pairs(seed, n)
+    assert same(*(k.pair_costs(*given, WEIGHTS) for k in (NUMPY, kernels)))
+
+
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 40), ties=st.booleans())
+@settings(max_examples=100, deadline=None)
+def test_certain_pairs(kernels, seed, n, ties):
+    rng = np.random.default_rng(seed)
+    rows, columns = np.divmod(rng.permutation(100)[:n], 10)
+    cost = rng.choice([0.1, 0.5, 0.9], n) if ties else rng.uniform(0, 1, n)
+    assert same(*(k.certain_pairs(rows, columns, cost, 1.0) for k in (NUMPY, kernels)))
 
 
 def test_another_kind_of_array_is_refused(kernels):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.geometry.kdop import AXES, widths
+from modt.geometry.kdop_pairs import SOFT_M, shares
 from modt.types import Float64
 
 AGREE_M = 0.6
@@ -19,17 +20,8 @@ _DISAGREEMENT = 0.3
 """Standard deviation of a displacement by ends that disagree, relative to the disagreement or the width, if less."""
 _DECAY = 0.97
 """Share of that variance that is left a frame later."""
-_SOFT_M = 0.3
-"""Added to widths that are compared: a difference of a few returns is noise."""
 _PRODUCTS = np.stack([AXES[0] * AXES[0], AXES[1] * AXES[1], AXES[0] * AXES[1]])
 """(3, 4) xx, yy and xy of the axes."""
-
-
-def least(a: Float64, b: Float64) -> Float64:
-    """(4, K) displacement along each axis of the end that moved less, from k-DOPs a to b (8, K) [m]."""
-    gain = b - a
-    ahead, behind = gain[:4], -gain[4:]
-    return np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
 
 
 def shift_between(a: Float64, b: Float64) -> Float64:
@@ -84,19 +76,7 @@ def _moved(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
     return (both - unlike * np.copysign(apart, both)) / 2, unlike, apart
 
 
-def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64, Float64]:
-    """Similarity of k-DOPs a and b (8, K), one by one.
-
-    Returns:
-        size: (K,) mean difference of the logarithms of their widths.
-        overlap: (K,) intersection over union.
-        coverage: (K,) intersection over the smaller of the two.
-    """
-    width_a, width_b = widths(a), widths(b)
-    size = np.abs(np.log((width_b + _SOFT_M) / (width_a + _SOFT_M))).sum(axis=0) / 4
-    pad = _SOFT_M / 3
-    common = np.maximum(widths(np.minimum(a, b)) + pad, 0.0)
-    areas = [side[:2] * side[2:] for side in (width_a + pad, width_b + pad)]
-    shared = common[:2] * common[2:]  # of the upright rectangles, and of those at 45 degrees
-    overlap = np.minimum(*(shared / (areas[0] + areas[1] - shared)))
-    return size, overlap, np.minimum(*(shared / np.minimum(*areas)))
+def shape_similarity(a: Float64, b: Float64) -> tuple[Float64, Float64]:
+    """(K,) mean difference of the logarithms of the widths of k-DOPs a and b (8, K), one by one, and (K,) overlap."""
+    size = np.abs(np.log((widths(b) + SOFT_M) / (widths(a) + SOFT_M))).sum(axis=0) / 4
+    return size, shares(a, b)[0]

@@ -6,6 +6,7 @@ from typing import Protocol
 
 from modt.geometry.boxes import bounds_along
 from modt.geometry.kdop import kdop_ends, reaching_pairs
+from modt.geometry.kdop_pairs import PairWeights, Shapes, certain_pairs, pair_costs
 from modt.types import Float32, Float64, Int, Int16
 
 
@@ -21,6 +22,20 @@ class GeometryKernels(Protocol):
     def reaching_pairs(self, ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
         """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
 
+    def pair_costs(
+        self,
+        a: Shapes,
+        b: Shapes,
+        covariance: Float64,
+        variance: Float64,
+        pairs: tuple[Int, Int],
+        weights: PairWeights,
+    ) -> tuple[Float64, Float64, Float64]:
+        """(K,) distance, cost and coverage of pairs of shapes."""
+
+    def certain_pairs(self, rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
+        """Pairs that a least-cost assignment keeps for certain, and those that it must decide among."""
+
 
 class NumpyGeometryKernels:
     """The passes in NumPy: the reference."""
@@ -28,6 +43,8 @@ class NumpyGeometryKernels:
     bounds_along = staticmethod(bounds_along)
     kdop_ends = staticmethod(kdop_ends)
     reaching_pairs = staticmethod(reaching_pairs)
+    pair_costs = staticmethod(pair_costs)
+    certain_pairs = staticmethod(certain_pairs)
 
 
 NUMPY_GEOMETRY = NumpyGeometryKernels()

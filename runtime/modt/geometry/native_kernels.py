@@ -7,13 +7,16 @@ import ctypes
 import numpy as np
 
 from modt.geometry.kdop import reaching_pairs
-from modt.native.arrays import Signatures, at, declare
+from modt.geometry.kdop_pairs import HALF_ROOT, PAD_M, PairWeights, Shapes
+from modt.native.arrays import Signatures, address, at, declare, pointers
 from modt.types import Float32, Float64, Int, Int16
 
-_L, _P = ctypes.c_int64, ctypes.c_void_p
+_D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
     "modt_ends_along": (None, (_P, _P, _P, _P, _L, _P, _L, _P, _P)),
     "modt_reaching_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
+    "modt_pair_costs": (None, (_P, _P, _P, _P, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
+    "modt_certain_pairs": (None, (_P, _P, _L, _D, _P, _P, _P, _P)),
 }
 _PAIRS_EACH = 8
 """Pairs that there is room for at first, of each k-DOP."""
@@ -70,3 +73,38 @@ class NativeGeometryKernels:
             if count <= limit:
                 return one[:count], other[:count]
             limit = count
+
+    def pair_costs(
+        self,
+        a: Shapes,
+        b: Shapes,
+        covariance: Float64,
+        variance: Float64,
+        pairs: tuple[Int, Int],
+        weights: PairWeights,
+    ) -> tuple[Float64, Float64, Float64]:
+        """(K,) distance, cost and coverage of pairs of shapes."""
+        rows, columns = pairs
+        distance, cost, coverage = out = np.empty((3, len(rows)))
+        self._library.modt_pair_costs(
+            self._shapes(a), self._shapes(b), at(covariance, np.float64), at(variance, np.float64),
+            at(rows, np.int64), at(columns, np.int64), len(rows), (_D * 4)(*weights), HALF_ROOT, PAD_M,
+            *map(address, out),
+        )  # fmt: skip
+        return distance, cost, coverage
+
+    def certain_pairs(self, rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
+        """Pairs that a least-cost assignment keeps for certain, and those that it must decide among."""
+        sizes = np.array([rows.max(initial=-1), columns.max(initial=-1)]) + 1
+        n, most = len(rows), int(sizes.max())
+        best, following, state = np.empty((2, most), np.int64), np.empty((2, most)), np.empty(n, np.uint8)
+        index = (_P * 2)(at(rows, np.int64), at(columns, np.int64))
+        self._library.modt_certain_pairs(
+            index, at(cost, np.float64), n, limit, address(sizes), pointers(best), pointers(following), address(state)
+        )
+        return (state == 1).nonzero()[0], (state == 2).nonzero()[0]
+
+    @staticmethod
+    def _shapes(shapes: Shapes) -> object:
+        columns = shapes.kdop, shapes.log_width, shapes.bottom, shapes.top, shapes.log_count
+        return (_P * 6)(*(at(column, np.float64) for column in columns), len(shapes))

@@ -1,46 +1,56 @@
 /* Cells of a grid: which are occupied, which hang together, and the bounds of what hangs together. */
 #include "kernels.h"
 
-/* SqrtRangeGrid.row_column */
-EXPORT void modt_row_column(const float *x, const float *y, const float *sqrt_range, i64 n, float scale, i32 centre,
-                            i32 *row, i32 *column)
-{
-    for (i64 i = 0; i < n; i++) {
-        float here = scale / sqrt_range[i];
-        row[i] = (i32)(x[i] * here + (float)centre);
-        column[i] = (i32)(y[i] * here + (float)centre);
-    }
-}
-
 typedef struct {
     i32 *row, *column;
     float *low, *high;
     i64 *entries;
 } Cells;
 
-/* occupied_cells: cells in the order of their last entries. `number` is a table of side * side, NONE throughout
- * before and after. Returns how many; they are the last of the n places of `sample` and of `cells`. */
-EXPORT i64 modt_occupied_cells(const i32 *row, const i32 *column, const float *low, const float *high, i64 n,
-                               i32 side, i32 *number, i64 *sample, i64 *cell, Cells *cells)
+typedef struct {
+    float *x, *y, *z, *sqrt_range; /* of one point of each cell */
+} Samples;
+
+enum { BLOCK = 128 }; /* points whose cells are fetched into the cache together */
+
+/* occupied_cells: cells of n points in the order of their last points, of a grid of cells 1 / `scale` wide. `number` is
+ * a table of side * side, NONE throughout before and after. Returns how many; they are the last of the n places of
+ * `sample`, `sampled` and `cells`. */
+EXPORT i64 modt_occupied_cells(const Samples *points, const float *height, i64 n, float scale, i32 centre, i32 side,
+                               i32 *number, i64 *sample, Samples *sampled, i64 *cell, Cells *cells)
 {
-    i32 first = (i32)n;
-    for (i64 i = n - 1; i >= 0; i--) { /* backwards: the last entry of a cell comes first */
-        PROVEN(row[i] >= 0 && row[i] < side && column[i] >= 0 && column[i] < side);
-        i32 *here = &number[row[i] * side + column[i]], c = *here;
-        if (c == NONE) {
-            c = *here = --first;
-            sample[c] = i;
-            cells->row[c] = row[i];
-            cells->column[c] = column[i];
-            cells->low[c] = low[i];
-            cells->high[c] = high[i];
-            cells->entries[c] = 1;
-        } else {
-            cells->low[c] = least(low[i], cells->low[c]);
-            cells->high[c] = most(high[i], cells->high[c]);
-            cells->entries[c]++;
+    i32 first = (i32)n, row[BLOCK], column[BLOCK];
+    for (i64 end = n; end > 0; end -= BLOCK) { /* backwards: the last point of a cell comes first */
+        i64 start = end > BLOCK ? end - BLOCK : 0;
+        for (i64 i = start; i < end; i++) { /* SqrtRangeGrid.row_column */
+            float here = scale / points->sqrt_range[i];
+            row[i - start] = (i32)(points->x[i] * here + (float)centre);
+            column[i - start] = (i32)(points->y[i] * here + (float)centre);
         }
-        cell[i] = c;
+        for (i64 i = 0; i < end - start; i++) {
+            PROVEN(row[i] >= 0 && row[i] < side && column[i] >= 0 && column[i] < side);
+            __builtin_prefetch(&number[row[i] * side + column[i]], 1);
+        }
+        for (i64 i = end - 1; i >= start; i--) {
+            i32 *here = &number[row[i - start] * side + column[i - start]], c = *here;
+            if (c == NONE) {
+                c = *here = --first;
+                sample[c] = i;
+                sampled->x[c] = points->x[i];
+                sampled->y[c] = points->y[i];
+                sampled->z[c] = points->z[i];
+                sampled->sqrt_range[c] = points->sqrt_range[i];
+                cells->row[c] = row[i - start];
+                cells->column[c] = column[i - start];
+                cells->low[c] = cells->high[c] = height[i];
+                cells->entries[c] = 1;
+            } else {
+                cells->low[c] = least(height[i], cells->low[c]);
+                cells->high[c] = most(height[i], cells->high[c]);
+                cells->entries[c]++;
+            }
+            cell[i] = c;
+        }
     }
     for (i64 i = 0; i < n; i++)
         cell[i] -= first;
@@ -66,21 +76,21 @@ static void join(i32 *parent, i32 a, i32 b)
     }
 }
 
-/* One stable pass of a radix sort: n rows in the order of their digits below `base`. */
-static void sort_by(const i32 *digit, i32 base, const i32 *rows, i64 n, i32 *next, i32 *sorted)
+/* One stable pass of a radix sort: n rows in the order of their digits, shifted right, which are below `base`. */
+static void sort_by(const i32 *digit, int shift, i32 base, const i32 *rows, i64 n, i32 *next, i32 *sorted)
 {
     i32 total = 0;
     for (i32 d = 0; d < base; d++)
         next[d] = 0;
     for (i64 k = 0; k < n; k++)
-        next[digit[rows[k]]]++;
+        next[digit[rows[k]] >> shift]++;
     for (i32 d = 0; d < base; d++) {
         i32 count = next[d];
         next[d] = total;
         total += count;
     }
     for (i64 k = 0; k < n; k++)
-        sorted[next[digit[rows[k]]]++] = rows[k];
+        sorted[next[digit[rows[k]] >> shift]++] = rows[k];
 }
 
 typedef struct {
@@ -93,30 +103,14 @@ static inline int near(const Span *before, const Span *after)
     return most(before->low, after->low) - least(before->high, after->high) < before->max_gap_m;
 }
 
-/* connect: component of each cell used of n_cells, in the order of their first cells. In the order of the grid the
- * neighbours of a cell are the one before it and up to three of the row before. Scratch: `next` of side, `scratch` of
- * 3 n_cells, `span` of n_cells. */
-EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, i32 side,
-                         i32 *next, i32 *scratch, Span *span, i64 *component)
+/* First cell of the component of each of n cells in the order of the grid, where the neighbours of a cell are the one
+ * before it and up to three of the row before. */
+static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
 {
-    i32 *order = scratch, *parent = scratch + n_cells, *root = scratch + 2 * n_cells;
-    i64 n = 0;
-    for (i64 i = 0; i < n_cells; i++) {
-        PROVEN(cells->row[i] >= 0 && cells->row[i] < side && cells->column[i] > 0 && cells->column[i] < side - 1);
-        root[n] = (i32)i;
-        n += use[i];
-    }
-    sort_by(cells->column, side, root, n, next, parent);
-    sort_by(cells->row, side, parent, n, next, order);
-    for (i64 k = 0; k < n; k++) {
-        i32 i = order[k];
-        Span own = {cells->row[i] * side + cells->column[i], cells->low[i], cells->high[i], max_gap_m[i]};
-        span[k] = own;
-        parent[k] = (i32)k;
-    }
     i32 above = 0;
     for (i32 k = 0; k < n; k++) {
         i32 place = span[k].place;
+        parent[k] = k;
         if (k && span[k - 1].place == place - 1 && near(&span[k - 1], &span[k]))
             join(parent, k - 1, k);
         while (span[above].place < place - side - 1)
@@ -125,12 +119,33 @@ EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8
             if (near(&span[a], &span[k]))
                 join(parent, a, k);
     }
-    for (i64 k = 0; k < n; k++) {
+    for (i32 k = 0; k < n; k++)
         parent[k] = parent[parent[k]];
-        root[order[k]] = parent[k];
+}
+
+/* connect: component of each cell used of n_cells, in the order of their first cells. Scratch: `next` of side,
+ * `scratch` of 3 n_cells, `span` of n_cells. */
+EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, i32 side,
+                         i32 *next, i32 *scratch, Span *span, i64 *component)
+{
+    i32 *order = scratch, *parent = scratch + n_cells, *root = scratch + 2 * n_cells;
+    i64 n = 0, count = 0;
+    for (i64 i = 0; i < n_cells; i++) {
+        PROVEN(cells->row[i] >= 0 && cells->row[i] < side && cells->column[i] > 0 && cells->column[i] < side - 1);
+        root[n] = (i32)i;
+        n += use[i];
     }
+    sort_by(cells->column, 0, side, root, n, next, parent);
+    sort_by(cells->row, 0, side, parent, n, next, order);
+    for (i64 k = 0; k < n; k++) {
+        i32 i = order[k];
+        Span own = {cells->row[i] * side + cells->column[i], cells->low[i], cells->high[i], max_gap_m[i]};
+        span[k] = own;
+    }
+    find_components(span, (i32)n, side, parent);
+    for (i64 k = 0; k < n; k++)
+        root[order[k]] = parent[k];
     i32 *number = order; /* of the component of each root */
-    i64 count = 0;
     for (i64 k = 0; k < n; k++)
         number[k] = NONE;
     for (i64 i = 0; i < n_cells; i++) {
@@ -141,6 +156,47 @@ EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8
             number[root[i]] = (i32)count++;
         component[i] = number[root[i]];
     }
+}
+
+/* connect_coarse: component of the cell twice as wide, of a grid of side * side, in which each of n_cells lies; in the
+ * order of the first of their wide cells, those in the order of their last cells. Scratch as
+ * for modt_connect, but 5 n_cells. */
+EXPORT void modt_connect_coarse(const Cells *cells, const float *max_gap_m, i64 n_cells, i32 side, i32 *next,
+                                i32 *scratch, Span *span, i64 *component)
+{
+    i32 *order = scratch, *parent = scratch + n_cells, *wide = scratch + 2 * n_cells, *last = scratch + 3 * n_cells;
+    i32 n = 0, count = 0, before = NONE;
+    for (i64 i = 0; i < n_cells; i++) {
+        PROVEN(cells->row[i] >= 0 && cells->row[i] >> 1 < side && cells->column[i] > 1 &&
+               cells->column[i] >> 1 < side - 1);
+        wide[i] = (i32)i;
+    }
+    sort_by(cells->column, 1, side, wide, n_cells, next, parent);
+    sort_by(cells->row, 1, side, parent, n_cells, next, order);
+    for (i64 k = 0; k < n_cells; k++) {
+        i32 i = order[k], place = (cells->row[i] >> 1) * side + (cells->column[i] >> 1), begins = place != before;
+        n += begins;
+        Span *own = &span[n - 1];
+        own->low = least(cells->low[i], begins ? INFINITY : own->low);
+        own->high = most(cells->high[i], begins ? -INFINITY : own->high);
+        own->place = before = place;
+        own->max_gap_m = max_gap_m[i];
+        last[n - 1] = i;
+        wide[i] = n - 1;
+    }
+    find_components(span, n, side, parent);
+    i32 *number = order, *ends = last + n_cells, m = 0; /* of the component of each root; cells that are the last */
+    for (i32 c = 0; c < n; c++)
+        number[c] = NONE;
+    for (i64 i = 0; i < n_cells; i++) {
+        ends[m] = wide[i];
+        m += last[wide[i]] == i;
+    }
+    for (i32 k = 0; k < m; k++)
+        if (number[parent[ends[k]]] == NONE)
+            number[parent[ends[k]]] = count++;
+    for (i64 i = 0; i < n_cells; i++)
+        component[i] = number[parent[wide[i]]];
 }
 
 typedef struct {
@@ -172,4 +228,101 @@ EXPORT void modt_cluster_bounds(const Cells *cells, const float *x, const float 
         bounds->points[g] += cells->entries[i];
         bounds->cell[g] = i;
     }
+}
+
+/* view_bounds: bounds of n clusters of cells in direction, range, height and elevation, and their scale; `number` of a
+ * cluster is its place among the n, or NONE. `height` is that of the points, of which those sampled are at `sample`. */
+EXPORT void modt_view_bounds(const Cells *cells, const Samples *sampled, const float *height, const i64 *sample,
+                             const i64 *cluster, i64 n_cells, const i64 *number, i64 n, float *const bounds[8],
+                             float *scale_m)
+{
+    float *const *low = bounds, *const *high = bounds + 4;
+    for (int v = 0; v < 4; v++)
+        for (i64 g = 0; g < n; g++) {
+            low[v][g] = INFINITY;
+            high[v][g] = -INFINITY;
+        }
+    for (i64 i = n_cells - 1; i >= 0; i--) { /* backwards: the scale is that of the first cell */
+        i64 g = number[cluster[i]];
+        PROVEN(g >= NONE && g < n);
+        if (g == NONE)
+            continue;
+        float x = sampled->x[i], y = sampled->y[i], across = magnitude(x) + magnitude(y);
+        float turn = y / most(across, 1e-6f), range_m = sampled->sqrt_range[i] * sampled->sqrt_range[i];
+        float ground = sampled->z[i] - height[sample[i]];
+        float least_of[4] = {(x < 0.0f ? 2.0f - turn : turn) + 1.0f, range_m, cells->low[i],
+                             (cells->low[i] + ground) / range_m};
+        float most_of[4] = {least_of[0], range_m, cells->high[i], (cells->high[i] + ground) / range_m};
+        for (int v = 0; v < 4; v++) {
+            low[v][g] = least(least_of[v], low[v][g]);
+            high[v][g] = most(most_of[v], high[v][g]);
+        }
+        scale_m[g] = across * across / range_m;
+    }
+}
+
+typedef struct {
+    float max_gap_m, min_gap_beams, max_gap_beams, min_width_m, max_width_m, min_top_m, max_top_m, max_bottom_m;
+    float max_diagonal_m, max_person_width_m, min_person_top_m, min_person_height_m;
+} Strips;
+
+enum { DIRECTION, RANGE, HEIGHT, ELEVATION, VIEW }; /* rows of the least values, then of the greatest */
+
+/* ViewBounds.width_m and strips.fits, of one cluster or of two; `b` may be `a` */
+static inline float width_of(float *const bounds[8], const float *scale_m, i64 a, i64 b)
+{
+    float right = least(bounds[DIRECTION][a], bounds[DIRECTION][b]);
+    return (most(bounds[VIEW + DIRECTION][a], bounds[VIEW + DIRECTION][b]) - right) * scale_m[a];
+}
+
+static inline int fits(const Strips *s, float *const bounds[8], const float *scale_m, i64 a, i64 b)
+{
+    float width = width_of(bounds, scale_m, a, b), near = least(bounds[RANGE][a], bounds[RANGE][b]);
+    float depth = most(bounds[VIEW + RANGE][a], bounds[VIEW + RANGE][b]) - near;
+    return width * width + depth * depth < s->max_diagonal_m * s->max_diagonal_m && width < s->max_width_m &&
+           most(bounds[VIEW + HEIGHT][a], bounds[VIEW + HEIGHT][b]) < s->max_top_m;
+}
+
+static inline int person_like(const Strips *s, float *const bounds[8], const float *scale_m, i64 a)
+{
+    float top = bounds[VIEW + HEIGHT][a];
+    return width_of(bounds, scale_m, a, a) < s->max_person_width_m && top > s->min_person_top_m &&
+           top - bounds[HEIGHT][a] > s->min_person_height_m;
+}
+
+/* Of strips.pairs; `a` is not farther than `b` */
+static int one_car(const Strips *s, float *const bounds[8], const float *scale_m, const float *beam_rad, i64 a, i64 b)
+{
+    float beams = (bounds[ELEVATION][b] - bounds[VIEW + ELEVATION][a]) / beam_rad[b];
+    return bounds[RANGE][b] - bounds[VIEW + RANGE][a] < s->max_gap_m && beams > s->min_gap_beams &&
+           beams < s->max_gap_beams && !person_like(s, bounds, scale_m, a) && !person_like(s, bounds, scale_m, b) &&
+           fits(s, bounds, scale_m, a, b) && width_of(bounds, scale_m, a, b) > s->min_width_m &&
+           most(bounds[VIEW + HEIGHT][a], bounds[VIEW + HEIGHT][b]) > s->min_top_m &&
+           least(bounds[HEIGHT][a], bounds[HEIGHT][b]) < s->max_bottom_m;
+}
+
+/* merge_strips: first of the clusters that make one car with each of n; `order` is that of their least directions.
+ * Scratch: `parent`, and bounds of cars. */
+EXPORT void modt_merge_strips(const Strips *s, float *const bounds[8], const float *scale_m, const float *beam_rad,
+                              i64 n, const i64 *order, i32 *parent, float *const cars[8], i64 *target)
+{
+    for (i64 g = 0; g < n; g++)
+        parent[g] = (i32)g;
+    for (i64 k = 0; k < n; k++)
+        for (i64 other = k + 1; other < n; other++) {
+            i64 a = order[k], b = order[other], swap = bounds[RANGE][b] < bounds[RANGE][a];
+            if (!(bounds[DIRECTION][b] <= bounds[VIEW + DIRECTION][a]))
+                break;
+            if (one_car(s, bounds, scale_m, beam_rad, swap ? b : a, swap ? a : b))
+                join(parent, (i32)a, (i32)b);
+        }
+    for (i64 g = 0; g < n; g++) {
+        i32 first = parent[g] = parent[parent[g]];
+        for (int v = 0; v < VIEW; v++) {
+            cars[v][first] = first == g ? bounds[v][g] : least(bounds[v][g], cars[v][first]);
+            cars[VIEW + v][first] = first == g ? bounds[VIEW + v][g] : most(bounds[VIEW + v][g], cars[VIEW + v][first]);
+        }
+    }
+    for (i64 g = 0; g < n; g++)
+        target[g] = fits(s, cars, scale_m, parent[g], parent[g]) ? parent[g] : g;
 }

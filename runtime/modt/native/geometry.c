@@ -65,3 +65,82 @@ EXPORT i64 modt_reaching_pairs(const i16 *ends, i64 n, const i16 *opposite, i64 
     }
     return count;
 }
+
+typedef struct {
+    const double *kdop, *log_width, *bottom, *top, *log_count; /* 8, 4, 1, 1, 1 numbers of each, row by row */
+    i64 n;
+} Shapes;
+
+typedef struct {
+    double size, overlap, height, count;
+} PairWeights;
+
+static inline double low(double a, double b) { return a < b ? a : b; }
+static inline double high(double a, double b) { return a > b ? a : b; }
+static inline double apart(double a, double b) { return __builtin_fabs(a - b); }
+
+/* pair_costs: squared distance, cost and coverage of n pairs (i, j) of shapes a and b; `covariance` has the xx, then
+ * the xy, then the yy of a. */
+EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *covariance, const double *variance,
+                            const i64 *rows, const i64 *columns, i64 n, const PairWeights *weights, double half_root,
+                            double pad_m, double *distance, double *cost, double *coverage)
+{
+    for (i64 pair = 0; pair < n; pair++) {
+        i64 i = rows[pair], j = columns[pair];
+        PROVEN(i >= 0 && i < a->n && j >= 0 && j < b->n);
+        double moved[4], side[4], other_side[4], common[4], size = 0.0, overlap[2], covered[2];
+        for (int k = 0; k < 4; k++) {
+            double one = a->kdop[k * a->n + i], one_back = a->kdop[(k + 4) * a->n + i];
+            double other = b->kdop[k * b->n + j], other_back = b->kdop[(k + 4) * b->n + j];
+            double ahead = other - one, behind = -(other_back - one_back);
+            moved[k] = __builtin_fabs(ahead) < __builtin_fabs(behind) ? ahead : behind;
+            common[k] = high(low(one, other) + low(one_back, other_back) + pad_m, 0.0);
+            side[k] = one + one_back + pad_m;
+            other_side[k] = other + other_back + pad_m;
+            size += apart(b->log_width[k * b->n + j], a->log_width[k * a->n + i]);
+        }
+        for (int k = 0; k < 2; k++) { /* of the upright rectangles, and of those at 45 degrees */
+            double area = side[k] * side[k + 2], other_area = other_side[k] * other_side[k + 2];
+            double shared = common[k] * common[k + 2];
+            overlap[k] = shared / (area + other_area - shared);
+            covered[k] = shared / low(area, other_area);
+        }
+        double xx = covariance[i] + variance[j], xy = covariance[a->n + i], yy = covariance[2 * a->n + i] + variance[j];
+        double dx = (moved[0] + half_root * (moved[1] - moved[3])) / 2;
+        double dy = (moved[2] + half_root * (moved[1] + moved[3])) / 2;
+        double shape = weights->size * (size / 4) + weights->overlap * (1 - low(overlap[0], overlap[1]));
+        double height = apart(a->top[i], b->top[j]) + apart(a->bottom[i], b->bottom[j]);
+        shape += weights->height * height / 2 + weights->count * apart(a->log_count[i], b->log_count[j]);
+        distance[pair] = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
+        cost[pair] = distance[pair] / 2 + shape;
+        coverage[pair] = low(covered[0], covered[1]);
+    }
+}
+
+/* certain_pairs: of n pairs, 1 for those kept for certain, 2 for contested ones, else 0. Scratch: `best` of the
+ * greatest index + 1, `next` likewise, for rows, and for columns. */
+EXPORT void modt_certain_pairs(const i64 *index[2], const double *cost, i64 n, double limit, const i64 sizes[2],
+                               i64 *best[2], double *next[2], uint8_t *state)
+{
+    for (int side = 0; side < 2; side++) {
+        for (i64 k = 0; k < sizes[side]; k++) {
+            best[side][k] = NONE;
+            next[side][k] = limit;
+        }
+        for (i64 pair = 0; pair < n; pair++) {
+            PROVEN(index[side][pair] >= 0 && index[side][pair] < sizes[side]);
+            i64 *own = &best[side][index[side][pair]];
+            double *second = &next[side][index[side][pair]];
+            if (*own == NONE || cost[pair] <= cost[*own]) {
+                *second = *own == NONE ? limit : cost[*own];
+                *own = pair;
+            } else
+                *second = low(cost[pair], *second);
+        }
+    }
+    for (i64 pair = 0; pair < n; pair++)
+        state[pair] = cost[pair] + limit < next[0][index[0][pair]] + next[1][index[1][pair]];
+    for (i64 pair = 0; pair < n; pair++)
+        if (state[best[0][index[0][pair]]] != 1 && state[best[1][index[1][pair]]] != 1)
+            state[pair] = 2;
+}

@@ -43,9 +43,9 @@ static ALWAYS_INLINE void place_points(const Ground *g, const float *points, i64
     }
 }
 
-/* GroundEstimator._lowest, of up to BLOCK points */
-static void find_lowest(const Ground *g, float height_m, const float *z, const float *sqrt_range, const i32 *cell,
-                        i64 n, float *lowest)
+/* GroundEstimator._lowest, of up to BLOCK points, and the highest of all points */
+static void find_bounds(const Ground *g, float height_m, const float *z, const float *sqrt_range, const i32 *cell,
+                        i64 n, float *lowest, float *highest)
 {
     float candidate[BLOCK];
     for (i64 i = 0; i < n; i++) {
@@ -56,21 +56,16 @@ static void find_lowest(const Ground *g, float height_m, const float *z, const f
     for (i64 i = 0; i < n; i++) {
         PROVEN(cell[i] >= 0 && cell[i] < g->rings * g->sectors);
         lowest[cell[i]] = least(candidate[i], lowest[cell[i]]);
+        highest[cell[i]] = most(z[i], highest[cell[i]]);
     }
 }
 
-/* GroundEstimator._stands; flat_m by ring */
-static void find_stands(const Ground *g, const float *flat_m, i64 n, Scratch *s)
+/* GroundEstimator._stands: a return lies far above the lowest if the highest does; flat_m by ring */
+static void find_stands(const Ground *g, const float *flat_m, const float *highest, Scratch *s)
 {
-    float *flat = s->other;
     for (i32 ring = 0; ring < g->rings; ring++)
         for (i32 k = ring * g->sectors; k < (ring + 1) * g->sectors; k++)
-            flat[k] = s->lowest[k] + flat_m[ring];
-    for (i32 k = 0; k < g->rings * g->sectors; k++)
-        s->stands[k] = 0;
-    for (i64 i = 0; i < n; i++)
-        if (s->z[i] > flat[s->cell[i]])
-            s->stands[s->cell[i]] = 1;
+            s->stands[k] = highest[k] > s->lowest[k] + flat_m[ring];
 }
 
 /* GroundEstimator.trace; `ray` holds height, range, slope and bend of the last ground cell of each ray */
@@ -148,8 +143,11 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
                              const float *points, i64 n, i64 width, Scratch *s, float *ray, const float bounds[4],
                              i64 *rows, float *kept[5])
 {
-    for (i32 i = 0; i < g->rings * g->sectors; i++)
+    float *highest = s->other;
+    for (i32 i = 0; i < g->rings * g->sectors; i++) {
         s->lowest[i] = INFINITY;
+        highest[i] = -INFINITY;
+    }
     for (i64 i = 0; i < n; i += BLOCK) {
         i64 m = n - i < BLOCK ? n - i : BLOCK;
         float *z = s->z + i, *sqrt_range = s->sqrt_range + i;
@@ -157,9 +155,9 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
             place_points(g, points + i * 4, m, 4, z, sqrt_range, s->cell + i);
         else
             place_points(g, points + i * width, m, width, z, sqrt_range, s->cell + i);
-        find_lowest(g, height_m, z, sqrt_range, s->cell + i, m, s->lowest);
+        find_bounds(g, height_m, z, sqrt_range, s->cell + i, m, s->lowest, highest);
     }
-    find_stands(g, flat_m, n, s);
+    find_stands(g, flat_m, highest, s);
     trace(g, height_m, range_m, s, ray);
     interpolate(g, height_m, range_m, s, ray);
     for (i32 ring = 0; ring < g->rings; ring++) {

@@ -133,10 +133,12 @@ EXPORT void modt_best_headings(const float *x, const float *y, const i64 *rows, 
 EXPORT void modt_reflectance_sums(const float *points, i64 width, const i64 *index, const i64 *offsets, i64 n,
                                   float bright, float dark, double *sums, float *greatest)
 {
+    i64 last = offsets[n];
     for (i64 g = 0; g < n; g++) {
         double number = 0.0, total = 0.0, squares = 0.0, brights = 0.0, darks = 0.0;
         float high = -INFINITY;
         for (i64 i = offsets[g]; i < offsets[g + 1]; i++) {
+            __builtin_prefetch(&points[index[i + AHEAD < last ? i + AHEAD : i] * width + 3]);
             float r = points[index[i] * width + 3];
             if (r < 0.0f)
                 continue;

@@ -19,6 +19,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #define ALWAYS_INLINE inline __attribute__((always_inline))
 #define NONE (-1)
+#define AHEAD 64 /* entries whose memory is on its way into the cache */
 #define INFINITY __builtin_inff()
 
 typedef int16_t i16;

@@ -127,7 +127,7 @@ class Registration:
             return None
         if not self._initialised:
             a, b = landmarks.kdop[:, i], near[:, j]
-            shift, (size, _, _) = shift_between(a, b), shape_similarity(a, b)
+            shift, (size, _) = shift_between(a, b), shape_similarity(a, b)
             vote = _vote(shift[size < config.max_size_difference], config.reach_m, config.vote_cell_m)
             motion = motion + np.append(-vote, 0.0)
         a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
@@ -137,7 +137,7 @@ class Registration:
         for _ in range(match_rounds):
             moved = b + np.tensordot(motion, jacobian, 1)
             shift = shift_between(a, moved)
-            size, overlap, _ = shape_similarity(a, moved)
+            size, overlap = shape_similarity(a, moved)
             best = _mutual(i, j, np.hypot(shift[:, 0], shift[:, 1]) + size - overlap)
             motion = _fit(
                 outward_shift.take(best, axis=1), jacobian.take(best, axis=2), variance[best], motion, scales

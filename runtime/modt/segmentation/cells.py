@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 
 from modt.segmentation.grids import Int32, SqrtRangeGrid
 from modt.segmentation.groups import label_max, label_min
+from modt.segmentation.point_columns import PointColumns
 from modt.types import NONE, Bool, Float32, Int
 
 
@@ -21,16 +22,22 @@ class Cells:
     column: Int32  # (C,) of the grid
     low: Float32  # (C,) least height of the points above ground [m]
     high: Float32  # (C,) greatest height of the points above ground [m]
-    entries: Int  # (C,) points, or cells of a finer grid, in each
+    entries: Int  # (C,) points in each
 
     def __len__(self) -> int:
         return len(self.row)
 
 
 def occupied_cells(
-    grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32
-) -> tuple[Cells, Int, Int]:
-    """Cells of (K,) entries (points, or cells of a finer grid), (C,) last entry of each, (K,) cell of each entry."""
+    grid: SqrtRangeGrid, points: PointColumns, height: Float32
+) -> tuple[Cells, Int, PointColumns, Int]:
+    """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
+    cells, sample, cell = _occupied(grid, *grid.row_column(points), height, height)
+    return cells, sample, points.take(sample), cell
+
+
+def _occupied(grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32) -> tuple[Cells, Int, Int]:
+    """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
     sample, cell = grid.occupied(grid.flat_index(row, column))
     n = len(sample)
     bounds = label_min(low, cell, n), label_max(high, cell, n)
@@ -55,3 +62,12 @@ def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) ->
     component = np.full(len(cells), NONE)
     component[rows] = connected_components(graph, directed=False)[1]
     return component
+
+
+def connect_coarse(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
+    """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies.
+
+    The gap of a wide cell is that of its last cell; wide cells are in the order of their last cells.
+    """
+    wide, sample, place = _occupied(grid, cells.row >> 1, cells.column >> 1, cells.low, cells.high)
+    return connect(grid, wide, max_gap_m.take(sample), np.ones(len(wide), np.bool_)).take(place)

@@ -44,9 +44,7 @@ class Clusterer:
 
     def cluster(self, points: PointColumns, height: Float32) -> Clusters:
         """Clusters of (K,) points, K > 0, with (K,) heights above ground [m]."""
-        row, column = self.kernels.row_column(self.fine, points)
-        cells, sample, cell = self.kernels.occupied_cells(self.fine, row, column, height, height)
-        sampled = points.take(sample)
+        cells, sample, sampled, cell = self.kernels.occupied_cells(self.fine, points, height)
         cluster, sizes = self._connect(cells, sampled)
         clusters = Clusters(points, height, cell, cells, sample, sampled, cluster, len(sizes))
         target = self.merger.merge(clusters, sizes, self._valid(sizes) | ~sizes.is_part)
@@ -56,10 +54,12 @@ class Clusterer:
     def _connect(self, cells: Cells, points: PointColumns) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each; sizes of the clusters."""
         beam_m = self._beam_m(points)
-        cluster = self._connect_coarse(cells, beam_m)
+        max_gap_m = self.gap_m + self.gap_beams * beam_m
+        cluster = self.kernels.connect_coarse(self.coarse, cells, max_gap_m)
         coarse = self._sizes(cells, points, beam_m, cluster)
         oversized = coarse.extent_m >= self.config.max_extent_m
-        part = self._components(self.fine, cells, beam_m, (oversized | self._may_hold_person(coarse)).take(cluster))
+        again = (oversized | self._may_hold_person(coarse)).take(cluster)
+        part = self.kernels.connect(self.fine, cells, max_gap_m, again)
         parts = self._sizes(cells, points, beam_m, part)
         owner = cluster.take(parts.cell)
         of_oversized = oversized.take(owner)
@@ -98,17 +98,6 @@ class Clusterer:
         range_m = points.sqrt_range * points.sqrt_range
         beam_m: Float32 = self.beams.step_rad(points.z / range_m) * range_m
         return beam_m
-
-    def _connect_coarse(self, fine: Cells, beam_m: Float32) -> Int:
-        """(C,) cluster of each fine cell: that of the coarse cell of which it is a quarter."""
-        row, column = fine.row >> 1, fine.column >> 1
-        cells, sample, coarse = self.kernels.occupied_cells(self.coarse, row, column, fine.low, fine.high)
-        component = self._components(self.coarse, cells, beam_m.take(sample), np.ones(len(cells), np.bool_))
-        return component.take(coarse)
-
-    def _components(self, grid: SqrtRangeGrid, cells: Cells, beam_m: Float32, use: Bool) -> Int:
-        """(C,) connected component of each cell used, NONE for the others."""
-        return self.kernels.connect(grid, cells, self.gap_m + self.gap_beams * beam_m, use)
 
     def _valid(self, sizes: ClusterSizes) -> Bool:
         """(G,) clusters of an object's size; a part of an oversized cluster must stand out from it."""

@@ -6,15 +6,18 @@ from typing import Protocol
 
 import numpy as np
 
+from modt.config.segmentation import CarMergeConfig
 from modt.geometry.kernels import GeometryKernels, NumpyGeometryKernels
 from modt.segmentation.box_fitting import best_headings
-from modt.segmentation.cells import Cells, connect, occupied_cells
+from modt.segmentation.cells import Cells, connect, connect_coarse, occupied_cells
 from modt.segmentation.clusters import ClusterBounds, Clusters, Members, cluster_bounds, members_of
-from modt.segmentation.grids import Int32, SqrtRangeGrid
+from modt.segmentation.grids import SqrtRangeGrid
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups
 from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.reflectance_statistics import reflectance_sums
+from modt.segmentation.strips import merge_strips
+from modt.segmentation.view_bounds import ViewBounds, view_bounds
 from modt.types import Bool, Float32, Float64, Int
 
 
@@ -37,19 +40,25 @@ class Kernels(GeometryKernels, Protocol):
         Bounds are the least and greatest height [m], and the least and greatest square root of range, exclusively.
         """
 
-    def row_column(self, grid: SqrtRangeGrid, points: PointColumns) -> tuple[Int32, Int32]:
-        """(K,) row and (K,) column of each point."""
-
     def occupied_cells(
-        self, grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32
-    ) -> tuple[Cells, Int, Int]:
-        """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
+        self, grid: SqrtRangeGrid, points: PointColumns, height: Float32
+    ) -> tuple[Cells, Int, PointColumns, Int]:
+        """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
 
     def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
         """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
 
+    def connect_coarse(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
+        """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
+
     def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
         """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
+
+    def view_bounds(self, clusters: Clusters, number: Int, n: int) -> ViewBounds:
+        """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
+
+    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> Int:
+        """(G,) first of the clusters that make one car with each, given (G,) the spacing of beams there [rad]."""
 
     def group(self, labels: Int, n: int) -> Groups:
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
@@ -73,7 +82,10 @@ class NumpyKernels(NumpyGeometryKernels):
     name = "numpy"
     occupied_cells = staticmethod(occupied_cells)
     connect = staticmethod(connect)
+    connect_coarse = staticmethod(connect_coarse)
     cluster_bounds = staticmethod(cluster_bounds)
+    view_bounds = staticmethod(view_bounds)
+    merge_strips = staticmethod(merge_strips)
     group = staticmethod(Groups.from_labels)
     members_of = staticmethod(members_of)
     best_headings = staticmethod(best_headings)
@@ -90,10 +102,6 @@ class NumpyKernels(NumpyGeometryKernels):
         mask &= (sweep.sqrt_range > near) & (sweep.sqrt_range < far)
         rows = np.flatnonzero(mask)
         return rows, sweep.take(rows), height[rows]
-
-    def row_column(self, grid: SqrtRangeGrid, points: PointColumns) -> tuple[Int32, Int32]:
-        """(K,) row and (K,) column of each point."""
-        return grid.row_column(points)
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""

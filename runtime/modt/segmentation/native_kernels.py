@@ -7,25 +7,29 @@ from typing import Any
 
 import numpy as np
 
+from modt.config.segmentation import CarMergeConfig
 from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native.arrays import Signatures, address, at, declare, pointers
 from modt.segmentation.box_fitting import AXES, HEADINGS
 from modt.segmentation.cells import Cells
 from modt.segmentation.clusters import ClusterBounds, Clusters, Members
-from modt.segmentation.grids import RING_STEP, SECTORS, Int32, SqrtRangeGrid
+from modt.segmentation.grids import RING_STEP, SECTORS, SqrtRangeGrid
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups
 from modt.segmentation.point_columns import FAR_M, PointColumns
 from modt.segmentation.reflectance_statistics import BRIGHT, DARK
+from modt.segmentation.view_bounds import DIRECTION, ViewBounds
 from modt.types import NONE, Bool, Float32, Float64, Int
 
 _F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
     "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
-    "modt_row_column": (None, (_P, _P, _P, _L, _F, _I, _P, _P)),
-    "modt_occupied_cells": (_L, (_P, _P, _P, _P, _L, _I, _P, _P, _P, _P)),
+    "modt_occupied_cells": (_L, (_P, _P, _L, _F, _I, _I, _P, _P, _P, _P, _P)),
     "modt_connect": (None, (_P, _P, _P, _L, _I, _P, _P, _P, _P)),
+    "modt_connect_coarse": (None, (_P, _P, _L, _I, _P, _P, _P, _P)),
     "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
+    "modt_view_bounds": (None, (_P, _P, _P, _P, _P, _L, _P, _L, _P, _P)),
+    "modt_merge_strips": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
     "modt_group": (_L, (_P, _L, _L, _P, _P)),
     "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
     "modt_group_sums": (None, (_P, _L, _L, _P, _L, _P)),
@@ -42,6 +46,13 @@ class _Ground(ctypes.Structure):
         *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope", "max_bend")),
         *((name, _F) for name in ("start_bend", "slope_gain", "noise_m", "max_gap_m", "flank_m")),
     )
+
+
+_STRIP_KEYS = (
+    *("max_gap_m", "min_gap_beams", "max_gap_beams", "min_width_m", "max_width_m", "min_top_m", "max_top_m"),
+    *("max_bottom_m", "max_diagonal_m", "max_person_width_m", "min_person_top_m", "min_person_height_m"),
+)
+"""Of CarMergeConfig, in the order of Strips of cells.c."""
 
 
 class _GroundBuffers:
@@ -89,6 +100,8 @@ class NativeKernels(NativeGeometryKernels):
         super().__init__(library)
         declare(library, _SIGNATURES)
         self.name = f"native ({instructions})"
+        self._work = np.empty(1, np.int32)
+        self._strips: dict[CarMergeConfig, Any] = {}
         self._ground: dict[GroundEstimator, _GroundBuffers] = {}
 
     def above_ground(
@@ -108,38 +121,47 @@ class NativeKernels(NativeGeometryKernels):
         x, y, z, sqrt_range, height = kept[:, :k]
         return rows[:k], PointColumns(x, y, z, sqrt_range), height
 
-    def row_column(self, grid: SqrtRangeGrid, points: PointColumns) -> tuple[Int32, Int32]:
-        """(K,) row and (K,) column of each point."""
-        row, column = np.empty((2, len(points)), np.int32)
-        given = at(points.x), at(points.y), at(points.sqrt_range), len(points)
-        self._library.modt_row_column(*given, 1 / grid.step, grid.centre, at(row, np.int32), at(column, np.int32))
-        return row, column
-
     def occupied_cells(
-        self, grid: SqrtRangeGrid, row: Int32, column: Int32, low: Float32, high: Float32
-    ) -> tuple[Cells, Int, Int]:
-        """Cells of (K,) entries, (C,) last entry of each, (K,) cell of each entry."""
-        k = len(row)
-        places, heights, entries = np.empty((2, k), np.int32), np.empty((2, k), np.float32), np.empty(k, np.int64)
+        self, grid: SqrtRangeGrid, points: PointColumns, height: Float32
+    ) -> tuple[Cells, Int, PointColumns, Int]:
+        """Cells of (K,) points with (K,) heights [m], (C,) last point of each, those points, (K,) cell of each."""
+        k = len(points)
+        places, entries = np.empty((2, k), np.int32), np.empty(k, np.int64)
+        heights, sampled = np.empty((2, k), np.float32), np.empty((4, k), np.float32)
         sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
-        out = pointers(places, heights, entries)
+        given, out, columns = self._columns(points), pointers(places, heights, entries), pointers(sampled)
         n = self._library.modt_occupied_cells(
-            at(row, np.int32), at(column, np.int32), at(low), at(high), k, grid.side, at(grid.number, np.int32),
-            at(sample, np.int64), at(cell, np.int64), ctypes.addressof(out),
+            ctypes.addressof(given), at(height), k, 1 / grid.step, grid.centre, grid.side, at(grid.number, np.int32),
+            at(sample, np.int64), ctypes.addressof(columns), at(cell, np.int64), ctypes.addressof(out),
         )  # fmt: skip
         (row, column), (low, high) = places[:, k - n :], heights[:, k - n :]
-        return Cells(row, column, low, high, entries[k - n :]), sample[k - n :], cell
+        cells = Cells(row, column, low, high, entries[k - n :])
+        return cells, sample[k - n :], PointColumns(*sampled[:, k - n :]), cell
 
     def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
         """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
-        n = len(cells)
-        next_, scratch, spans = np.empty(grid.side, np.int32), np.empty(3 * n, np.int32), np.empty(4 * n, np.int32)
-        component, own = np.empty(n, np.int64), self._cells(cells)
+        component, own = np.empty(len(cells), np.int64), self._cells(cells)
         self._library.modt_connect(
-            ctypes.addressof(own), at(max_gap_m), at(use, np.bool_), n, grid.side, address(next_),
-            address(scratch), address(spans), at(component, np.int64),
+            ctypes.addressof(own), at(max_gap_m), at(use, np.bool_), len(cells), grid.side,
+            *self._scratch(grid, len(cells)), at(component, np.int64),
         )  # fmt: skip
         return component
+
+    def connect_coarse(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
+        """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
+        component, own = np.empty(len(cells), np.int64), self._cells(cells)
+        self._library.modt_connect_coarse(
+            ctypes.addressof(own), at(max_gap_m), len(cells), grid.side, *self._scratch(grid, len(cells)),
+            at(component, np.int64),
+        )  # fmt: skip
+        return component
+
+    def _scratch(self, grid: SqrtRangeGrid, n: int) -> tuple[int, int, int]:
+        """Addresses of scratch for `modt_connect` and `modt_connect_coarse`: next, scratch and span."""
+        if len(self._work) < grid.side + 9 * n:
+            self._work = np.empty(grid.side + 9 * n, np.int32)
+        following = address(self._work)
+        return following, following + 4 * (grid.side + 4 * n), following + 4 * grid.side
 
     def cluster_bounds(self, cells: Cells, points: PointColumns, cluster: Int, n: int) -> ClusterBounds:
         """Bounds of n clusters, given (C,) the cluster of each cell, or NONE, and a point of each cell."""
@@ -150,6 +172,31 @@ class NativeKernels(NativeGeometryKernels):
             ctypes.addressof(out),
         )  # fmt: skip
         return ClusterBounds(*bounds, *counts)
+
+    def view_bounds(self, clusters: Clusters, number: Int, n: int) -> ViewBounds:
+        """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
+        bounds, scale_m = np.empty((8, n), np.float32), np.empty(n, np.float32)
+        cells, sampled, out = self._cells(clusters.cells), self._columns(clusters.sampled), pointers(bounds)
+        self._library.modt_view_bounds(
+            ctypes.addressof(cells), ctypes.addressof(sampled), at(clusters.height), at(clusters.sample, np.int64),
+            at(clusters.of_cell, np.int64), len(clusters.sample), at(number, np.int64), n, ctypes.addressof(out),
+            at(scale_m),
+        )  # fmt: skip
+        return ViewBounds(bounds[:4], bounds[4:], scale_m)
+
+    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> Int:
+        """(G,) first of the clusters that make one car with each, given (G,) the spacing of beams there [rad]."""
+        n, limits = len(bounds), self._strips.get(config)
+        if limits is None:
+            limits = self._strips[config] = (_F * len(_STRIP_KEYS))(*(getattr(config, key) for key in _STRIP_KEYS))
+        order, target = np.argsort(bounds.min[DIRECTION], kind="stable"), np.empty(n, np.int64)
+        parent, united = np.empty(n, np.int32), np.empty((8, n), np.float32)
+        given, out = pointers(bounds.min, bounds.max), pointers(united)
+        self._library.modt_merge_strips(
+            ctypes.addressof(limits), ctypes.addressof(given), at(bounds.scale_m), at(beam_rad), n,
+            at(order, np.int64), address(parent), ctypes.addressof(out), at(target, np.int64),
+        )  # fmt: skip
+        return target
 
     def group(self, labels: Int, n: int) -> Groups:
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
@@ -195,6 +242,10 @@ class NativeKernels(NativeGeometryKernels):
             at(sums, np.float64), at(greatest),
         )  # fmt: skip
         return sums, greatest
+
+    @staticmethod
+    def _columns(points: PointColumns) -> Any:
+        return (_P * 4)(at(points.x), at(points.y), at(points.z), at(points.sqrt_range))
 
     @staticmethod
     def _cells(cells: Cells) -> Any:

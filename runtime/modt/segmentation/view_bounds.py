@@ -7,6 +7,7 @@ from typing import Self
 
 import numpy as np
 
+from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import pseudo_angle
 from modt.segmentation.groups import Groups
 from modt.segmentation.point_columns import PointColumns
@@ -56,7 +57,15 @@ class ViewBounds:
         return width_m
 
     @property
-    def diagonal_m(self) -> Float32:
-        """(G,) extent across and along the ray [m]."""
-        diagonal_m: Float32 = np.hypot(self.width_m, self.max[RANGE] - self.min[RANGE])
-        return diagonal_m
+    def diagonal_m2(self) -> Float32:
+        """(G,) square of the extent across and along the ray [m2]."""
+        diagonal_m2: Float32 = np.square(self.width_m) + np.square(self.max[RANGE] - self.min[RANGE])
+        return diagonal_m2
+
+
+def view_bounds(clusters: Clusters, number: Int, n: int) -> ViewBounds:
+    """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
+    groups = Groups.from_labels(number.take(clusters.of_cell), n)
+    points, cells = clusters.sampled.take(groups.rows), clusters.cells
+    ground = points.z - clusters.height.take(clusters.sample.take(groups.rows))
+    return ViewBounds.of_cells(points, ground, cells.low.take(groups.rows), cells.high.take(groups.rows), groups)

@@ -126,11 +126,3 @@ def inverse_2x2(S: Float64) -> Float64:
     (a, b), (c, d) = S
     inverse: Float64 = np.array(((d, -b), (-c, a))) / (a * d - b * c)
     return inverse
-
-
-def mahalanobis_squared(nu: Float64, S: Float64) -> Float64:
-    """(M,) nu' S^-1 nu of residuals (2, M) and covariances (2, 2, M)."""
-    (a, b), (_, d) = S
-    dx, dy = nu
-    out: Float64 = (d * dx * dx - 2 * b * dx * dy + a * dy * dy) / (a * d - b * b)
-    return out

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import KdopAssociationConfig
-from modt.geometry.kdop import AXES, DIRECTIONS, overlapping_pairs, width_sum
-from modt.geometry.kdop_displacement import least, measured, shape_similarity
+from modt.geometry.kdop import DIRECTIONS, overlapping_pairs, width_sum
+from modt.geometry.kdop_displacement import measured
+from modt.geometry.kdop_pairs import PairWeights, Shapes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
-from modt.tracking import kalman
 from modt.tracking.assignment import assign
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
@@ -30,6 +30,9 @@ class KdopAssociation:
 
     def __init__(self, config: KdopAssociationConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
         self.config, self._kernels = config, kernels
+        self._weights = PairWeights(
+            config.size_weight, config.overlap_weight, config.height_weight, config.count_weight
+        )
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
         """Pairs within the gate; then, among the rest, those that overlap although they changed their shape."""
@@ -38,30 +41,27 @@ class KdopAssociation:
         variance = self.noise(observations)
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
         rows, columns = overlapping_pairs(expected + reach, observations.kdop, self._kernels.reaching_pairs)
-        a, b = expected.take(rows, axis=1), observations.kdop.take(columns, axis=1)
-        size, overlap, coverage = shape_similarity(a, b)
-        S = tracks.P[:, :2, :2].transpose(1, 2, 0).copy().take(rows, axis=2)
-        noise = variance[columns] + weight.jump_sigma_m**2
-        for k in (0, 1):
-            S[k, k] += noise
-        distance = kalman.mahalanobis_squared(AXES @ least(a, b) / 2, S)
-        height = np.abs(tracks.top[rows] - observations.top[columns])
-        bottom = np.abs(tracks.bottom[rows] - observations.bottom[columns])
-        count = np.abs(np.log(tracks.points[rows] / observations.count[columns]))
-        shape = weight.size_weight * size + weight.overlap_weight * (1 - overlap)
-        shape += weight.height_weight * (height + bottom) / 2 + weight.count_weight * count
-        cost = distance / 2 + shape
+        distance, cost, coverage = self._kernels.pair_costs(
+            Shapes.of(expected, tracks.bottom, tracks.top, tracks.points),
+            Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count),
+            np.stack([tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]]),
+            variance + weight.jump_sigma_m**2,
+            (rows, columns),
+            self._weights,
+        )
         first = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
-        first = first[assign(rows[first], columns[first], cost[first], weight.max_cost)]
+        first = first[assign(rows[first], columns[first], cost[first], weight.max_cost, self._kernels)]
         free = _free(rows, rows[first], len(tracks)) & _free(columns, columns[first], len(observations))
         second = (free & (coverage > weight.min_coverage)).nonzero()[0]
-        second = second[assign(rows[second], columns[second], 1 - coverage[second], 1.0)]
+        second = second[assign(rows[second], columns[second], 1 - coverage[second], 1.0, self._kernels)]
         kept = np.concatenate([first, second])
         rows, columns = rows[kept], columns[kept]
         x = tracks.x.take(rows, axis=0)[:, :2]
         mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
         before = tracks.end_variance.T.take(rows, axis=1)
-        shift, covariance, end_variance = measured(mean, b.take(kept, axis=1), variance[columns], before)
+        shift, covariance, end_variance = measured(
+            mean, observations.kdop.take(columns, axis=1), variance[columns], before
+        )
         return Matches(rows, columns, x + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:
