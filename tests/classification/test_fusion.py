@@ -355,8 +355,9 @@ def test_a_further_view_equal_to_the_prior_changes_nothing(pool_weight: float) -
     fusion.asks(tracks, proposals, np.array([True]))
     first = np.array([[0.5, 0.3, 0.1, 0.1]])
     fusion.fuse(tracks, proposals, row, first)
-    pooled_prior = np.array([0.88, 0.08, 0.02, 0.02]) ** (1 - pool_weight) * np.array(UNCERTAIN) ** pool_weight
-    fusion.fuse(tracks, proposals, row, pooled_prior[None] / pooled_prior.sum())
+    odds = (0.05 / 0.95) / (0.12 / 0.88)  # of an object, by the box, over those by frequency
+    prior = np.array([0.88, 0.08, 0.02, 0.02]) * np.array([1.0, odds, odds, odds]) ** pool_weight
+    fusion.fuse(tracks, proposals, row, prior[None] / prior.sum())
     np.testing.assert_allclose(tracks.posterior, first, rtol=1e-6)
     assert tracks.views.tolist() == [2]
 

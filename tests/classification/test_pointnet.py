@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
+from onnxruntime.capi.onnxruntime_pybind11_state import Fail
 
 from modt import assets
 from modt.classification.box_classifier import NoBoxClassifier
-from modt.classification.pointnet import PointNet
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
 from modt.config import ClassificationConfig, SensorConfig
 from modt.energy.instrumentation import padded_size
 from modt.errors import MisuseError
@@ -171,6 +172,29 @@ def test_file_that_is_not_a_model_is_misuse(tmp_path: Path, content: bytes) -> N
     with pytest.raises(MisuseError, match=r"net\.onnx") as caught:
         network(path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "frequency", ["[0.5, 0.2, 0.2]", "[0.7, 0.3, 0.0, 0.1]", "[0.7, 0.5, 0.4, 0.3]", "[0.7, NaN, 0.1, 0.1]"]
+)
+def test_malformed_class_frequency_is_misuse(tmp_path: Path, frequency: str) -> None:
+    model = graph(random_layers(0))
+    onnx.helper.set_model_props(model, {CLASS_FREQUENCY_KEY: frequency})
+    path = tmp_path / "net.onnx"
+    path.write_bytes(model.SerializeToString())
+    with pytest.raises(MisuseError, match="class frequency"):
+        network(path)
+
+
+def test_refusal_without_a_message_is_misuse(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = save(tmp_path, random_layers(0))
+
+    def refuse(*args: Any, **kwargs: Any) -> None:
+        raise Fail
+
+    monkeypatch.setattr("onnxruntime.InferenceSession", refuse)
+    with pytest.raises(MisuseError, match=r"not an ONNX model \(Fail\)"):
+        network(path)
 
 
 @pytest.mark.parametrize("width", [(4, 4), (3, 5)])

@@ -19,6 +19,7 @@ from modt.classification.box_classifier import (
 )
 from modt.classification.box_scores import BoxScores
 from modt.classification.pointnet import PointNet
+from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import ClassificationConfig, SensorConfig
@@ -26,8 +27,9 @@ from modt.types import Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(5)
+WEIGHTS = PoolWeights(network=0.8, box=0.4)
 LAYERS = [(RNG.normal(size=(N_FEATURES, 5)), RNG.normal(size=5)), (RNG.normal(size=(5, 4)), RNG.normal(size=4))]
-BOXES = MlpBoxClassifier(LAYERS, 0.4)
+BOXES = MlpBoxClassifier(LAYERS, WEIGHTS)
 NO_REFLECTANCE = NoReflectanceClassifier()
 SCORES = BoxScores(BOXES, NO_REFLECTANCE, SensorConfig())
 SHIPPED = ("pointnet-kitti", "pointnet-synthetic")
@@ -53,7 +55,7 @@ def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
     np.testing.assert_allclose(prior.probability(proposals), [[0.89, 0.08, 0.02, 0.01]] * 2)
     assert prior.may_be_object(prior.probability(proposals), 1.0).all()
     assert isinstance(prior, FrequencyPrior)
-    boxes = from_metadata({METADATA_KEY: to_metadata(LAYERS, 0.4)})
+    boxes = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
     by_box = make_prior(BoxScores(boxes, NO_REFLECTANCE, SensorConfig()), (0.1, 0.1, 0.1))
     assert isinstance(by_box, BoxPrior)
     assert (prior.pool_weight, by_box.pool_weight) == (0.0, 0.4)
@@ -95,7 +97,15 @@ def test_no_proposals_give_no_priors() -> None:
 
 
 @pytest.mark.parametrize(
-    "entry", ["[]", "no json", "{}", '{"share": 1.5, "layers": []}', '{"share": 0.5, "layers": []}']
+    "entry",
+    [
+        "[]",
+        "no json",
+        "{}",
+        '{"weights": {"network": 1.5, "box": 0.5, "reflectance": 0}, "layers": []}',
+        '{"weights": {"network": 0.5, "box": 0.5}, "layers": []}',
+        '{"weights": {"network": 0.5, "box": 0.5, "reflectance": 0}, "layers": []}',
+    ],
 )
 def test_malformed_metadata_is_rejected(entry: str) -> None:
     with pytest.raises((KeyError, TypeError, ValueError)):
@@ -104,7 +114,7 @@ def test_malformed_metadata_is_rejected(entry: str) -> None:
 
 def test_box_classifier_round_trips_through_metadata() -> None:
     features = RNG.normal(size=(6, N_FEATURES))
-    loaded = from_metadata({METADATA_KEY: to_metadata(LAYERS, 0.4)})
+    loaded = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
     np.testing.assert_array_equal(loaded.log_probability(features), BOXES.log_probability(features))
-    assert loaded.pool_weight == 0.4
+    assert loaded.weights == WEIGHTS
     assert not from_metadata({}).log_probability(features).any()

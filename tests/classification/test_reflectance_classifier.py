@@ -15,7 +15,8 @@ from modt.classification import box_classifier
 from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, proposal_features
 from modt.classification.box_scores import BoxScores
 from modt.classification.mlp import logits
-from modt.classification.pointnet import PointNet
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
+from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, make_prior
 from modt.classification.reflectance_classifier import (
     METADATA_KEY,
@@ -31,13 +32,15 @@ from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)
 BOX_LAYERS = [(RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4))]
-BOXES = MlpBoxClassifier(BOX_LAYERS, 0.0)
+BOXES = MlpBoxClassifier(BOX_LAYERS, PoolWeights())
 LAYERS = [(RNG.normal(size=(N_FEATURES + N_REFLECTANCE, 4)), RNG.normal(size=4))]
 REFLECTANCE = RNG.uniform(0, 1, (3, N_REFLECTANCE))
+FREQUENCY = np.array([0.8, 0.12, 0.05, 0.03])
 SENSOR = SensorConfig(reflectance="hdl-64e")
 WITHOUT = BoxPrior(BoxScores(BOXES, NoReflectanceClassifier(), SENSOR))
 """The prior without reflectance."""
-METADATA = {METADATA_KEY: to_metadata(LAYERS, 0.0, 0.5, "hdl-64e")}
+WEIGHTS = PoolWeights(network=0.7, box=0.3, reflectance=0.5)
+METADATA = {METADATA_KEY: to_metadata(LAYERS, PoolWeights(reflectance=0.5), "hdl-64e")}
 
 
 def measured() -> Proposals:
@@ -60,7 +63,7 @@ def test_another_sensor_or_a_model_without_classifier_adds_nothing() -> None:
     for metadata, sensor in ((METADATA, SensorConfig()), ({}, SENSOR)):
         reflectance = from_metadata(metadata, sensor)
         assert isinstance(reflectance, NoReflectanceClassifier)
-        assert reflectance.weight == 0
+        assert reflectance.weights is None
         assert not reflectance.log_likelihood(np.ones((3, N_FEATURES)), REFLECTANCE).any()
 
 
@@ -97,9 +100,9 @@ def test_no_warning_for_an_empty_frame(caplog: pytest.LogCaptureFixture) -> None
         "{}",
         "[]",
         "no json",
-        json.dumps({"sensor": "hdl-64e", "share": 0.5, "weight": 2.0, "layers": []}),
-        json.dumps({"sensor": "hdl-64e", "share": -0.5, "weight": 0.5, "layers": []}),
-        json.dumps({"sensor": "hdl-64e", "share": 0.5, "weight": 0.5, "layers": []}),
+        json.dumps({"sensor": "hdl-64e", "weights": WEIGHTS.as_dict() | {"reflectance": 2.0}, "layers": []}),
+        json.dumps({"sensor": "hdl-64e", "weights": WEIGHTS.as_dict() | {"box": -0.5}, "layers": []}),
+        json.dumps({"sensor": "hdl-64e", "weights": WEIGHTS.as_dict(), "layers": []}),
     ],
 )
 def test_malformed_metadata_is_rejected(text: str) -> None:
@@ -133,16 +136,19 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     points, _ = blobs([10, 30, 60], np.random.default_rng(0))
     proposals, which = measured(), np.array([2, 0])
     metadata = {
-        box_classifier.METADATA_KEY: box_classifier.to_metadata(BOX_LAYERS, 0.2),
-        METADATA_KEY: to_metadata(LAYERS, 0.3, 0.5, "hdl-64e"),
+        box_classifier.METADATA_KEY: box_classifier.to_metadata(BOX_LAYERS, PoolWeights(0.8, 0.2)),
+        METADATA_KEY: to_metadata(LAYERS, WEIGHTS, "hdl-64e"),
+        CLASS_FREQUENCY_KEY: json.dumps(FREQUENCY.tolist()),
     }
     alone = PointNet(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)
     model = _with_metadata(tmp_path / "pooled.onnx", metadata)
     shape, feature = alone.classify(points, proposals, which), proposal_features(proposals, SENSOR)[which]
     box, likelihood = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
+    object_ = (box[:, 1:].sum(axis=1) / box[:, 0]) / (FREQUENCY[1:].sum() / FREQUENCY[0])
+    either = np.c_[np.ones(2), np.tile(object_[:, None], 3)]  # the same for every class of object
     for sensor, expected in (
-        (SENSOR, shape**0.7 * box**0.3 * likelihood**0.5),
-        (SensorConfig(), shape**0.8 * box**0.2),
+        (SENSOR, FREQUENCY * (shape / FREQUENCY) ** 0.7 * either**0.3 * likelihood**0.5),
+        (SensorConfig(), FREQUENCY * (shape / FREQUENCY) ** 0.8 * either**0.2),
     ):
         network = PointNet(model, sensor)
         probability = network.classify(points, proposals, which)

@@ -73,8 +73,9 @@ def model_metadata(folder: Path) -> Feed:
     """The classifiers of boxes and of reflectance, and the class frequency, a line each."""
     path = folder / "net.onnx"
     load = _loading(path)
-    box = {"share": 0.5, "layers": [[[[0.1] * 4] * 7, [0.2] * 4]]}
-    reflectance = {"sensor": "hdl-64e", "share": 0.5, "weight": 0.3, "layers": [[[[0.1] * 4] * 12, [0.2] * 4]]}
+    weights = {"network": 0.8, "box": 0.5, "reflectance": 0.3}
+    box = {"weights": weights, "layers": [[[[0.1] * 4] * 7, [0.2] * 4]]}
+    reflectance = {"sensor": "hdl-64e", "weights": weights, "layers": [[[[0.1] * 4] * 12, [0.2] * 4]]}
     entries = {"box_prior": box, "reflectance": reflectance, "class_frequency": [0.7, 0.1, 0.1, 0.1]}
 
     def call(raw: bytes) -> None:

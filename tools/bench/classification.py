@@ -28,7 +28,7 @@ from modt.segmentation.segmenter import Segmenter
 from modt.sources.recognise import open_stream
 from modt.types import Float32, Float64, Proposals
 from tools.options import parser
-from tools.train.export_pointnet import graph
+from tools.train.export_pointnet import N_SHARED, graph
 from tools.train.weights import Layer
 
 TEXTBOOK_POINTS = 400
@@ -37,8 +37,11 @@ TEXTBOOK_BATCHES = (1, 8, 64)
 
 def layers_of(model: Path) -> list[Layer]:
     """Layers of an exported model."""
-    table = {t.name: numpy_helper.to_array(t) for t in onnx.load(model).graph.initializer}
-    return [(table[f"weight{i}"], table[f"bias{i}"]) for i in range(sum(k.startswith("weight") for k in table))]
+    network = onnx.load(model).graph
+    table = {t.name: numpy_helper.to_array(t) for t in network.initializer}
+    layers = [(table[f"weight{i}"], table[f"bias{i}"]) for i in range(sum(k.startswith("weight") for k in table))]
+    shared = N_SHARED if network.node[0].op_type == "Transpose" else 0  # layers of points in columns
+    return [(weight.T.copy(), bias.ravel()) for weight, bias in layers[:shared]] + layers[shared:]
 
 
 def textbook(net: PointNet, points: Float32, proposals: Proposals, batch: int, sensor: SensorConfig) -> Float64:

@@ -22,14 +22,22 @@ BATCH_SIZE = 128
 """Labelled crops of a step."""
 
 
-def sampling_pools(data: Dataset, rows: Int) -> list[tuple[Int, Float64]]:
-    """Rows of each class and the probability of each row; equal within a class, variant and height."""
+def sampling_pools(data: Dataset, rows: Int, worth: Float64 | None = None) -> list[tuple[Int, Float64]]:
+    """Rows of each class and the probability of each row: equal within a class, variant and height.
+
+    Args:
+        data: all crops.
+        rows: to draw from.
+        worth: (len(data),) relative probability within these groups, equal by default.
+    """
+    worth = np.ones(len(data)) if worth is None else worth
     pools = []
     for c in range(N_CLASSES):
         own = rows[data.label[rows] == c]
         group = 2 * data.variant[own] + data.tall[own]
         share = np.outer(VARIANT_SHARE[c], [1 - TALL_SHARE, TALL_SHARE]).ravel()
-        weight = (share / np.bincount(group, minlength=len(share)).clip(1))[group]
+        total = np.bincount(group, worth[own], minlength=len(share))
+        weight = worth[own] * (share / np.where(total > 0, total, 1.0))[group]
         pools.append((own, weight / weight.sum()))
     return pools
 

@@ -45,6 +45,8 @@ from tools.train.paste import cut_objects, paste_objects
 CELL_SCALES = (0.75, 1.4)
 """Cell sizes relative to the profile's, for training alone."""
 MAX_POINTS = 1200
+UNLABELLED_SHARE, FOREIGN_SHARE = 0.2, 0.2
+"""Of a proposal's points: more without a label make it unknown, more of an object that is not its own partial."""
 MIN_BOX_POINTS, MIN_DETECTABLE_POINTS = 5, 10
 """Minimum points of an object for training, and for the ground truth of the validation."""
 TALL_M = 1.85
@@ -79,7 +81,7 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
     kind = np.full(len(proposals), ObjectClass.BACKGROUND, np.int64)
     outside = np.bincount(number[scan.unlabelled & (number >= 0)], minlength=len(proposals))
     partial, tall = np.zeros(len(proposals), np.bool_), np.zeros(len(proposals), np.bool_)
-    unknown = outside > 0.5 * size
+    unknown = outside > UNLABELLED_SHARE * size
     held, whole_of = np.zeros((len(proposals), N_CLASSES)), np.full(len(scan.objects), NONE)
     valid = points_in_view(scan) >= MIN_DETECTABLE_POINTS
     for k, (members, object_class, box) in enumerate(zip(scan.objects, scan.kinds, scan.boxes, strict=True)):
@@ -91,7 +93,7 @@ def label(scan: Scan, proposals: Proposals) -> Labels:
         whole = (shared > 0.5 * size) & (shared > 0.5 * len(own))
         kind[whole] = object_class
         tall[whole] = object_class == ObjectClass.CAR and box[5] > TALL_M
-        partial |= (shared > 0.2 * size) & ~whole
+        partial |= (shared > FOREIGN_SHARE * size) & ~whole
         partial[whole] = False
         unknown[whole] = not valid[k]
         whole_of[k] = np.flatnonzero(whole)[0] if whole.any() else NONE

@@ -3,7 +3,7 @@
     python -m tools.train.train_box_classifier OUT_DIR CROPS.npz... [--steps N] [--folds K] [--seed S]
 
 OUT_DIR holds the output of train_pointnet for the same crops and folds. Writes OUT_DIR/boxes.npz for export_pointnet
-and OUT_DIR/boxes.json: the share of the box in the pool with the network, out-of-fold scores by sensor of the box
+and OUT_DIR/boxes.json: the weights of the pool with the network, out-of-fold scores by sensor of the box
 alone and of the pool and, for several thresholds, the share of each class below the threshold. Crops are augmented as
 for the PointNet, and the boxes fitted to the augmented crops.
 """
@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.random import Generator
-from scipy.optimize import minimize_scalar
-from scipy.special import log_softmax
 
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.classification.mlp import Layers, logits
@@ -29,6 +27,7 @@ from tools.train.box_features import crop_features, dataset_features
 from tools.train.dataset import Dataset, load
 from tools.train.held_out import Model, load_network, out_of_fold
 from tools.train.mlp_training import Batch, train_mlp
+from tools.train.pool_fit import fit_pool
 from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration
 from tools.train.weights import save_layers
@@ -80,24 +79,14 @@ def cross_validate(
         return lambda rows: logits(layers, dataset_features(data, rows))
 
     held = out_of_fold(data, k, model)
-    valid, box, shape = held.validation, np.log(held.probability), np.log(network)
-    share = fit_share(shape, box, valid.label, valid.weight)
+    valid, box = held.validation, held.probability
+    pool = fit_pool(network, box, np.zeros_like(box), valid, valid.weight)
     return held.calibration, {
-        "share": share,
-        "cross_validation": by_sensor(box, valid, valid.clear),
-        "pool": by_sensor((1.0 - share) * shape + share * box, valid, valid.clear),
+        "weights": pool.weights.as_dict(),
+        "cross_validation": by_sensor(np.log(box), valid, valid.clear),
+        "pool": by_sensor(pool.log_posterior, valid, valid.clear),
         "ruled_out": ruled_out(held.probability[valid.clear], valid.label[valid.clear]),
     }
-
-
-def fit_share(network: Float64, box: Float64, label: Int, weight: Float64) -> float:
-    """Share of the box, 0 to 1, that minimises the log loss of the pool of two log probabilities (R, 4)."""
-
-    def loss(share: float) -> float:
-        pool = log_softmax((1.0 - share) * network + share * box, axis=1)
-        return -float(weight @ pool[np.arange(len(label)), label])
-
-    return round(float(minimize_scalar(loss, bounds=(0.0, 1.0), method="bounded").x), 2)
 
 
 def ruled_out(probability: Float64, label: Int) -> list[dict[str, Any]]:

@@ -4,8 +4,8 @@
                                     [--steps N] [--folds K] [--seed S]
 
 OUT_DIR holds the output of train_pointnet and train_box_classifier for the same crops and folds. Writes
-OUT_DIR/reflectance.npz for export_pointnet and OUT_DIR/reflectance.json: the weights of box and reflectance in the
-pool with the network, and out-of-fold scores by sensor of box with reflectance and of all three.
+OUT_DIR/reflectance.npz for export_pointnet and OUT_DIR/reflectance.json: the weights of the pool of all
+three, and out-of-fold scores by sensor of box with reflectance and of all three.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from scipy.optimize import minimize
-from scipy.special import log_softmax, softmax
+from scipy.special import softmax
 
 from modt.classification.mlp import Layers, logits
 from modt.types import Bool, Float64, Int
@@ -27,6 +26,7 @@ from tools.train.box_features import dataset_features
 from tools.train.dataset import Dataset, load
 from tools.train.held_out import Model, Validation, load_network, out_of_fold
 from tools.train.mlp_training import Batch, train_mlp
+from tools.train.pool_fit import fit_pool
 from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration, fit_calibration
 from tools.train.weights import load_layers, save_layers
@@ -106,37 +106,17 @@ def cross_validate(
     valid = held.validation
     known = has_reflectance(data, valid.rows)
     weight = valid.weight_of(known)
-    box, shape = np.log(by_box.probability), np.log(network)
+    box = np.log(by_box.probability)
     calibration = fit_calibration(held.logits, valid.label, weight, box)
     evidence = (held.logits / calibration.temperature + calibration.offset) * known[:, None]
-    share, power = fit_pool(shape, box, evidence, valid.label, weight)
+    pool = fit_pool(network, by_box.probability, evidence, valid, weight)
     clear = valid.clear & known
     return calibration, {
-        "share": share,
-        "weight": power,
+        "weights": pool.weights.as_dict(),
         "cross_validation": by_sensor(box + evidence, valid, known),
-        "pool": by_sensor((1.0 - share) * shape + share * box + power * evidence, valid, known),
+        "pool": by_sensor(pool.log_posterior, valid, known),
         "ruled_out": train_box_classifier.ruled_out(softmax((box + evidence)[clear], axis=1), valid.label[clear]),
     }
-
-
-def fit_pool(network: Float64, box: Float64, evidence: Float64, label: Int, weight: Float64) -> tuple[float, float]:
-    """Share of the box and power of the evidence, both in 0 to 1, that minimise the log loss of the pool.
-
-    Args:
-        network: (R, 4) log probabilities.
-        box: (R, 4) log probabilities.
-        evidence: (R, 4) log-likelihoods.
-        label: (R,) classes.
-        weight: (R,) of each, 1 in total.
-    """
-
-    def loss(x: Float64) -> float:
-        pool = log_softmax((1.0 - x[0]) * network + x[0] * box + x[1] * evidence, axis=1)
-        return -float(weight @ pool[np.arange(len(label)), label])
-
-    share, power = minimize(loss, x0=(0.5, 0.5), bounds=((0.0, 1.0),) * 2).x.tolist()
-    return round(share, 2), round(power, 2)
 
 
 def main() -> None:

@@ -13,7 +13,8 @@ import numpy as np
 
 from modt.classes import N_CLASSES
 from modt.classification.crops import ground_z_m
-from modt.classification.mlp import Layers, fraction, from_lists, logits, to_lists
+from modt.classification.mlp import Layers, from_lists, logits, to_lists
+from modt.classification.pool import PoolWeights
 from modt.config import SensorConfig
 from modt.types import Float64, Int, Proposals
 
@@ -28,7 +29,7 @@ _LENGTH_OFFSET_M = 0.05  # keeps the logarithm of a length finite
 class NoBoxClassifier:
     """No information from boxes."""
 
-    pool_weight = 0.0
+    weights = PoolWeights()
 
     def log_probability(self, features: Float64) -> Float64:
         """(R, 4) zeros."""
@@ -40,7 +41,7 @@ class MlpBoxClassifier:
     """Multilayer perceptron of 1,444 weights."""
 
     layers: Layers
-    pool_weight: float  # exponent of P(class | box) in the pool with the network, without reflectance (0 to 1)
+    weights: PoolWeights  # in the pool with the network, without reflectance
 
     def log_probability(self, features: Float64) -> Float64:
         """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features`."""
@@ -90,9 +91,9 @@ def proposal_features(proposals: Proposals, sensor: SensorConfig) -> Float64:
     return box_features(proposals.count, proposals.box, ground_z_m(proposals, slice(None), sensor), beam_sr)
 
 
-def to_metadata(layers: Layers, pool_weight: float) -> str:
+def to_metadata(layers: Layers, weights: PoolWeights) -> str:
     """Metadata entry of a box classifier."""
-    return json.dumps({"share": pool_weight, "layers": to_lists(layers)})
+    return json.dumps({"weights": weights.as_dict(), "layers": to_lists(layers)})
 
 
 def from_metadata(metadata: Mapping[str, str]) -> BoxClassifier:
@@ -105,4 +106,4 @@ def from_metadata(metadata: Mapping[str, str]) -> BoxClassifier:
     if text is None:
         return NoBoxClassifier()
     content = json.loads(text)
-    return MlpBoxClassifier(from_lists(content["layers"], N_FEATURES), fraction(content, "share"))
+    return MlpBoxClassifier(from_lists(content["layers"], N_FEATURES), PoolWeights.from_dict(content["weights"]))

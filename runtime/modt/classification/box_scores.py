@@ -6,6 +6,7 @@ import numpy as np
 
 from modt.classes import N_CLASSES
 from modt.classification.box_classifier import BoxClassifier, proposal_features
+from modt.classification.pool import PoolWeights
 from modt.classification.reflectance_classifier import ReflectanceClassifier
 from modt.config import SensorConfig
 from modt.types import Float64, Proposals
@@ -29,15 +30,9 @@ class BoxScores:
         self._scores = np.zeros((2, 0, N_CLASSES))
 
     @property
-    def pool_weight(self) -> float:
-        """Exponent of P(class | box) in the classifier's log-linear pool."""
-        with_reflectance = self.reflectance.pool_weight
-        return self.boxes.pool_weight if with_reflectance is None else with_reflectance
-
-    @property
-    def reflectance_weight(self) -> float:
-        """Exponent of P(reflectance | class, box) in that pool."""
-        return self.reflectance.weight
+    def weights(self) -> PoolWeights:
+        """In the pool with the network."""
+        return self.reflectance.weights or self.boxes.weights
 
     def of(self, proposals: Proposals) -> Float64:
         """(2, P, 4) log P(class | box) and log P(reflectance | class, box) of each proposal, up to constants."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.classification.pool import pooled_prior
 from modt.classification.posterior import MIN_PROBABILITY, from_log_weights, normalise, update_from_boxes
 from modt.classification.prior import FrequencyPrior, Prior, with_background
 from modt.config import FusionConfig
@@ -160,11 +161,9 @@ class KeyViews:
         return certain
 
     def _log_pooled_prior(self, box_prior: Float64) -> Float64:
-        """(R, 4) logarithm of the prior that a likelihood contains: pool of class frequency and box prior (R, 4)."""
-        weight = self.prior.pool_weight
-        box = np.log(np.maximum(box_prior, MIN_PROBABILITY))
-        pooled: Float64 = (1.0 - weight) * self._log_frequency + weight * box
-        return pooled
+        """(R, 4) logarithm of the prior that a likelihood contains: class frequency and box prior (R, 4)."""
+        log_box = np.log(np.maximum(box_prior, MIN_PROBABILITY))
+        return pooled_prior(log_box, self._log_frequency, self.prior.pool_weight)
 
 
 def _has_more_points(tracks: Tracks, proposals: Proposals, rows: Int, config: FusionConfig) -> Bool:

@@ -20,6 +20,8 @@ from modt.classification import box_classifier, reflectance_classifier
 from modt.classification.box_scores import BoxScores
 from modt.classification.crops import canonical, gather, ground_z_m
 from modt.classification.model_file import REMEDY, read_model
+from modt.classification.pool import PoolWeights, log_pool
+from modt.classification.prior import with_background
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Int, Proposals
@@ -38,7 +40,6 @@ MEMORY_BYTES = 1 << 30
 """For the numbers and the results of a model: no file can take more."""
 CLASS_FREQUENCY_KEY = "class_frequency"
 """Key of the class frequency in the metadata of a model: (4,), background first."""
-_MIN_PROBABILITY = 1e-12  # keeps logarithms finite
 
 
 class PointNet:
@@ -75,6 +76,8 @@ class PointNet:
             boxes = box_classifier.from_metadata(pooled)
             self.box_scores = BoxScores(boxes, reflectance_classifier.from_metadata(pooled, sensor), sensor)
             self.class_frequency = _class_frequency(metadata)
+            objects = self.class_frequency or (1 / N_CLASSES,) * (N_CLASSES - 1)
+            self._log_frequency = np.log(with_background(objects))
         except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
             raise MisuseError(self.path, cause, "export the model again") from None
@@ -98,14 +101,12 @@ class PointNet:
         return self._pooled(out, proposals, which)
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(class | points)^(1 - w) P(class | box)^w P(reflectance | class, box)^v, normalised."""
-        box_weight, weight = self.box_scores.pool_weight, self.box_scores.reflectance_weight
-        if not box_weight and not weight:
+        """(R, 4) P(class | points, box, reflectance)."""
+        weights = self.box_scores.weights
+        if weights == PoolWeights():
             return network
         boxes, reflectance = self.box_scores.of(proposals).take(which, axis=1)
-        score = (1.0 - box_weight) * np.log(np.maximum(network, _MIN_PROBABILITY))
-        score += box_weight * boxes + weight * reflectance
-        probability: Float64 = softmax(score, axis=1)
+        probability: Float64 = softmax(log_pool(network, boxes, reflectance, self._log_frequency, weights), axis=1)
         return probability
 
     def facts(self) -> dict[str, str]:
@@ -121,7 +122,7 @@ class PointNet:
         try:
             shape = self.infer(np.zeros((batch, points, 3), np.float32)).shape
         except _MODEL_ERRORS as error:
-            cause = f"cannot run {batch} proposals of {points} points ({str(error).splitlines()[0]})"
+            cause = f"cannot run {batch} proposals of {points} points ({_first_line(error)})"
             raise MisuseError(self.path, cause, f"use a smaller model; it has {MEMORY_BYTES >> 20} MiB") from None
         if shape != (batch, N_CLASSES):
             raise MisuseError(self.path, f"an output of shape {shape}", REMEDY)
@@ -131,6 +132,11 @@ class PointNet:
         (output,) = self._session.run(None, {self._input: batch})
         probability: Float32 = output
         return probability
+
+
+def _first_line(error: Exception) -> str:
+    """Of its message, or its kind where it has none."""
+    return next(iter(str(error).splitlines()), type(error).__name__)
 
 
 @cache
@@ -162,7 +168,7 @@ def _session(path: Path, raw: bytes) -> ort.InferenceSession:
         ends = [(end.name, tuple(end.shape)) for end in (*session.get_inputs(), *session.get_outputs())]
         session.get_modelmeta()
     except _MODEL_ERRORS as error:
-        cause = f"not an ONNX model ({str(error).splitlines()[0]})"
+        cause = f"not an ONNX model ({_first_line(error)})"
         raise MisuseError(path, cause, REMEDY) from None
     shapes = [shape for _, shape in ends]
     if len(shapes) != 2 or not _fits(shapes[0], (None, None, 3)) or not _fits(shapes[1], (None, N_CLASSES)):
@@ -176,7 +182,7 @@ def _class_frequency(metadata: Mapping[str, str]) -> tuple[float, ...] | None:
     if text is None:
         return None
     frequency = tuple(float(share) for share in json.loads(text))
-    if len(frequency) != N_CLASSES or min(frequency) <= 0:
+    if len(frequency) != N_CLASSES or min(frequency) <= 0 or not sum(frequency[1:]) < 1:  # nor NaN
         raise ValueError(f"class frequency {text}")
     return frequency[1:]
 

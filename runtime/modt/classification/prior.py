@@ -19,7 +19,7 @@ class Prior(Protocol):
 
     @property
     def pool_weight(self) -> float:
-        """Exponent of the prior in the classifier's log-linear pool (0 to 1)."""
+        """Exponent of what the prior says of an object, in the classifier's pool (0 to 1)."""
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) of each proposal of a frame."""
@@ -53,7 +53,7 @@ class BoxPrior:
     """P(class | box, reflectance)."""
 
     def __init__(self, scores: BoxScores) -> None:
-        self.pool_weight = scores.pool_weight
+        self.pool_weight = scores.weights.box
         self._scores = scores
 
     def probability(self, proposals: Proposals) -> Float64:

@@ -15,7 +15,8 @@ import numpy as np
 
 from modt.classes import N_CLASSES
 from modt.classification.box_classifier import N_FEATURES
-from modt.classification.mlp import Layers, fraction, from_lists, logits, to_lists
+from modt.classification.mlp import Layers, from_lists, logits, to_lists
+from modt.classification.pool import PoolWeights
 from modt.config import SensorConfig
 from modt.types import N_REFLECTANCE, Float64
 
@@ -28,8 +29,7 @@ METADATA_KEY = "reflectance"
 class NoReflectanceClassifier:
     """No information from reflectance."""
 
-    pool_weight = None
-    weight = 0.0
+    weights = None
 
     def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
         """(R, 4) zeros."""
@@ -41,12 +41,11 @@ class MlpReflectanceClassifier:
 
     Args:
         layers: of the network.
-        pool_weight: exponent of P(class | box) in the log-linear pool with reflectance (0 to 1).
-        weight: exponent of the likelihood in that pool: the part of it that the shape does not imply (0 to 1).
+        weights: in the pool of network, box and reflectance.
     """
 
-    def __init__(self, layers: Layers, pool_weight: float, weight: float) -> None:
-        self._layers, self.pool_weight, self.weight = layers, pool_weight, weight
+    def __init__(self, layers: Layers, weights: PoolWeights) -> None:
+        self._layers, self.weights = layers, weights
         self._warned = False
 
     def log_likelihood(self, box_features: Float64, reflectance: Float64 | None) -> Float64:
@@ -70,9 +69,9 @@ class MlpReflectanceClassifier:
 ReflectanceClassifier = NoReflectanceClassifier | MlpReflectanceClassifier
 
 
-def to_metadata(layers: Layers, pool_weight: float, weight: float, sensor: str) -> str:
+def to_metadata(layers: Layers, weights: PoolWeights, sensor: str) -> str:
     """Metadata entry of a reflectance classifier."""
-    return json.dumps({"sensor": sensor, "share": pool_weight, "weight": weight, "layers": to_lists(layers)})
+    return json.dumps({"sensor": sensor, "weights": weights.as_dict(), "layers": to_lists(layers)})
 
 
 def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> ReflectanceClassifier:
@@ -88,4 +87,4 @@ def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> Reflecta
     if content["sensor"] != sensor.reflectance:
         return NoReflectanceClassifier()
     layers = from_lists(content["layers"], N_FEATURES + N_REFLECTANCE)
-    return MlpReflectanceClassifier(layers, fraction(content, "share"), fraction(content, "weight"))
+    return MlpReflectanceClassifier(layers, PoolWeights.from_dict(content["weights"]))

@@ -18,7 +18,7 @@ class ClassificationConfig(StageConfig):
     )
     max_points: int = number(128, 8, 4096, "", "points of a proposal handed to the network")
     min_points: int = number(1, 1, 4096, "", "to which they are repeated, which costs more and changes no class")
-    batch: int = number(8, 1, 256, "", "proposals of one network call at most")
+    batch: int = number(4, 1, 256, "", "proposals of one network call at most")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

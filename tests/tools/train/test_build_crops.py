@@ -32,7 +32,7 @@ def test_unlabelled_proposals_are_unknown() -> None:
     points = np.zeros((40, 4), np.float32)
     box, none = np.zeros((4, 7)), np.zeros(4, np.bool_)
     proposals = Proposals(np.arange(40), np.array([0, 10, 20, 30, 40]), points[:, :3].T, np.zeros((4, 3)), box, none)
-    unlabelled = np.arange(40) >= 10
+    unlabelled = np.isin(np.arange(40), [0, 1, 10, 11, 12]) | (np.arange(40) >= 20)  # 2, 3 and 10 of ten points
     assert label(scan_of(points, [], [], unlabelled), proposals).unknown.tolist() == [False, True, True, True]
 
 

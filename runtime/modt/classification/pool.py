@@ -1,0 +1,89 @@
+"""The pool of network, box and reflectance: the box says whether there is an object, not which."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from modt.classification.mlp import fraction
+from modt.types import Float64
+
+_MIN_PROBABILITY = 1e-12  # keeps logarithms finite
+
+
+@dataclass(frozen=True, slots=True)
+class PoolWeights:
+    """Exponents of the likelihoods that multiply the class frequency to a posterior.
+
+    Attributes:
+        network: of P(points | class).
+        box: of P(box | object) / P(box | background).
+        reflectance: of P(reflectance | class, box).
+    """
+
+    network: float = 1.0
+    box: float = 0.0
+    reflectance: float = 0.0
+
+    def as_dict(self) -> dict[str, float]:
+        """Entries of a model's metadata."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> PoolWeights:
+        """Read from a model's metadata.
+
+        Raises:
+            KeyError, TypeError, ValueError: missing, not a number, or out of range.
+        """
+        return cls(*(fraction(content, name) for name in ("network", "box", "reflectance")))
+
+
+def object_log_odds(log_box: Float64, log_frequency: Float64) -> Float64:
+    """(R,) log of P(box | object) / P(box | background), of log P(class | box) (R, 4) and log class frequency (4,).
+
+    Both up to a constant a row.
+    """
+    return _log_odds(log_box) - _log_odds(log_frequency[None])
+
+
+def _log_odds(log_probability: Float64) -> Float64:
+    """(R,) of any object against background, of (R, 4)."""
+    log_odds: Float64 = np.log(np.exp(log_probability[:, 1:] - log_probability[:, :1]).sum(axis=1))
+    return log_odds
+
+
+def pooled_prior(log_box: Float64, log_frequency: Float64, weight: float) -> Float64:
+    """(R, 4) logarithm of the class frequency and of what log P(class | box) (R, 4) says, up to a constant.
+
+    Args:
+        log_box: (R, 4) log P(class | box), up to a constant a row.
+        log_frequency: (4,) of the classes.
+        weight: exponent of the box.
+    """
+    out = np.repeat(log_frequency[None], len(log_box), axis=0)
+    if weight:
+        out[:, 1:] += weight * object_log_odds(log_box, log_frequency)[:, None]
+    return out
+
+
+def log_pool(
+    network: Float64, log_box: Float64, reflectance: Float64, log_frequency: Float64, weights: PoolWeights
+) -> Float64:
+    """(R, 4) logarithm of the pool, up to a constant.
+
+    Args:
+        network: (R, 4) P(class | points).
+        log_box: (R, 4) log P(class | box), up to a constant a row.
+        reflectance: (R, 4) log P(reflectance | class, box), up to a constant a row.
+        log_frequency: (4,) of the classes, which network and box assume.
+        weights: of the three.
+    """
+    score = pooled_prior(log_box, log_frequency, weights.box)
+    score += weights.network * (np.log(np.maximum(network, _MIN_PROBABILITY)) - log_frequency)
+    if weights.reflectance:
+        score += weights.reflectance * reflectance
+    return score
