@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import pytest
+import scipy.special
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.classification.mlp import from_lists, logits, to_lists
+from modt.classification.mlp import from_lists, logits, softmax, to_lists
 from modt.types import Float64
 
 RNG = np.random.default_rng(5)
@@ -28,11 +30,22 @@ def test_logits_agree_with_the_reference(feature: Float64) -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-def test_layers_round_trip_through_json() -> None:
+@given(arrays(np.float64, (6, FEATURES), elements=st.floats(-5, 5)))
+def test_single_precision_is_close_to_double(feature: Float64) -> None:
+    single = [(weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in LAYERS]
+    np.testing.assert_allclose(logits(single, feature), logits(LAYERS, feature), rtol=0, atol=2e-5)
+
+
+def test_layers_round_trip_through_json_in_single_precision() -> None:
     loaded = from_lists(json.loads(json.dumps(to_lists(LAYERS))), FEATURES)
-    for (weight, bias), (loaded_weight, loaded_bias) in zip(LAYERS, loaded, strict=True):
-        np.testing.assert_array_equal(weight, loaded_weight)
-        np.testing.assert_array_equal(bias, loaded_bias)
+    for own, found in zip(chain(*LAYERS), chain(*loaded), strict=True):
+        np.testing.assert_array_equal(own.astype(np.float32), found, strict=True)
+    assert to_lists(loaded) == to_lists(from_lists(to_lists(loaded), FEATURES))
+
+
+@given(arrays(np.float64, (3, 4), elements=st.floats(-1e3, 1e3)))
+def test_softmax_agrees_with_scipy(log_weight: Float64) -> None:
+    np.testing.assert_allclose(softmax(log_weight), scipy.special.softmax(log_weight, axis=1), atol=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -41,6 +54,7 @@ def test_layers_round_trip_through_json() -> None:
         [],
         [[[[1]], [1]]],
         [[[[float("nan"), 0, 0, 0]], [0, 0, 0, 0]]],
+        [[[[1e300] * 4] * 7, [0.0] * 4]],
         [[[[0.0] * 4] * 6, [0.0] * 4]],
         [[[[0.0] * 3] * 7, [0.0] * 3]],
         {},

@@ -18,6 +18,7 @@ from modt.classification.box_classifier import (
     to_metadata,
 )
 from modt.classification.box_scores import BoxScores
+from modt.classification.mlp import from_lists
 from modt.classification.pointnet import PointNet
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, FrequencyPrior, make_prior
@@ -28,7 +29,8 @@ from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(5)
 WEIGHTS = PoolWeights(network=0.8, box=0.4)
-LAYERS = [(RNG.normal(size=(N_FEATURES, 5)), RNG.normal(size=5)), (RNG.normal(size=(5, 4)), RNG.normal(size=4))]
+SHAPES = ((N_FEATURES, 5), (5, 4))
+LAYERS = from_lists([[RNG.normal(size=shape), RNG.normal(size=shape[1])] for shape in SHAPES], N_FEATURES)
 BOXES = MlpBoxClassifier(LAYERS, WEIGHTS)
 NO_REFLECTANCE = NoReflectanceClassifier()
 SCORES = BoxScores(BOXES, NO_REFLECTANCE, SensorConfig())

@@ -14,7 +14,7 @@ from modt.classes import ObjectClass
 from modt.classification import box_classifier
 from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, proposal_features
 from modt.classification.box_scores import BoxScores
-from modt.classification.mlp import logits
+from modt.classification.mlp import from_lists, logits
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, make_prior
@@ -31,9 +31,10 @@ from modt.types import N_REFLECTANCE, Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)
-BOX_LAYERS = [(RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4))]
+BOX_LAYERS = from_lists([[RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4)]], N_FEATURES)
 BOXES = MlpBoxClassifier(BOX_LAYERS, PoolWeights())
-LAYERS = [(RNG.normal(size=(N_FEATURES + N_REFLECTANCE, 4)), RNG.normal(size=4))]
+N_BOTH = N_FEATURES + N_REFLECTANCE
+LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH)
 REFLECTANCE = RNG.uniform(0, 1, (3, N_REFLECTANCE))
 FREQUENCY = np.array([0.8, 0.12, 0.05, 0.03])
 SENSOR = SensorConfig(reflectance="hdl-64e")

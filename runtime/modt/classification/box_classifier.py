@@ -69,20 +69,16 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
         ground_z_m: (P,) of the ground beneath each, sensor frame.
         beam_sr: (P,) or () solid angle of a point [sr].
     """
-    distance = np.maximum(np.hypot(box[:, 0], box[:, 1]), 1.0)
-    foot = box[:, 2] - box[:, 5] / 2 - ground_z_m
-    return np.stack(
-        [
-            np.log(np.clip(count, 1, _MAX_COUNT) * distance**2 * beam_sr),
-            np.log(distance),
-            np.log(box[:, 3] + _LENGTH_OFFSET_M),
-            np.log(box[:, 4] + _LENGTH_OFFSET_M),
-            box[:, 5],
-            foot,
-            foot + box[:, 5],
-        ],
-        axis=1,
-    )
+    x, y, z, length, width, height, _ = box.T
+    features = np.empty((N_FEATURES, len(box)))
+    area, distance, *_, foot, top = features
+    np.maximum(np.hypot(x, y), 1.0, out=distance)
+    np.multiply(np.minimum(np.maximum(count, 1), _MAX_COUNT), distance**2 * beam_sr, out=area)
+    features[2:5] = length + _LENGTH_OFFSET_M, width + _LENGTH_OFFSET_M, height
+    np.log(features[:4], out=features[:4])
+    foot[:] = z - height / 2 - ground_z_m
+    np.add(foot, height, out=top)
+    return features.T
 
 
 def proposal_features(proposals: Proposals, sensor: SensorConfig) -> Float64:

@@ -7,21 +7,23 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.classes import N_CLASSES
 from modt.types import Float64
 
-Layers = Sequence[tuple[Float64, Float64]]
+Weights = NDArray[np.floating[Any]]
+Layers = Sequence[tuple[Weights, Weights]]
 """(in, out) weight and (out,) bias of each layer."""
 
 
 def logits(layers: Layers, features: Float64) -> Float64:
-    """(R, 4) of (R, F) features."""
+    """(R, 4) of (R, F) features, worked out in the precision of the layers."""
     *hidden, (weight, bias) = layers
-    value = features
+    value: Weights = features.astype(weight.dtype)
     for hidden_weight, hidden_bias in hidden:
         value = np.tanh(value @ hidden_weight + hidden_bias)
-    output: Float64 = value @ weight + bias
+    output: Float64 = (value @ weight + bias).astype(np.float64)
     return output
 
 
@@ -31,18 +33,26 @@ def to_lists(layers: Layers) -> list[list[Any]]:
 
 
 def from_lists(lists: Any, n_features: int) -> Layers:
-    """Layers from JSON.
+    """Layers from JSON, in single precision: half the time of double.
 
     Raises:
         TypeError, ValueError: not layers, not finite, or not from n_features inputs to the classes.
     """
-    layers = [(np.array(weight, np.float64), np.array(bias, np.float64)) for weight, bias in lists]
+    with np.errstate(over="ignore"):
+        layers = [(np.array(weight, np.float32), np.array(bias, np.float32)) for weight, bias in lists]
     if not all(np.isfinite(weight).all() and np.isfinite(bias).all() for weight, bias in layers):
         raise ValueError("weights that are not finite")
     widths = [n_features, *(len(bias) for _, bias in layers)]
     if widths[-1] != N_CLASSES or [weight.shape for weight, _ in layers] != [*pairwise(widths)]:
         raise ValueError(f"layers of {' x '.join(map(str, widths))}, wanted {n_features} to {N_CLASSES}")
     return layers
+
+
+def softmax(log_weight: Float64) -> Float64:
+    """(R, 4) of each row; SciPy's takes five times as long for a frame's proposals."""
+    weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf))
+    probability: Float64 = weight / weight.sum(axis=1, keepdims=True)
+    return probability
 
 
 def fraction(content: Mapping[str, Any], key: str) -> float:
