@@ -62,7 +62,7 @@ def build(folder: Path, crops: list[Path], out: Path, options: list[str], data: 
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("work", type=Path, help="folder for crops and trained weights")
-    options.add_argument("--steps", type=int, default=4800, help="of each network (default: %(default)s)")
+    options.add_argument("--steps", type=int, default=24000, help="of each network (default: %(default)s)")
     add_sources(options)
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)

@@ -118,7 +118,7 @@ def cross_validate(data: Dataset, box: Float64, k: int, steps: int, seed: int) -
 
 def main() -> None:
     parser = training_parser(__doc__)
-    parser.add_argument("--steps", type=int, default=4800, help="of each network (default: %(default)s)")
+    parser.add_argument("--steps", type=int, default=24000, help="of each network (default: %(default)s)")
     args = parser.parse_args()
     make_torch_deterministic()
     data = load(*args.crops)

@@ -85,7 +85,7 @@ def street(config: ProfileConfig, _folder: Path) -> str:
 
 
 def long_street(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(4, 4.0), config)
+    return replay(frames(6, 4.0), config)
 
 
 def unknown_height(config: ProfileConfig, _folder: Path) -> str:
