@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.special
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.classification.mlp import from_lists, logits, softmax, to_lists
+from modt.classification.mlp import from_lists, logits, to_lists
 from modt.types import Float64
 
 RNG = np.random.default_rng(5)
@@ -41,11 +40,6 @@ def test_layers_round_trip_through_json_in_single_precision() -> None:
     for own, found in zip(chain(*LAYERS), chain(*loaded), strict=True):
         np.testing.assert_array_equal(own.astype(np.float32), found, strict=True)
     assert to_lists(loaded) == to_lists(from_lists(to_lists(loaded), FEATURES))
-
-
-@given(arrays(np.float64, (3, 4), elements=st.floats(-1e3, 1e3)))
-def test_softmax_agrees_with_scipy(log_weight: Float64) -> None:
-    np.testing.assert_allclose(softmax(log_weight), scipy.special.softmax(log_weight, axis=1), atol=1e-15)
 
 
 @pytest.mark.parametrize(

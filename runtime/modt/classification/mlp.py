@@ -48,13 +48,6 @@ def from_lists(lists: Any, n_features: int) -> Layers:
     return layers
 
 
-def softmax(log_weight: Float64) -> Float64:
-    """(R, 4) of each row; SciPy's takes five times as long for a frame's proposals."""
-    weight = np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf))
-    probability: Float64 = weight / weight.sum(axis=1, keepdims=True)
-    return probability
-
-
 def fraction(content: Mapping[str, Any], key: str) -> float:
     """Number from 0 to 1 under a key.
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import onnxruntime as ort
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
+from scipy.special import softmax
 
 from modt import assets
 from modt.classes import N_CLASSES
 from modt.classification import box_classifier, reflectance_classifier
 from modt.classification.box_scores import BoxScores
 from modt.classification.crops import canonical, gather, ground_z_m
-from modt.classification.mlp import softmax
 from modt.classification.model_file import REMEDY, read_model
 from modt.classification.pool import PoolWeights, log_pool
 from modt.classification.prior import with_background
@@ -106,7 +106,8 @@ class PointNet:
         if weights == PoolWeights():
             return network
         boxes, reflectance = self.box_scores.of(proposals).take(which, axis=1)
-        return softmax(log_pool(network, boxes, reflectance, self._log_frequency, weights))
+        probability: Float64 = softmax(log_pool(network, boxes, reflectance, self._log_frequency, weights), axis=1)
+        return probability
 
     def facts(self) -> dict[str, str]:
         """File and hash of the model, for the record of a run."""

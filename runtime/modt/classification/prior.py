@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+from scipy.special import softmax
 
 from modt.classes import ObjectClass
 from modt.classification.box_classifier import NoBoxClassifier
 from modt.classification.box_scores import BoxScores
-from modt.classification.mlp import softmax
 from modt.types import Bool, Float64, Proposals
 
 
@@ -58,7 +58,8 @@ class BoxPrior:
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) of each proposal of a frame."""
-        return softmax(self._scores.of(proposals).sum(axis=0))
+        probability: Float64 = softmax(self._scores.of(proposals).sum(axis=0), axis=1)
+        return probability
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) rows of priors (M, 4) that give the objects together at least this probability."""
