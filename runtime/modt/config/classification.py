@@ -81,7 +81,7 @@ class FusionConfig(StageConfig):
     first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")
     first_view_min_hits: int = number(3, 1, 1000, "frames", "with a proposal, to be classified")
     first_view_final: str = choice("certain", ("certain", "any"), "view that is final; the paper: any")
-    min_object_probability: float = number(0.01, 0.0, 1.0, "", "by the box prior, for the first of several views")
+    min_object_probability: float = number(0.05, 0.0, 1.0, "", "by the box prior, for the first of several views")
     start_frame: int = number(5, 1, 1000, "frames", "age of a track from which views are fused")
     object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")
     background_threshold: float = number(0.4, 0.25, 1.0, "", "posterior under equal frequencies; final background")
@@ -98,5 +98,5 @@ class FusionConfig(StageConfig):
         "points over those of the key view, for another view of a class in doubt or final; none: never",
     )
     review_extra_points: int = number(5, 0, 1000, "", "more points than that ratio, beyond random variation")
-    review_max_points: int = number(400, 0, 10000, "", "of the last key view; with more, no review (drive 0005)")
+    review_max_points: int = number(100, 0, 10000, "", "of the last key view; with more, no review")
     review_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, for a review")
