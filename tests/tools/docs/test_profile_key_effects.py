@@ -61,14 +61,14 @@ def frames(seed: int, seconds: float) -> tuple[Frame, ...]:
 
 
 def replay(stream: tuple[Frame, ...], config: ProfileConfig, mode: str = "accurate", view: Any = None) -> str:
-    """Digest of the tracks, the proposals and the work of every frame."""
+    """Digest of the tracks, the proposals, the class frequency and the work of every frame."""
     ledger = Ledger(lambda: 0, lambda: 0)
     pipeline = assembly.pipeline(assembly.MODES[mode], config, view or FieldOfView(), ledger)
     digest = hashlib.sha256()
     for frame in stream:
         result = pipeline.step(frame, assembly.MODES[mode].budget(config))
         columns = [column for _, column in result.tracks.columns()]
-        for column in (*columns, result.proposals.members, result.proposals.box):
+        for column in (*columns, result.proposals.members, result.proposals.box, pipeline.decision.frequency):
             digest.update(column.tobytes())
         digest.update(json.dumps(ledger.close_frame(frame.index)["stages"]).encode())
     return digest.hexdigest()
