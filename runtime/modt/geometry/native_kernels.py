@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+from array import array
 
 import numpy as np
 
 from modt.geometry.kdop import reaching_pairs
 from modt.geometry.kdop_pairs import HALF_ROOT, PAD_M, PairWeights, Shapes
-from modt.native.arrays import Signatures, address, at, declare, pointers
+from modt.native.arrays import FLOAT64, INT16, INT64, Signatures, address, at, declare, pointers
 from modt.types import Float32, Float64, Int, Int16
 
 _D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
@@ -54,7 +55,7 @@ class NativeGeometryKernels:
         """(G, 4) greatest and (G, 4) least coordinates along four axes, those of a group `stride` numbers on."""
         n = len(offsets) - 1
         ahead, behind = np.empty((2, n, 4), np.float32)
-        given = *map(at, xyz), at(offsets, np.int64), n, at(axes), stride
+        given = *map(at, xyz), at(offsets, INT64), n, at(axes), stride
         self._library.modt_ends_along(*given, at(ahead), at(behind))
         return ahead, behind
 
@@ -65,10 +66,10 @@ class NativeGeometryKernels:
         n, k = ends.shape[1], opposite.shape[1]
         near, limit = np.empty(k + 4, np.int16), _PAIRS_EACH * (n + k)
         first, second = np.ascontiguousarray(ends), np.ascontiguousarray(opposite)
-        given = at(first, np.int16), n, at(second, np.int16), k, at(near, np.int16)
+        given = at(first, INT16), n, at(second, INT16), k, at(near, INT16)
         while True:
             one, other = np.empty((2, limit), np.int64)
-            pairs = at(one, np.int64), at(other, np.int64)
+            pairs = at(one, INT64), at(other, INT64)
             count = self._library.modt_reaching_pairs(*given, limit, *pairs)
             if count <= limit:
                 return one[:count], other[:count]
@@ -86,9 +87,10 @@ class NativeGeometryKernels:
         """(K,) distance, cost and coverage of pairs of shapes."""
         rows, columns = pairs
         distance, cost, coverage = out = np.empty((3, len(rows)))
+        tracks, proposals, weighted = self._shapes(a), self._shapes(b), array("d", weights)
         self._library.modt_pair_costs(
-            self._shapes(a), self._shapes(b), at(covariance, np.float64), at(variance, np.float64),
-            at(rows, np.int64), at(columns, np.int64), len(rows), (_D * 4)(*weights), HALF_ROOT, PAD_M,
+            address(tracks), address(proposals), at(covariance, FLOAT64), at(variance, FLOAT64),
+            at(rows, INT64), at(columns, INT64), len(rows), address(weighted), HALF_ROOT, PAD_M,
             *map(address, out),
         )  # fmt: skip
         return distance, cost, coverage
@@ -98,13 +100,13 @@ class NativeGeometryKernels:
         sizes = np.array([rows.max(initial=-1), columns.max(initial=-1)]) + 1
         n, most = len(rows), int(sizes.max())
         best, following, state = np.empty((2, most), np.int64), np.empty((2, most)), np.empty(n, np.uint8)
-        index = (_P * 2)(at(rows, np.int64), at(columns, np.int64))
+        index, scratch = array("Q", (at(rows, INT64), at(columns, INT64))), (pointers(best), pointers(following))
         self._library.modt_certain_pairs(
-            index, at(cost, np.float64), n, limit, address(sizes), pointers(best), pointers(following), address(state)
+            address(index), at(cost, FLOAT64), n, limit, address(sizes), *map(address, scratch), address(state)
         )
         return (state == 1).nonzero()[0], (state == 2).nonzero()[0]
 
     @staticmethod
-    def _shapes(shapes: Shapes) -> object:
+    def _shapes(shapes: Shapes) -> array[int]:
         columns = shapes.kdop, shapes.log_width, shapes.bottom, shapes.top, shapes.log_count
-        return (_P * 6)(*(at(column, np.float64) for column in columns), len(shapes))
+        return array("Q", (*(at(column, FLOAT64) for column in columns), len(shapes)))

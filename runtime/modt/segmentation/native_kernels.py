@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+from array import array
 from typing import Any
 
 import numpy as np
 
 from modt.config.segmentation import CarMergeConfig
 from modt.geometry.native_kernels import NativeGeometryKernels
-from modt.native.arrays import Signatures, address, at, declare, pointers
+from modt.native.arrays import BOOL, FLOAT32, FLOAT64, INT32, INT64, Signatures, address, at, declare, pointers
 from modt.segmentation.box_fitting import AXES, HEADINGS
 from modt.segmentation.cells import Cells
 from modt.segmentation.clusters import ClusterBounds, Clusters, Members
@@ -80,7 +81,7 @@ class _GroundBuffers:
         self.rays = np.empty((4, SECTORS), np.float32)
         self._scratch = pointers(*self.cells, self.points)
 
-    def scratch(self, n: int) -> Any:
+    def scratch(self, n: int) -> array[int]:
         """Scratch of ground.c, for n points."""
         if n > self.points.shape[1]:
             self.points = np.empty((3, n), np.float32)
@@ -115,8 +116,8 @@ class NativeKernels(NativeGeometryKernels):
         scratch, out = buffers.scratch(n), pointers(kept)
         k = self._library.modt_above_ground(
             ctypes.addressof(buffers.constants), at(ground.grid.range_m), at(buffers.flat_m), sensor_height_m,
-            at(points), n, width, ctypes.addressof(scratch), at(buffers.rays), at(bounds), at(rows, np.int64),
-            ctypes.addressof(out),
+            at(points), n, width, address(scratch), at(buffers.rays), at(bounds), at(rows, INT64),
+            address(out),
         )  # fmt: skip
         x, y, z, sqrt_range, height = kept[:, :k]
         return rows[:k], PointColumns(x, y, z, sqrt_range), height
@@ -131,8 +132,8 @@ class NativeKernels(NativeGeometryKernels):
         sample, cell = np.empty(k, np.int64), np.empty(k, np.int64)
         given, out, columns = self._columns(points), pointers(places, heights, entries), pointers(sampled)
         n = self._library.modt_occupied_cells(
-            ctypes.addressof(given), at(height), k, 1 / grid.step, grid.centre, grid.side, at(grid.number, np.int32),
-            at(sample, np.int64), ctypes.addressof(columns), at(cell, np.int64), ctypes.addressof(out),
+            address(given), at(height), k, 1 / grid.step, grid.centre, grid.side, at(grid.number, INT32),
+            at(sample, INT64), address(columns), at(cell, INT64), address(out),
         )  # fmt: skip
         (row, column), (low, high) = places[:, k - n :], heights[:, k - n :]
         cells = Cells(row, column, low, high, entries[k - n :])
@@ -142,8 +143,8 @@ class NativeKernels(NativeGeometryKernels):
         """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
         component, own = np.empty(len(cells), np.int64), self._cells(cells)
         self._library.modt_connect(
-            ctypes.addressof(own), at(max_gap_m), at(use, np.bool_), len(cells), grid.side,
-            *self._scratch(grid, len(cells)), at(component, np.int64),
+            address(own), at(max_gap_m), at(use, BOOL), len(cells), grid.side,
+            *self._scratch(grid, len(cells)), at(component, INT64),
         )  # fmt: skip
         return component
 
@@ -151,8 +152,8 @@ class NativeKernels(NativeGeometryKernels):
         """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
         component, own = np.empty(len(cells), np.int64), self._cells(cells)
         self._library.modt_connect_coarse(
-            ctypes.addressof(own), at(max_gap_m), len(cells), grid.side, *self._scratch(grid, len(cells)),
-            at(component, np.int64),
+            address(own), at(max_gap_m), len(cells), grid.side, *self._scratch(grid, len(cells)),
+            at(component, INT64),
         )  # fmt: skip
         return component
 
@@ -168,8 +169,8 @@ class NativeKernels(NativeGeometryKernels):
         bounds, counts = np.empty((6, n), np.float32), np.empty((2, n), np.int64)
         own, out = self._cells(cells), pointers(bounds, counts)
         self._library.modt_cluster_bounds(
-            ctypes.addressof(own), at(points.x), at(points.y), at(cluster, np.int64), len(cells), n,
-            ctypes.addressof(out),
+            address(own), at(points.x), at(points.y), at(cluster, INT64), len(cells), n,
+            address(out),
         )  # fmt: skip
         return ClusterBounds(*bounds, *counts)
 
@@ -178,8 +179,8 @@ class NativeKernels(NativeGeometryKernels):
         bounds, scale_m = np.empty((8, n), np.float32), np.empty(n, np.float32)
         cells, sampled, out = self._cells(clusters.cells), self._columns(clusters.sampled), pointers(bounds)
         self._library.modt_view_bounds(
-            ctypes.addressof(cells), ctypes.addressof(sampled), at(clusters.height), at(clusters.sample, np.int64),
-            at(clusters.of_cell, np.int64), len(clusters.sample), at(number, np.int64), n, ctypes.addressof(out),
+            address(cells), address(sampled), at(clusters.height), at(clusters.sample, INT64),
+            at(clusters.of_cell, INT64), len(clusters.sample), at(number, INT64), n, address(out),
             at(scale_m),
         )  # fmt: skip
         return ViewBounds(bounds[:4], bounds[4:], scale_m)
@@ -193,15 +194,15 @@ class NativeKernels(NativeGeometryKernels):
         parent, united = np.empty(n, np.int32), np.empty((8, n), np.float32)
         given, out = pointers(bounds.min, bounds.max), pointers(united)
         self._library.modt_merge_strips(
-            ctypes.addressof(limits), ctypes.addressof(given), at(bounds.scale_m), at(beam_rad), n,
-            at(order, np.int64), address(parent), ctypes.addressof(out), at(target, np.int64),
+            ctypes.addressof(limits), address(given), at(bounds.scale_m), at(beam_rad), n,
+            at(order, INT64), address(parent), address(out), at(target, INT64),
         )  # fmt: skip
         return target
 
     def group(self, labels: Int, n: int) -> Groups:
         """Groups 0 to n - 1 of the rows with these labels; rows labelled NONE are left out."""
         rows, offsets = np.empty(len(labels), np.int64), np.empty(n + 1, np.int64)
-        given = at(labels, np.int64), len(labels), n, at(rows, np.int64), at(offsets, np.int64)
+        given = at(labels, INT64), len(labels), n, at(rows, INT64), at(offsets, INT64)
         return Groups(rows[: self._library.modt_group(*given)], offsets)
 
     def members_of(self, clusters: Clusters, index: Int) -> Members:
@@ -210,26 +211,26 @@ class NativeKernels(NativeGeometryKernels):
         m = int(cells.entries.sum(where=of_cell != NONE))
         offsets, rows, own = np.empty(clusters.n + 1, np.int64), np.empty(m, np.int64), np.empty((4, m), np.float32)
         columns = [at(column) for column in (points.x, points.y, points.z, clusters.height)]
-        given, out = (_P * 5)(*columns, at(index, np.int64)), pointers(offsets, rows, own)
+        given, out = array("Q", (*columns, at(index, INT64))), pointers(offsets, rows, own)
         self._library.modt_members(
-            ctypes.addressof(given), at(clusters.cell, np.int64), len(index), at(of_cell, np.int64),
-            at(cells.entries, np.int64), len(cells), clusters.n, ctypes.addressof(out),
+            address(given), at(clusters.cell, INT64), len(index), at(of_cell, INT64),
+            at(cells.entries, INT64), len(cells), clusters.n, address(out),
         )  # fmt: skip
         return Members(offsets, rows, own)
 
     def group_sums(self, values: Float32, offsets: Int) -> Float64:
         """(V, G) sum of the values of each group, given (V, K) in their order."""
         sums = np.empty((len(values), len(offsets) - 1), np.float64)
-        given = at(values), *values.shape, at(offsets, np.int64), sums.shape[1]
-        self._library.modt_group_sums(*given, at(sums, np.float64))
+        given = at(values), *values.shape, at(offsets, INT64), sums.shape[1]
+        self._library.modt_group_sums(*given, at(sums, FLOAT64))
         return sums
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
         best = np.empty(len(groups), np.int64)
         self._library.modt_best_headings(
-            at(x), at(y), at(groups.rows, np.int64), at(groups.offsets, np.int64), len(groups), limit,
-            at(AXES[0]), at(AXES[1]), len(HEADINGS), noise_m, at(best, np.int64),
+            at(x), at(y), at(groups.rows, INT64), at(groups.offsets, INT64), len(groups), limit,
+            at(AXES[0]), at(AXES[1]), len(HEADINGS), noise_m, at(best, INT64),
         )  # fmt: skip
         return best
 
@@ -238,17 +239,17 @@ class NativeKernels(NativeGeometryKernels):
         points, n = np.ascontiguousarray(points, np.float32), len(offsets) - 1
         sums, greatest = np.empty((5, n), np.float64), np.empty(n, np.float32)
         self._library.modt_reflectance_sums(
-            at(points), points.shape[1], at(index, np.int64), at(offsets, np.int64), n, BRIGHT, DARK,
-            at(sums, np.float64), at(greatest),
+            at(points), points.shape[1], at(index, INT64), at(offsets, INT64), n, BRIGHT, DARK,
+            at(sums, FLOAT64), at(greatest),
         )  # fmt: skip
         return sums, greatest
 
     @staticmethod
-    def _columns(points: PointColumns) -> Any:
-        return (_P * 4)(at(points.x), at(points.y), at(points.z), at(points.sqrt_range))
+    def _columns(points: PointColumns) -> array[int]:
+        return array("Q", map(at, (points.x, points.y, points.z, points.sqrt_range)))
 
     @staticmethod
-    def _cells(cells: Cells) -> Any:
-        for column, kind in ((cells.row, np.int32), (cells.low, np.float32), (cells.entries, np.int64)):
+    def _cells(cells: Cells) -> array[int]:
+        for column, kind in ((cells.row, INT32), (cells.low, FLOAT32), (cells.entries, INT64)):
             at(column, kind)
         return pointers(cells.row, cells.column, cells.low, cells.high, cells.entries)
