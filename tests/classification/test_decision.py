@@ -38,6 +38,29 @@ def test_of_two_objects_the_likelier_is_said():
     assert said(config, [0.4, 0.0, 0.25, 0.35]) == [ObjectClass.CYCLIST]
 
 
+def test_the_class_that_was_said_needs_less():
+    config = DecisionConfig(hysteresis=0.4, **ALIKE)
+    table, decision = tracks([0.4, 0.6, 0.0, 0.0]), Decision(config, ASSUMED)
+    history = []
+    for car in (0.6, 0.45, 0.21, 0.19, 0.45, 0.51):
+        table.posterior[:] = [1 - car, car, 0.0, 0.0]
+        decision.decide(table)
+        history.append(table.object_class[0])
+    assert history == [ObjectClass.CAR] * 3 + [ObjectClass.BACKGROUND] * 2 + [ObjectClass.CAR]
+
+
+def test_another_object_is_said_where_it_is_clearly_likelier():
+    config = DecisionConfig(hysteresis=0.4, **ALIKE)
+    table, decision = tracks([0.1, 0.0, 0.6, 0.3]), Decision(config, ASSUMED)
+    history = []
+    for pedestrian in (0.6, 0.3, 0.25, 0.3):
+        table.posterior[:] = [0.1, 0.0, pedestrian, 0.9 - pedestrian]
+        decision.decide(table)
+        history.append(table.object_class[0])
+    pedestrian, cyclist = ObjectClass.PEDESTRIAN, ObjectClass.CYCLIST
+    assert history == [pedestrian, pedestrian, cyclist, cyclist]
+
+
 def stream(frequency, rng, n):
     """Posteriors, calibrated under ASSUMED, of proposals whose classes have another frequency."""
     true = rng.choice(4, n, p=frequency)

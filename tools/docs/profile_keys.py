@@ -43,6 +43,7 @@ CONDITIONS = {
     "fusion.first_view_min_object_probability": "--mode efficient",
     "fusion.first_view_min_hits": "--mode efficient",
     "fusion.first_view_final": "--mode efficient",
+    "fusion.first_view_background_threshold": "--mode efficient",
     "odometry": "--odometry udp://, unix://",
     "odometry.registration": "frames without a pose",
     "odometry.registration.initial_turn_rad": "the first frames without a pose",

@@ -4,7 +4,8 @@ A posterior holds for the class frequencies that the model was trained to assume
 from the posteriors themselves (M. Saerens et al., "Adjusting the outputs of a classifier to new a priori
 probabilities", Neural Computation 2002), slowly and within bounds: no object becomes rarer than the model assumes,
 since the first of its class may still come. An object is said where its expected cost, if it were missed, exceeds
-that of a false one.
+that of a false one. The class that was said last needs less: a posterior that falls because the object is half
+hidden says little against what was seen before.
 """
 
 from __future__ import annotations
@@ -42,9 +43,11 @@ class Decision:
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
         adapted = self.adapted(tracks.posterior)
-        likeliest = adapted[:, 1:].argmax(axis=1)
-        said = adapted[np.arange(len(adapted)), likeliest + 1] >= self._threshold[likeliest]
-        tracks.object_class = np.where(said, likeliest + 1, 0)
+        rows, weighed = np.arange(len(adapted)), adapted.copy()
+        weighed[rows, tracks.object_class] /= self.config.hysteresis
+        likeliest = weighed[:, 1:].argmax(axis=1) + 1
+        said = weighed[rows, likeliest] >= self._threshold[likeliest - 1]
+        tracks.object_class = np.where(said, likeliest, 0)
         self._learn(adapted[tracks.proposal != NONE])
 
     def adapted(self, posterior: Float64) -> Float64:

@@ -21,12 +21,16 @@ class Certainty:
 
     Background is the most frequent class and has a high posterior before any view, so its threshold applies to the
     posterior under equal class frequencies.
+
+    Args:
+        config: frequencies, and the threshold of objects.
+        background_threshold: that of background.
     """
 
-    def __init__(self, config: FusionConfig) -> None:
+    def __init__(self, config: FusionConfig, background_threshold: float) -> None:
         frequency = np.maximum(with_background(config.prior), MIN_PROBABILITY)
         self.log_frequency: Float64 = np.log(frequency / frequency.sum())
-        self._object, self._background = config.object_threshold, config.background_threshold
+        self._object, self._background = config.object_threshold, background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
         """(R,) of posteriors (R, 4)."""
@@ -74,7 +78,8 @@ class OneView(EveryFrame):
     def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         self.config = config
         self.prior = prior or FrequencyPrior(config.prior)
-        self._certain = AnyView() if config.first_view_final == "any" else Certainty(config)
+        certainty = Certainty(config, config.first_view_background_threshold)
+        self._certain = AnyView() if config.first_view_final == "any" else certainty
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
@@ -116,7 +121,7 @@ class KeyViews:
         self.config = config
         self.prior = prior or FrequencyPrior(config.prior)
         self._point_change = np.array(config.point_change)
-        self._certain = Certainty(config)
+        self._certain = Certainty(config, config.background_threshold)
         self._log_frequency = self._certain.log_frequency
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:

@@ -60,6 +60,7 @@ class DecisionConfig(StageConfig):
     missed_cost: tuple[float, ...] = per_class(
         "missed_cost", 0.01, 1000.0, "cost of a missed object over that of a false one; 1: said from 1/2 on"
     )
+    hysteresis: float = number(0.4, 0.01, 1.0, "", "share of that posterior that the class said last needs; 1: none")
     frequency: tuple[float, ...] | None = shares(
         0.33, "of the classes among proposals, at the start; null: those that the model assumes"
     )
@@ -81,6 +82,9 @@ class FusionConfig(StageConfig):
     first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")
     first_view_min_hits: int = number(3, 1, 1000, "frames", "with a proposal, to be classified")
     first_view_final: str = choice("certain", ("certain", "any"), "view that is final; the paper: any")
+    first_view_background_threshold: float = number(
+        0.9, 0.25, 1.0, "", "posterior under equal frequencies; final background"
+    )
     min_object_probability: float = number(0.05, 0.0, 1.0, "", "by the box prior, for the first of several views")
     start_frame: int = number(5, 1, 1000, "frames", "age of a track from which views are fused")
     object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")
