@@ -89,6 +89,7 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
     "views by points": ("Equation 4", values("fusion", point_change=(10.0,) * 4)),
     "views by extent": ("independent by extent", values("fusion", extent_change=10.0)),
     "start frame": ("of fusion", values("fusion", start_frame=1)),
+    "hysteresis": ("of the class that is said", values("decision", hysteresis=1.0)),
     "worth": (
         "order of calls; off: longest waiting first",
         values("scheduler.worth", uncertainty_weight=0.0, nearness_weight=0.0, novelty_weight=0.0),

@@ -55,8 +55,8 @@ DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "log" / "fusion-sweep.
 BEGIN, END = "<!-- tools/study/sweep_fusion.py -->\n", "<!-- end of tools/study/sweep_fusion.py -->"
 OBJECTS = CLASS_NAMES[1:]
 POINT_CHANGES = (0.05, 0.1, 0.16, 0.22, 0.3, 0.5, 1.0, 2.0)
-FIRST_VIEW_KEY = "first_view_min_object_probability"
-"""The only swept key of mode `efficient`."""
+FIRST_VIEW = "first_view_"
+"""Keys of mode `efficient` begin so."""
 SWEEPS: dict[str, tuple[float | None, ...]] = {
     "start_frame": (1, 2, 3, 4, 5, 6, 7, 8),
     "object_threshold": (0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98),
@@ -65,7 +65,8 @@ SWEEPS: dict[str, tuple[float | None, ...]] = {
     "review_point_ratio": (1.25, 1.5, 2.0, 3.0, 5.0, 10.0, None),
     "review_max_points": (30, 50, 100, 200, 400, 800),
     "min_object_probability": (0.0, 0.005, 0.01, 0.02, 0.05, 0.1),
-    FIRST_VIEW_KEY: (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
+    f"{FIRST_VIEW}min_object_probability": (0.0, 0.01, 0.02, 0.05, 0.1, 0.2),
+    f"{FIRST_VIEW}background_threshold": (0.25, 0.4, 0.6, 0.8, 0.9, 1.0),
     "review_min_object_probability": (0.0, 0.02, 0.05, 0.1, 0.2),
     "box_update_weight": (0.0, 0.25, 0.5, 0.75, 1.0),
     "mismatch_probability": (0.0, 0.03, 0.1, 0.2, 0.3),
@@ -137,7 +138,7 @@ def sweeps(config: FusionConfig) -> Iterator[Setting]:
 
 def _changed(config: FusionConfig, sweep: str, text: str, **changes: Any) -> Setting:
     changed = dataclasses.replace(config, **changes)
-    made = OneView if sweep == FIRST_VIEW_KEY else KeyViews
+    made = OneView if sweep.startswith(FIRST_VIEW) else KeyViews
     return Setting(sweep, f"{text} *" if changed == config else text, lambda prior: made(changed, prior))
 
 
