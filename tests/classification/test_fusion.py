@@ -119,6 +119,16 @@ def test_the_first_view_of_the_paper_is_final_whatever_it_says() -> None:
     assert fuse(OneView(FusionConfig(first_view_final="any")), tracks, proposals, np.array([0]), likelihood).all()
 
 
+def test_each_mode_has_its_threshold_of_final_background() -> None:
+    proposals, tracks = scene((50,))
+    config = FusionConfig(prior=(0.25, 0.25, 0.25), background_threshold=0.4, first_view_background_threshold=0.9)
+    row, likely, clear = np.array([0]), np.array([[0.6, 0.2, 0.1, 0.1]]), np.array([[0.95, 0.03, 0.01, 0.01]])
+    assert not fuse(OneView(config), tracks, proposals, row, likely).any()
+    assert fuse(OneView(config), tracks, proposals, row, clear).all()
+    proposals, tracks = scene((50,))
+    assert fuse(KeyViews(config), tracks, proposals, row, likely).all()
+
+
 def test_an_uncertain_view_of_efficient_is_replaced_by_one_with_clearly_more_points() -> None:
     config = FusionConfig(review_point_ratio=2.0, review_extra_points=5)
     proposals, tracks = scene((50,))
