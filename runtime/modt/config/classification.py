@@ -73,7 +73,8 @@ class DecisionConfig(StageConfig):
 class FusionConfig(StageConfig):
     """Independent views and final classes (section V-C, Figs. 10 and 11), found by tools/study/sweep_fusion.py.
 
-    first_view_*: mode efficient; start_frame, thresholds, *_change and review_*: mode accurate.
+    first_view_*: mode efficient; object_threshold, review_point_ratio, review_extra_points: both modes; the other
+    thresholds, start_frame, *_change and review_*: mode accurate.
     """
 
     prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency that a model assumes which states none")
