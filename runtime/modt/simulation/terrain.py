@@ -12,8 +12,12 @@ from modt.types import Float32, Float64, Int
 
 UInt8 = NDArray[np.uint8]
 
-N_ITERATIONS = 3
-"""Fixed-point iterations of the intersection of a ray with the ground."""
+NEAREST_M, N_DISTANCES = 0.5, 90
+"""Series of distances along a ray, each 6 % longer than the one before."""
+N_HALVINGS = 6
+"""Of the interval in which a ray meets the ground."""
+STEEPEST = 0.1
+"""Tangent of the rays that may meet rising ground."""
 
 
 @dataclass(frozen=True)
@@ -40,32 +44,33 @@ class Terrain:
         return np.asarray(self.height.ravel()[cell], np.float64)
 
     def cast(self, caster: RayCaster, T_world_sensor: Float64) -> tuple[Float32, UInt8]:
-        """(B, A) horizontal distance to the ground [m], infinite where a ray misses it, and its material.
-
-        Fixed-point iteration: each ray is intersected with the plane at the height below its last intersection.
-        """
+        """(B, A) horizontal distance to the ground [m], infinite where a ray misses it, and its material."""
         sensor = caster.sensor
         distance = np.full(sensor.shape, np.inf, np.float32)
         surface = np.zeros(sensor.shape, np.uint8)
-        R, t = T_world_sensor[:3, :3].astype(np.float32), T_world_sensor[:3, 3]
-        low = np.flatnonzero(caster.tangent[:, 0] < 0.05)
+        low = np.flatnonzero(caster.tangent[:, 0] < STEEPEST)
         if not len(low):
             return distance, surface
         rows = slice(int(low[0]), int(low[-1]) + 1)
-        tangent, origin = caster.tangent[rows], caster.origin[rows]
-        d = [(R[i, 0] * caster.cos + R[i, 1] * caster.sin) + R[i, 2] * tangent for i in range(3)]
-        start = [np.float32(t[i]) + R[i, 2] * origin for i in range(3)]
-        fall = np.minimum(d[2], np.float32(-1e-4))
-        height = np.float32(self.heights(t[:1], t[1:2])[0])
-        reach = np.float32(sensor.max_range_m)
-        inverse = 1 / fall
-        s = (height - start[2]) * inverse
+        R, t = T_world_sensor[:3, :3].astype(np.float32), T_world_sensor[:3, 3].astype(np.float32)
+        across = [R[i, 0] * caster.cos + R[i, 1] * caster.sin for i in range(3)]
+        direction = [across[i] + R[i, 2] * caster.tangent[rows] for i in range(3)]
+        start = [t[i] + R[i, 2] * caster.origin[rows] for i in range(3)]
         flat = self.height.ravel()
-        for _ in range(N_ITERATIONS):
-            s = np.minimum(s, reach)
-            cell = self.cells(start[0] + s * d[0], start[1] + s * d[1])
-            s = (flat[cell] - start[2]) * inverse
-        met = (s > 0) & (s < reach)
-        distance[rows] = np.where(met, s, np.inf)
+        foot = R[:, 2] * (flat[self.cells(t[:1], t[1:2])] - t[2])
+        series = np.geomspace(NEAREST_M, sensor.max_range_m, N_DISTANCES, dtype=np.float32)
+        first_below = np.full(direction[2].shape, N_DISTANCES)
+        for k in reversed(range(N_DISTANCES)):
+            x, y = (t[i] + foot[i] + series[k] * across[i] for i in range(2))
+            np.copyto(first_below, k, where=start[2] + series[k] * direction[2] < flat[self.cells(x, y)])
+        met = first_below < N_DISTANCES
+        ends = np.concatenate([np.zeros(1, np.float32), series, series[-1:]])
+        near, far = ends[first_below], ends[first_below + 1]
+        for _ in range(N_HALVINGS):
+            middle = (near + far) / 2
+            cell = self.cells(start[0] + middle * direction[0], start[1] + middle * direction[1])
+            below = start[2] + middle * direction[2] < flat[cell]
+            near, far = np.where(below, near, middle), np.where(below, middle, far)
+        distance[rows] = np.where(met, far, np.inf)
         surface[rows] = self.surface.ravel()[cell]
         return distance, surface
