@@ -70,19 +70,21 @@ def test_training_separates_classes_by_size() -> None:
 def test_training_separates_classes_by_reflectance() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
     from modt.classification.mlp import logits
-    from tools.train.train_reflectance_classifier import Features, cross_validate, train
+    from tools.train.train_reflectance_classifier import Features, cross_validate, has_reflectance, on_scale, train
 
     rng = np.random.default_rng(0)
     label = np.arange(160) // 2 % 4
     alike = cubes(np.ones(160), label, rng)
     told = rng.normal(0.2 * label, 0.03, (N_REFLECTANCE, 160)).T
-    told[::20] = np.nan  # of another sensor
-    data = dataclasses.replace(alike, reflectance=told)
+    told[::20] = np.nan  # not measured
+    data = on_scale(dataclasses.replace(alike, reflectance=told), "hdl-64e")
     features = Features(data)
     dumb = [(np.zeros((N_FEATURES, 4)), np.zeros(4))]
     layers = train(data, features, np.arange(160), dumb, 200, seed=1)
     known = np.isfinite(told).all(axis=1)
     assert np.mean(logits(layers, features.all[known]).argmax(axis=1) == label[known]) > 0.9
+
+    assert not has_reflectance(on_scale(data, "pandar64"), np.arange(160)).any()
 
     data = dataclasses.replace(alike, reflectance=np.nan_to_num(told, nan=0.3))
     network = np.full((160, 4), 0.25)

@@ -41,7 +41,12 @@ SENSOR = SensorConfig(reflectance="hdl-64e")
 WITHOUT = BoxPrior(BoxScores(BOXES, NoReflectanceClassifier(), SENSOR))
 """The prior without reflectance."""
 WEIGHTS = PoolWeights(network=0.7, box=0.3, reflectance=0.5)
-METADATA = {METADATA_KEY: to_metadata(LAYERS, PoolWeights(reflectance=0.5), "hdl-64e")}
+OTHER_LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH)
+METADATA = {
+    METADATA_KEY: to_metadata(
+        {"hdl-64e": (LAYERS, PoolWeights(reflectance=0.5)), "pandar64": (OTHER_LAYERS, PoolWeights(reflectance=0.8))}
+    )
+}
 
 
 def measured() -> Proposals:
@@ -58,6 +63,15 @@ def test_prior_is_box_probability_times_reflectance_likelihood() -> None:
     reflectance = from_metadata(METADATA, SENSOR)
     prior = make_prior(BoxScores(BOXES, reflectance, SENSOR), (0.1, 0.1, 0.1))
     np.testing.assert_allclose(prior.probability(proposals), expected)
+
+
+def test_a_sensor_has_the_classifier_of_its_scale() -> None:
+    features = RNG.normal(size=(3, N_FEATURES))
+    for scale, layers, weight in (("hdl-64e", LAYERS, 0.5), ("pandar64", OTHER_LAYERS, 0.8)):
+        reflectance = from_metadata(METADATA, SensorConfig(reflectance=scale))
+        assert reflectance.weights == PoolWeights(reflectance=weight)
+        expected = logits(layers, np.c_[features, REFLECTANCE])
+        np.testing.assert_array_equal(reflectance.log_likelihood(features, REFLECTANCE), expected)
 
 
 def test_another_sensor_or_a_model_without_classifier_adds_nothing() -> None:
@@ -101,9 +115,11 @@ def test_no_warning_for_an_empty_frame(caplog: pytest.LogCaptureFixture) -> None
         "{}",
         "[]",
         "no json",
-        json.dumps({"sensor": "hdl-64e", "weights": WEIGHTS.as_dict() | {"reflectance": 2.0}, "layers": []}),
-        json.dumps({"sensor": "hdl-64e", "weights": WEIGHTS.as_dict() | {"box": -0.5}, "layers": []}),
-        json.dumps({"sensor": "hdl-64e", "weights": WEIGHTS.as_dict(), "layers": []}),
+        json.dumps({"hdl-64e": {"weights": WEIGHTS.as_dict() | {"reflectance": 2.0}, "layers": []}}),
+        json.dumps({"hdl-64e": {"weights": WEIGHTS.as_dict() | {"box": -0.5}, "layers": []}}),
+        json.dumps({"hdl-64e": {"weights": WEIGHTS.as_dict(), "layers": []}}),
+        json.dumps({"hdl-64e": None}),
+        to_metadata({"hdl-46e": (LAYERS, WEIGHTS)}),
     ],
 )
 def test_malformed_metadata_is_rejected(text: str) -> None:
@@ -138,7 +154,7 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     proposals, which = measured(), np.array([2, 0])
     metadata = {
         box_classifier.METADATA_KEY: box_classifier.to_metadata(BOX_LAYERS, PoolWeights(0.8, 0.2)),
-        METADATA_KEY: to_metadata(LAYERS, WEIGHTS, "hdl-64e"),
+        METADATA_KEY: to_metadata({"hdl-64e": (LAYERS, WEIGHTS)}),
         CLASS_FREQUENCY_KEY: json.dumps(FREQUENCY.tolist()),
     }
     alone = PointNet(_with_metadata(tmp_path / "alone.onnx", {}), SENSOR)

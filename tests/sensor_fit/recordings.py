@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 from modt.sensor_fit.finding import Recording
+from modt.sensor_fit.reflectance import SCALES
 from modt.sources.synthetic_stream import SyntheticStream
 
 
@@ -16,6 +17,13 @@ def recording(sensor: str, scene: str = "street", sweeps: int = 6, seed: int = 3
     simulator = SyntheticStream(scene, sensor, 4.0, seed).simulator
     frames = [simulator.sweep(5 * k)[0] for k in range(sweeps)]
     return Recording([frame.points for frame in frames], [frame.stamp_s for frame in frames])
+
+
+def with_scale(recorded: Recording, name: str) -> Recording:
+    """The same with reflectances on a scale that is known."""
+    rng, values = np.random.default_rng(0), np.array([0.0, *SCALES[name].deciles, 0.5], np.float32)
+    sweeps = [np.column_stack([sweep[:, :3], rng.choice(values, len(sweep))]) for sweep in recorded.sweeps]
+    return Recording(sweeps, recorded.stamps_s)
 
 
 def with_mast(recorded: Recording, azimuth_deg: float, range_m: float) -> Recording:

@@ -12,7 +12,7 @@ from modt.sensor_fit.fit import FINDERS, cell_m, fit
 from modt.sensor_fit.profile_text import doubts, profile_text
 from modt.simulation.sensors import sensor
 from modt.sources.recognise import open_stream
-from tests.sensor_fit.recordings import recording, with_mast
+from tests.sensor_fit.recordings import recording, with_mast, with_scale
 
 PROFILES = [path.stem for path in sorted(assets.folder("profiles").glob("*.yaml"))]
 
@@ -55,6 +55,15 @@ def test_the_scale_of_the_reflectance_is_found(name, scale):
     assert fit(recording(name))[0].sensor.reflectance == scale
 
 
+@pytest.mark.parametrize(("name", "scale"), [("pandar64", "pandar64"), ("vlp-16", "none")])
+def test_a_scale_of_several_sensors_counts_with_the_beams_that_are_known(name, scale):
+    config, findings = fit(with_scale(recording(name), "pandar64"))
+    assert config.sensor.reflectance == scale
+    said = next(f.evidence for f in findings if f.key == "reflectance")
+    assert "as of the pandar64" in said
+    assert ("other beams" in said) is (scale == "none")
+
+
 def test_reflectance_that_is_not_recorded_has_no_scale():
     swept = [np.column_stack([p[:, :3], np.full(len(p), -1, np.float32)]) for p in recording("hdl-64e").sweeps]
     config, findings = fit(Recording(swept, recording("hdl-64e").stamps_s))
@@ -94,7 +103,7 @@ def test_a_finder_adds_keys_that_rest_on_those_before_it():
     ("path", "height_m", "reflectance"),
     [
         ("raw/2011_09_26/2011_09_26_drive_0005_sync", 1.73, "hdl-64e"),
-        ("pandaset_002/scans", 2.13, "none"),
+        ("pandaset_002/scans", 2.13, "pandar64"),
     ],
 )
 def test_real_sensors(kitti_root, path, height_m, reflectance):

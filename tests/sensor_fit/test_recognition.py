@@ -11,7 +11,7 @@ from modt import profile
 from modt.sensor_fit.recognition import recognise
 from modt.simulation.sensors import SENSORS
 from modt.sources.scan_file import read_scan
-from tests.sensor_fit.recordings import recording
+from tests.sensor_fit.recordings import recording, with_scale
 
 
 @pytest.mark.parametrize("name", SENSORS)
@@ -42,6 +42,19 @@ def test_what_is_found_takes_the_place_of_the_profile():
     assert found.sensor.reflectance == "none"
     assert found.segmentation.cell_m > profile.load().segmentation.cell_m
     assert found.fusion == own.fusion  # not those that rest on reflectance
+
+
+def test_the_scale_of_the_reflectance_is_found_too():
+    found = recognise(with_scale(recording("pandar64"), "pandar64").sweeps[0], profile.load())
+    assert found.nearest == found.fitted.sensor.reflectance == "pandar64"
+    assert any("reflectance of another scale than hdl-64e" in difference for difference in found.differences)
+
+
+def test_another_scale_of_the_reflectance_is_said():
+    swept = with_scale(recording("pandar64"), "hdl-64e").sweeps[0]
+    swept[:, 3] = np.rint(100 * swept[:, 3]) / 100
+    found = recognise(swept, profile.load("pandar64"))
+    assert found.differences == ("reflectance of another scale than pandar64",)
 
 
 def test_another_mount_changes_the_height_alone():

@@ -14,12 +14,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+from modt.config.sensor import REFLECTANCE_SCALES
 from tools.options import parser
 from tools.train.build_crops import add_sources
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
-SENSOR = "hdl-64e"
-"""Sensor that measured the reflectance of the crops."""
 WORLDS, PASTES = 240, 120
 KITTI_DATA = (
     "106 + 2 and 53 more object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR "
@@ -55,7 +54,8 @@ def build(folder: Path, crops: list[Path], out: Path, options: list[str], data: 
     """
     run("train_pointnet", folder, *crops, *options)
     run("train_box_classifier", folder, *crops)
-    run("train_reflectance_classifier", folder, *crops, "--sensor", SENSOR)
+    for sensor in REFLECTANCE_SCALES:
+        run("train_reflectance_classifier", folder, *crops, "--sensor", sensor)
     run("export_pointnet", folder, out, "--data", data, "--licence", licence)
 
 

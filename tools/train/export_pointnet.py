@@ -2,8 +2,8 @@
 
     python -m tools.train.export_pointnet TRAINED_DIR models/NAME.onnx --data TEXT --licence TEXT
 
-TRAINED_DIR holds the output of train_pointnet, train_box_classifier and, optionally, train_reflectance_classifier.
-The layers of the box and the reflectance classifier are stored in the model's metadata.
+TRAINED_DIR holds the output of train_pointnet, train_box_classifier and, for any number of sensors,
+train_reflectance_classifier. The layers of the box and the reflectance classifiers go to the model's metadata.
 
 The maximum over points commutes with adding a bias and with ReLU, so the exported graph applies both after it, to one
 row instead of one for each point. Up to there the points are columns: ONNX Runtime finds a maximum along rows five
@@ -105,8 +105,8 @@ def card(name: str, sha256: str, report: dict[str, Any], data: str, licence: str
         "",
         *_threshold_table(report["boxes"]["ruled_out"]),
     ]
-    if "reflectance" in report:
-        lines += ["From box and reflectance:", "", *_threshold_table(report["reflectance"]["ruled_out"])]
+    for told in report["reflectance"]:
+        lines += [f"From box and reflectance, {told['sensor']}:", "", *_threshold_table(told["ruled_out"])]
     return "\n".join(lines)
 
 
@@ -121,14 +121,18 @@ def _shares(values: list[float]) -> str:
 
 def _by_sensor(report: dict[str, Any]) -> list[str]:
     """Tables of the out-of-fold scores (tools.train.scores), method by method and sensor by sensor."""
-    boxes, told = report["boxes"], report.get("reflectance")
+    boxes = report["boxes"]
     methods = {
         "network": report["cross_validation"],
         "box": boxes["cross_validation"],
         _pool_name(boxes["weights"]): boxes["pool"],
     }
-    if told:
-        methods |= {"box and reflectance": told["cross_validation"], _pool_name(told["weights"]): told["pool"]}
+    for told in report["reflectance"]:
+        of_sensor = f", reflectance of the {told['sensor']}"
+        methods |= {
+            f"box{of_sensor}": told["cross_validation"],
+            _pool_name(told["weights"]) + of_sensor: told["pool"],
+        }
     lines = [
         "## Out of fold, by sensor (drives never split)",
         "",
@@ -190,13 +194,14 @@ def main() -> None:
     report = json.loads((args.trained / "report.json").read_text(encoding="utf-8"))
     report["boxes"] = json.loads((args.trained / "boxes.json").read_text(encoding="utf-8"))
     metadata = {CLASS_FREQUENCY_KEY: json.dumps(report["class_frequency"])}
-    if (args.trained / "reflectance.json").exists():
-        fused = json.loads((args.trained / "reflectance.json").read_text(encoding="utf-8"))
-        report["reflectance"] = fused
-        layers = load_layers(args.trained / "reflectance.npz")
-        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(
-            layers, PoolWeights.from_dict(fused["weights"]), fused["sensor"]
-        )
+    paths = sorted(args.trained.glob("reflectance-*.json"))
+    report["reflectance"] = [json.loads(path.read_text(encoding="utf-8")) for path in paths]
+    classifiers = {
+        told["sensor"]: (load_layers(path.with_suffix(".npz")), PoolWeights.from_dict(told["weights"]))
+        for path, told in zip(paths, report["reflectance"], strict=True)
+    }
+    if classifiers:
+        metadata[reflectance_classifier.METADATA_KEY] = reflectance_classifier.to_metadata(classifiers)
     metadata[box_classifier.METADATA_KEY] = box_classifier.to_metadata(
         load_layers(args.trained / "boxes.npz"), PoolWeights.from_dict(report["boxes"]["weights"])
     )

@@ -278,6 +278,7 @@ def pandaset_scans(folder: Path) -> Iterator[Scan]:
         position = np.array(PANDASET_SENSOR_M.get(path.stem, PANDASET_VEHICLE_SENSOR_M), np.float32)
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         points[:, :3] -= position
+        points[:, 3] /= 255
         with (folder / f"{path.stem}.csv").open(encoding="utf-8") as rows:
             cuboids = list(csv.DictReader(rows))
         columns = ("x", "y", "z", "length", "width", "height", "yaw")

@@ -3,14 +3,16 @@
     python -m tools.train.train_reflectance_classifier OUT_DIR CROPS.npz... --sensor NAME
                                     [--steps N] [--folds K] [--seed S]
 
-OUT_DIR holds the output of train_pointnet and train_box_classifier for the same crops and folds. Writes
-OUT_DIR/reflectance.npz for export_pointnet and OUT_DIR/reflectance.json: the weights of the pool of all
-three, and out-of-fold scores by sensor of box with reflectance and of all three.
+OUT_DIR holds the output of train_pointnet and train_box_classifier for the same crops and folds. The crops of a
+sensor are those of this name, thinned ones too. Writes OUT_DIR/reflectance-NAME.npz for export_pointnet and
+OUT_DIR/reflectance-NAME.json: the weights of the pool of all three, and out-of-fold scores by sensor of box with
+reflectance and of all three.
 """
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +20,7 @@ import torch
 from scipy.special import softmax
 
 from modt.classification.mlp import Layers, logits
+from modt.config.sensor import REFLECTANCE_SCALES
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier
@@ -31,7 +34,7 @@ from tools.train.scores import by_sensor
 from tools.train.temperature_scaling import Calibration, fit_calibration
 from tools.train.weights import load_layers, save_layers
 
-STEPS = 1500
+STEPS = 600
 JITTER = 0.1
 """Noise added to the features of a batch, as a fraction of their standard deviation; few crops are drawn often."""
 
@@ -47,6 +50,12 @@ class Features:
     def __init__(self, data: Dataset) -> None:
         self.box = dataset_features(data, np.arange(len(data)))
         self.all = np.hstack([self.box, data.reflectance])
+
+
+def on_scale(data: Dataset, sensor: str) -> Dataset:
+    """The data set with the reflectance of one sensor alone."""
+    own = np.array([name.split(",")[0] == sensor for name in data.sensor_names])[data.sensor]
+    return replace(data, reflectance=np.where(own[:, None], data.reflectance, np.nan))
 
 
 def has_reflectance(data: Dataset, rows: Int) -> Bool:
@@ -121,22 +130,22 @@ def cross_validate(
 
 def main() -> None:
     parser = training_parser(__doc__)
-    parser.add_argument("--sensor", required=True, help="sensor that measured the reflectance, by its profile's name")
+    parser.add_argument("--sensor", required=True, choices=REFLECTANCE_SCALES, help="that measured the reflectance")
     parser.add_argument("--steps", type=int, default=STEPS)
     args = parser.parse_args()
     make_torch_deterministic()
-    data = load(*args.crops)
+    data = on_scale(load(*args.crops), args.sensor)
     features = Features(data)
     network = load_network(args.out, data)
     if not has_reflectance(data, Validation.of(data).rows).any():
-        print("no reflectance to validate by: the model has no reflectance classifier")
+        print(f"no reflectance of {args.sensor} to validate by: the model has no classifier of it")
         return
     calibration, report = cross_validate(data, features, network, args.folds, args.steps, args.seed)
     boxes = load_layers(args.out / "boxes.npz")
     layers = train(data, features, np.flatnonzero(data.trainable), boxes, args.steps, args.seed)
-    save_layers(args.out / "reflectance.npz", [*layers[:-1], calibration.fold_into(layers[-1])])
+    save_layers(args.out / f"reflectance-{args.sensor}.npz", [*layers[:-1], calibration.fold_into(layers[-1])])
     report |= {"sensor": args.sensor, "steps": args.steps, "seed": args.seed}
-    (args.out / "reflectance.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    (args.out / f"reflectance-{args.sensor}.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(report))
 
 

@@ -1,8 +1,9 @@
 """Likelihood of a proposal's reflectance statistics under each class.
 
 Number plates and lamps are bright, car paint at a grazing angle returns nothing, cloth and leaves lie between. The
-values hold on the scale of one sensor, named by the model and by `sensor.reflectance` of the profile: where the two
-differ, or a sweep has no reflectance, the classifier adds nothing.
+values hold on the scale of one sensor: a model has a classifier for each scale that it learnt, by its name. Where the
+scale that `sensor.reflectance` of the profile names is not among them, or a sweep has no reflectance, none adds
+anything.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +20,13 @@ from modt.classification.box_classifier import N_FEATURES
 from modt.classification.mlp import Layers, from_lists, logits, to_lists
 from modt.classification.pool import PoolWeights
 from modt.config import SensorConfig
+from modt.config.sensor import REFLECTANCE_SCALES
 from modt.types import N_REFLECTANCE, Float64
 
 log = logging.getLogger(__name__)
 
 METADATA_KEY = "reflectance"
-"""Key of the reflectance classifier in the metadata of an ONNX model."""
+"""Key of the reflectance classifiers in the metadata of an ONNX model."""
 
 
 class NoReflectanceClassifier:
@@ -69,13 +72,18 @@ class MlpReflectanceClassifier:
 ReflectanceClassifier = NoReflectanceClassifier | MlpReflectanceClassifier
 
 
-def to_metadata(layers: Layers, weights: PoolWeights, sensor: str) -> str:
-    """Metadata entry of a reflectance classifier."""
-    return json.dumps({"sensor": sensor, "weights": weights.as_dict(), "layers": to_lists(layers)})
+def to_metadata(classifiers: Mapping[str, tuple[Layers, PoolWeights]]) -> str:
+    """Metadata entry of the reflectance classifiers of a model, by their scales."""
+    return json.dumps(
+        {
+            scale: {"weights": weights.as_dict(), "layers": to_lists(layers)}
+            for scale, (layers, weights) in classifiers.items()
+        }
+    )
 
 
 def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> ReflectanceClassifier:
-    """Reflectance classifier of a model; NoReflectanceClassifier where its metadata has none for this sensor.
+    """Reflectance classifier of a model; NoReflectanceClassifier where its metadata has none of this scale.
 
     Raises:
         KeyError, TypeError, ValueError: malformed entry.
@@ -83,8 +91,12 @@ def from_metadata(metadata: Mapping[str, str], sensor: SensorConfig) -> Reflecta
     text = metadata.get(METADATA_KEY)
     if text is None:
         return NoReflectanceClassifier()
-    content = json.loads(text)
-    if content["sensor"] != sensor.reflectance:
-        return NoReflectanceClassifier()
+    classifiers = {scale: _from_dict(content) for scale, content in dict(json.loads(text)).items()}
+    if not classifiers or not classifiers.keys() <= set(REFLECTANCE_SCALES):
+        raise ValueError(f"scales of reflectance {', '.join(classifiers) or 'none'}, not of {REFLECTANCE_SCALES}")
+    return classifiers.get(sensor.reflectance, NoReflectanceClassifier())
+
+
+def _from_dict(content: Mapping[str, Any]) -> MlpReflectanceClassifier:
     layers = from_lists(content["layers"], N_FEATURES + N_REFLECTANCE)
     return MlpReflectanceClassifier(layers, PoolWeights.from_dict(content["weights"]))

@@ -10,6 +10,9 @@ from modt.config.base import StageConfig, choice, number, numbers
 if TYPE_CHECKING:
     from modt.geometry.beams import Beams
 
+REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
+"""Sensors whose reflectance a model may have learnt."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensorConfig(StageConfig):
@@ -29,7 +32,7 @@ class SensorConfig(StageConfig):
     blind_range_m: float = number(3.0, 0.1, 20.0, "m", "of returns left out in these sectors, at most")
     period_s: float = number(0.1, 0.001, 10.0, "s", "between sweeps, of folders without stamps and of max_missed")
     reflectance: str = choice(
-        "none", ("none", "hdl-64e"), "scale; models use only the one they learnt; none: not used"
+        "none", ("none", *REFLECTANCE_SCALES), "scale; models use only those they learnt; none: not used"
     )
 
     @property

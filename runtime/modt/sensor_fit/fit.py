@@ -13,7 +13,8 @@ from modt.sensor_fit.beams import BeamPattern, find_beams
 from modt.sensor_fit.body import REACH_M, find_body
 from modt.sensor_fit.finding import Finder, Finding, Recording, apply
 from modt.sensor_fit.height import ground_height_m
-from modt.sensor_fit.reflectance import HDL_64E, NONE, reflectance_scale
+from modt.sensor_fit.likeness import nearest_profile, tangents
+from modt.sensor_fit.reflectance import NONE, SCALES, reflectance_scale
 from modt.types import Float32
 
 MAX_RANGE_M = 100.0
@@ -129,9 +130,13 @@ def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding
 
 
 def find_reflectance(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
-    """Scale of the reflectance."""
-    scale, said = reflectance_scale(np.concatenate(recording.sweeps)[:, 3])
-    yield Finding("sensor", "reflectance", HDL_64E if scale == HDL_64E else NONE, said)
+    """Scale of the reflectance; one that several sensors have counts with the beams of the one that models know."""
+    points = np.concatenate(recording.sweeps)
+    scale, said = reflectance_scale(points[:, 3])
+    known = SCALES.get(scale)
+    if known and not known.hundredths and nearest_profile(config.sensor, tangents(points)) != scale:
+        known, said = None, f"{said}, but these are other beams: not used"
+    yield Finding("sensor", "reflectance", scale if known else NONE, said)
 
 
 FINDERS: tuple[Finder, ...] = (find_period, find_pattern, find_body_and_range, find_height, find_reflectance)

@@ -6,19 +6,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modt import assets, profile
 from modt.config import ProfileConfig, SensorConfig
 from modt.sensor_fit.beams import COARSE_ORIGINS_M, find_beams
 from modt.sensor_fit.finding import Recording, apply
-from modt.sensor_fit.fit import find_height, pattern_findings
-from modt.sensor_fit.reflectance import OTHER, reflectance_scale
+from modt.sensor_fit.fit import find_height, find_reflectance, pattern_findings
+from modt.sensor_fit.likeness import azimuth_ratio, nearest_profile, spacing_ratio, tangents
+from modt.sensor_fit.reflectance import NONE, reflectance_scale
 from modt.types import Float32
 
 MAX_SPACING_RATIO = 1.35  # of the beams, median over the points, and of the returns along a beam
 MAX_AZIMUTH_RATIO = 1.6  # a head may turn faster
 MAX_HEIGHT_SHARE, MAX_HEIGHT_M = 0.2, 0.15  # difference of the height: the greater of the two
-MAX_LIKENESS_RATIO = 1.2  # of a shipped profile that is named
-SAMPLE = 20  # points per one that is compared
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,14 +49,15 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
         return Recognition((), None, config)
     found = apply(ProfileConfig(), pattern_findings(pattern))
     found = apply(found, find_height(Recording([points[::2]], [0.0]), found))
-    some = points[::SAMPLE]
-    tangent: Float32 = (some[:, 2] / np.hypot(some[:, 0], some[:, 1])).astype(np.float32)
+    found = apply(found, find_reflectance(Recording([points], [0.0]), found))
+    tangent = tangents(points)
     of_sensor = _pattern_differences(config.sensor, found.sensor, tangent)
-    if config.sensor.reflectance != "none" and reflectance_scale(some[:, 3])[0] == OTHER:
+    scale, _ = reflectance_scale(points[:, 3])
+    if NONE not in {config.sensor.reflectance, scale} and scale != config.sensor.reflectance:
         of_sensor.append(f"reflectance of another scale than {config.sensor.reflectance}")
     of_mount = _height_differences(config.sensor.height_m, found.sensor.height_m)
     if of_sensor:
-        return Recognition((*of_sensor, *of_mount), _nearest(found.sensor, tangent), _with_reach(found))
+        return Recognition((*of_sensor, *of_mount), nearest_profile(found.sensor, tangent), _with_reach(found))
     if of_mount:
         mounted = replace(config.sensor, height_m=found.sensor.height_m)
         return Recognition(tuple(of_mount), None, replace(config, sensor=mounted))
@@ -67,10 +66,10 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
 
 def _pattern_differences(expected: SensorConfig, found: SensorConfig, tangent: Float32) -> list[str]:
     said = []
-    if _spacing_ratio(expected, found, tangent) > MAX_SPACING_RATIO:
+    if spacing_ratio(expected, found, tangent) > MAX_SPACING_RATIO:
         steps = (float(np.rad2deg(np.median(s.beams.step_rad(tangent)))) for s in (found, expected))
         said.append("beams {:.2f} deg apart, not {:.2f}".format(*steps))
-    if _ratio(expected.azimuth_step_deg, found.azimuth_step_deg) > MAX_AZIMUTH_RATIO:
+    if azimuth_ratio(expected, found) > MAX_AZIMUTH_RATIO:
         said.append(f"returns {found.azimuth_step_deg:.2f} deg apart, not {expected.azimuth_step_deg:.2f}")
     return said
 
@@ -83,31 +82,6 @@ def _height_differences(expected_m: float | None, found_m: float | None) -> list
     ):
         return []
     return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"]
-
-
-def _spacing_ratio(a: SensorConfig, b: SensorConfig, tangent: Float32) -> float:
-    """Median ratio of the spacings of two sensors' beams, the greater by the smaller, at some elevations."""
-    log_ratio = np.log(a.beams.step_rad(tangent) / b.beams.step_rad(tangent))
-    return float(np.exp(np.median(np.abs(log_ratio))))
-
-
-def _ratio(a: float, b: float) -> float:
-    return max(a / b, b / a)
-
-
-def _nearest(found: SensorConfig, tangent: Float32) -> str | None:
-    """The shipped profile of the same beams, by the height of the mount where several have them."""
-    best = None
-    for path in sorted(assets.folder("profiles").glob("*.yaml")):
-        shipped = profile.resolve(path.stem)
-        if shipped.sensor is None:  # a board
-            continue
-        sensor = shipped.config.sensor
-        ratios = _spacing_ratio(sensor, found, tangent), _ratio(sensor.azimuth_step_deg, found.azimuth_step_deg)
-        if max(ratios) < MAX_LIKENESS_RATIO:
-            away_m = abs((sensor.height_m or 0.0) - (found.height_m or 0.0))
-            best = min(best or (np.inf, ""), (away_m, path.stem))
-    return best[1] if best else None
 
 
 def _with_reach(found: ProfileConfig) -> ProfileConfig:

@@ -157,6 +157,7 @@ _MODELS = (
         height_m=2.1,
         min_range_m=0.9,
         max_range_m=100.0,
+        response=Response(most=0.0),  # materials are not known on its scale
     ),
     SensorModel(
         name="xt-32",
