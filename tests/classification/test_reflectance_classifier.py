@@ -163,15 +163,18 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
     box, likelihood = np.exp(logits(BOX_LAYERS, feature)), np.exp(logits(LAYERS, np.c_[feature, REFLECTANCE[which]]))
     object_ = (box[:, 1:].sum(axis=1) / box[:, 0]) / (FREQUENCY[1:].sum() / FREQUENCY[0])
     either = np.c_[np.ones(2), np.tile(object_[:, None], 3)]  # the same for every class of object
-    for sensor, expected in (
-        (SENSOR, FREQUENCY * (shape / FREQUENCY) ** 0.7 * either**0.3 * likelihood**0.5),
-        (SensorConfig(), FREQUENCY * (shape / FREQUENCY) ** 0.8 * either**0.2),
+    bare = dataclasses.replace(proposals, reflectance=None)
+    with_box = FREQUENCY * (shape / FREQUENCY) ** 0.8 * either**0.2
+    for sensor, given, expected, weight in (
+        (SENSOR, proposals, FREQUENCY * (shape / FREQUENCY) ** 0.7 * either**0.3 * likelihood**0.5, 0.3),
+        (SENSOR, bare, with_box, 0.2),
+        (SensorConfig(), proposals, with_box, 0.2),
     ):
         network = PointNet(model, sensor)
-        probability = network.classify(points, proposals, which)
+        probability = network.classify(points, given, which)
         np.testing.assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
         prior = make_prior(network.box_scores, (0.1, 0.1, 0.1))
-        assert prior.pool_weight == (0.3 if sensor is SENSOR else 0.2)
+        assert prior.pool_weight == weight
 
 
 @pytest.mark.parametrize("key", [METADATA_KEY, box_classifier.METADATA_KEY])

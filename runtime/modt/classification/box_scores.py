@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.classification.box_classifier import BoxClassifier, proposal_features
+from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, proposal_features
 from modt.classification.pool import PoolWeights
-from modt.classification.reflectance_classifier import ReflectanceClassifier
+from modt.classification.reflectance_classifier import NoReflectanceClassifier, ReflectanceClassifier
 from modt.config import SensorConfig
 from modt.types import Float64, Proposals
 
@@ -30,9 +30,15 @@ class BoxScores:
         self._scores = np.zeros((2, 0, N_CLASSES))
 
     @property
+    def informative(self) -> bool:
+        """Whether there is either classifier."""
+        return not (isinstance(self.boxes, NoBoxClassifier) and isinstance(self.reflectance, NoReflectanceClassifier))
+
+    @property
     def weights(self) -> PoolWeights:
-        """In the pool with the network."""
-        return self.reflectance.weights or self.boxes.weights
+        """In the pool with the network, of the proposals last given: without reflectance the network counts more."""
+        told = None if self._proposals.reflectance is None else self.reflectance.weights
+        return told or self.boxes.weights
 
     def of(self, proposals: Proposals) -> Float64:
         """(2, P, 4) log P(class | box) and log P(reflectance | class, box) of each proposal, up to constants."""

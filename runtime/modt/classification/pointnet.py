@@ -20,7 +20,7 @@ from modt.classification import box_classifier, reflectance_classifier
 from modt.classification.box_scores import BoxScores
 from modt.classification.crops import canonical, gather, ground_z_m
 from modt.classification.model_file import REMEDY, read_model
-from modt.classification.pool import PoolWeights, log_pool
+from modt.classification.pool import log_pool
 from modt.classification.prior import with_background
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
@@ -102,10 +102,10 @@ class PointNet:
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:
         """(R, 4) P(class | points, box, reflectance)."""
-        weights = self.box_scores.weights
-        if weights == PoolWeights():
+        if not self.box_scores.informative:
             return network
         boxes, reflectance = self.box_scores.of(proposals).take(which, axis=1)
+        weights = self.box_scores.weights
         probability: Float64 = softmax(log_pool(network, boxes, reflectance, self._log_frequency, weights), axis=1)
         return probability
 

@@ -53,8 +53,12 @@ class BoxPrior:
     """P(class | box, reflectance)."""
 
     def __init__(self, scores: BoxScores) -> None:
-        self.pool_weight = scores.weights.box
         self._scores = scores
+
+    @property
+    def pool_weight(self) -> float:
+        """Weight of the box in the pool, of the proposals last given."""
+        return self._scores.weights.box
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) of each proposal of a frame."""
