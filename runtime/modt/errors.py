@@ -1,5 +1,7 @@
 """Errors with a remedy, each one line of subject, cause and remedy."""
 
+from __future__ import annotations
+
 
 class ModtError(Exception):
     """A failure that the user can remedy; exit status 1.
@@ -15,6 +17,10 @@ class ModtError(Exception):
     def __init__(self, subject: object, cause: str, remedy: str) -> None:
         super().__init__(f"{subject}: {cause}; {remedy}")
         self.subject, self.cause, self.remedy = str(subject), cause, remedy
+
+    def __reduce__(self) -> tuple[type[ModtError], tuple[str, str, str]]:
+        """Arguments to make it again from, in the process that waits for the one that failed."""
+        return type(self), (self.subject, self.cause, self.remedy)
 
 
 class MisuseError(ModtError):
