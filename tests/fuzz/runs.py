@@ -75,7 +75,7 @@ def model_metadata(folder: Path) -> Feed:
     load = _loading(path)
     weights = {"network": 0.8, "box": 0.5, "reflectance": 0.3}
     box = {"weights": weights, "layers": [[[[0.1] * 4] * 7, [0.2] * 4]]}
-    reflectance = {"sensor": "hdl-64e", "weights": weights, "layers": [[[[0.1] * 4] * 12, [0.2] * 4]]}
+    reflectance = {"hdl-64e": {"weights": weights, "layers": [[[[0.1] * 4] * 12, [0.2] * 4]]}}
     entries = {"box_prior": box, "reflectance": reflectance, "class_frequency": [0.7, 0.1, 0.1, 0.1]}
 
     def call(raw: bytes) -> None:

@@ -122,7 +122,7 @@ def printed(config: ProfileConfig, folder: Path) -> str:
 
 def one_call(config: ProfileConfig, _folder: Path) -> str:
     one = changed(config, "scheduler.calls_per_frame", 1)
-    return replay(frames(1, 4.0), one, view=FieldOfView.of_camera(CAMERA))
+    return replay(frames(8, 4.0), one, view=FieldOfView.of_camera(CAMERA))
 
 
 def two_ms(config: ProfileConfig, _folder: Path) -> str:
