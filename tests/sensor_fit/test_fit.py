@@ -7,9 +7,11 @@ import pytest
 
 from modt import assets, profile
 from modt.config import ProfileConfig
+from modt.config.sensor import REFLECTANCE_SCALES
 from modt.sensor_fit.finding import Finding, Recording
 from modt.sensor_fit.fit import FINDERS, cell_m, fit
 from modt.sensor_fit.profile_text import doubts, profile_text
+from modt.sensor_fit.reflectance import SCALES
 from modt.simulation.sensors import sensor
 from modt.sources.recognise import open_stream
 from tests.sensor_fit.recordings import recording, with_mast, with_scale
@@ -62,6 +64,10 @@ def test_a_scale_of_several_sensors_counts_with_the_beams_that_are_known(name, s
     said = next(f.evidence for f in findings if f.key == "reflectance")
     assert "as of the pandar64" in said
     assert ("other beams" in said) is (scale == "none")
+
+
+def test_every_scale_that_models_may_learn_can_be_found():
+    assert tuple(SCALES) == REFLECTANCE_SCALES
 
 
 def test_reflectance_that_is_not_recorded_has_no_scale():
