@@ -2,11 +2,11 @@
 
     python -m tools.bench.frame DRIVE [--frames N] [--write] [--against FILE]
 
-All run alternately in one thread, frame by frame, on the full circle: the pipelines on compiled kernels and on NumPy,
-Patchwork++ (ground only; extra "bench") and the yardstick, sorting 100,000 numbers. Ratios are of medians, with
-95 % intervals from resampled frames. --write puts the table into docs/segmentation.md. --against compares the ratios
-to the yardstick with those of an earlier output and fails where one is larger by more than --tolerance: what a busy
-machine slows, it slows alike.
+All run in one thread, frame by frame in random order, on the full circle: the pipelines on compiled kernels and on
+NumPy, Patchwork++ (ground only; extra "bench") and the yardstick, sorting 100,000 numbers. Ratios are of medians,
+with 95 % intervals from resampled frames. --write puts the table into docs/segmentation.md. --against compares the
+ratios to the yardstick with those of an earlier output and fails where one is larger by more than --tolerance: what a
+busy machine slows, it slows alike.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from tools.options import parser
 FIRST = 10
 """Frames left out, while tracks begin."""
 MODES = ("accurate", "efficient")
+PART = "segmentation in it"
 BASELINE, YARDSTICK = "Patchwork++: ground alone", "sorting 100,000 numbers"
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "segmentation.md"
 _NUMBERS = np.random.default_rng(0).random(100_000)
@@ -57,7 +58,7 @@ def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
 
 
 def contenders() -> dict[str, Work]:
-    """What is timed, in the order in which it runs on each frame."""
+    """What is timed."""
     found: dict[str, Work] = {YARDSTICK: partial(timed, lambda _: np.sort(_NUMBERS))}
     patchwork = optional("pypatchworkpp")
     if patchwork is not None:
@@ -73,16 +74,22 @@ def contenders() -> dict[str, Work]:
             pipeline = assembly.pipeline(assembly.MODES[mode], config, FieldOfView(), ledger)
             budget = assembly.MODES[mode].budget(config)
             found[f"{mode}, {kernels}"] = partial(timed, partial(pipeline.step, budget=budget))
-            found[f"segmentation in it ({mode}, {kernels})"] = partial(segmentation_ms, ledger)
+            found[f"{PART} ({mode}, {kernels})"] = partial(segmentation_ms, ledger)
     return found
 
 
 def measure(frames: list[Frame], work: dict[str, Work]) -> dict[str, Float64]:
-    """CPU times of all on every frame but the first ones [ms]."""
+    """CPU times of all on every frame but the first ones [ms].
+
+    The order is drawn anew for each frame: who runs first finds the points outside the cache. What is part of another
+    is read when all have run.
+    """
     times: dict[str, list[float]] = {name: [] for name in work}
+    whole, parts = ([name for name in work if name.startswith(PART) is part] for part in (False, True))
+    rng = np.random.default_rng(0)
     for frame in frames:
-        for name, run in work.items():
-            times[name].append(run(frame))
+        for name in (*rng.permutation(whole).tolist(), *parts):
+            times[name].append(work[name](frame))
     return {name: np.array(ms[FIRST:]) for name, ms in times.items()}
 
 
