@@ -57,6 +57,7 @@ class Terrain:
         direction = [across[i] + R[i, 2] * caster.tangent[rows] for i in range(3)]
         start = [t[i] + R[i, 2] * caster.origin[rows] for i in range(3)]
         flat = self.height.ravel()
+        # a tilted sensor: wherever a ray meets the ground, it has fallen about as far as the sensor is high
         foot = R[:, 2] * (flat[self.cells(t[:1], t[1:2])] - t[2])
         series = np.geomspace(NEAREST_M, sensor.max_range_m, N_DISTANCES, dtype=np.float32)
         first_below = np.full(direction[2].shape, N_DISTANCES)
