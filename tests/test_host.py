@@ -1,6 +1,8 @@
 """Cores of the loop and of what serves it."""
 
 import os
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -13,6 +15,13 @@ from modt import host
 )
 def test_lists_of_cores_of_the_kernel(text, cores):
     assert host.core_list(text) == cores
+
+
+@pytest.mark.parametrize("module", ["main", "profile"])
+def test_commands_load_what_sizes_thread_pools_only_once_they_are_pinned(module):
+    code = f"import modt.cli.{module}, sys; print({{'numpy', 'scipy', 'onnxruntime'}} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"
 
 
 def test_threads_begun_elsewhere_stay_there_and_the_loop_where_it_is():

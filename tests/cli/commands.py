@@ -11,8 +11,9 @@ RUNTIME = Path(__file__).resolve().parents[2] / "runtime"
 
 
 def environment() -> dict[str, str]:
-    """This one's, with the checkout's package in it."""
-    return {**os.environ, "PYTHONPATH": str(RUNTIME), "PYTHONWARNINGS": "error", "PYTHONUNBUFFERED": "1"}
+    """This one's, with the checkout's package in it, but without the sizes of thread pools in it."""
+    own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    return {**own, "PYTHONPATH": str(RUNTIME), "PYTHONWARNINGS": "error", "PYTHONUNBUFFERED": "1"}
 
 
 def modt(*arguments: object, cwd: Path, module: str = "modt.cli.main", **options) -> subprocess.CompletedProcess[str]:

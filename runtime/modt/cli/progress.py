@@ -5,10 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
-from modt.types import FrameResult
+if TYPE_CHECKING:  # NumPy is imported once the process is pinned
+    from modt.types import FrameResult
 
-Tick = Callable[[FrameResult], None]
+Tick = Callable[["FrameResult"], None]
 
 
 @contextmanager
