@@ -44,9 +44,9 @@ class ClassSpec:
 CLASSES: dict[ObjectClass, ClassSpec] = {
     # What counts as background may be a car that is not recognised yet: its size is that of a car.
     ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, False, 0.88, 0.0, 0.5, "#8a8f98"),
-    ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 0.08, 2.0, 0.2, "#2f6fde"),
+    ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 0.08, 1.5, 0.2, "#2f6fde"),
     ObjectClass.PEDESTRIAN: ClassSpec(
-        ("Pedestrian", "Person", "Person_sitting"), (30, 254), 1.1, 1.1, True, 0.02, 2.0, 0.16, "#d9480f"
+        ("Pedestrian", "Person", "Person_sitting"), (30, 254), 1.1, 1.1, True, 0.02, 1.0, 0.16, "#d9480f"
     ),
     ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 0.02, 1.0, 0.22, "#2b8a3e"),
 }
