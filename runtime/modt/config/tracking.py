@@ -45,7 +45,7 @@ class KdopAssociationConfig(StageConfig):
     gate: float = number(16.0, 0.1, 1000.0, "", "squared Mahalanobis distance of a pair at most")
     max_cost: float = number(10.0, 0.1, 1000.0, "", "cost of leaving a track without a proposal")
     min_coverage: float = number(0.3, 0.0, 1.0, "", "overlap over the smaller, of a pair that changed its shape")
-    jump_sigma_m: float = number(0.3, 0.0, 5.0, "m", "jumps of k-DOPs as parts of an object come into view and go")
+    jump_sigma_m: float = number(0.2, 0.0, 5.0, "m", "jumps of k-DOPs as parts of an object come into view and go")
     size_weight: float = number(2.0, 0.0, 100.0, "", "of the difference of log sizes")
     overlap_weight: float = number(3.0, 0.0, 100.0, "", "of 1 - IoU")
     height_weight: float = number(2.0, 0.0, 100.0, "1/m", "of the difference of heights")
