@@ -11,7 +11,7 @@ RUNTIME = Path(__file__).resolve().parents[2] / "runtime"
 
 
 def environment() -> dict[str, str]:
-    """This one's, with the checkout's package in it, but without the sizes of thread pools in it."""
+    """This one's, with the checkout's package and without sizes of thread pools."""
     own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     return {**own, "PYTHONPATH": str(RUNTIME), "PYTHONWARNINGS": "error", "PYTHONUNBUFFERED": "1"}
 
