@@ -32,37 +32,46 @@ def random_pairs(seed, n):
 def test_costs_equal_those_of_pairs_one_by_one(seed, n):
     a, b, covariance, variance, pairs = random_pairs(seed, n)
     found = pair_costs(a, b, covariance, variance, pairs, WEIGHTS)
-    for i, j, distance, cost, coverage in zip(*pairs, *found, strict=True):
+    for i, j, cost, coverage in zip(*pairs, *found, strict=True):
         ends = [min(b.kdop[k, j] - a.kdop[k, i], a.kdop[k + 4, i] - b.kdop[k + 4, j], key=abs) for k in range(4)]
         xx, xy, yy = covariance[:, i]
         shift = AXES @ ends / 2
         S = np.array([[xx, xy], [xy, yy]]) + variance[j] * np.eye(2)
-        np.testing.assert_allclose(distance, shift @ np.linalg.inv(S) @ shift, atol=1e-9)
+        displacement = (shift @ np.linalg.inv(S) @ shift + np.log(np.linalg.det(S / variance[j]))) / 2
         size, overlap = slow_similarity(a.kdop[:, i], b.kdop[:, j])
         height = abs(a.top[i] - b.top[j]) + abs(a.bottom[i] - b.bottom[j])
         count = abs(a.log_count[i] - b.log_count[j])
         shape = 1.5 * size + 0.8 * (1 - overlap) + 2.0 * height / 2 + 0.5 * count
-        np.testing.assert_allclose(cost, distance / 2 + shape, atol=1e-9)
+        np.testing.assert_allclose(cost, displacement + shape, atol=1e-9)
         assert overlap - 1e-9 <= coverage <= 1
 
 
-def test_growth_at_one_end_is_no_distance():
-    rng = np.random.default_rng(0)
+def cost_of(kdop, variance_m2):
+    """Cost without shape, and coverage, of a square at the origin and another k-DOP, by variance of the expected."""
+    rng, pair = np.random.default_rng(0), np.zeros(1, np.int64)
+    covariance = np.array([[variance_m2], [0.0], [variance_m2]])
+    given = shapes(rng, square((0, 0), 1.0)), shapes(rng, kdop), covariance, np.array([0.3]), (pair, pair)
+    return pair_costs(*given, PairWeights(0.0, 0.0, 0.0, 0.0))
+
+
+def test_growth_at_one_end_is_no_displacement():
     grown = square((0, 0), 1.0)
     grown[:2] += 1.5
-    a, b = shapes(rng, square((0, 0), 1.0)), shapes(rng, grown)
-    pair = np.zeros(1, np.int64)
-    distance, _, coverage = pair_costs(a, b, np.ones((3, 1)) * [[1], [0], [1]], np.ones(1), (pair, pair), WEIGHTS)
-    np.testing.assert_allclose(distance, 0, atol=1e-12)
+    cost, coverage = cost_of(grown, 0.0)
+    np.testing.assert_allclose(cost, 0, atol=1e-12)
     np.testing.assert_allclose(coverage, 1)
 
 
-@given(st.floats(-1, 1), st.floats(-1, 1))
-def test_the_distance_of_a_displaced_shape_is_that_of_its_centre(dx, dy):
-    rng, pair = np.random.default_rng(0), np.zeros(1, np.int64)
-    a, b = shapes(rng, square((0, 0), 1.0)), shapes(rng, square((dx, dy), 1.0))
-    distance, _, _ = pair_costs(a, b, np.array([[0.2], [0.0], [0.2]]), np.array([0.3]), (pair, pair), WEIGHTS)
-    np.testing.assert_allclose(distance, (dx**2 + dy**2) / 0.5, atol=1e-9)
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1))
+def test_the_displacement_of_a_displaced_shape_is_that_of_its_centre(dx, dy, variance_m2):
+    S = variance_m2 + 0.3
+    cost, _ = cost_of(square((dx, dy), 1.0), variance_m2)
+    np.testing.assert_allclose(cost, (dx**2 + dy**2) / S / 2 + np.log(S / 0.3), atol=1e-9)
+
+
+def test_what_is_where_it_is_expected_costs_less_the_more_precisely_it_is_expected():
+    precise, vague = (cost_of(square((0.3, 0), 1.0), variance_m2)[0] for variance_m2 in (0.1, 10.0))
+    assert precise < vague
 
 
 def test_pairs_without_a_rival_are_certain():

@@ -40,10 +40,17 @@ def test_the_position_moves_with_the_kdop():
     np.testing.assert_allclose(matches.position[order], [[10.3, 3.1], [20.1, -5.0]], atol=0.1)
 
 
-def test_a_pair_beyond_the_gate_is_not_matched():
+def test_a_lost_track_does_not_take_the_proposal_of_a_track_that_is_expected_there():
+    """By the deviations of the two, the person is nearer to the lost one."""
+    tracks, person = tracks_at([box(9.3, 0, 0.6, 0.6), box(11.5, 0, 0.6, 0.6)]), observed([box(10, 0, 0.6, 0.6)])
+    tracks.P[:, :2, :2] = np.eye(2) * np.array([0.1, 9.0])[:, None, None]
+    assert matched(tracks, person)[0] == [(0, 0)]
+
+
+def test_a_pair_too_far_apart_is_not_matched():
     tracks, person = tracks_at([box(10, 0, 0.6, 0.6)]), observed([box(10.9, 0, 0.6, 0.6)])
-    assert matched(tracks, person, gate=30.0)[0] == [(0, 0)]
-    assert matched(tracks, person, gate=2.0)[0] == []
+    assert matched(tracks, person, max_cost=30.0)[0] == [(0, 0)]
+    assert matched(tracks, person, max_cost=2.0, min_coverage=1.0)[0] == []
 
 
 def test_pairs_are_sought_as_far_as_the_filter_is_uncertain():

@@ -42,7 +42,6 @@ class PaperAssociationConfig(StageConfig):
 class KdopAssociationConfig(StageConfig):
     """Association by k-DOPs; in effect with association: kdop."""
 
-    gate: float = number(16.0, 0.1, 1000.0, "", "squared Mahalanobis distance of a pair at most")
     max_cost: float = number(10.0, 0.1, 1000.0, "", "cost of leaving a track without a proposal")
     min_coverage: float = number(0.3, 0.0, 1.0, "", "overlap over the smaller, of a pair that changed its shape")
     jump_sigma_m: float = number(0.2, 0.0, 5.0, "m", "jumps of k-DOPs as parts of an object come into view and go")

@@ -19,7 +19,7 @@ PAD_M = SOFT_M / 3
 
 
 class PairWeights(NamedTuple):
-    """What a difference adds to the cost of a pair, beside half its squared distance."""
+    """What a difference adds to the cost of a pair, beside the likelihood of its displacement."""
 
     size: float  # mean difference of the logarithms of the widths
     overlap: float  # of 1 - intersection over union
@@ -59,8 +59,12 @@ def shares(a: Float64, b: Float64) -> tuple[Float64, Float64]:
 
 def pair_costs(
     a: Shapes, b: Shapes, covariance: Float64, variance: Float64, pairs: tuple[Int, Int], weights: PairWeights
-) -> tuple[Float64, Float64, Float64]:
+) -> tuple[Float64, Float64]:
     """Costs of pairs of shapes.
+
+    The displacement of a pair, by the ends that moved less, costs the negative logarithm of its Gaussian density,
+    relative to the density at no displacement from a position known exactly. The distance alone would favour
+    whatever is expected least precisely.
 
     Args:
         a: n of them, where they are expected.
@@ -71,8 +75,7 @@ def pair_costs(
         weights: of the cost.
 
     Returns:
-        distance: (K,) squared Mahalanobis distance by the ends that moved less.
-        cost: (K,) half the distance, and what the differences add.
+        cost: (K,) of the displacement, and what the differences add.
         coverage: (K,) intersection over the smaller of the two.
     """
     rows, columns = pairs
@@ -84,13 +87,14 @@ def pair_costs(
     east, north_east, north, north_west = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
     dx = (east + HALF_ROOT * (north_east - north_west)) / 2
     dy = (north + HALF_ROOT * (north_east + north_west)) / 2
-    distance = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy)
+    determinant = xx * yy - xy * xy
+    distance = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant
     overlap, coverage = shares(one, other)
     size = np.abs(b.log_width.take(columns, axis=1) - a.log_width.take(rows, axis=1)).sum(axis=0) / 4
     height = np.abs(a.top[rows] - b.top[columns]) + np.abs(a.bottom[rows] - b.bottom[columns])
     shape = weights.size * size + weights.overlap * (1 - overlap)
     shape += weights.height * height / 2 + weights.points * np.abs(a.log_count[rows] - b.log_count[columns])
-    return distance, distance / 2 + shape, coverage
+    return distance / 2 + shape + np.log(determinant / np.square(noise)) / 2, coverage
 
 
 def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:

@@ -30,8 +30,8 @@ class GeometryKernels(Protocol):
         variance: Float64,
         pairs: tuple[Int, Int],
         weights: PairWeights,
-    ) -> tuple[Float64, Float64, Float64]:
-        """(K,) distance, cost and coverage of pairs of shapes."""
+    ) -> tuple[Float64, Float64]:
+        """(K,) cost and coverage of pairs of shapes."""
 
     def certain_pairs(self, rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
         """Pairs that a least-cost assignment keeps for certain, and those that it must decide among."""

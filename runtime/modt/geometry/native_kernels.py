@@ -83,17 +83,17 @@ class NativeGeometryKernels:
         variance: Float64,
         pairs: tuple[Int, Int],
         weights: PairWeights,
-    ) -> tuple[Float64, Float64, Float64]:
-        """(K,) distance, cost and coverage of pairs of shapes."""
+    ) -> tuple[Float64, Float64]:
+        """(K,) cost and coverage of pairs of shapes."""
         rows, columns = pairs
-        distance, cost, coverage = out = np.empty((3, len(rows)))
+        spread, cost, coverage = out = np.empty((3, len(rows)))
         tracks, proposals, weighted = self._shapes(a), self._shapes(b), array("d", weights)
         self._library.modt_pair_costs(
             address(tracks), address(proposals), at(covariance, FLOAT64), at(variance, FLOAT64),
             at(rows, INT64), at(columns, INT64), len(rows), address(weighted), HALF_ROOT, PAD_M,
             *map(address, out),
         )  # fmt: skip
-        return distance, cost, coverage
+        return cost + np.log(spread) / 2, coverage
 
     def certain_pairs(self, rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
         """Pairs that a least-cost assignment keeps for certain, and those that it must decide among."""

@@ -79,11 +79,11 @@ static inline double low(double a, double b) { return a < b ? a : b; }
 static inline double high(double a, double b) { return a > b ? a : b; }
 static inline double apart(double a, double b) { return __builtin_fabs(a - b); }
 
-/* pair_costs: squared distance, cost and coverage of n pairs (i, j) of shapes a and b; `covariance` has the xx, then
- * the xy, then the yy of a. */
+/* pair_costs: coverage of n pairs (i, j) of shapes a and b, cost without the term of the determinant, and that
+ * determinant over its least; `covariance` has the xx, then the xy, then the yy of a. */
 EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *covariance, const double *variance,
                             const i64 *rows, const i64 *columns, i64 n, const PairWeights *weights, double half_root,
-                            double pad_m, double *distance, double *cost, double *coverage)
+                            double pad_m, double *spread, double *cost, double *coverage)
 {
     for (i64 pair = 0; pair < n; pair++) {
         i64 i = rows[pair], j = columns[pair];
@@ -111,8 +111,9 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
         double shape = weights->size * (size / 4) + weights->overlap * (1 - low(overlap[0], overlap[1]));
         double height = apart(a->top[i], b->top[j]) + apart(a->bottom[i], b->bottom[j]);
         shape += weights->height * height / 2 + weights->count * apart(a->log_count[i], b->log_count[j]);
-        distance[pair] = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
-        cost[pair] = distance[pair] / 2 + shape;
+        double determinant = xx * yy - xy * xy;
+        spread[pair] = determinant / (variance[j] * variance[j]);
+        cost[pair] = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant / 2 + shape;
         coverage[pair] = low(covered[0], covered[1]);
     }
 }

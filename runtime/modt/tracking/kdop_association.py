@@ -1,4 +1,4 @@
-"""The default association: k-DOPs instead of centroids, gated by the filter."""
+"""The default association: k-DOPs instead of centroids, costed by the filter."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ class KdopAssociation:
 
     The visible part of an object changes with the view: its far side appears, a pole hides its rear, the field of
     view cuts it. Along each of four axes a k-DOP has two ends, of which one usually stays: the smaller of their
-    displacements from where the filter expects them is the object's own, and pairs are gated by it alone.
+    displacements from where the filter expects them is the object's own, and pairs are costed by it alone.
 
     Args:
-        config: gate, weights of the cost and noise of the positions.
+        config: weights of the cost and noise of the positions.
         kernels: passes over pairs.
     """
 
@@ -35,13 +35,13 @@ class KdopAssociation:
         )
 
     def match(self, tracks: TrackTable, observations: Observations) -> Matches:
-        """Pairs within the gate; then, among the rest, those that overlap although they changed their shape."""
+        """Pairs of least cost; then, among the rest, those that overlap although they changed their shape."""
         weight = self.config
         expected = tracks.predicted_kdops()
         variance = self.noise(observations)
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
         rows, columns = overlapping_pairs(expected + reach, observations.kdop, self._kernels.reaching_pairs)
-        distance, cost, coverage = self._kernels.pair_costs(
+        cost, coverage = self._kernels.pair_costs(
             Shapes.of(expected, tracks.bottom, tracks.top, tracks.points),
             Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count),
             np.stack([tracks.P[:, 0, 0], tracks.P[:, 0, 1], tracks.P[:, 1, 1]]),
@@ -49,7 +49,7 @@ class KdopAssociation:
             (rows, columns),
             self._weights,
         )
-        first = ((distance < weight.gate) & (cost < weight.max_cost)).nonzero()[0]
+        first = (cost < weight.max_cost).nonzero()[0]
         first = first[assign(rows[first], columns[first], cost[first], weight.max_cost, self._kernels)]
         free = _free(rows, rows[first], len(tracks)) & _free(columns, columns[first], len(observations))
         second = (free & (coverage > weight.min_coverage)).nonzero()[0]
