@@ -42,9 +42,9 @@ class PaperAssociationConfig(StageConfig):
 class KdopAssociationConfig(StageConfig):
     """Association by k-DOPs; in effect with association: kdop."""
 
-    max_cost: float = number(10.0, 0.1, 1000.0, "", "cost of leaving a track without a proposal")
+    max_cost: float = number(7.0, 0.1, 1000.0, "", "cost of leaving a track without a proposal")
     min_coverage: float = number(0.3, 0.0, 1.0, "", "overlap over the smaller, of a pair that changed its shape")
-    jump_sigma_m: float = number(0.2, 0.0, 5.0, "m", "jumps of k-DOPs as parts of an object come into view and go")
+    jump_sigma_m: float = number(0.4, 0.0, 5.0, "m", "jumps of k-DOPs as parts of an object come into view and go")
     size_weight: float = number(2.0, 0.0, 100.0, "", "of the difference of log sizes")
     overlap_weight: float = number(3.0, 0.0, 100.0, "", "of 1 - IoU")
     height_weight: float = number(2.0, 0.0, 100.0, "1/m", "of the difference of heights")
