@@ -14,7 +14,7 @@ class FilterConfig(StageConfig):
     acceleration_sigma_mps2: float = number(2.0, 0.01, 50.0, "m/s2", "process noise of the speed")
     turn_sigma_radps: float = number(0.3, 0.001, 10.0, "rad/s", "process noise of the heading")
     initial_position_sigma_m: float = number(0.3, 0.01, 5.0, "m", "of the position of a new track")
-    initial_speed_sigma_mps: float = number(5.0, 0.1, 50.0, "m/s", "of the speed of a new track")
+    initial_speed_sigma_mps: float = number(8.0, 0.1, 50.0, "m/s", "of the speed of a new track")
     stationary_radius_m: float = number(0.5, 0.05, 5.0, "m", "a track this near to its rest position is stationary")
     stationary_sigma_mps: float | None = number(
         1.0, 0.01, 50.0, "m/s", "of the speed 0 that is observed of such a track; null: none is"
