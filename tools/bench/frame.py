@@ -11,6 +11,7 @@ busy machine slows, it slows alike.
 
 from __future__ import annotations
 
+import gc
 import json
 import time
 from collections.abc import Callable
@@ -87,6 +88,8 @@ def measure(frames: list[Frame], work: dict[str, Work]) -> dict[str, Float64]:
     times: dict[str, list[float]] = {name: [] for name in work}
     whole, parts = ([name for name in work if name.startswith(PART) is part] for part in (False, True))
     rng = np.random.default_rng(0)
+    gc.collect()
+    gc.freeze()  # as every loop does before its first frame
     for frame in frames:
         for name in (*rng.permutation(whole).tolist(), *parts):
             times[name].append(work[name](frame))
