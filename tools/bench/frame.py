@@ -93,6 +93,7 @@ def measure(frames: list[Frame], work: dict[str, Work]) -> dict[str, Float64]:
     for frame in frames:
         for name in (*rng.permutation(whole).tolist(), *parts):
             times[name].append(work[name](frame))
+    gc.unfreeze()
     return {name: np.array(ms[FIRST:]) for name, ms in times.items()}
 
 
