@@ -24,7 +24,6 @@ class Observations:
         bottom, top: (P,) heights of the lowest and the highest point [m].
         count: (P,) points.
         range_m: (P,) distance from the sensor.
-        partial: (P,) truncated, merged or split off.
         sensor_xy: (2,) position of the sensor [m].
     """
 
@@ -35,7 +34,6 @@ class Observations:
     top: Float64
     count: Int
     range_m: Float64
-    partial: Bool
     sensor_xy: Float64
 
     def __len__(self) -> int:
@@ -58,7 +56,6 @@ class Observations:
             top=self.top,
             count=self.count,
             range_m=self.range_m,
-            partial=self.partial,
             sensor_xy=self.sensor_xy,
         )
 
@@ -72,7 +69,6 @@ class Observations:
             top=self.top[rows],
             count=self.count[rows],
             range_m=self.range_m[rows],
-            partial=self.partial[rows],
             sensor_xy=self.sensor_xy,
         )
 
@@ -80,7 +76,7 @@ class Observations:
         """Overwrite the rows given."""
         self.box[rows], self.centroid[rows], self.kdop[:, rows] = few.box, few.centroid, few.kdop
         self.bottom[rows], self.top[rows], self.count[rows] = few.bottom, few.top, few.count
-        self.range_m[rows], self.partial[rows] = few.range_m, few.partial
+        self.range_m[rows] = few.range_m
 
 
 def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Observations:
@@ -94,7 +90,6 @@ def observe(proposals: Proposals, T_world_sensor: Float64, kernels: GeometryKern
         top=box[:, 2] + box[:, 5] / 2,
         count=proposals.count,
         range_m=np.hypot(proposals.centroid[:, 0], proposals.centroid[:, 1]),
-        partial=proposals.truncated.copy(),
         sensor_xy=T_world_sensor[:2, 3],
     )
 

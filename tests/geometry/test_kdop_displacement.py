@@ -67,10 +67,10 @@ def slow_shift(a, b):
 def test_measured_displacement_matches_the_slow_reference(n, seed):
     rng = np.random.default_rng(seed)
     a, b = random_kdops(rng, n)
-    variance, before = rng.uniform(0.01, 1.0, n), rng.uniform(0, 0.5, (4, n))
+    variance, before = rng.uniform(0.01, 1.0), rng.uniform(0, 0.5, (4, n))
     shift, covariance, end_variance = measured(a, b, variance, before)
     for k in range(n):
-        slow = slow_measured(a[:, k], b[:, k], variance[k], before[:, k])
+        slow = slow_measured(a[:, k], b[:, k], variance, before[:, k])
         for fast, one in zip((shift[k], covariance[k], end_variance[:, k]), slow, strict=True):
             np.testing.assert_allclose(fast, one, atol=1e-9)
 
@@ -104,7 +104,7 @@ def test_growth_at_one_end_is_no_displacement(growth):
 def test_an_unchanged_shape_has_no_end_variance(seed, dx, dy):
     a, _ = random_kdops(np.random.default_rng(seed), 5)
     b = a + (np.array([dx, dy]) @ DIRECTIONS)[:, None]
-    shift, covariance, end_variance = measured(a, b, np.full(5, 0.04), np.zeros((4, 5)))
+    shift, covariance, end_variance = measured(a, b, 0.04, np.zeros((4, 5)))
     np.testing.assert_allclose(shift, np.tile([dx, dy], (5, 1)), atol=1e-9)
     np.testing.assert_allclose(shift, shift_between(a, b), atol=1e-9)
     np.testing.assert_allclose(covariance, np.tile(0.04 * np.eye(2), (5, 1, 1)), atol=1e-9)
@@ -114,14 +114,14 @@ def test_an_unchanged_shape_has_no_end_variance(seed, dx, dy):
 def test_an_end_that_comes_into_view_adds_variance_along_its_axis_that_decays():
     before = square((1.0, 0.0), 1.0)
     after = before + np.array([1.5, 0, 0, 0, 0, 0, 0, 0])[:, None]
-    _, covariance, end_variance = measured(before, after, np.full(1, 0.01), np.zeros((4, 1)))
+    _, covariance, end_variance = measured(before, after, 0.01, np.zeros((4, 1)))
     np.testing.assert_allclose(end_variance[:, 0], [(DISAGREEMENT * 1.5) ** 2, 0, 0, 0])
     assert covariance[0, 0, 0] > 1.9 * covariance[0, 1, 1]  # the diagonal axes measure along it as well
-    _, _, later = measured(after, after, np.full(1, 0.01), end_variance)
+    _, _, later = measured(after, after, 0.01, end_variance)
     np.testing.assert_allclose(later, DECAY * end_variance)
 
 
 def test_the_end_variance_is_bounded_by_the_size_of_the_kdop():
     wall, person = np.full((8, 1), 5.0), np.full((8, 1), 0.3)
-    _, _, end_variance = measured(wall, person, np.full(1, 0.01), np.zeros((4, 1)))
+    _, _, end_variance = measured(wall, person, 0.01, np.zeros((4, 1)))
     np.testing.assert_allclose(end_variance, (DISAGREEMENT * 0.6) ** 2)

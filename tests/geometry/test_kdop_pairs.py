@@ -18,14 +18,14 @@ def shapes(rng, kdop):
 
 
 def random_pairs(seed, n):
-    """Two sets of n shapes, covariances, variances, and some of their pairs."""
+    """Two sets of n shapes, covariances, a variance, and some of their pairs."""
     rng = np.random.default_rng(seed)
     a, b = (shapes(rng, kdop) for kdop in random_kdops(rng, n))
     root = rng.normal(size=(n, 2, 2))
     P = root @ root.transpose(0, 2, 1) + 0.1 * np.eye(2)
     covariance = np.stack([P[:, 0, 0], P[:, 0, 1], P[:, 1, 1]])
     pairs = np.divmod(rng.permutation(n * n)[: 2 * n], max(n, 1))
-    return a, b, covariance, rng.uniform(0.01, 1, n), pairs
+    return a, b, covariance, rng.uniform(0.01, 1), pairs
 
 
 @given(st.integers(0, 2**16), st.integers(0, 6))
@@ -36,8 +36,8 @@ def test_costs_equal_those_of_pairs_one_by_one(seed, n):
         ends = [min(b.kdop[k, j] - a.kdop[k, i], a.kdop[k + 4, i] - b.kdop[k + 4, j], key=abs) for k in range(4)]
         xx, xy, yy = covariance[:, i]
         shift = AXES @ ends / 2
-        S = np.array([[xx, xy], [xy, yy]]) + variance[j] * np.eye(2)
-        displacement = (shift @ np.linalg.inv(S) @ shift + np.log(np.linalg.det(S / variance[j]))) / 2
+        S = np.array([[xx, xy], [xy, yy]]) + variance * np.eye(2)
+        displacement = (shift @ np.linalg.inv(S) @ shift + np.log(np.linalg.det(S / variance))) / 2
         size, overlap = slow_similarity(a.kdop[:, i], b.kdop[:, j])
         height = abs(a.top[i] - b.top[j]) + abs(a.bottom[i] - b.bottom[j])
         count = abs(a.log_count[i] - b.log_count[j])
@@ -50,7 +50,7 @@ def cost_of(kdop, variance_m2):
     """Cost without shape, and coverage, of a square at the origin and another k-DOP, by variance of the expected."""
     rng, pair = np.random.default_rng(0), np.zeros(1, np.int64)
     covariance = np.array([[variance_m2], [0.0], [variance_m2]])
-    given = shapes(rng, square((0, 0), 1.0)), shapes(rng, kdop), covariance, np.array([0.3]), (pair, pair)
+    given = shapes(rng, square((0, 0), 1.0)), shapes(rng, kdop), covariance, 0.3, (pair, pair)
     return pair_costs(*given, PairWeights(0.0, 0.0, 0.0, 0.0))
 
 

@@ -1,7 +1,5 @@
 """The association by k-DOPs."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -69,16 +67,6 @@ def test_a_pair_above_the_highest_cost_is_not_matched():
 def test_what_changed_its_shape_is_matched_by_coverage_among_the_rest():
     tracks, part = tracks_at([box(10, 3)], points=300), observed([box(9.0, 3, 0.5, 1.8, 0.4, z=-1.5)], points=8)
     assert matched(tracks, part, max_cost=2.0, min_coverage=0.3)[0] == [(0, 0)]
-
-
-def test_the_noise_grows_with_range_extent_and_occlusion():
-    association = KdopAssociation(KdopAssociationConfig())
-    observations = observed([box(8, 0, 1, 1), box(40, 0, 1, 1), box(0, 8, 3, 1)])
-    near, far, long = association.noise(observations)
-    assert far > near
-    assert long > near
-    hidden = replace(observations, partial=np.ones(3, np.bool_))
-    np.testing.assert_allclose(association.noise(hidden), 1.5**2 * np.array([near, far, long]))
 
 
 def test_a_stationary_car_that_comes_into_view_has_no_speed():

@@ -56,7 +56,6 @@ def test_the_parts_of_a_car_become_one_proposal():
     assert groups == [[0, 1]]
     np.testing.assert_allclose(after.proposals.box[0], WHOLE, atol=0.05)
     np.testing.assert_allclose(after.observations.box[0], WHOLE, atol=0.05)
-    assert after.observations.partial.all()
     assert (after.matches.rows.tolist(), after.matches.proposals.tolist()) == ([0], [0])
 
 

@@ -56,10 +56,9 @@ def scenes(draw):
     source = np.array([np.searchsorted(proposals.offsets, m[0], side="right") - 1 for m in members])
     same = [np.array_equal(m, np.arange(*proposals.offsets[k : k + 2])) for m, k in zip(members, source, strict=True)]
     changed = np.flatnonzero(~np.array(same))
-    partial = changed[draw(st.integers(0, 1)) :]
     yaw = draw(st.floats(-3, 3))
     runs = [slice(m[0], m[-1] + 1) if len(m) == m[-1] - m[0] + 1 else m for m in members]
-    grouping = Grouping(runs, np.bincount(label), source, changed, np.full(len(changed), yaw), partial)
+    grouping = Grouping(runs, np.bincount(label), source, changed, np.full(len(changed), yaw))
     return Scene(frame.points, Associated(proposals, observations, NO_MATCHES), placement, deskew, label, grouping)
 
 
@@ -123,7 +122,6 @@ def test_observations_of_changed_proposals_are_deskewed_at_their_positions_and_o
     step = scene.deskew[scene.grouping.source]
     step[scene.grouping.changed] = scene.placement.deskew(fresh.centroid[scene.grouping.changed])
     expected = fresh.moved(step)
-    expected.partial[scene.grouping.partial] = True
     for column in dataclasses.fields(expected):
         found, want = getattr(observations, column.name), getattr(expected, column.name)
         np.testing.assert_allclose(found, want, atol=1e-6, err_msg=column.name)
@@ -154,7 +152,7 @@ def test_corners_of_a_regrouped_box_enclose_both_parts():
     _, proposals = frame_of([box(10, 0, 2.0), box(13, 0, 2.0)])
     frame = Associated(proposals, observe(proposals, EYE), NO_MATCHES)
     zero = np.array([0])
-    grouping = Grouping([slice(None)], np.array([120]), zero, zero, np.zeros(1), zero)
+    grouping = Grouping([slice(None)], np.array([120]), zero, zero, np.zeros(1))
     after, _ = grouping.apply(frame, Placement(EYE))
     np.testing.assert_allclose(corners(after.box)[0].min(axis=0), [9.0, -0.9], atol=1e-5)
     np.testing.assert_allclose(corners(after.box)[0].max(axis=0), [14.0, 0.9], atol=1e-5)

@@ -60,7 +60,6 @@ def test_the_points_of_a_person_are_split_off_a_wall():
     assert dict(zip(after.matches.rows.tolist(), after.matches.proposals.tolist(), strict=True)) == {0: 1, 1: 0}
     np.testing.assert_allclose(after.proposals.box[1], PERSON, atol=0.05)
     np.testing.assert_allclose(after.proposals.box[0, :6], WALL[:6], atol=0.05)
-    assert after.observations.partial.tolist() == [False, True]
 
 
 def test_neither_the_piece_nor_the_rest_measures_anything():

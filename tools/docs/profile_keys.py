@@ -29,7 +29,6 @@ CONDITIONS = {
     "segmentation.view_margin": "--fov camera",
     "tracking.paper": "association: paper",
     "tracking.kdop": "association: kdop",
-    "tracking.kdop.partial_factor": "association: kdop, --fov camera",
     "tracking.split": "association: kdop",
     "tracking.merge": "association: kdop",
     "tracking.background_map": "association: kdop",

@@ -49,10 +49,7 @@ class KdopAssociationConfig(StageConfig):
     overlap_weight: float = number(3.0, 0.0, 100.0, "", "of 1 - IoU")
     height_weight: float = number(2.0, 0.0, 100.0, "1/m", "of the difference of heights")
     count_weight: float = number(0.5, 0.0, 100.0, "", "of the difference of log point numbers")
-    sigma_m: float = number(0.06, 0.001, 5.0, "m", "of a measured position, at range 0 of a thing without extent")
-    sigma_per_range: float = number(0.001, 0.0, 1.0, "", "its growth with range")
-    sigma_per_extent: float = number(0.03, 0.0, 1.0, "", "its growth with the mean width, up to 3 m of it")
-    partial_factor: float = number(1.5, 1.0, 10.0, "", "its growth where truncated, merged or split off")
+    position_sigma_m: float = number(0.1, 0.001, 5.0, "m", "of a measured position")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

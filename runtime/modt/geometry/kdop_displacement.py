@@ -31,13 +31,13 @@ def shift_between(a: Float64, b: Float64) -> Float64:
     return shift
 
 
-def measured(a: Float64, b: Float64, variance: Float64, before: Float64) -> tuple[Float64, Float64, Float64]:
+def measured(a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
     """Displacement between k-DOPs with its covariance.
 
     Args:
         a: (8, K) k-DOPs before [m].
         b: (8, K) and after [m].
-        variance: (K,) of the displacement if the ends agree [m2].
+        variance: of the displacement if the ends agree [m2].
         before: (4, K) variance along each axis by ends that disagreed, a frame ago [m2].
 
     Returns:

@@ -58,7 +58,7 @@ def shares(a: Float64, b: Float64) -> tuple[Float64, Float64]:
 
 
 def pair_costs(
-    a: Shapes, b: Shapes, covariance: Float64, variance: Float64, pairs: tuple[Int, Int], weights: PairWeights
+    a: Shapes, b: Shapes, covariance: Float64, variance: float, pairs: tuple[Int, Int], weights: PairWeights
 ) -> tuple[Float64, Float64]:
     """Costs of pairs of shapes.
 
@@ -70,7 +70,7 @@ def pair_costs(
         a: n of them, where they are expected.
         b: k of them.
         covariance: (3, n) xx, xy and yy of the position of each of a [m2].
-        variance: (k,) of the position of each of b [m2].
+        variance: of the position of any of b [m2].
         pairs: (K,) index of each among a, and among b.
         weights: of the cost.
 
@@ -80,8 +80,8 @@ def pair_costs(
     """
     rows, columns = pairs
     one, other = a.kdop.take(rows, axis=1), b.kdop.take(columns, axis=1)
-    (xx, xy, yy), noise = covariance.take(rows, axis=1), variance.take(columns)
-    xx, yy = xx + noise, yy + noise
+    xx, xy, yy = covariance.take(rows, axis=1)
+    xx, yy = xx + variance, yy + variance
     gain = other - one
     ahead, behind = gain[:4], -gain[4:]
     east, north_east, north, north_west = np.where(np.abs(ahead) < np.abs(behind), ahead, behind)
@@ -94,7 +94,7 @@ def pair_costs(
     height = np.abs(a.top[rows] - b.top[columns]) + np.abs(a.bottom[rows] - b.bottom[columns])
     shape = weights.size * size + weights.overlap * (1 - overlap)
     shape += weights.height * height / 2 + weights.points * np.abs(a.log_count[rows] - b.log_count[columns])
-    return distance / 2 + shape + np.log(determinant / np.square(noise)) / 2, coverage
+    return distance / 2 + shape + np.log(determinant / variance**2) / 2, coverage
 
 
 def certain_pairs(rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:

@@ -27,7 +27,7 @@ class GeometryKernels(Protocol):
         a: Shapes,
         b: Shapes,
         covariance: Float64,
-        variance: Float64,
+        variance: float,
         pairs: tuple[Int, Int],
         weights: PairWeights,
     ) -> tuple[Float64, Float64]:

@@ -16,7 +16,7 @@ _D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
     "modt_ends_along": (None, (_P, _P, _P, _P, _L, _P, _L, _P, _P)),
     "modt_reaching_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
-    "modt_pair_costs": (None, (_P, _P, _P, _P, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
+    "modt_pair_costs": (None, (_P, _P, _P, _D, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
     "modt_certain_pairs": (None, (_P, _P, _L, _D, _P, _P, _P, _P)),
 }
 _PAIRS_EACH = 8
@@ -80,7 +80,7 @@ class NativeGeometryKernels:
         a: Shapes,
         b: Shapes,
         covariance: Float64,
-        variance: Float64,
+        variance: float,
         pairs: tuple[Int, Int],
         weights: PairWeights,
     ) -> tuple[Float64, Float64]:
@@ -89,7 +89,7 @@ class NativeGeometryKernels:
         spread, cost, coverage = out = np.empty((3, len(rows)))
         tracks, proposals, weighted = self._shapes(a), self._shapes(b), array("d", weights)
         self._library.modt_pair_costs(
-            address(tracks), address(proposals), at(covariance, FLOAT64), at(variance, FLOAT64),
+            address(tracks), address(proposals), at(covariance, FLOAT64), variance,
             at(rows, INT64), at(columns, INT64), len(rows), address(weighted), HALF_ROOT, PAD_M,
             *map(address, out),
         )  # fmt: skip

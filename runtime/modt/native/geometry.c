@@ -81,7 +81,7 @@ static inline double apart(double a, double b) { return __builtin_fabs(a - b); }
 
 /* pair_costs: coverage of n pairs (i, j) of shapes a and b, cost without the term of the determinant, and that
  * determinant over its least; `covariance` has the xx, then the xy, then the yy of a. */
-EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *covariance, const double *variance,
+EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *covariance, double variance,
                             const i64 *rows, const i64 *columns, i64 n, const PairWeights *weights, double half_root,
                             double pad_m, double *spread, double *cost, double *coverage)
 {
@@ -105,14 +105,14 @@ EXPORT void modt_pair_costs(const Shapes *a, const Shapes *b, const double *cova
             overlap[k] = shared / (area + other_area - shared);
             covered[k] = shared / low(area, other_area);
         }
-        double xx = covariance[i] + variance[j], xy = covariance[a->n + i], yy = covariance[2 * a->n + i] + variance[j];
+        double xx = covariance[i] + variance, xy = covariance[a->n + i], yy = covariance[2 * a->n + i] + variance;
         double dx = (moved[0] + half_root * (moved[1] - moved[3])) / 2;
         double dy = (moved[2] + half_root * (moved[1] + moved[3])) / 2;
         double shape = weights->size * (size / 4) + weights->overlap * (1 - low(overlap[0], overlap[1]));
         double height = apart(a->top[i], b->top[j]) + apart(a->bottom[i], b->bottom[j]);
         shape += weights->height * height / 2 + weights->count * apart(a->log_count[i], b->log_count[j]);
         double determinant = xx * yy - xy * xy;
-        spread[pair] = determinant / (variance[j] * variance[j]);
+        spread[pair] = determinant / (variance * variance);
         cost[pair] = (yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / determinant / 2 + shape;
         coverage[pair] = low(covered[0], covered[1]);
     }

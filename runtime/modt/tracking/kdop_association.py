@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import KdopAssociationConfig
-from modt.geometry.kdop import DIRECTIONS, overlapping_pairs, width_sum
+from modt.geometry.kdop import DIRECTIONS, overlapping_pairs
 from modt.geometry.kdop_displacement import measured
 from modt.geometry.kdop_pairs import PairWeights, Shapes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -38,7 +38,7 @@ class KdopAssociation:
         """Pairs of least cost; then, among the rest, those that overlap although they changed their shape."""
         weight = self.config
         expected = tracks.predicted_kdops()
-        variance = self.noise(observations)
+        variance = weight.position_sigma_m**2
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
         rows, columns = overlapping_pairs(expected + reach, observations.kdop, self._kernels.reaching_pairs)
         cost, coverage = self._kernels.pair_costs(
@@ -59,23 +59,12 @@ class KdopAssociation:
         x = tracks.x.take(rows, axis=0)[:, :2]
         mean = tracks.mean_kdop.T.take(rows, axis=1) + DIRECTIONS.T @ x.T
         before = tracks.end_variance.T.take(rows, axis=1)
-        shift, covariance, end_variance = measured(
-            mean, observations.kdop.take(columns, axis=1), variance[columns], before
-        )
+        shift, covariance, end_variance = measured(mean, observations.kdop.take(columns, axis=1), variance, before)
         return Matches(rows, columns, x + shift, covariance, end_variance.T)
 
     def initial_position(self, observations: Observations) -> Float64:
         """Centre of the k-DOP."""
         return observations.position
-
-    def noise(self, observations: Observations) -> Float64:
-        """(P,) variance of a position [m2]: k-DOPs jitter by the spacing of returns, and more where partial."""
-        noise = self.config
-        extent = np.minimum(width_sum(observations.kdop) / 4, 3.0)
-        sigma = noise.sigma_m + noise.sigma_per_range * observations.range_m + noise.sigma_per_extent * extent
-        sigma = np.where(observations.partial, noise.partial_factor * sigma, sigma)
-        variance: Float64 = np.square(sigma)
-        return variance
 
 
 def _free(index: Int, taken: Int, n: int) -> Bool:

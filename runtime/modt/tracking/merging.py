@@ -57,7 +57,7 @@ class CarMerging:
         count = np.bincount(number[into], frame.proposals.count, len(source)).astype(np.int64)
         runs = contiguous_runs(into.argsort(kind="stable"), frame.proposals.offsets)
         changed = number[np.unique(hosts)]
-        grouping = Grouping(runs, count, source, changed, yaw[source[changed]], partial=changed)
+        grouping = Grouping(runs, count, source, changed, yaw[source[changed]])
         proposals, observations = grouping.apply(frame, placement, self._kernels)
         matched = number[frame.matches.proposals]
         of_kept = (matched != NONE).nonzero()[0]

@@ -56,7 +56,6 @@ class Grouping:
         source: (Q,) proposal whose columns each takes over.
         changed: (C,) those of the Q whose members changed.
         yaw: (C,) heading of their boxes [rad, sensor frame].
-        partial: (n,) those of the Q that are merged or split off.
     """
 
     runs: Sequence[slice | Int]
@@ -64,7 +63,6 @@ class Grouping:
     source: Int
     changed: Int
     yaw: Float64
-    partial: Int
 
     def apply(
         self, frame: Associated, placement: Placement, kernels: GeometryKernels = NUMPY_GEOMETRY
@@ -79,7 +77,6 @@ class Grouping:
         observations = frame.observations.take(self.source)
         changed = observe(few, placement.T_world_sensor, kernels)
         observations.put(self.changed, changed.moved(placement.deskew(changed.centroid)))
-        observations.partial[self.partial] = True
         return proposals, observations
 
 

@@ -130,7 +130,6 @@ class ExpectedSplitting:
             np.append(np.arange(n), hosts),
             np.append(changed_hosts, new),
             np.append(old.box[changed_hosts, 6], yaw),
-            partial=new,
         )
         proposals, observations = grouping.apply(frame, placement, self._kernels)
         if proposals.reflectance is not None:

@@ -68,7 +68,9 @@ def replay(stream: tuple[Frame, ...], config: ProfileConfig, mode: str = "accura
     for frame in stream:
         result = pipeline.step(frame, assembly.MODES[mode].budget(config))
         columns = [column for _, column in result.tracks.columns()]
-        for column in (*columns, result.proposals.members, result.proposals.box, pipeline.decision.frequency):
+        proposals = result.proposals
+        columns += [proposals.members, proposals.box, proposals.truncated, pipeline.decision.frequency]
+        for column in columns:
             digest.update(column.tobytes())
         digest.update(json.dumps(ledger.close_frame(frame.index)["stages"]).encode())
     return digest.hexdigest()
