@@ -144,13 +144,13 @@ class Scheduler:
         count, points_at_key_view = proposals.count[proposal_rows], tracks.key_points[rows]
         novelty = np.minimum(np.abs(count - points_at_key_view) / np.maximum(points_at_key_view, 1), 1.0)
         nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / config.range_scale_m)
-        whole = np.where(proposals.truncated[proposal_rows], config.partial_view_factor, 1.0)
-        value: Float64 = whole * (
+        value: Float64 = (
             config.uncertainty_weight * uncertainty
             + config.nearness_weight * nearness
             + config.novelty_weight * novelty
+            + config.waiting_weight * tracks.waiting[rows]
         )
-        return value + config.waiting_weight * tracks.waiting[rows]
+        return value
 
     def _affordable(self, points: Int, budget: Budget) -> Bool:
         """(R,) calls, in this order, that the budget pays for; a call that does not fit is skipped."""

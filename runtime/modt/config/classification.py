@@ -29,7 +29,6 @@ class CallWorthConfig(StageConfig):
     nearness_weight: float = number(0.3, 0.0, 1.0, "", "of exp(-distance / range_scale_m)")
     novelty_weight: float = number(0.3, 0.0, 1.0, "", "of the relative change of points since the last key view")
     range_scale_m: float = number(30.0, 1.0, 1000.0, "m", "distance at which nearness is 1/e")
-    partial_view_factor: float = number(0.5, 0.0, 1.0, "", "on the worth of truncated proposals")
     waiting_weight: float = number(0.1, 0.001, 10.0, "", "added per frame of waiting, so that every call is made")
 
 
