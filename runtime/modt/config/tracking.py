@@ -59,7 +59,6 @@ class FragmentConfig(StageConfig):
     min_coverage: float = number(
         0.6, 0.0, 1.0, "", "part of one that lies within what is known of the other; 1: none are reunited"
     )
-    shrink: float = number(1.2, 1.0, 10.0, "", "a k-DOP smaller by this factor than the known extent is a fragment")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

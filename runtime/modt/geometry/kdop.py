@@ -61,12 +61,6 @@ def widths(kdop: Float64) -> Float64:
     return width
 
 
-def width_sum(kdop: Float64) -> Float64:
-    """(n,) sum of the four widths of (8, n) k-DOPs [m]."""
-    total: Float64 = widths(kdop).sum(axis=0)
-    return total
-
-
 def centres(kdop: Float64) -> Float64:
     """(4, n) middle along each axis, of (8, n) k-DOPs [m]."""
     centre: Float64 = (kdop[:4] - kdop[4:]) / 2

@@ -15,7 +15,7 @@ import numpy as np
 
 from modt.classes import CLASSES, ObjectClass
 from modt.config import FragmentConfig
-from modt.geometry.kdop import coverage, overlapping_pairs, width_sum
+from modt.geometry.kdop import coverage, overlapping_pairs
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches
@@ -54,17 +54,11 @@ class Reunion:
         proposal_of_track = np.full(len(tracks), NONE, np.int64)
         track_of_proposal = np.full(len(observations), NONE, np.int64)
         proposal_of_track[matches.rows], track_of_proposal[matches.proposals] = matches.proposals, matches.rows
-        incomplete = self._incomplete(tracks, observations, proposal_of_track)
-        senior, parts = self._parts(tracks, observations, incomplete, proposal_of_track, track_of_proposal)
+        seen_twice = (tracks.hits > 1).nonzero()[0]
+        by_seniority = seen_twice[(-_seniority(tracks)[seen_twice]).argsort(kind="stable")]
+        senior, parts = self._parts(tracks, observations, by_seniority, proposal_of_track, track_of_proposal)
         rows, proposals = swap_proposals(senior, parts, proposal_of_track, track_of_proposal)
         return matches.reassigned(tracks, rows, proposals) if len(rows) else matches
-
-    def _incomplete(self, tracks: TrackTable, observations: Observations, proposal_of_track: Int) -> Int:
-        """Rows, most senior first, of tracks seen more than once with no proposal, or one below the known extent."""
-        now, known = width_sum(observations.kdop)[proposal_of_track], width_sum(tracks.envelope.T.copy())
-        incomplete = (proposal_of_track == NONE) | (known > self.config.shrink * now)
-        rows: Int = ((tracks.hits > 1) & incomplete).nonzero()[0]
-        return rows[(-_seniority(tracks)[rows]).argsort(kind="stable")]
 
     def _parts(
         self, tracks: TrackTable, observations: Observations, row: Int, proposal_of_track: Int, track_of_proposal: Int
