@@ -123,58 +123,25 @@ static void find_components(const Span *span, i32 n, i32 side, i32 *parent)
         parent[k] = parent[parent[k]];
 }
 
-/* connect: component of each cell used of n_cells, in the order of their first cells. Scratch: `next` of side,
- * `scratch` of 3 n_cells, `span` of n_cells. */
-EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, i32 side,
-                         i32 *next, i32 *scratch, Span *span, i64 *component)
-{
-    i32 *order = scratch, *parent = scratch + n_cells, *root = scratch + 2 * n_cells;
-    i64 n = 0, count = 0;
-    for (i64 i = 0; i < n_cells; i++) {
-        PROVEN(cells->row[i] >= 0 && cells->row[i] < side && cells->column[i] > 0 && cells->column[i] < side - 1);
-        root[n] = (i32)i;
-        n += use[i];
-    }
-    sort_by(cells->column, 0, side, root, n, next, parent);
-    sort_by(cells->row, 0, side, parent, n, next, order);
-    for (i64 k = 0; k < n; k++) {
-        i32 i = order[k];
-        Span own = {cells->row[i] * side + cells->column[i], cells->low[i], cells->high[i], max_gap_m[i]};
-        span[k] = own;
-    }
-    find_components(span, (i32)n, side, parent);
-    for (i64 k = 0; k < n; k++)
-        root[order[k]] = parent[k];
-    i32 *number = order; /* of the component of each root */
-    for (i64 k = 0; k < n; k++)
-        number[k] = NONE;
-    for (i64 i = 0; i < n_cells; i++) {
-        component[i] = NONE;
-        if (!use[i])
-            continue;
-        if (number[root[i]] == NONE)
-            number[root[i]] = (i32)count++;
-        component[i] = number[root[i]];
-    }
-}
-
-/* connect_coarse: component of the cell twice as wide, of a grid of side * side, in which each of n_cells lies; in the
- * order of the first of their wide cells, those in the order of their last cells. Scratch as
- * for modt_connect, but 5 n_cells. */
-EXPORT void modt_connect_coarse(const Cells *cells, const float *max_gap_m, i64 n_cells, i32 side, i32 *next,
-                                i32 *scratch, Span *span, i64 *component)
+/* connect and connect_coarse: component of the cell 2^shift times as wide, of a grid of side * side, in which each cell
+ * used lies, NONE for the others; in the order of the first of their wide cells, those in the order of their last
+ * cells. Scratch: `next` of side, `scratch` of 5 n_cells, `span` of n_cells. */
+EXPORT void modt_connect(const Cells *cells, const float *max_gap_m, const uint8_t *use, i64 n_cells, int shift,
+                         i32 side, i32 *next, i32 *scratch, Span *span, i64 *component)
 {
     i32 *order = scratch, *parent = scratch + n_cells, *wide = scratch + 2 * n_cells, *last = scratch + 3 * n_cells;
-    i32 n = 0, count = 0, before = NONE;
+    i32 used = 0, n = 0, count = 0, before = NONE;
     for (i64 i = 0; i < n_cells; i++) {
-        PROVEN(cells->row[i] >= 0 && cells->row[i] >> 1 < side && cells->column[i] > 1 &&
-               cells->column[i] >> 1 < side - 1);
-        wide[i] = (i32)i;
+        PROVEN(cells->row[i] >= 0 && cells->row[i] >> shift < side && cells->column[i] >> shift > 0 &&
+               cells->column[i] >> shift < side - 1);
+        wide[used] = (i32)i;
+        used += use[i];
     }
-    sort_by(cells->column, 1, side, wide, n_cells, next, parent);
-    sort_by(cells->row, 1, side, parent, n_cells, next, order);
-    for (i64 k = 0; k < n_cells; k++) {
-        i32 i = order[k], place = (cells->row[i] >> 1) * side + (cells->column[i] >> 1), begins = place != before;
+    sort_by(cells->column, shift, side, wide, used, next, parent);
+    sort_by(cells->row, shift, side, parent, used, next, order);
+    for (i64 k = 0; k < used; k++) {
+        i32 i = order[k], place = (cells->row[i] >> shift) * side + (cells->column[i] >> shift);
+        int begins = place != before;
         n += begins;
         Span *own = &span[n - 1];
         own->low = least(cells->low[i], begins ? INFINITY : own->low);
@@ -190,13 +157,13 @@ EXPORT void modt_connect_coarse(const Cells *cells, const float *max_gap_m, i64 
         number[c] = NONE;
     for (i64 i = 0; i < n_cells; i++) {
         ends[m] = wide[i];
-        m += last[wide[i]] == i;
+        m += use[i] && last[wide[i]] == i;
     }
     for (i32 k = 0; k < m; k++)
         if (number[parent[ends[k]]] == NONE)
             number[parent[ends[k]]] = count++;
     for (i64 i = 0; i < n_cells; i++)
-        component[i] = number[parent[wide[i]]];
+        component[i] = use[i] ? number[parent[wide[i]]] : NONE;
 }
 
 typedef struct {

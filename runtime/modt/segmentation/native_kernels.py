@@ -26,8 +26,7 @@ _F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
     "modt_above_ground": (_L, (_P, _P, _P, _F, _P, _L, _L, _P, _P, _P, _P, _P)),
     "modt_occupied_cells": (_L, (_P, _P, _L, _F, _I, _I, _P, _P, _P, _P, _P)),
-    "modt_connect": (None, (_P, _P, _P, _L, _I, _P, _P, _P, _P)),
-    "modt_connect_coarse": (None, (_P, _P, _L, _I, _P, _P, _P, _P)),
+    "modt_connect": (None, (_P, _P, _P, _L, _I, _I, _P, _P, _P, _P)),
     "modt_cluster_bounds": (None, (_P, _P, _P, _P, _L, _L, _P)),
     "modt_view_bounds": (None, (_P, _P, _P, _P, _P, _L, _P, _L, _P, _P)),
     "modt_merge_strips": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
@@ -141,24 +140,23 @@ class NativeKernels(NativeGeometryKernels):
 
     def connect(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) -> Int:
         """(C,) connected component of each cell used, in the order of their first cells, NONE for the others."""
+        return self._connected(grid, cells, max_gap_m, use, 0)
+
+    def connect_coarse(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
+        """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
+        return self._connected(grid, cells, max_gap_m, np.ones(len(cells), np.bool_), 1)
+
+    def _connected(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool, shift: int) -> Int:
+        """(C,) connected component of the cell of the grid, 2^shift times as wide, in which each cell used lies."""
         component, own = np.empty(len(cells), np.int64), self._cells(cells)
         self._library.modt_connect(
-            address(own), at(max_gap_m), at(use, BOOL), len(cells), grid.side,
+            address(own), at(max_gap_m), at(use, BOOL), len(cells), shift, grid.side,
             *self._scratch(grid, len(cells)), at(component, INT64),
         )  # fmt: skip
         return component
 
-    def connect_coarse(self, grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32) -> Int:
-        """(C,) connected component of the cell of the grid, twice as wide, in which each cell lies."""
-        component, own = np.empty(len(cells), np.int64), self._cells(cells)
-        self._library.modt_connect_coarse(
-            address(own), at(max_gap_m), len(cells), grid.side, *self._scratch(grid, len(cells)),
-            at(component, INT64),
-        )  # fmt: skip
-        return component
-
     def _scratch(self, grid: SqrtRangeGrid, n: int) -> tuple[int, int, int]:
-        """Addresses of scratch for `modt_connect` and `modt_connect_coarse`: next, scratch and span."""
+        """Addresses of scratch for `modt_connect`: next, scratch and span."""
         if len(self._work) < grid.side + 9 * n:
             self._work = np.empty(grid.side + 9 * n, np.int32)
         following = address(self._work)
