@@ -20,7 +20,6 @@ from modt.classes import N_CLASSES
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]
 Int = NDArray[np.int64]
-Int16 = NDArray[np.int16]
 Bool = NDArray[np.bool_]
 
 NONE = -1

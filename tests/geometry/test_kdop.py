@@ -1,24 +1,19 @@
 """k-DOPs and their overlap against slow references."""
 
 import numpy as np
-import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.geometry.kdop import DIRECTIONS, centres, coverage, kdops, overlapping_pairs, widths
 from tests.tracking.tracking_scenes import box, frame_of
 
-SIZES = {"exact": (15, 15), "in cells": (90, 70)}
-"""Numbers of k-DOPs for which overlapping_pairs takes each of its two ways."""
 PAD_M = 0.15
-at_each_size = pytest.mark.parametrize("size", SIZES.values(), ids=SIZES)
 
 
 def random_ends(n, seed, max_length):
     """(n, 4) low and (n, 4) high ends, in half metres."""
     rng = np.random.default_rng(seed)
-    spread = 20 + n // 5  # about as many neighbours each, however many
-    middle, length = rng.integers(-spread, spread, (n, 4)), rng.integers(0, max_length + 1, (n, 4))
+    middle, length = rng.integers(-20, 20, (n, 4)), rng.integers(0, max_length + 1, (n, 4))
     return middle - length / 2, middle + length / 2
 
 
@@ -37,37 +32,15 @@ def slow_overlapping_pairs(low_a, high_a, low_b, high_b):
     return pairs
 
 
-@at_each_size
-@settings(max_examples=15)
-@given(data=st.data(), seed=st.integers(0, 2**16), max_length=st.integers(0, 30))
-def test_overlapping_pairs_match_the_slow_reference(size, data, seed, max_length):
-    n, k = size if max(size) > 15 else (data.draw(st.integers(0, size[0])), data.draw(st.integers(0, size[1])))
+@given(n=st.integers(0, 30), k=st.integers(0, 30), seed=st.integers(0, 2**16), max_length=st.integers(0, 30))
+def test_overlapping_pairs_match_the_slow_reference(n, k, seed, max_length):
     a, b = random_ends(n, seed, max_length), random_ends(k, seed + 1, max_length)
     i, j = overlapping_pairs(kdop(*a), kdop(*b))
     assert list(zip(i.tolist(), j.tolist(), strict=True)) == slow_overlapping_pairs(*a, *b)
 
 
-@at_each_size
-def test_an_empty_envelope_overlaps_nothing(size):
-    n, k = size
-    assert not len(overlapping_pairs(np.full((8, n), -np.inf), kdop(*random_ends(k, 0, 30)))[0])
-
-
-@at_each_size
-def test_pairs_do_not_depend_on_the_origin_of_the_world(size):
-    n, k = size
-    origin = (np.array([-458_000, 5_430_000]) @ DIRECTIONS)[:, None]
-    a, b = kdop(*random_ends(n, 1, 9)) + 0.51, kdop(*random_ends(k, 2, 9))
-    near, far = overlapping_pairs(a, b), overlapping_pairs(a + origin, b + origin)
-    assert len(near[0])
-    np.testing.assert_array_equal(far, near)
-
-
-@at_each_size
-def test_groups_far_apart_do_not_overlap(size):
-    n, k = size
-    a = kdop(*random_ends(n, 1, 9)) + (np.array([2_000.0, 0.0]) @ DIRECTIONS)[:, None]
-    assert not len(overlapping_pairs(a, kdop(*random_ends(k, 2, 9)))[0])
+def test_an_empty_envelope_overlaps_nothing():
+    assert not len(overlapping_pairs(np.full((8, 15), -np.inf), kdop(*random_ends(15, 0, 30)))[0])
 
 
 @given(st.integers(0, 9), st.integers(0, 2**16))

@@ -207,14 +207,13 @@ def test_ends_of_kdops(kernels, seed, sizes):
 
 @given(seed=st.integers(0, 10_000), n=st.integers(0, 40), k=st.integers(0, 40), spread=st.integers(0, 60))
 @settings(max_examples=100, deadline=None)
-def test_reaching_pairs(kernels, seed, n, k, spread):
+def test_overlapping_pairs(kernels, seed, n, k, spread):
     rng = np.random.default_rng(seed)
-    ends, opposite = (rng.integers(-spread, spread + 1, (4, m)).astype(np.int16) for m in (n, k))
-    for kind in (np.int16, np.float64):
-        one, other = (each.reaching_pairs(ends.astype(kind), opposite.astype(kind)) for each in (NUMPY, kernels))
-        assert same(one, other)
+    a, b = (rng.integers(-spread, spread + 1, (8, m)).astype(np.float64) for m in (n, k))
+    one, other = (each.overlapping_pairs(a, b) for each in (NUMPY, kernels))
+    assert same(one, other)
     if spread == 0:
-        assert len(one[0]) == n * k, "all reach one another: more pairs than there was room for at first"
+        assert len(one[0]) == n * k, "all overlap: more pairs than there was room for at first"
 
 
 @given(seed=st.integers(0, 10_000), n=st.integers(0, 12))

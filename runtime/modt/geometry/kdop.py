@@ -11,10 +11,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from modt.types import Bool, Float32, Float64, Int, Int16, Proposals
+from modt.types import Bool, Float32, Float64, Int, Proposals
 
 Ends = Callable[[Float32, Int, Float32], Float32]
-Reaching = Callable[[Int16 | Float64, Int16 | Float64], tuple[Int, Int]]
 
 _BEARINGS_RAD = np.deg2rad([0.0, 45.0, 90.0, 135.0])
 AXES = np.stack([np.cos(_BEARINGS_RAD), np.sin(_BEARINGS_RAD)])
@@ -23,10 +22,6 @@ DIRECTIONS = np.concatenate([AXES, -AXES], axis=1)
 """(2, 8) the directions: each axis forth, then each axis back."""
 _PAD_M = 0.15
 """Jitter of the ends of k-DOPs."""
-_CELL_M, _FARTHEST = 0.02, 2**15 - 1
-"""Many k-DOPs are compared in whole cells: 16 bits are compared twice as fast as 32."""
-_FEW_PAIRS = 4_000
-"""Up to so many pairs, exact comparison costs less than cells."""
 
 
 def kdop_ends(xyz: Float32, offsets: Int, axes: Float32) -> Float32:
@@ -75,29 +70,11 @@ def coverage(kdop: Float64, other: Float64) -> Float64:
     return least
 
 
-def reaching_pairs(ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
-    """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
-    near: Bool = ends[0][:, None] >= opposite[2]
-    for side in (1, 2, 3):
-        near &= ends[side][:, None] >= opposite[side - 2]
+def overlapping_pairs(a: Float64, b: Float64) -> tuple[Int, Int]:
+    """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices."""
+    near: Bool = a[0][:, None] >= -b[4]
+    for side in (2, 4, 6):
+        near &= a[side][:, None] >= -b[side - 4]
     pair = near.ravel().nonzero()[0]
     one = pair // near.shape[1]
     return one, pair - one * near.shape[1]
-
-
-def overlapping_pairs(a: Float64, b: Float64, reaching: Reaching = reaching_pairs) -> tuple[Int, Int]:
-    """Pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y: two arrays of indices, in order.
-
-    Of many, pairs less than a cell of 2 cm apart may count as overlapping, and so may all that lie more than 655 m
-    from the first of b, on the same side. k-DOPs b are finite; an infinitely small one of a overlaps nothing.
-    `reaching` is `reaching_pairs`, or what does the same.
-    """
-    if a.shape[1] * b.shape[1] <= _FEW_PAIRS:
-        return reaching(a[::2], -b[::2])
-    origin = (b[:4:2, 0] @ DIRECTIONS[:, ::2])[:, None]
-    return reaching(_cells(a[::2] - origin), _cells(-b[::2] + origin))
-
-
-def _cells(coordinate: Float64) -> Int16:
-    """Coordinates about the same origin [m], in cells."""
-    return np.minimum(np.maximum(coordinate / _CELL_M, -_FARTHEST), _FARTHEST).astype(np.int16)

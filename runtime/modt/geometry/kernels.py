@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 from modt.geometry.boxes import bounds_along
-from modt.geometry.kdop import kdop_ends, reaching_pairs
+from modt.geometry.kdop import kdop_ends, overlapping_pairs
 from modt.geometry.kdop_pairs import PairWeights, Shapes, certain_pairs, pair_costs
-from modt.types import Float32, Float64, Int, Int16
+from modt.types import Float32, Float64, Int
 
 
 class GeometryKernels(Protocol):
@@ -19,8 +19,8 @@ class GeometryKernels(Protocol):
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
         """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
 
-    def reaching_pairs(self, ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
-        """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
+    def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
+        """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""
 
     def pair_costs(
         self,
@@ -42,7 +42,7 @@ class NumpyGeometryKernels:
 
     bounds_along = staticmethod(bounds_along)
     kdop_ends = staticmethod(kdop_ends)
-    reaching_pairs = staticmethod(reaching_pairs)
+    overlapping_pairs = staticmethod(overlapping_pairs)
     pair_costs = staticmethod(pair_costs)
     certain_pairs = staticmethod(certain_pairs)
 

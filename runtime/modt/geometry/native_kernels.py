@@ -7,15 +7,14 @@ from array import array
 
 import numpy as np
 
-from modt.geometry.kdop import reaching_pairs
 from modt.geometry.kdop_pairs import HALF_ROOT, PAD_M, PairWeights, Shapes
-from modt.native.arrays import FLOAT64, INT16, INT64, Signatures, address, at, declare, pointers
-from modt.types import Float32, Float64, Int, Int16
+from modt.native.arrays import FLOAT64, INT64, Signatures, address, at, declare, pointers
+from modt.types import Float32, Float64, Int
 
 _D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
     "modt_ends_along": (None, (_P, _P, _P, _P, _L, _P, _L, _P, _P)),
-    "modt_reaching_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
+    "modt_overlapping_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
     "modt_pair_costs": (None, (_P, _P, _P, _D, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
     "modt_certain_pairs": (None, (_P, _P, _L, _D, _P, _P, _P, _P)),
 }
@@ -59,18 +58,14 @@ class NativeGeometryKernels:
         self._library.modt_ends_along(*given, at(ahead), at(behind))
         return ahead, behind
 
-    def reaching_pairs(self, ends: Int16 | Float64, opposite: Int16 | Float64) -> tuple[Int, Int]:
-        """Pairs, in order, of which ends (4, n) reach the opposite ends (4, k), two rows on, on every side."""
-        if ends.dtype != np.int16:  # few
-            return reaching_pairs(ends, opposite)
-        n, k = ends.shape[1], opposite.shape[1]
-        near, limit = np.empty(k + 4, np.int16), _PAIRS_EACH * (n + k)
-        first, second = np.ascontiguousarray(ends), np.ascontiguousarray(opposite)
-        given = at(first, INT16), n, at(second, INT16), k, at(near, INT16)
+    def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
+        """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""
+        n, k = a.shape[1], b.shape[1]
+        near, limit = np.empty(k, np.int64), _PAIRS_EACH * (n + k)
+        given = at(a, FLOAT64), n, at(b, FLOAT64), k, address(near)
         while True:
             one, other = np.empty((2, limit), np.int64)
-            pairs = at(one, INT64), at(other, INT64)
-            count = self._library.modt_reaching_pairs(*given, limit, *pairs)
+            count = self._library.modt_overlapping_pairs(*given, limit, address(one), address(other))
             if count <= limit:
                 return one[:count], other[:count]
             limit = count

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 
 Signatures = Mapping[str, tuple[Any, Sequence[Any]]]
 """Result and arguments of every function."""
-FLOAT32, FLOAT64, INT16, INT32, INT64, BOOL = map(
-    np.dtype, (np.float32, np.float64, np.int16, np.int32, np.int64, np.bool_)
-)
+FLOAT32, FLOAT64, INT32, INT64, BOOL = map(np.dtype, (np.float32, np.float64, np.int32, np.int64, np.bool_))
 
 
 def declare(library: ctypes.CDLL, signatures: Signatures) -> None:

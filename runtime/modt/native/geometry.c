@@ -37,31 +37,25 @@ EXPORT void modt_ends_along(const float *x, const float *y, const float *z, cons
     }
 }
 
-/* reaching_pairs: pairs of which the ends (4, n) reach the opposite ends (4, k), two rows on, on every side. Returns
- * how many there are; no more than `limit` are written. Scratch: `near` of k + 4. */
-EXPORT i64 modt_reaching_pairs(const i16 *ends, i64 n, const i16 *opposite, i64 k, i16 *near, i64 limit, i64 *one,
-                               i64 *other)
+/* overlapping_pairs: pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y. Returns how many there are;
+ * no more than `limit` are written. Scratch: `near` of k. */
+EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, i64 *near, i64 limit, i64 *one,
+                                  i64 *other)
 {
-    const i16 *b0 = opposite, *b1 = b0 + k, *b2 = b1 + k, *b3 = b2 + k;
+    const double *east = b, *north = b + 2 * k, *west = b + 4 * k, *south = b + 6 * k;
     i64 count = 0;
-    for (i64 j = k; j < k + 4; j++)
-        near[j] = 0;
     for (i64 i = 0; i < n; i++) {
-        i16 a0 = ends[i], a1 = ends[n + i], a2 = ends[2 * n + i], a3 = ends[3 * n + i];
+        double to_east = a[i], to_north = a[2 * n + i], to_west = a[4 * n + i], to_south = a[6 * n + i];
         for (i64 j = 0; j < k; j++)
-            near[j] = (a0 >= b2[j]) & (a1 >= b3[j]) & (a2 >= b0[j]) & (a3 >= b1[j]);
-        for (i64 j = 0; j < k; j += 4) {
-            i64 any;
-            __builtin_memcpy(&any, near + j, sizeof any);
-            for (i64 at = j; any && at < j + 4; at++)
-                if (near[at]) {
-                    if (count < limit) {
-                        one[count] = i;
-                        other[count] = at;
-                    }
-                    count++;
+            near[j] = (to_east >= -west[j]) & (to_north >= -south[j]) & (to_west >= -east[j]) & (to_south >= -north[j]);
+        for (i64 j = 0; j < k; j++)
+            if (near[j]) {
+                if (count < limit) {
+                    one[count] = i;
+                    other[count] = j;
                 }
-        }
+                count++;
+            }
     }
     return count;
 }

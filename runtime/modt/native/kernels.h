@@ -22,7 +22,6 @@
 #define AHEAD 64 /* entries whose memory is on its way into the cache */
 #define INFINITY __builtin_inff()
 
-typedef int16_t i16;
 typedef int32_t i32;
 typedef int64_t i64;
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from modt.config import RegistrationConfig
 from modt.geometry import rotation_zyx, se3
-from modt.geometry.kdop import DIRECTIONS, centres, overlapping_pairs
+from modt.geometry.kdop import DIRECTIONS, centres
 from modt.geometry.kdop_displacement import shape_similarity, shift_between
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
@@ -150,7 +150,7 @@ class Registration:
     def _pairs(self, a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
         """Indices of k-DOPs a and b whose centres are within reach of one another, along x and along y."""
         middle_a, middle_b = (np.concatenate([middle, -middle]) for middle in (centres(a), centres(b)))
-        return overlapping_pairs(middle_a + reach, middle_b, self._kernels.reaching_pairs)
+        return self._kernels.overlapping_pairs(middle_a + reach, middle_b)
 
 
 def _jacobian(observations: Observations) -> Float64:

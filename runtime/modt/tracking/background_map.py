@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import BackgroundMapConfig
-from modt.geometry.kdop import coverage, overlapping_pairs
+from modt.geometry.kdop import coverage
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.track_table import TrackTable
@@ -36,7 +36,7 @@ class BackgroundMap:
             place = np.concatenate([self._kdop, tracks.known_kdops(rows)], axis=1)
             top = np.concatenate([self._top, tracks.top[rows]])
             kdop = observations.kdop.take(which, axis=1)
-            i, j = overlapping_pairs(kdop, place, self._kernels.reaching_pairs)
+            i, j = self._kernels.overlapping_pairs(kdop, place)
             within = coverage(kdop.take(i, axis=1), place.take(j, axis=1)) >= config.min_coverage
             known[i[within & (observations.top[which[i]] < top[j] + config.rise_m)]] = True
         return known

@@ -15,7 +15,7 @@ import numpy as np
 
 from modt.classes import CLASSES, ObjectClass
 from modt.config import FragmentConfig
-from modt.geometry.kdop import coverage, overlapping_pairs
+from modt.geometry.kdop import coverage
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.tracking.association import Matches
@@ -67,7 +67,7 @@ class Reunion:
         if not len(row):
             return row, row
         known = tracks.known_kdops(row)
-        i, part = overlapping_pairs(known, observations.kdop, self._kernels.reaching_pairs)
+        i, part = self._kernels.overlapping_pairs(known, observations.kdop)
         senior, other = row[i], track_of_proposal[part]
         seniority = _seniority(tracks)
         size = np.where(proposal_of_track == NONE, 0, observations.count[proposal_of_track])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import KdopAssociationConfig
-from modt.geometry.kdop import DIRECTIONS, overlapping_pairs
+from modt.geometry.kdop import DIRECTIONS
 from modt.geometry.kdop_displacement import measured
 from modt.geometry.kdop_pairs import PairWeights, Shapes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -40,7 +40,7 @@ class KdopAssociation:
         expected = tracks.predicted_kdops()
         variance = weight.position_sigma_m**2
         reach = 0.5 + 3 * np.sqrt(np.maximum(tracks.P[:, 0, 0], tracks.P[:, 1, 1]))
-        rows, columns = overlapping_pairs(expected + reach, observations.kdop, self._kernels.reaching_pairs)
+        rows, columns = self._kernels.overlapping_pairs(expected + reach, observations.kdop)
         cost, coverage = self._kernels.pair_costs(
             Shapes.of(expected, tracks.bottom, tracks.top, tracks.points),
             Shapes.of(observations.kdop, observations.bottom, observations.top, observations.count),

@@ -16,7 +16,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.config import MergeConfig
 from modt.geometry import yaw_of
-from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
+from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.placement import Placement
@@ -75,7 +75,7 @@ class CarMerging:
         room = (known - kdops.take(hosts, axis=1)).max(axis=0) > self.config.longer_m
         mergers = (room | _cars(tracks, rows)).nonzero()[0]  # background that reaches its ends lacks no part
         rows, hosts, known = rows[mergers], hosts[mergers], known.take(mergers, axis=1)
-        k, parts = overlapping_pairs(known, kdops, self._kernels.reaching_pairs)
+        k, parts = self._kernels.overlapping_pairs(known, kdops)
         other = (parts != hosts[k]).nonzero()[0]
         k, parts = k[other], parts[other]
         owner = np.full(kdops.shape[1], NONE)

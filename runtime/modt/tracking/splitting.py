@@ -13,7 +13,7 @@ import numpy as np
 from modt.classes import ObjectClass
 from modt.config import SplitConfig
 from modt.geometry import yaw_of
-from modt.geometry.kdop import DIRECTIONS, coverage, overlapping_pairs, widths
+from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.placement import Placement
@@ -65,7 +65,7 @@ class ExpectedSplitting:
         if not len(rows):
             return rows, rows
         expected = tracks.predicted_kdops(rows)
-        i, j = overlapping_pairs(expected, observations.kdop, self._kernels.reaching_pairs)
+        i, j = self._kernels.overlapping_pairs(expected, observations.kdop)
         kdop, expected = observations.kdop.take(j, axis=1), expected.take(i, axis=1)
         covered = coverage(expected, kdop)
         longer = widths(kdop).max(axis=0) > widths(expected).max(axis=0) + self.config.longer_m
