@@ -3,6 +3,8 @@
 
 typedef float f4 __attribute__((vector_size(16)));
 typedef i32 i4 __attribute__((vector_size(16)));
+typedef double d4 __attribute__((vector_size(32), aligned(8)));
+typedef i64 l4 __attribute__((vector_size(32)));
 
 static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less) | ((i4)b & ~less)); }
 static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
@@ -38,24 +40,30 @@ EXPORT void modt_ends_along(const float *x, const float *y, const float *z, cons
 }
 
 /* overlapping_pairs: pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y. Returns how many there are;
- * no more than `limit` are written. Scratch: `near` of k. */
-EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, i64 *near, i64 limit, i64 *one,
+ * no more than `limit` are written. Scratch: `least`, of 16 numbers for each four of b. */
+EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, d4 (*least)[4], i64 limit, i64 *one,
                                   i64 *other)
 {
-    const double *east = b, *north = b + 2 * k, *west = b + 4 * k, *south = b + 6 * k;
-    i64 count = 0;
+    i64 fours = (k + 3) / 4, count = 0;
+    for (i64 j = 0; j < 4 * fours; j++)
+        for (int side = 0; side < 4; side++) /* what the ends to the east, west, north and south of a have to reach */
+            least[j / 4][side][j % 4] = j < k ? -b[(side / 2 * 2 + (side % 2 ? 0 : 4)) * k + j] : INFINITY;
     for (i64 i = 0; i < n; i++) {
-        double to_east = a[i], to_north = a[2 * n + i], to_west = a[4 * n + i], to_south = a[6 * n + i];
-        for (i64 j = 0; j < k; j++)
-            near[j] = (to_east >= -west[j]) & (to_north >= -south[j]) & (to_west >= -east[j]) & (to_south >= -north[j]);
-        for (i64 j = 0; j < k; j++)
-            if (near[j]) {
-                if (count < limit) {
-                    one[count] = i;
-                    other[count] = j;
+        double east = a[i], north = a[2 * n + i], west = a[4 * n + i], south = a[6 * n + i];
+        for (i64 j = 0; j < fours; j++) {
+            l4 near = (east >= least[j][0]) & (west >= least[j][1]);
+            if (!(near[0] | near[1] | near[2] | near[3]))
+                continue;
+            near &= (north >= least[j][2]) & (south >= least[j][3]);
+            for (int at = 0; at < 4; at++)
+                if (near[at]) {
+                    if (count < limit) {
+                        one[count] = i;
+                        other[count] = 4 * j + at;
+                    }
+                    count++;
                 }
-                count++;
-            }
+        }
     }
     return count;
 }
