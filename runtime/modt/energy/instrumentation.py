@@ -55,19 +55,14 @@ def padded_points(count: Int, max_points: int, batch: int, min_points: int = 1) 
     A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them and
     to min_points.
     """
-    number, most = _batches(np.sort(np.maximum(np.minimum(count, max_points), min_points)), batch)
-    return int(number @ most)
+    size = sorted(max(min(n, max_points), min_points) for n in count.tolist())  # few: faster than arrays
+    return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
 
 
 def padded_each(count: Int, limits: ClassificationConfig) -> Int:
     """(R,) the same of each proposal."""
     size = np.maximum(np.minimum(count, limits.max_points), limits.min_points)
     order = np.argsort(size, kind="stable")
-    size[order] = np.repeat(*_batches(size[order], limits.batch)[::-1])
+    last = np.minimum(np.arange(len(size)) // limits.batch * limits.batch + limits.batch, len(size)) - 1
+    size[order] = size[order[last]]
     return size
-
-
-def _batches(size: Int, batch: int) -> tuple[Int, Int]:
-    """Proposals of each batch, and the most points of one, of (R,) sorted sizes."""
-    ends = np.minimum(np.arange(batch, len(size) + batch, batch), len(size))
-    return np.diff(ends, prepend=0), size[ends - 1]
