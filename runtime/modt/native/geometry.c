@@ -40,26 +40,29 @@ EXPORT void modt_ends_along(const float *x, const float *y, const float *z, cons
 }
 
 /* overlapping_pairs: pairs of k-DOPs a (8, n) and b (8, k) that overlap along x and along y. Returns how many there are;
- * no more than `limit` are written. Scratch: `least`, of 16 numbers for each four of b. */
-EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, d4 (*least)[4], i64 limit, i64 *one,
-                                  i64 *other)
+ * no more than `limit` are written. Scratch: `least`, 64 numbers for each sixteen of b. */
+EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k, d4 (*least)[4][4], i64 limit,
+                                  i64 *one, i64 *other)
 {
-    i64 fours = (k + 3) / 4, count = 0;
-    for (i64 j = 0; j < 4 * fours; j++)
+    i64 groups = (k + 15) / 16, count = 0;
+    for (i64 j = 0; j < 16 * groups; j++)
         for (int side = 0; side < 4; side++) /* what the ends to the east, west, north and south of a have to reach */
-            least[j / 4][side][j % 4] = j < k ? -b[(side / 2 * 2 + (side % 2 ? 0 : 4)) * k + j] : INFINITY;
+            least[j / 16][side][j / 4 % 4][j % 4] = j < k ? -b[(side / 2 * 2 + (side % 2 ? 0 : 4)) * k + j] : INFINITY;
     for (i64 i = 0; i < n; i++) {
         double east = a[i], north = a[2 * n + i], west = a[4 * n + i], south = a[6 * n + i];
-        for (i64 j = 0; j < fours; j++) {
-            l4 near = (east >= least[j][0]) & (west >= least[j][1]);
-            if (!(near[0] | near[1] | near[2] | near[3]))
+        for (i64 g = 0; g < groups; g++) {
+            l4 near[4], any;
+            for (int f = 0; f < 4; f++)
+                near[f] = (east >= least[g][0][f]) & (west >= least[g][1][f]) & (north >= least[g][2][f]) &
+                          (south >= least[g][3][f]);
+            any = near[0] | near[1] | near[2] | near[3];
+            if (!(any[0] | any[1] | any[2] | any[3]))
                 continue;
-            near &= (north >= least[j][2]) & (south >= least[j][3]);
-            for (int at = 0; at < 4; at++)
-                if (near[at]) {
+            for (int at = 0; at < 16; at++)
+                if (near[at / 4][at % 4]) {
                     if (count < limit) {
                         one[count] = i;
-                        other[count] = 4 * j + at;
+                        other[count] = 16 * g + at;
                     }
                     count++;
                 }
