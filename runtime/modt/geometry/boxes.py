@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from modt.geometry.transforms import transform, wrap, yaw_of
 from modt.types import Float32, Float64, Int
-
-Bounds = Callable[[Float32, Int, Float32, Float32], tuple[Float32, Float32]]
 
 
 def transform_boxes(T: Float64, boxes: Float64) -> Float64:
@@ -20,40 +16,28 @@ def transform_boxes(T: Float64, boxes: Float64) -> Float64:
     return out
 
 
-def bounds_along(xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
-    """(3, G) least and (3, G) greatest coordinates of groups of points along the axes of each group.
-
-    Args:
-        xyz: (3, K) points sorted by group [m].
-        offsets: (G + 1,) group i owns the columns from offsets[i] to offsets[i + 1]; none is empty.
-        cosine: (G,) of the heading.
-        sine: (G,) of the heading.
-    """
-    starts, count = offsets[:-1], offsets[1:] - offsets[:-1]
-    c, s = np.repeat(cosine, count), np.repeat(sine, count)
-    x, y, z = xyz
-    sides = (x * c + y * s, y * c - x * s, z)
-    low, high = (np.stack([f.reduceat(side, starts) for side in sides]) for f in (np.minimum, np.maximum))
-    return low, high
-
-
-def upright_boxes(xyz: Float32, offsets: Int, yaw: Float64, bounds: Bounds = bounds_along) -> Float64:
+def upright_boxes(xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
     """(G, 7) boxes at headings or across them, so that l >= w, about groups of points.
 
     Args:
         xyz: (3, K) points sorted by group [m].
         offsets: (G + 1,) group i owns the columns from offsets[i] to offsets[i + 1]; none is empty.
         yaw: (G,) headings [rad].
-        bounds: `bounds_along`, or what does the same.
     """
-    c, s = np.cos(yaw), np.sin(yaw)
-    low, high = (side.astype(np.float64) for side in bounds(xyz, offsets, c.astype(np.float32), s.astype(np.float32)))
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    count = offsets[1:] - offsets[:-1]
+    c, s = (np.repeat(along.astype(np.float32), count) for along in (cosine, sine))
+    x, y, z = xyz
+    sides = (x * c + y * s, y * c - x * s, z)
+    low, high = (
+        np.stack([f.reduceat(side, offsets[:-1]) for side in sides]).astype(np.float64)
+        for f in (np.minimum, np.maximum)
+    )
     (u, v, w), (length, width, height) = (low + high) / 2, high - low
     turn = length < width
     longer, shorter = np.where(turn, width, length), np.where(turn, length, width)
-    return np.stack(
-        [u * c - v * s, u * s + v * c, w, longer, shorter, height, yaw - np.where(turn, np.pi / 2, 0.0)], axis=1
-    )
+    x, y = u * cosine - v * sine, u * sine + v * cosine
+    return np.stack([x, y, w, longer, shorter, height, yaw - np.where(turn, np.pi / 2, 0.0)], axis=1)
 
 
 def corners(boxes: Float64) -> Float64:

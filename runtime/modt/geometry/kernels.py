@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from modt.geometry.boxes import bounds_along
+import numpy as np
+
+from modt.geometry.boxes import upright_boxes
 from modt.geometry.kdop import kdop_ends, overlapping_pairs
 from modt.geometry.kdop_pairs import PairWeights, Shapes, certain_pairs, pair_costs
 from modt.types import Float32, Float64, Int
@@ -13,8 +15,11 @@ from modt.types import Float32, Float64, Int
 class GeometryKernels(Protocol):
     """The passes; every implementation gives the same bytes for the same input."""
 
-    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
-        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
+    def upright_boxes(self, xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
+        """(G, 7) boxes at (G,) headings, or across them, about groups of (3, K) points."""
+
+    def group_sums(self, values: Float32, offsets: Int) -> Float64:
+        """(V, G) sum of the values of each group, given (V, K) in their order."""
 
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
         """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
@@ -40,11 +45,16 @@ class GeometryKernels(Protocol):
 class NumpyGeometryKernels:
     """The passes in NumPy: the reference."""
 
-    bounds_along = staticmethod(bounds_along)
+    upright_boxes = staticmethod(upright_boxes)
     kdop_ends = staticmethod(kdop_ends)
     overlapping_pairs = staticmethod(overlapping_pairs)
     pair_costs = staticmethod(pair_costs)
     certain_pairs = staticmethod(certain_pairs)
+
+    def group_sums(self, values: Float32, offsets: Int) -> Float64:
+        """(V, G) sum of the values of each group, given (V, K) in their order."""
+        total: Float64 = np.add.reduceat(values, offsets[:-1], axis=1, dtype=np.float64)
+        return total
 
 
 NUMPY_GEOMETRY = NumpyGeometryKernels()

@@ -13,7 +13,9 @@ from modt.types import Float32, Float64, Int
 
 _D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
-    "modt_ends_along": (None, (_P, _P, _P, _P, _L, _P, _L, _P, _P)),
+    "modt_upright_boxes": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _D, _P)),
+    "modt_kdop_ends": (None, (_P, _P, _P, _P, _L, _P, _P)),
+    "modt_group_sums": (None, (_P, _L, _L, _P, _L, _P)),
     "modt_overlapping_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
     "modt_pair_costs": (None, (_P, _P, _P, _D, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
     "modt_certain_pairs": (None, (_P, _P, _L, _D, _P, _P, _P, _P)),
@@ -33,30 +35,27 @@ class NativeGeometryKernels:
         declare(library, _SIGNATURES)
         self._library = library
 
-    def bounds_along(self, xyz: Float32, offsets: Int, cosine: Float32, sine: Float32) -> tuple[Float32, Float32]:
-        """(3, G) least and greatest coordinates of each group along its axes, given (3, K) points."""
-        axes = np.zeros((len(cosine), 3, 4), np.float32)
-        axes[:, 0, 0] = axes[:, 1, 1] = cosine
-        axes[:, 1, 0], axes[:, 2, 2] = sine, 1.0
-        np.negative(sine, out=axes[:, 0, 1])
-        ahead, behind = self._ends_along(xyz, offsets, axes, 12)
-        return behind.T[:3], ahead.T[:3]
+    def upright_boxes(self, xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
+        """(G, 7) boxes at (G,) headings, or across them, about groups of (3, K) points."""
+        box, cosine, sine = np.empty((len(yaw), 7)), np.cos(yaw), np.sin(yaw)
+        headings = at(yaw, FLOAT64), address(cosine), address(sine)
+        given = *map(at, xyz), at(offsets, INT64), len(yaw)
+        self._library.modt_upright_boxes(*given, *headings, np.pi / 2, address(box))
+        return box
 
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
         """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
-        ahead, behind = self._ends_along(xyz, offsets, axes, 0)
-        ends = np.empty((8, len(ahead)), np.float32)
-        ends[:4] = ahead.T
-        np.negative(behind.T, out=ends[4:])
+        n = len(offsets) - 1
+        ends = np.empty((8, n), np.float32)
+        self._library.modt_kdop_ends(*map(at, xyz), at(offsets, INT64), n, at(axes), address(ends))
         return ends
 
-    def _ends_along(self, xyz: Float32, offsets: Int, axes: Float32, stride: int) -> tuple[Float32, Float32]:
-        """(G, 4) greatest and (G, 4) least coordinates along four axes, those of a group `stride` numbers on."""
-        n = len(offsets) - 1
-        ahead, behind = np.empty((2, n, 4), np.float32)
-        given = *map(at, xyz), at(offsets, INT64), n, at(axes), stride
-        self._library.modt_ends_along(*given, at(ahead), at(behind))
-        return ahead, behind
+    def group_sums(self, values: Float32, offsets: Int) -> Float64:
+        """(V, G) sum of the values of each group, given (V, K) in their order."""
+        sums = np.empty((len(values), len(offsets) - 1), np.float64)
+        given = at(values), *values.shape, at(offsets, INT64), sums.shape[1]
+        self._library.modt_group_sums(*given, at(sums, FLOAT64))
+        return sums
 
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
         """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""

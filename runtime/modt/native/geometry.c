@@ -1,4 +1,5 @@
-/* Extents of groups of points along axes, and pairs of extents that reach one another. */
+/* Extents and boxes of groups of points, and pairs of k-DOPs. A group i has the points from offsets[i] to
+ * offsets[i + 1]; none is empty. */
 #include "kernels.h"
 
 typedef float f4 __attribute__((vector_size(16)));
@@ -10,32 +11,62 @@ static inline f4 least4(f4 a, f4 b) { i4 less = a < b; return (f4)(((i4)a & less
 static inline f4 most4(f4 a, f4 b) { i4 more = a > b; return (f4)(((i4)a & more) | ((i4)b & ~more)); }
 static inline f4 spread(float a) { return (f4){a, a, a, a}; }
 
-/* kdop_ends and bounds_along: greatest and least coordinates of groups of points along four axes. A group i has the
- * points from offsets[i] to offsets[i + 1]; none is empty. `axes` has their x, then their y, then their z; those of
- * the next group are `stride` numbers on. */
-EXPORT void modt_ends_along(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
-                            const float *axes, i64 stride, float *ahead, float *behind)
+/* Least and greatest coordinates of points, at least one, along four axes of which x, y and z are given. */
+static ALWAYS_INLINE void ends_along(const float *x, const float *y, const float *z, i64 i, i64 end, const f4 axes[3],
+                                     f4 *least, f4 *greatest)
 {
-    for (i64 g = 0; g < n; g++, axes += stride) {
-        f4 u, v, w, low[2] = {spread(INFINITY), spread(INFINITY)}, high[2] = {-low[0], -low[0]};
-        __builtin_memcpy(&u, axes, sizeof u);
-        __builtin_memcpy(&v, axes + 4, sizeof v);
-        __builtin_memcpy(&w, axes + 8, sizeof w);
-        i64 i = offsets[g], end = offsets[g + 1];
-        if ((end - i) & 1) { /* then two at a time, which do not wait for one another */
-            low[0] = high[0] = u * spread(x[i]) + v * spread(y[i]) + w * spread(z[i]);
-            i++;
+    f4 low[2] = {spread(INFINITY), spread(INFINITY)}, high[2] = {-low[0], -low[0]};
+    if ((end - i) & 1) { /* then two at a time, which do not wait for one another */
+        low[0] = high[0] = axes[0] * spread(x[i]) + axes[1] * spread(y[i]) + axes[2] * spread(z[i]);
+        i++;
+    }
+    for (; i < end; i += 2)
+        for (int k = 0; k < 2; k++) {
+            f4 along = axes[0] * spread(x[i + k]) + axes[1] * spread(y[i + k]) + axes[2] * spread(z[i + k]);
+            low[k] = least4(along, low[k]);
+            high[k] = most4(along, high[k]);
         }
-        for (; i < end; i += 2)
-            for (int k = 0; k < 2; k++) {
-                f4 along = u * spread(x[i + k]) + v * spread(y[i + k]) + w * spread(z[i + k]);
-                low[k] = least4(along, low[k]);
-                high[k] = most4(along, high[k]);
-            }
-        low[0] = least4(low[0], low[1]);
-        high[0] = most4(high[0], high[1]);
-        __builtin_memcpy(behind + 4 * g, &low[0], sizeof low[0]);
-        __builtin_memcpy(ahead + 4 * g, &high[0], sizeof high[0]);
+    *least = least4(low[0], low[1]);
+    *greatest = most4(high[0], high[1]);
+}
+
+/* kdop_ends: greatest coordinates of n groups of points along four axes, then against them, eight rows of n. */
+EXPORT void modt_kdop_ends(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
+                           const float *axes, float *ends)
+{
+    f4 along[3], low, high;
+    __builtin_memcpy(along, axes, sizeof along);
+    for (i64 g = 0; g < n; g++) {
+        ends_along(x, y, z, offsets[g], offsets[g + 1], along, &low, &high);
+        for (int k = 0; k < 4; k++) {
+            ends[k * n + g] = high[k];
+            ends[(k + 4) * n + g] = -low[k];
+        }
+    }
+}
+
+/* upright_boxes: boxes of n groups of points, at headings of which the cosine and the sine are given, or across them. */
+EXPORT void modt_upright_boxes(const float *x, const float *y, const float *z, const i64 *offsets, i64 n,
+                               const double *yaw, const double *cosine, const double *sine, double quarter_turn,
+                               double (*box)[7])
+{
+    for (i64 g = 0; g < n; g++) {
+        float c = (float)cosine[g], s = (float)sine[g];
+        f4 axes[3] = {{c, -s, 0.0f, 0.0f}, {s, c, 0.0f, 0.0f}, {0.0f, 0.0f, 1.0f, 0.0f}}, low, high;
+        double middle[3], side[3];
+        ends_along(x, y, z, offsets[g], offsets[g + 1], axes, &low, &high);
+        for (int k = 0; k < 3; k++) {
+            middle[k] = ((double)low[k] + (double)high[k]) / 2;
+            side[k] = (double)high[k] - (double)low[k];
+        }
+        int turn = side[0] < side[1];
+        box[g][0] = middle[0] * cosine[g] - middle[1] * sine[g];
+        box[g][1] = middle[0] * sine[g] + middle[1] * cosine[g];
+        box[g][2] = middle[2];
+        box[g][3] = side[turn];
+        box[g][4] = side[!turn];
+        box[g][5] = side[2];
+        box[g][6] = turn ? yaw[g] - quarter_turn : yaw[g];
     }
 }
 

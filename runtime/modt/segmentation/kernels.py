@@ -66,9 +66,6 @@ class Kernels(GeometryKernels, Protocol):
     def members_of(self, clusters: Clusters, index: Int) -> Members:
         """Points of each cluster, given (K,) the row of each point in the sweep."""
 
-    def group_sums(self, values: Float32, offsets: Int) -> Float64:
-        """(V, G) sum of the values of each group, given (V, K) in their order."""
-
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""
 
@@ -102,11 +99,6 @@ class NumpyKernels(NumpyGeometryKernels):
         mask &= (sweep.sqrt_range > near) & (sweep.sqrt_range < far)
         rows = np.flatnonzero(mask)
         return rows, sweep.take(rows), height[rows]
-
-    def group_sums(self, values: Float32, offsets: Int) -> Float64:
-        """(V, G) sum of the values of each group, given (V, K) in their order."""
-        total: Float64 = np.add.reduceat(values, offsets[:-1], axis=1, dtype=np.float64)
-        return total
 
 
 NUMPY = NumpyKernels()

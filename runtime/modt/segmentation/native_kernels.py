@@ -32,7 +32,6 @@ _SIGNATURES: Signatures = {
     "modt_merge_strips": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _P)),
     "modt_group": (_L, (_P, _L, _L, _P, _P)),
     "modt_members": (None, (_P, _P, _L, _P, _P, _L, _L, _P)),
-    "modt_group_sums": (None, (_P, _L, _L, _P, _L, _P)),
     "modt_best_headings": (None, (_P, _P, _P, _P, _L, _L, _P, _P, _I, _F, _P)),
     "modt_reflectance_sums": (None, (_P, _L, _P, _P, _L, _F, _F, _P, _P)),
 }
@@ -215,13 +214,6 @@ class NativeKernels(NativeGeometryKernels):
             at(cells.entries, INT64), len(cells), clusters.n, address(out),
         )  # fmt: skip
         return Members(offsets, rows, own)
-
-    def group_sums(self, values: Float32, offsets: Int) -> Float64:
-        """(V, G) sum of the values of each group, given (V, K) in their order."""
-        sums = np.empty((len(values), len(offsets) - 1), np.float64)
-        given = at(values), *values.shape, at(offsets, INT64), sums.shape[1]
-        self._library.modt_group_sums(*given, at(sums, FLOAT64))
-        return sums
 
     def best_headings(self, x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
         """(G,) index of the heading whose sides the points of a group, at most `limit` of them, are closest to."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.geometry import FieldOfView, upright_boxes
+from modt.geometry import FieldOfView
 from modt.segmentation.box_fitting import HEADINGS
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
@@ -88,7 +88,7 @@ class Segmenter:
             offsets=offsets,
             coordinates=own,
             centroid=np.ascontiguousarray(mean[:3].T),
-            box=upright_boxes(own, offsets, HEADINGS[heading], kernels.bounds_along),
+            box=kernels.upright_boxes(own, offsets, HEADINGS[heading]),
             truncated=truncated,
             ground_z_m=mean[3],
             reflectance=statistics,

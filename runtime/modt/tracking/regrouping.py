@@ -8,7 +8,6 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.geometry import upright_boxes
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations, observe
 from modt.placement import Placement
@@ -70,9 +69,8 @@ class Grouping:
         """Proposals and observations in the new grouping; boxes and k-DOPs of what changed come from its points."""
         proposals = frame.proposals.regrouped(self.runs, self.count, self.source)
         few = proposals.take(self.changed)
-        box = upright_boxes(few.coordinates, few.offsets, self.yaw, kernels.bounds_along)
-        sums = np.add.reduceat(few.coordinates, few.offsets[:-1], axis=1, dtype=np.float64)
-        few.box[:], few.centroid[:] = box, (sums / few.count).T
+        few.box[:] = kernels.upright_boxes(few.coordinates, few.offsets, self.yaw)
+        few.centroid[:] = (kernels.group_sums(few.coordinates, few.offsets) / few.count).T
         proposals.box[self.changed], proposals.centroid[self.changed] = few.box, few.centroid
         observations = frame.observations.take(self.source)
         changed = observe(few, placement.T_world_sensor, kernels)
