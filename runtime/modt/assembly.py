@@ -107,9 +107,12 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     size = padded_size(limits)
     cost = LinearCost(limits.max_points, size, profile.scheduler.cost)
     warm_up(network, cost, limits.max_points, limits.batch, time.thread_time_ns)
-    _check_budget(mode.budget(profile), cost)
-    timed = TimedClassifier(CountingClassifier(network, ledger, size), cost, time.thread_time_ns)
-    return stages(mode, profile, network, segmenter(profile, fov, kernels), timed, cost, ledger, kernels)
+    budget = mode.budget(profile)
+    _check_budget(budget, cost)
+    classifier: Classifier = CountingClassifier(network, ledger, size)
+    if budget.cpu_ms is not None:  # else nobody asks what a call costs
+        classifier = TimedClassifier(classifier, cost, time.thread_time_ns)
+    return stages(mode, profile, network, segmenter(profile, fov, kernels), classifier, cost, ledger, kernels)
 
 
 def stages(

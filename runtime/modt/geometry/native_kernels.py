@@ -91,8 +91,8 @@ class NativeGeometryKernels:
 
     def certain_pairs(self, rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
         """Pairs that a least-cost assignment keeps for certain, and those that it must decide among."""
-        sizes = np.array([rows.max(initial=-1), columns.max(initial=-1)]) + 1
-        n, most = len(rows), int(sizes.max())
+        sizes = array("q", (int(rows.max(initial=-1)) + 1, int(columns.max(initial=-1)) + 1))
+        n, most = len(rows), max(sizes)
         best, following, state = np.empty((2, most), np.int64), np.empty((2, most)), np.empty(n, np.uint8)
         index, scratch = array("Q", (at(rows, INT64), at(columns, INT64))), (pointers(best), pointers(following))
         self._library.modt_certain_pairs(

@@ -49,7 +49,7 @@ class Clusterer:
         clusters = Clusters(points, height, cell, cells, sample, sampled, cluster, len(sizes))
         target = self.merger.merge(clusters, sizes, self._valid(sizes) | ~sizes.is_part)
         valid = self._valid(sizes.merged(target))
-        return replace(clusters, of_cell=consecutive(valid)[target][cluster], n=int(valid.sum()))
+        return replace(clusters, of_cell=consecutive(valid)[target].take(cluster), n=int(valid.sum()))
 
     def _connect(self, cells: Cells, points: PointColumns) -> tuple[Int, ClusterSizes]:
         """(C,) cluster of each cell, given one point of each; sizes of the clusters."""

@@ -137,7 +137,7 @@ class StateMachine:
             UndefinedTransitionError: the table has no row for one of them.
         """
         after: Int = self.after[states, events]
-        if NONE in after:
+        if after.min(initial=0) == NONE:
             bad = (after == NONE).nonzero()[0][0]
             event = Event(np.broadcast_to(events, after.shape)[bad])
             raise UndefinedTransitionError(f"{self.title}: {event.name} in state {self.names[states[bad]]}")
