@@ -27,7 +27,7 @@ class Crops:
     @property
     def count(self) -> Int:
         """(R,) points of each crop."""
-        return np.diff(self.offsets)
+        return self.offsets[1:] - self.offsets[:-1]
 
     def padded(self, rows: Int, least: int = 1) -> Float32:
         """(len(rows), n, 3) crops of these rows, each padded with repetitions of its own points to the largest, or to
@@ -59,7 +59,8 @@ def gather(points: Float32, proposals: Proposals, which: Int, max_points: int) -
     """
     own = proposals.count[which]
     kept = np.minimum(own, max_points)
-    offsets = np.append(0, np.cumsum(kept))
+    offsets = np.zeros(len(kept) + 1, np.int64)
+    kept.cumsum(out=offsets[1:])
     step = np.arange(offsets[-1]) - np.repeat(offsets[:-1], kept)
     inside = step * np.repeat(own, kept) // np.repeat(kept, kept)
     members = proposals.members[np.repeat(proposals.offsets[which], kept) + inside]

@@ -65,6 +65,6 @@ class Decision:
             self._mass *= config.memory_proposals / total
         frequency = config.start_proposals * self._start + self._mass
         frequency /= frequency.sum()
-        objects = np.clip(frequency[1:], self._assumed[1:], self._assumed[1:] * config.max_change)
-        self.frequency = np.append(max(1.0 - objects.sum(), MIN_BACKGROUND), objects)
-        self.frequency /= self.frequency.sum()
+        frequency[1:] = np.minimum(np.maximum(frequency, self._assumed), self._assumed * config.max_change)[1:]
+        frequency[0] = max(1.0 - frequency[1:].sum(), MIN_BACKGROUND)
+        self.frequency = frequency / frequency.sum()

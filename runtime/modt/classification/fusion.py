@@ -89,7 +89,7 @@ class OneView(EveryFrame):
             wants_class & ~tracks.final & (tracks.proposal != NONE) & (tracks.hits >= config.first_view_min_hits)
         )
         asks &= self.prior.may_be_object(tracks.prior, config.first_view_min_object_probability)
-        rows = np.flatnonzero(asks)
+        rows = asks.nonzero()[0]
         asks[rows] = ~tracks.viewed[rows] | _has_more_points(tracks, proposals, rows, config)
         return asks
 
@@ -128,12 +128,12 @@ class KeyViews:
         """(M,) tracks at their first or an independent view, and final ones to review."""
         config = self.config
         update_from_boxes(tracks, proposals, self.prior, config)
-        asks, rows = wants_class.copy(), np.flatnonzero(wants_class)
+        asks, rows = wants_class.copy(), wants_class.nonzero()[0]
         started = tracks.age[rows] >= config.start_frame
         fresh = (tracks.views[rows] == 0) | self.independent(tracks, proposals, rows)
         may_be_object = self.prior.may_be_object(tracks.prior[rows], config.min_object_probability)
         asks[rows] = np.where(tracks.viewed[rows], started & fresh, may_be_object)
-        return asks | self._reviewed(tracks, proposals, np.flatnonzero(tracks.final & (tracks.proposal != NONE)))
+        return asks | self._reviewed(tracks, proposals, (tracks.final & (tracks.proposal != NONE)).nonzero()[0])
 
     def _reviewed(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Bool:
         """(M,) tracks of these rows, all final, whose number of points has grown enough for another view."""

@@ -94,7 +94,7 @@ class PointNet:
         crops = gather(points, proposals, which, self.config.max_points)
         crops = canonical(crops, ground_z_m(proposals, which, self._sensor))
         out = np.empty((len(crops), N_CLASSES))
-        by_size = np.argsort(crops.count, kind="stable")
+        by_size = crops.count.argsort(kind="stable")
         for first in range(0, len(crops), self.config.batch):
             rows = by_size[first : first + self.config.batch]
             out[rows] = self.infer(crops.padded(rows, self.config.min_points))

@@ -21,7 +21,7 @@ def update_from_boxes(tracks: Tracks, proposals: Proposals, prior: Prior, config
 
     With `mismatch_probability` the proposal is not the object of its track: the posterior is then the prior.
     """
-    rows = np.flatnonzero(tracks.proposal != NONE)
+    rows = (tracks.proposal != NONE).nonzero()[0]
     tracks.prior[rows] = prior.probability(proposals)[tracks.proposal[rows]]
     viewed = tracks.viewed[rows]
     new = rows[~viewed & ~tracks.final[rows]]

@@ -127,7 +127,7 @@ class Scheduler:
             asks: (M,) tracks that request a class, each with a proposal.
             budget: of the frame.
         """
-        asking = np.flatnonzero(asks & (tracks.proposal != NONE))
+        asking = (asks & (tracks.proposal != NONE)).nonzero()[0]
         worth = self.worth(tracks, proposals, asking)
         ranked = asking[np.lexsort((tracks.id[asking], -worth))]
         granted = self._affordable(proposals.count[tracks.proposal[ranked]], budget)
@@ -139,7 +139,7 @@ class Scheduler:
     def worth(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Float64:
         """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
         config, proposal_rows = self._config, tracks.proposal[rows]
-        posterior = np.clip(tracks.posterior[rows], 1e-12, 1.0)
+        posterior = np.maximum(tracks.posterior[rows], 1e-12)
         uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / np.log(N_CLASSES)
         count, points_at_key_view = proposals.count[proposal_rows], tracks.key_points[rows]
         novelty = np.minimum(np.abs(count - points_at_key_view) / np.maximum(points_at_key_view, 1), 1.0)

@@ -37,7 +37,7 @@ class StripMerger:
     def merge(self, clusters: Clusters, sizes: ClusterSizes, mergeable: Bool) -> Int:
         """(G,) cluster into which each is merged, itself where it is not; only the (G,) mergeable ones are."""
         target, candidate = np.arange(clusters.n), mergeable & self.candidates(sizes)
-        rows = np.flatnonzero(candidate)
+        rows = candidate.nonzero()[0]
         if len(rows):
             bounds = self.kernels.view_bounds(clusters, consecutive(candidate), len(rows))
             target[rows] = rows[self.targets(bounds)]

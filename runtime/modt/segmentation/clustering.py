@@ -64,9 +64,9 @@ class Clusterer:
         owner = cluster.take(parts.cell)
         of_oversized = oversized.take(owner)
         split = of_oversized | self._may_be_person(parts)
-        cluster = np.where(
-            np.append(split, False).take(part), part + len(coarse), cluster
-        )  # the last is that of NONE
+        number = np.full(len(parts) + 1, NONE)  # the last is that of NONE
+        number[:-1][split] = len(coarse) + split.nonzero()[0]
+        cluster = np.maximum(number.take(part), cluster)  # parts follow the clusters
         whole = np.bincount(owner, parts.points * split, len(coarse))
         coarse, parts = (
             replace(coarse, points=coarse.points - whole.astype(np.int64)),

@@ -62,7 +62,7 @@ class Groups:
 
 def consecutive(mask: Bool) -> Int:
     """(n,) rank of each True entry among them, NONE for False."""
-    return np.where(mask, np.cumsum(mask) - 1, NONE)
+    return np.where(mask, mask.cumsum() - 1, NONE)
 
 
 def label_min(values: Float32, labels: Int, n: int) -> Float32:

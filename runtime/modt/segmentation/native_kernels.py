@@ -187,7 +187,7 @@ class NativeKernels(NativeGeometryKernels):
         n, limits = len(bounds), self._strips.get(config)
         if limits is None:
             limits = self._strips[config] = (_F * len(_STRIP_KEYS))(*(getattr(config, key) for key in _STRIP_KEYS))
-        order, target = np.argsort(bounds.min[DIRECTION], kind="stable"), np.empty(n, np.int64)
+        order, target = bounds.min[DIRECTION].argsort(kind="stable"), np.empty(n, np.int64)
         parent, united = np.empty(n, np.int32), np.empty((8, n), np.float32)
         given, out = pointers(bounds.min, bounds.max), pointers(united)
         self._library.modt_merge_strips(

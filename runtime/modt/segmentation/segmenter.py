@@ -77,7 +77,7 @@ class Segmenter:
         heading = kernels.best_headings(cells.x, cells.y, by_cell, boxes.max_cells, boxes.noise_m)
         members = kernels.members_of(clusters, index)
         offsets, own = members.offsets, members.columns[:3]
-        mean = kernels.group_sums(members.columns, offsets) / np.diff(offsets)
+        mean = kernels.group_sums(members.columns, offsets) / (offsets[1:] - offsets[:-1])
         truncated, statistics = np.zeros(clusters.n, np.bool_), None
         if depth is not None:
             truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m

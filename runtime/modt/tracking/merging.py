@@ -56,7 +56,9 @@ class CarMerging:
         number[source] = np.arange(len(source))
         count = np.bincount(number[into], frame.proposals.count, len(source)).astype(np.int64)
         runs = contiguous_runs(into.argsort(kind="stable"), frame.proposals.offsets)
-        changed = number[np.unique(hosts)]
+        whole = np.zeros(len(source), np.bool_)
+        whole[number[hosts]] = True
+        changed = whole.nonzero()[0]
         grouping = Grouping(runs, count, source, changed, yaw[source[changed]])
         proposals, observations = grouping.apply(frame, placement, self._kernels)
         matched = number[frame.matches.proposals]

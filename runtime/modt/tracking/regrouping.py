@@ -80,8 +80,8 @@ class Grouping:
 
 def contiguous_runs(order: Int, offsets: Int) -> list[slice]:
     """Members of P proposals in a new order of the proposals, as few slices as possible."""
-    begin = np.diff(order - np.arange(len(order)), prepend=-1) != 0
-    begin[:1] = True
-    end = np.append(begin[1:], True)
+    begin, end = np.ones((2, len(order)), np.bool_)
+    np.not_equal(order[1:], order[:-1] + 1, out=begin[1:])
+    end[:-1] = begin[1:]
     pairs = zip(offsets[order[begin]].tolist(), offsets[order[end] + 1].tolist(), strict=True)
     return [slice(*pair) for pair in pairs]
