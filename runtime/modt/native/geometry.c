@@ -77,8 +77,10 @@ EXPORT i64 modt_overlapping_pairs(const double *a, i64 n, const double *b, i64 k
 {
     i64 groups = (k + 15) / 16, count = 0;
     for (i64 j = 0; j < 16 * groups; j++)
-        for (int side = 0; side < 4; side++) /* what the ends to the east, west, north and south of a have to reach */
-            least[j / 16][side][j / 4 % 4][j % 4] = j < k ? -b[(side / 2 * 2 + (side % 2 ? 0 : 4)) * k + j] : INFINITY;
+        for (int side = 0; side < 4; side++) { /* what the ends to the east, west, north and south of a have to reach */
+            double end = j < k ? -b[(side / 2 * 2 + (side % 2 ? 0 : 4)) * k + j] : __builtin_nan(""); /* not reached */
+            least[j / 16][side][j / 4 % 4][j % 4] = end;
+        }
     for (i64 i = 0; i < n; i++) {
         double east = a[i], north = a[2 * n + i], west = a[4 * n + i], south = a[6 * n + i];
         for (i64 g = 0; g < groups; g++) {
