@@ -6,7 +6,7 @@ number of proposals in a frame, M the number of tracks alive, N the number of po
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cache
 from operator import attrgetter
@@ -85,22 +85,21 @@ class Proposals:
         out[self.members] = np.repeat(np.arange(len(self)), self.count)
         return out
 
-    def regrouped(self, runs: Sequence[slice | Int], count: Int, source: Int) -> Proposals:
-        """The members in another grouping.
+    def regrouped(self, members: Int, coordinates: Float32, count: Int, source: Int) -> Proposals:
+        """Members in another grouping.
 
         Args:
-            runs: rows of members in their new order; few long slices are copied faster than one by one.
+            members: (K,) of the new proposals, one after the other.
+            coordinates: (3, K) of them.
             count: (Q,) members of each new proposal.
             source: (Q,) proposal whose centroid, box and other columns each new one takes over.
         """
         offsets = np.zeros(len(count) + 1, np.int64)
         count.cumsum(out=offsets[1:])
         return Proposals(
-            members=np.concatenate([self.members[:0], *(self.members[run] for run in runs)]),
+            members=members,
             offsets=offsets,
-            coordinates=np.concatenate(
-                [self.coordinates[:, :0], *(self.coordinates[:, run] for run in runs)], axis=1
-            ),
+            coordinates=coordinates,
             centroid=self.centroid.take(source, axis=0),
             box=self.box.take(source, axis=0),
             truncated=self.truncated[source],
@@ -110,8 +109,8 @@ class Proposals:
 
     def take(self, which: Int) -> Proposals:
         """A copy of the rows given, in their order."""
-        ends = zip(self.offsets[which].tolist(), self.offsets[which + 1].tolist(), strict=True)
-        return self.regrouped([slice(*pair) for pair in ends], self.count[which], which)
+        runs = np.stack([self.offsets[which], self.offsets[which + 1]])
+        return self.regrouped(*copy_runs(self.members, self.coordinates, runs), self.count[which], which)
 
     @classmethod
     def empty(cls) -> Proposals:
@@ -124,6 +123,15 @@ class Proposals:
             box=np.zeros((0, 7)),
             truncated=np.zeros(0, np.bool_),
         )
+
+
+def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:
+    """Members and (3, ...) coordinates of runs of them, one after the other; runs (2, R) begin at, and end before."""
+    slices = [slice(*run) for run in runs.T.tolist()]
+    return (
+        np.concatenate([members[:0], *(members[run] for run in slices)]),
+        np.concatenate([coordinates[:, :0], *(coordinates[:, run] for run in slices)], axis=1),
+    )
 
 
 def column(kind: type, *shape: int, fill: float = 0) -> Any:

@@ -204,6 +204,14 @@ def test_ends_of_kdops(kernels, seed, sizes):
     assert same(*(k.kdop_ends(xyz, offsets, axes) for k in (NUMPY, kernels)))
 
 
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 30), n_runs=st.integers(0, 6))
+def test_copied_runs(kernels, seed, n, n_runs):
+    rng = np.random.default_rng(seed)
+    members, xyz = rng.permutation(n), rng.normal(0, 9, (3, n)).astype(np.float32)
+    runs = np.sort(rng.integers(0, n + 1, (2, n_runs)), axis=0)
+    assert same(*(k.copy_runs(members, xyz, runs) for k in (NUMPY, kernels)))
+
+
 @given(seed=st.integers(0, 10_000), n=st.integers(0, 40), k=st.integers(0, 40), spread=st.integers(0, 60))
 @settings(max_examples=100, deadline=None)
 def test_overlapping_pairs(kernels, seed, n, k, spread):

@@ -11,7 +11,7 @@ from modt.geometry import corners
 from modt.observations import observe
 from modt.placement import Placement
 from modt.tracking.association import Matches
-from modt.tracking.regrouping import Associated, Grouping, contiguous_runs
+from modt.tracking.regrouping import Associated, Grouping, runs_of
 from tests.tracking.tracking_scenes import EYE, box, driving, frame_of
 
 NO_MATCHES = Matches(*(np.zeros((0, *shape)) for shape in ((), (), (2,), (2, 2), (4,))))
@@ -57,7 +57,7 @@ def scenes(draw):
     same = [np.array_equal(m, np.arange(*proposals.offsets[k : k + 2])) for m, k in zip(members, source, strict=True)]
     changed = np.flatnonzero(~np.array(same))
     yaw = draw(st.floats(-3, 3))
-    runs = [slice(m[0], m[-1] + 1) if len(m) == m[-1] - m[0] + 1 else m for m in members]
+    runs = runs_of(np.concatenate(members))
     grouping = Grouping(runs, np.bincount(label), source, changed, np.full(len(changed), yaw))
     return Scene(frame.points, Associated(proposals, observations, NO_MATCHES), placement, deskew, label, grouping)
 
@@ -140,19 +140,19 @@ def test_the_frame_before_is_left_as_it_was(scene):
 
 
 @given(st.lists(st.integers(1, 5), min_size=1, max_size=7), st.data())
-def test_contiguous_runs_are_the_members_in_order_in_few_slices(counts, data):
+def test_runs_of_proposals_are_their_members_in_order_in_few_runs(counts, data):
     offsets, order = np.cumsum([0, *counts]), np.array(data.draw(st.permutations(range(len(counts)))), np.int64)
-    runs = contiguous_runs(order, offsets)
-    rows = [row for run in runs for row in range(run.start, run.stop)]
+    runs = offsets.take(runs_of(order)).T.tolist()
+    rows = [row for run in runs for row in range(*run)]
     assert rows == [row for k in order for row in range(*offsets[k : k + 2])]
-    assert all(a.stop != b.start for a, b in itertools.pairwise(runs))
+    assert all(end != begin for (_, end), (begin, _) in itertools.pairwise(runs))
 
 
 def test_corners_of_a_regrouped_box_enclose_both_parts():
     _, proposals = frame_of([box(10, 0, 2.0), box(13, 0, 2.0)])
     frame = Associated(proposals, observe(proposals, EYE), NO_MATCHES)
     zero = np.array([0])
-    grouping = Grouping([slice(None)], np.array([120]), zero, zero, np.zeros(1))
+    grouping = Grouping(np.array([[0], [120]]), np.array([120]), zero, zero, np.zeros(1))
     after, _ = grouping.apply(frame, Placement(EYE))
     np.testing.assert_allclose(corners(after.box)[0].min(axis=0), [9.0, -0.9], atol=1e-5)
     np.testing.assert_allclose(corners(after.box)[0].max(axis=0), [14.0, 0.9], atol=1e-5)

@@ -9,7 +9,7 @@ import numpy as np
 from modt.geometry.boxes import upright_boxes
 from modt.geometry.kdop import kdop_ends, overlapping_pairs
 from modt.geometry.kdop_pairs import PairWeights, Shapes, certain_pairs, pair_costs
-from modt.types import Float32, Float64, Int
+from modt.types import Float32, Float64, Int, copy_runs
 
 
 class GeometryKernels(Protocol):
@@ -23,6 +23,9 @@ class GeometryKernels(Protocol):
 
     def kdop_ends(self, xyz: Float32, offsets: Int, axes: Float32) -> Float32:
         """(8, G) greatest coordinates of each group along (3, 4) axes, then against them, given (3, K) points."""
+
+    def copy_runs(self, members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:
+        """Members and (3, ...) coordinates of (2, R) runs of them, one after the other."""
 
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
         """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""
@@ -47,6 +50,7 @@ class NumpyGeometryKernels:
 
     upright_boxes = staticmethod(upright_boxes)
     kdop_ends = staticmethod(kdop_ends)
+    copy_runs = staticmethod(copy_runs)
     overlapping_pairs = staticmethod(overlapping_pairs)
     pair_costs = staticmethod(pair_costs)
     certain_pairs = staticmethod(certain_pairs)

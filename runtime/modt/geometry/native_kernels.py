@@ -16,6 +16,7 @@ _SIGNATURES: Signatures = {
     "modt_upright_boxes": (None, (_P, _P, _P, _P, _L, _P, _P, _P, _D, _P)),
     "modt_kdop_ends": (None, (_P, _P, _P, _P, _L, _P, _P)),
     "modt_group_sums": (None, (_P, _L, _L, _P, _L, _P)),
+    "modt_copy_runs": (None, (_P, _P, _P, _L, _P)),
     "modt_overlapping_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
     "modt_pair_costs": (None, (_P, _P, _P, _D, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
     "modt_certain_pairs": (None, (_P, _P, _L, _D, _P, _P, _P, _P)),
@@ -56,6 +57,14 @@ class NativeGeometryKernels:
         given = at(values), *values.shape, at(offsets, INT64), sums.shape[1]
         self._library.modt_group_sums(*given, at(sums, FLOAT64))
         return sums
+
+    def copy_runs(self, members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:
+        """Members and (3, ...) coordinates of (2, R) runs of them, one after the other."""
+        (begin, end), n = runs, int((runs[1] - runs[0]).sum())
+        rows, xyz = np.empty(n, np.int64), np.empty((3, n), np.float32)
+        given, out = pointers(members, coordinates), pointers(rows, xyz)
+        self._library.modt_copy_runs(address(given), at(begin, INT64), at(end, INT64), len(begin), address(out))
+        return rows, xyz
 
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
         """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""

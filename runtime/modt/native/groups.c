@@ -28,6 +28,23 @@ EXPORT i64 modt_group(const i64 *labels, i64 n_rows, i64 n, i64 *rows, i64 *offs
 }
 
 typedef struct {
+    i64 *index;
+    float *xyz[3];
+} Rows;
+
+/* copy_runs: of n runs of rows, which begin at, and end before, one after the other. */
+EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i64 n, Rows *copied)
+{
+    i64 at = 0;
+    for (i64 run = 0; run < n; at += end[run] - begin[run], run++)
+        for (i64 i = begin[run], to = at; i < end[run]; i++, to++) {
+            copied->index[to] = rows->index[i];
+            for (int v = 0; v < 3; v++)
+                copied->xyz[v][to] = rows->xyz[v][i];
+        }
+}
+
+typedef struct {
     const float *x, *y, *z, *height;
     const i64 *index;
 } Points;

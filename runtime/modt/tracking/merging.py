@@ -20,7 +20,7 @@ from modt.geometry.kdop import DIRECTIONS, coverage, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.placement import Placement
-from modt.tracking.regrouping import Associated, Grouping, contiguous_runs
+from modt.tracking.regrouping import Associated, Grouping, runs_of
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Int
 
@@ -55,7 +55,7 @@ class CarMerging:
         number = np.full(n, NONE)
         number[source] = np.arange(len(source))
         count = np.bincount(number[into], frame.proposals.count, len(source)).astype(np.int64)
-        runs = contiguous_runs(into.argsort(kind="stable"), frame.proposals.offsets)
+        runs = frame.proposals.offsets.take(runs_of(into.argsort(kind="stable")))
         whole = np.zeros(len(source), np.bool_)
         whole[number[hosts]] = True
         changed = whole.nonzero()[0]

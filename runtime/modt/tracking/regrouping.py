@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -50,14 +49,14 @@ class Grouping:
     """How P proposals become Q.
 
     Attributes:
-        runs: rows of members in their new order.
+        runs: (2, R) of members in their new order: where each begins, and before which it ends.
         count: (Q,) members of each.
         source: (Q,) proposal whose columns each takes over.
         changed: (C,) those of the Q whose members changed.
         yaw: (C,) heading of their boxes [rad, sensor frame].
     """
 
-    runs: Sequence[slice | Int]
+    runs: Int
     count: Int
     source: Int
     changed: Int
@@ -67,21 +66,25 @@ class Grouping:
         self, frame: Associated, placement: Placement, kernels: GeometryKernels = NUMPY_GEOMETRY
     ) -> tuple[Proposals, Observations]:
         """Proposals and observations in the new grouping; boxes and k-DOPs of what changed come from its points."""
-        proposals = frame.proposals.regrouped(self.runs, self.count, self.source)
-        few = proposals.take(self.changed)
+        old, changed = frame.proposals, self.changed
+        proposals = old.regrouped(
+            *kernels.copy_runs(old.members, old.coordinates, self.runs), self.count, self.source
+        )
+        runs = np.array((proposals.offsets[changed], proposals.offsets[changed + 1]))
+        copied = kernels.copy_runs(proposals.members, proposals.coordinates, runs)
+        few = proposals.regrouped(*copied, self.count[changed], changed)
         few.box[:] = kernels.upright_boxes(few.coordinates, few.offsets, self.yaw)
         few.centroid[:] = (kernels.group_sums(few.coordinates, few.offsets) / few.count).T
-        proposals.box[self.changed], proposals.centroid[self.changed] = few.box, few.centroid
+        proposals.box[changed], proposals.centroid[changed] = few.box, few.centroid
         observations = frame.observations.take(self.source)
-        changed = observe(few, placement.T_world_sensor, kernels)
-        observations.put(self.changed, changed.moved(placement.deskew(changed.centroid)))
+        observed = observe(few, placement.T_world_sensor, kernels)
+        observations.put(changed, observed.moved(placement.deskew(observed.centroid)))
         return proposals, observations
 
 
-def contiguous_runs(order: Int, offsets: Int) -> list[slice]:
-    """Members of P proposals in a new order of the proposals, as few slices as possible."""
-    begin, end = np.ones((2, len(order)), np.bool_)
-    np.not_equal(order[1:], order[:-1] + 1, out=begin[1:])
+def runs_of(rows: Int) -> Int:
+    """(2, R) runs of consecutive numbers among (n,) rows: where each begins, and before which it ends."""
+    begin, end = np.ones((2, len(rows)), np.bool_)
+    np.not_equal(rows[1:], rows[:-1] + 1, out=begin[1:])
     end[:-1] = begin[1:]
-    pairs = zip(offsets[order[begin]].tolist(), offsets[order[end] + 1].tolist(), strict=True)
-    return [slice(*pair) for pair in pairs]
+    return np.array((rows[begin], rows[end] + 1))

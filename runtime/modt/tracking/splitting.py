@@ -18,7 +18,7 @@ from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
 from modt.placement import Placement
 from modt.tracking.association import Matches
-from modt.tracking.regrouping import Associated, Grouping
+from modt.tracking.regrouping import Associated, Grouping, runs_of
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int
 
@@ -113,19 +113,17 @@ class ExpectedSplitting:
         changed_hosts, new = np.unique(hosts), np.arange(n, n + len(hosts))
         kept = np.ones(len(old.members), np.bool_)
         kept[np.concatenate(pieces)] = False
-        runs: list[slice | Int] = []
-        end = 0
-        for host in changed_hosts:
-            begin, stop = old.offsets[host : host + 2]
-            runs += [slice(end, begin), begin + kept[begin:stop].nonzero()[0]]
+        runs, end = [], 0
+        for begin, stop in old.offsets[np.array((changed_hosts, changed_hosts + 1))].T.tolist():
+            runs += [np.array(((end,), (begin,))), runs_of(begin + kept[begin:stop].nonzero()[0])]
             end = stop
-        runs += [slice(end, None), *pieces]
+        runs += [np.array(((end,), (len(kept),))), *map(runs_of, pieces)]
         size = np.array([len(piece) for piece in pieces])
         count = np.append(old.count, size)
         np.subtract.at(count, hosts, size)
         yaw = tracks.box[rows, 6] - yaw_of(placement.T_world_sensor)
         grouping = Grouping(
-            runs,
+            np.concatenate(runs, axis=1),
             count,
             np.append(np.arange(n), hosts),
             np.append(changed_hosts, new),
