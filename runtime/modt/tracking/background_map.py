@@ -25,6 +25,8 @@ class BackgroundMap:
 
     def add(self, tracks: TrackTable, rows: Int) -> None:
         """Remember the places of rows, background at rest; beyond the capacity the oldest places are dropped."""
+        if not len(rows):
+            return
         first = max(0, len(self._top) + len(rows) - self.config.capacity)
         self._kdop = np.concatenate([self._kdop, tracks.kdop.take(rows, axis=0).T], axis=1)[:, first:]
         self._top = np.concatenate([self._top, tracks.top[rows]])[first:]

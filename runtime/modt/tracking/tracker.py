@@ -256,6 +256,8 @@ class Tracker:
         t = self._tracks
         t.inherited &= ~t.viewed
         rows = (t.inherited & (t.proposal != NONE) & ~self._near_rest()).nonzero()[0]
+        if not len(rows):
+            return
         t.state[rows] = self.machine.transition(t.state[rows], Event.WITHDRAWN)
         t.final[rows], t.inherited[rows], t.posterior[rows] = self.machine.final[t.state[rows]], False, 1 / N_CLASSES
 
