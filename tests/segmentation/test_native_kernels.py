@@ -220,6 +220,7 @@ def test_overlapping_pairs(kernels, seed, n, k, spread):
     a[:, :1], a[:, 1:2] = np.inf, np.nan  # overlaps all, overlaps nothing
     one, other = (each.overlapping_pairs(a, b) for each in (NUMPY, kernels))
     assert same(one, other)
+    assert same(one, kernels.overlapping_pairs(np.asfortranarray(a), np.asfortranarray(b)))
     if spread == 0:
         assert len(one[0]) == k * (n - (n > 1)), "all overlap: more pairs than there was room for at first"
 

@@ -68,7 +68,7 @@ class NativeGeometryKernels:
 
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
         """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""
-        n, k = a.shape[1], b.shape[1]
+        a, b, n, k = np.ascontiguousarray(a), np.ascontiguousarray(b), a.shape[1], b.shape[1]
         fours, limit = np.empty(4 * (k + 15)), _PAIRS_EACH * (n + k)
         given = at(a, FLOAT64), n, at(b, FLOAT64), k, address(fours)
         while True:
