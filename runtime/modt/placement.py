@@ -36,7 +36,7 @@ class PlanarMotion:
 
     def displacement(self, position_m: Float64, delay_s: Float64) -> Float64:
         """(P, 2) from positions (P, 2) seen delay_s (P,) after the stamp to where the sensor sees them at it [m]."""
-        position = position_m[:, 0] + 1j * position_m[:, 1]
+        position = position_m.copy().view(np.complex128)[:, 0]
         half = np.exp(0.5j * self.yaw_rate_radps * delay_s)
         step = position * (half * half - 1.0) + self.velocity_mps * delay_s * half
         xy: Float64 = step.view(np.float64).reshape(-1, 2)

@@ -112,12 +112,12 @@ def face(x: Float64, P: Float64, heading_rad: Float64) -> tuple[Float64, Float64
 
 def turn_about(x: Float64, P: Float64) -> tuple[Float64, Float64]:
     """The same motion with a speed that is not negative."""
-    back = (x[SPEED] < 0).nonzero()[0]
+    sign = np.where(x[SPEED] < 0, -1.0, 1.0)
     forth, turned = x.copy(), P.copy()
-    forth[SPEED, back] *= -1
-    forth[HEADING, back] = wrap(x[HEADING, back] + np.pi)
-    turned[SPEED, :, back] *= -1
-    turned[:, SPEED, back] *= -1
+    forth[SPEED] *= sign
+    forth[HEADING] = np.where(sign < 0, wrap(x[HEADING] + np.pi), x[HEADING])
+    turned[SPEED] *= sign
+    turned[:, SPEED] *= sign
     return forth, turned
 
 
