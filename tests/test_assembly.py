@@ -10,6 +10,7 @@ from modt import assembly, profile
 from modt.classification.pointnet import PointNet
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
+from modt.sources.synthetic_stream import SyntheticStream
 
 BASE = profile.load("vlp-16")
 
@@ -45,3 +46,16 @@ def test_a_budget_that_buys_no_call_is_warned_of(mode, scheduler, warned, monkey
     with caplog.at_level(logging.WARNING):
         pipeline(mode, **scheduler)
     assert ("pay for no classification" in caplog.text) is warned
+
+
+@pytest.mark.parametrize(
+    ("scheduler", "timed"), [({"cpu_ms_per_frame": 100.0}, True), ({"calls_per_frame": 4}, False)]
+)
+def test_calls_are_timed_where_cpu_time_binds(scheduler, timed, monkeypatch):
+    readings = itertools.count(0, 400_000)
+    monkeypatch.setattr(assembly, "time", type("Clock", (), {"thread_time_ns": readings.__next__}))
+    stages = pipeline("accurate", **scheduler)
+    before = next(readings)
+    for frame, _ in SyntheticStream("street", "vlp-16", 0.3, 0).sweeps():
+        assert len(stages.step(frame).classified)
+    assert (next(readings) > before + 400_000) is timed

@@ -126,7 +126,13 @@ class Proposals:
 
 
 def copy_runs(members: Int, coordinates: Float32, runs: Int) -> tuple[Int, Float32]:
-    """Members and (3, ...) coordinates of runs of them, one after the other; runs (2, R) begin at, and end before."""
+    """Members and (3, ...) coordinates of runs of them, one after the other.
+
+    Args:
+        members: (K,) of the proposals.
+        coordinates: (3, K) of them.
+        runs: (2, R) first row of each run, and the row after its last.
+    """
     slices = [slice(*run) for run in runs.T.tolist()]
     return (
         np.concatenate([members[:0], *(members[run] for run in slices)]),

@@ -13,7 +13,11 @@ from modt.types import Float32, Float64, Int, copy_runs
 
 
 class GeometryKernels(Protocol):
-    """The passes; every implementation gives the same bytes for the same input."""
+    """The passes; every implementation gives the same bytes for the same input.
+
+    Sums alone may differ in their last bit, since NumPy adds in another order: in double precision the sum of single
+    precision numbers is exact in any order, unless one of them is 2^29 times smaller than another.
+    """
 
     def upright_boxes(self, xyz: Float32, offsets: Int, yaw: Float64) -> Float64:
         """(G, 7) boxes at (G,) headings, or across them, about groups of (3, K) points."""

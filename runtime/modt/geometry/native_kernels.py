@@ -69,8 +69,8 @@ class NativeGeometryKernels:
     def overlapping_pairs(self, a: Float64, b: Float64) -> tuple[Int, Int]:
         """Pairs, in order, of k-DOPs a (8, n) and b (8, k) that overlap along x and along y."""
         a, b, n, k = np.ascontiguousarray(a), np.ascontiguousarray(b), a.shape[1], b.shape[1]
-        fours, limit = np.empty(4 * (k + 15)), _PAIRS_EACH * (n + k)
-        given = at(a, FLOAT64), n, at(b, FLOAT64), k, address(fours)
+        least, limit = np.empty(4 * (k + 15)), _PAIRS_EACH * (n + k)
+        given = at(a, FLOAT64), n, at(b, FLOAT64), k, address(least)
         while True:
             one, other = np.empty((2, limit), np.int64)
             count = self._library.modt_overlapping_pairs(*given, limit, address(one), address(other))

@@ -32,7 +32,7 @@ typedef struct {
     float *xyz[3];
 } Rows;
 
-/* copy_runs: of n runs of rows, which begin at, and end before, one after the other. */
+/* copy_runs: n runs of rows, from `begin` to before `end`, one after the other. */
 EXPORT void modt_copy_runs(const Rows *rows, const i64 *begin, const i64 *end, i64 n, Rows *copied)
 {
     i64 at = 0;

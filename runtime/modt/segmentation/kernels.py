@@ -22,11 +22,7 @@ from modt.types import Bool, Float32, Float64, Int
 
 
 class Kernels(GeometryKernels, Protocol):
-    """The passes, with those of geometry; every implementation gives the same bytes for the same input.
-
-    Sums alone may differ in their last bit, since NumPy adds in another order: in double precision the sum of single
-    precision numbers is exact in any order, unless one of them is 2^29 times smaller than another.
-    """
+    """The passes, with those of geometry; every implementation gives the same bytes for the same input."""
 
     @property
     def name(self) -> str:

@@ -49,7 +49,7 @@ class Grouping:
     """How P proposals become Q.
 
     Attributes:
-        runs: (2, R) of members in their new order: where each begins, and before which it ends.
+        runs: (2, R) of members in their new order, as for `modt.types.copy_runs`.
         count: (Q,) members of each.
         source: (Q,) proposal whose columns each takes over.
         changed: (C,) those of the Q whose members changed.
@@ -83,7 +83,7 @@ class Grouping:
 
 
 def runs_of(rows: Int) -> Int:
-    """(2, R) runs of consecutive numbers among (n,) rows: where each begins, and before which it ends."""
+    """(2, R) runs of consecutive numbers among (n,) rows, as for `modt.types.copy_runs`."""
     begin, end = np.ones((2, len(rows)), np.bool_)
     np.not_equal(rows[1:], rows[:-1] + 1, out=begin[1:])
     end[:-1] = begin[1:]
