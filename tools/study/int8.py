@@ -8,12 +8,15 @@ Prints one JSON object. Every other crop is for the calibration, the rest for th
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"  # read at the import, as in modt.classification.pointnet
 from onnxruntime.quantization import CalibrationDataReader, QuantFormat, QuantType, quantize_static
 
 from modt.classes import N_CLASSES

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
@@ -10,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import softmax
+
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"  # read at its import; else it writes into ~/.cache and looks up a host
 import onnxruntime as ort
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
-from scipy.special import softmax
 
 from modt import assets
 from modt.classes import N_CLASSES
