@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 import onnx
 import pytest
-from onnxruntime.capi.onnxruntime_pybind11_state import Fail
 
 from modt import assets
 from modt.classification.box_classifier import NoBoxClassifier
-from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet, ort_errors
 from modt.config import ClassificationConfig, SensorConfig
 from modt.energy.instrumentation import padded_size
 from modt.errors import MisuseError
@@ -190,7 +189,7 @@ def test_refusal_without_a_message_is_misuse(tmp_path: Path, monkeypatch: pytest
     path = save(tmp_path, random_layers(0))
 
     def refuse(*args: Any, **kwargs: Any) -> None:
-        raise Fail
+        raise ort_errors.Fail
 
     monkeypatch.setattr("onnxruntime.InferenceSession", refuse)
     with pytest.raises(MisuseError, match=r"not an ONNX model \(Fail\)"):

@@ -7,10 +7,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import onnxruntime as ort
 import pytest
 
-from modt.classification.pointnet import PointNet
+from modt.classification.pointnet import PointNet, ort
 from modt.config import ClassificationConfig, SensorConfig
 from tests.tools.train.datasets import write_folder
 from tools.train import build_models
