@@ -1,8 +1,8 @@
 """Class posteriors: normalisation with a floor, and the update of a track by the box of the frame.
 
-Before its first view a track has the prior of its box, or is background for certain where it inherited that class from
-a remembered place. Afterwards it has the posterior of its last key view, updated by the change of that prior since the
-view. A final class stays, but its posterior follows the box.
+Before its first view a track has the prior of its box; an inherited class has probability 1. Afterwards it has the
+posterior of its last key view, updated by the change of that prior since the view. A final class stays, but its
+posterior follows the box.
 """
 
 from __future__ import annotations
