@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import CLASSES, ObjectClass
+from modt.class_sizes import MAX_SIZE_M
+from modt.classes import ObjectClass
 from modt.config import BackgroundMapConfig, TrackingConfig
 from modt.geometry.kdop import DIRECTIONS, widths
 from modt.geometry.kdop_displacement import AGREE_M
@@ -27,7 +28,6 @@ from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
 
 CREEPING = 0.1
 """Of the period: shorter steps are those of a clock that stands."""
-_MAX_LENGTH_M = np.array([spec.max_length_m for spec in CLASSES.values()])
 
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
@@ -295,6 +295,6 @@ def _oversized(object_class: Int, kdop: Float64) -> Int:
     """Indices of objects, by classes (n,) and k-DOPs (n, 8), that are longer than their class: merged with others."""
     objects: Int = (object_class != ObjectClass.BACKGROUND.value).nonzero()[0]
     longer: Bool = (
-        widths(kdop.take(objects, axis=0).T).max(axis=0, initial=0.0) > _MAX_LENGTH_M[object_class[objects]]
+        widths(kdop.take(objects, axis=0).T).max(axis=0, initial=0.0) > MAX_SIZE_M[object_class[objects], 0]
     )
     return objects[longer]
