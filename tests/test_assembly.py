@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import logging
 
+import numpy as np
 import pytest
 
 from modt import assembly, profile
@@ -11,6 +12,7 @@ from modt.classification.pointnet import PointNet
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.sources.synthetic_stream import SyntheticStream
+from modt.types import Budget
 
 BASE = profile.load("vlp-16")
 
@@ -48,14 +50,10 @@ def test_a_budget_that_buys_no_call_is_warned_of(mode, scheduler, warned, monkey
     assert ("pay for no classification" in caplog.text) is warned
 
 
-@pytest.mark.parametrize(
-    ("scheduler", "timed"), [({"cpu_ms_per_frame": 100.0}, True), ({"calls_per_frame": 4}, False)]
-)
-def test_calls_are_timed_where_cpu_time_binds(scheduler, timed, monkeypatch):
-    readings = itertools.count(0, 400_000)
-    monkeypatch.setattr(assembly, "time", type("Clock", (), {"thread_time_ns": readings.__next__}))
-    stages = pipeline("accurate", **scheduler)
-    before = next(readings)
+@pytest.mark.parametrize(("budget", "learns"), [(Budget(cpu_ms=100.0), True), (Budget(calls=4), False)])
+def test_the_cost_of_calls_is_learnt_where_cpu_time_binds(budget, learns):
+    stages, points = pipeline("accurate"), np.array([100])
+    before_ms = stages.scheduler.cost.cost_ms(points)
     for frame, _ in SyntheticStream("street", "vlp-16", 0.3, 0).sweeps():
-        assert len(stages.step(frame).classified)
-    assert (next(readings) > before + 400_000) is timed
+        assert len(stages.step(frame, budget).classified)
+    assert (stages.scheduler.cost.cost_ms(points) != before_ms) is learns

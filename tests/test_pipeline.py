@@ -1,9 +1,12 @@
 """The step: every stage once, in order, with what the stage before it made."""
 
+from dataclasses import replace
+from itertools import count
+
 import numpy as np
 import pytest
 
-from modt.energy.ledger import Ledger
+from modt.energy.ledger import Ledger, NullLedger
 from modt.observations import Located, observe
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING, Pipeline
 from modt.placement import Placement
@@ -26,6 +29,7 @@ class Stages:
         self.tracks = Tracks.blank(3)
         self.tracks.id[:] = [4, 5, 6]
         self.tracks.proposal[:] = [1, NONE, 0]
+        self.cost = self
 
     def segment(self, points):
         self.calls.append(("segment", len(points)))
@@ -53,6 +57,12 @@ class Stages:
         rows = self.choose(asks, budget)
         self.calls.append(("select", budget))
         return Selected(rows, int(asks.sum()) - len(rows))
+
+    def size(self, count):
+        return 10 * int(count.sum())
+
+    def update(self, count, cpu_ms):
+        self.calls.append(("update", count.tolist(), cpu_ms))
 
     def classify(self, points, found, which):
         self.calls.append(("classify", found.count.tolist(), which.tolist()))
@@ -111,6 +121,19 @@ def test_without_a_selection_nothing_is_classified():
     assert stages.calls[-1] == ("conclude", [], [])
     assert (len(result.classified), result.n_deferred) == (0, 2)
     assert CLASSIFICATION not in pipe.ledger.close_frame(7)["stages"]
+
+
+@pytest.mark.parametrize(
+    ("budget", "learnt"), [(Budget(calls=5), []), (Budget(cpu_ms=9.0), [("update", [3, 4], 0.25)])]
+)
+@pytest.mark.parametrize("books", [Ledger, NullLedger])
+def test_points_are_counted_and_the_cost_model_learns_where_cpu_time_binds(books, budget, learnt):
+    stages, cpu_ns = Stages(), count(0, 250_000)
+    pipe = replace(pipeline(stages), ledger=books(cpu_ns=lambda: next(cpu_ns)))
+    pipe.step(FRAME, budget)
+    assert [call for call in stages.calls if call[0] == "update"] == learnt
+    row = pipe.ledger.close_frame(7)["stages"].get(CLASSIFICATION)
+    assert row is None if books is NullLedger else (row["calls"], row["items"], row["points"]) == (1, 2, 70)
 
 
 def test_a_result_is_independent_of_the_live_tracks():

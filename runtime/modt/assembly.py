@@ -12,18 +12,18 @@ import numpy as np
 from modt import host, kernel_choice
 from modt.classification.decision import Decision
 from modt.classification.fusion import EveryFrame, KeyViews, OneView
-from modt.classification.instrumentation import TimedClassifier, warm_up
+from modt.classification.padding import padded_size
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler
+from modt.classification.warm_up import warm_up
 from modt.config import FusionConfig, ProfileConfig
-from modt.energy.instrumentation import Classifier, CountingClassifier, padded_size
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
 from modt.geometry.blind_sectors import BlindSectors
 from modt.geometry.kernels import GeometryKernels
 from modt.odometry.odometry import Odometry
-from modt.pipeline import Fusion, Pipeline
+from modt.pipeline import Classifier, Fusion, Pipeline
 from modt.pipeline import Segmenter as SegmenterStage
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.segmenter import Segmenter
@@ -104,15 +104,10 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     kernels = kernel_choice.choose(profile.segmentation.kernels)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
-    size = padded_size(limits)
-    cost = LinearCost(limits.max_points, size, profile.scheduler.cost)
-    warm_up(network, cost, limits.max_points, limits.batch, time.thread_time_ns)
-    budget = mode.budget(profile)
-    _check_budget(budget, cost)
-    classifier: Classifier = CountingClassifier(network, ledger, size)
-    if budget.cpu_ms is not None:  # else nobody asks what a call costs
-        classifier = TimedClassifier(classifier, cost, time.thread_time_ns)
-    return stages(mode, profile, network, segmenter(profile, fov, kernels), classifier, cost, ledger, kernels)
+    cost = LinearCost(limits.max_points, padded_size(limits), profile.scheduler.cost)
+    warm_up(network.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
+    _check_budget(mode.budget(profile), cost)
+    return stages(mode, profile, network, segmenter(profile, fov, kernels), network, cost, ledger, kernels)
 
 
 def stages(

@@ -127,9 +127,19 @@ class Pipeline:
         chosen = run(SCHEDULING, self.scheduler.select, tracks, proposals, asks, budget)
         rows, certain = chosen.rows, _NOTHING
         if len(rows):
-            likelihood = run(CLASSIFICATION, self.classifier.classify, frame.points, proposals, tracks.proposal[rows])
+            likelihood = self._classify(frame.points, proposals, tracks.proposal[rows], budget)
             certain = run(FUSION, self.fusion.fuse, tracks, proposals, rows, likelihood)
         run(FUSION, self.decision.decide, tracks)
         final = run(TRACKING, self.tracker.conclude, rows, certain)
         names, classified = self.tracker.state_names, final.id[rows]
         return FrameResult(frame, proposals, final, names, chosen.deferred, classified)
+
+    def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
+        """(R, 4) likelihoods; the ledger counts the points, and the cost model learns where CPU time is limited."""
+        cost, count = self.scheduler.cost, proposals.count[which]
+        classify = self.classifier.classify
+        likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
+        self.ledger.count(CLASSIFICATION, points=cost.size(count))
+        if budget.cpu_ms is not None:
+            cost.update(count, cpu_ns / 1e6)
+        return likelihood

@@ -147,11 +147,12 @@ def column(kind: type, *shape: int, fill: float = 0) -> Any:
 
 @dataclass(slots=True)
 class Tracks:
-    """The tracks alive, one row each; stages write the columns they own in place."""
+    """The tracks alive, one row each; every stage writes the columns it owns in place, and no other's."""
 
     # Columns of the tracker
     id: Int = column(int, fill=NONE)  # never used twice in a run
     state: Int = column(int)  # value of the state machine's enumeration
+    final: Bool = column(bool)  # that state's class is final: not asked for again unless the view improves
     x: Float64 = column(float, 4)  # filter state x, y [m, world], heading [rad], speed [m/s] (Equation 1)
     P: Float64 = column(float, 4, 4)  # its covariance
     box: Float64 = column(float, 7)  # last box seen, world frame
@@ -162,14 +163,15 @@ class Tracks:
     missed: Int = column(int)  # frames since the last proposal
     # Columns of the fusion
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen
-    posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, box); before a view, prior
-    final: Bool = column(bool)  # the class is not asked for again unless the view improves
+    posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, box)
     views: Int = column(int)  # key views fused
     key_prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # at the last key view
     key_posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)
     key_points: Int = column(int)  # 0 before any key view
     key_extent: Float64 = column(float, 3)  # l, w, h of the box [m]
+    # Column of the scheduler
     waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
+    # Column of the decision
     object_class: Int = column(int)  # the class that is said
 
     def __len__(self) -> int:
@@ -180,6 +182,12 @@ class Tracks:
         """(M,) whether the network ever saw it."""
         viewed: Bool = self.key_points > 0
         return viewed
+
+    @property
+    def inherited(self) -> Bool:
+        """(M,) whether the class is final without any view: that of a remembered background place."""
+        inherited: Bool = self.final & ~self.viewed
+        return inherited
 
     @classmethod
     def blank(cls, m: int = 0) -> Self:

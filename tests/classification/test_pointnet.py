@@ -14,9 +14,9 @@ import pytest
 
 from modt import assets
 from modt.classification.box_classifier import NoBoxClassifier
+from modt.classification.padding import padded_size
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet, ort_errors
 from modt.config import ClassificationConfig, SensorConfig
-from modt.energy.instrumentation import padded_size
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Proposals
 from tests.classification.scenes import blobs

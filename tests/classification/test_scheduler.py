@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.instrumentation import TimedClassifier, warm_up
 from modt.classification.scheduler import LinearCost, Scheduler
+from modt.classification.warm_up import warm_up
 from modt.config import SchedulerConfig
 from modt.types import NONE, UNLIMITED, Budget, Float32, Float64, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
@@ -203,19 +203,9 @@ class Constant:
         return {}
 
 
-def test_timed_classifier_updates_the_cost_model() -> None:
-    points, proposals = blobs([40, 60], np.random.default_rng(0))
-    cost, clock = cost_model(), iter(range(0, 10**9, 3_000_000))
-    classifier = TimedClassifier(Constant(), cost, lambda: next(clock))
-    for _ in range(100):
-        out = classifier.classify(points, proposals, np.arange(2))
-    assert out.shape == (2, 4)
-    assert 3.0 < cost.cost_ms(np.array([40, 60])) < 9.0
-
-
 def test_the_warm_up_classifies_small_and_large_frames_and_prices_them() -> None:
     network, clock = Constant(), iter(range(0, 10**12, 2_000_000))
     cost = LinearCost(128, lambda points: int(points.sum()), CONFIG.cost)
-    warm_up(network, cost, 128, 8, lambda: next(clock))
+    warm_up(network.classify, cost, 128, 8, lambda: next(clock))
     assert set(network.sizes) == {1, 8, 16}
     assert cost.cost_ms(np.array([60])) == pytest.approx(CONFIG.cost.margin * 2.0, rel=0.01)

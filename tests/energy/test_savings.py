@@ -1,16 +1,11 @@
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.config import ClassificationConfig
 from modt.energy.equations import EnergyModel
-from modt.energy.instrumentation import CountingClassifier, padded_size
-from modt.energy.ledger import Ledger
 from modt.energy.savings import Counts, OtherCosts, UnitCosts, reconcile
-from modt.types import Float32, Float64, Int, Proposals
 
 COSTS = UnitCosts(seg=5e-3, track=1e-3, class_call=1e-4, class_item=2e-4, class_point=1e-6)
 NOTHING, SAME = OtherCosts(0.0, 0.0), OtherCosts(1e-3, 0.0)
@@ -82,32 +77,3 @@ def test_empty_runs_save_nothing() -> None:
     assert found.model.gamma == pytest.approx(1.0)
     assert (nothing.beta, nothing.n_go, nothing.n, nothing.n_obj) == (1.0, 1.0, 0.0, 0.0)
     assert EnergyModel(0, 0, 0, 1).gamma == 1.0
-
-
-class Half:
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        return np.full((len(which), 4), 0.25)
-
-    def facts(self) -> dict[str, str]:
-        return {"file": "half"}
-
-
-@pytest.mark.parametrize(("batch", "points"), [(1, 10 + 290 + 400), (2, 2 * 290 + 400), (8, 3 * 400)])
-def test_points_are_counted_with_padding(batch: int, points: int) -> None:
-    ledger = Ledger()
-    offsets = np.array([0, 10, 710, 1000, 1001])
-    proposals = replace(Proposals.empty(), members=np.arange(1001), offsets=offsets)
-    counted = CountingClassifier(Half(), ledger, padded_size(ClassificationConfig(max_points=400, batch=batch)))
-    which = np.array([0, 1, 2])
-    out = ledger.run("classification", counted.classify, np.zeros((1001, 4), np.float32), proposals, which)
-    assert out.shape == (3, 4)
-    row = ledger.close_frame(0)["stages"]["classification"]
-    assert (row["calls"], row["items"], row["points"]) == (1, 3, points)
-    assert counted.facts() == {"file": "half"}
-
-
-def test_nothing_to_classify_has_no_points() -> None:
-    ledger = Ledger()
-    counted = CountingClassifier(Half(), ledger, padded_size(ClassificationConfig(max_points=400)))
-    counted.classify(np.zeros((0, 4), np.float32), Proposals.empty(), np.zeros(0, np.int64))
-    assert ledger.close_frame(0)["stages"]["classification"]["points"] == 0

@@ -7,8 +7,8 @@ import pytest
 import yaml
 
 from modt import profile
+from modt.classification.padding import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
-from modt.energy.instrumentation import padded_size
 from modt.errors import MisuseError
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 from unittest.mock import patch
 
@@ -43,7 +42,7 @@ class Watched:
     """A scheduler whose grants are held against the budget."""
 
     def __init__(self, scheduler: Scheduler) -> None:
-        self._scheduler, self._cost = scheduler, scheduler._cost
+        self._scheduler, self.cost = scheduler, scheduler.cost
 
     def select(self, tracks: Any, proposals: Any, asks: Any, budget: Budget) -> Selection:
         chosen = self._scheduler.select(tracks, proposals, asks, budget)
@@ -52,7 +51,7 @@ class Watched:
         assert len(chosen.rows) + chosen.deferred == np.count_nonzero(asks & (tracks.proposal != NONE))
         assert budget.calls is None or len(chosen.rows) <= budget.calls
         if budget.cpu_ms is not None and len(points):
-            assert self._cost.cost_ms(points) <= budget.cpu_ms or (self._cost.outdated and len(points) == 1)
+            assert self.cost.cost_ms(points) <= budget.cpu_ms or (self.cost.outdated and len(points) == 1)
         return chosen
 
 
@@ -68,7 +67,7 @@ def _network(*arguments: Any) -> PointNet:
     return PointNet(*arguments)
 
 
-def _warm_up(classifier: Any, cost: Any, *_: Any) -> None:
+def _warm_up(classify: Any, cost: Any, *_: Any) -> None:
     cost.warmed_up(_CALL_POINTS, 1.0)
 
 
@@ -87,8 +86,7 @@ class Run:
     _next_id: int = 0
 
     def __post_init__(self) -> None:
-        clock = SimpleNamespace(thread_time_ns=Clock())
-        with patch.multiple(assembly, PointNet=_network, warm_up=_warm_up, time=clock):
+        with patch.multiple(assembly, PointNet=_network, warm_up=_warm_up):
             ledger = Ledger(Clock(self.back), Clock(self.back))
             made = assembly.pipeline(assembly.MODES[self.mode], self.config, FieldOfView(), ledger)
         self.pipeline = replace(made, scheduler=Watched(made.scheduler))  # type: ignore[arg-type]

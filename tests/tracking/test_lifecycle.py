@@ -1,5 +1,7 @@
 """Lives of tracks through the pipeline: every row of every state machine, and what the machine says is final."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -37,6 +39,7 @@ class Scripted:
     """Segmenter, fusion, scheduler and classifier that follow a script."""
 
     deferred = 0
+    cost = SimpleNamespace(size=np.sum)
 
     def __init__(self):
         self.proposals, self.certain = None, None

@@ -1,19 +1,22 @@
 """Class posteriors: normalisation with a floor, and the update of a track by the box of the frame.
 
-Before its first view a track has the prior of its box. Afterwards it has the posterior of its last key view, updated
-by the change of that prior since the view. A final class stays, but its posterior follows the box.
+Before its first view a track has the prior of its box; an inherited class has probability 1. Afterwards it has the
+posterior of its last key view, updated by the change of that prior since the view. A final class stays, but its
+posterior follows the box.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.prior import Prior
 from modt.config import FusionConfig
 from modt.types import NONE, Float64, Proposals, Tracks
 
 MIN_PROBABILITY = 1e-4
 """Floor of every likelihood and posterior: no class is excluded for good."""
+_BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
 
 
 def update_from_boxes(tracks: Tracks, proposals: Proposals, prior: Prior, config: FusionConfig) -> None:
@@ -24,9 +27,8 @@ def update_from_boxes(tracks: Tracks, proposals: Proposals, prior: Prior, config
     rows = (tracks.proposal != NONE).nonzero()[0]
     tracks.prior[rows] = prior.probability(proposals)[tracks.proposal[rows]]
     viewed = tracks.viewed[rows]
-    new = rows[~viewed & ~tracks.final[rows]]
-    tracks.posterior[new] = tracks.prior[new]
-    known = rows[viewed]
+    new, known = rows[~viewed], rows[viewed]
+    tracks.posterior[new] = np.where(tracks.inherited[new, None], _BACKGROUND, tracks.prior.take(new, axis=0))
     now, then = (np.maximum(p.take(known, axis=0), MIN_PROBABILITY) for p in (tracks.prior, tracks.key_prior))
     change = config.box_update_weight * np.log(now / then)
     matched = from_log_weights(np.log(tracks.key_posterior.take(known, axis=0)) + change)

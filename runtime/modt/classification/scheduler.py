@@ -34,7 +34,7 @@ class LinearCost:
     """
 
     def __init__(self, max_points: int, size: Callable[[Int], int], config: CostModelConfig) -> None:
-        self._max_points, self._size, self._config = max_points, size, config
+        self._max_points, self.size, self._config = max_points, size, config
         self._margin, self._starved = config.margin, 0
         self._equations = np.zeros((3, 4))
         self._fitted_ms: Float64 | None = None
@@ -85,7 +85,7 @@ class LinearCost:
         self._fitted_ms = None
 
     def _terms(self, points: Int) -> Float64:
-        return np.array([1.0, len(points), self._size(points) / _POINTS])
+        return np.array([1.0, len(points), self.size(points) / _POINTS])
 
     def _terms_ms(self) -> Float64:
         """(3,) upper estimate of each term's CPU time [ms]."""
@@ -116,7 +116,7 @@ class Scheduler:
     """
 
     def __init__(self, config: CallWorthConfig, cost: LinearCost) -> None:
-        self._config, self._cost = config, cost
+        self._config, self.cost = config, cost
 
     def select(self, tracks: Tracks, proposals: Proposals, asks: Bool, budget: Budget) -> Selection:
         """The tracks to classify in this frame; writes tracks.waiting.
@@ -156,15 +156,15 @@ class Scheduler:
         """(R,) calls, in this order, that the budget pays for; a call that does not fit is skipped."""
         granted = np.ones(len(points), np.bool_)
         if budget.cpu_ms is not None:
-            left_ms = budget.cpu_ms - self._cost.cost_ms(points[:0])
-            for i, added_ms in enumerate(self._cost.added_ms(points).tolist()):
+            left_ms = budget.cpu_ms - self.cost.cost_ms(points[:0])
+            for i, added_ms in enumerate(self.cost.added_ms(points).tolist()):
                 granted[i] = added_ms <= left_ms
                 left_ms -= added_ms * granted[i]
-            while granted.any() and self._cost.cost_ms(points[granted]) > budget.cpu_ms:  # by padding
+            while granted.any() and self.cost.cost_ms(points[granted]) > budget.cpu_ms:  # by padding
                 granted[granted.nonzero()[0][-1]] = False
             if len(points) and not granted.any():
-                self._cost.starve()
-                granted[0] = self._cost.outdated and budget.cpu_ms > 0
+                self.cost.starve()
+                granted[0] = self.cost.outdated and budget.cpu_ms > 0
         if budget.calls is not None:
             granted &= np.cumsum(granted) <= budget.calls
         return granted

@@ -8,9 +8,9 @@ from itertools import islice
 import numpy as np
 
 from modt import assembly
+from modt.classification.padding import padded_size
 from modt.cli import assemble, metering
 from modt.config import ProfileConfig
-from modt.energy.instrumentation import padded_size
 from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter
 from modt.reporting.comparison import ModeRun, RecordingClassifier, RecordingFusion, Repetition, interleave

@@ -39,12 +39,12 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt import assembly, kernel_choice, profile
+    from modt.classification.padding import padded_size
     from modt.classification.pointnet import PointNet
     from modt.cli import assemble, metering
     from modt.cli.chosen_profile import choose
     from modt.config import WindowConfig
     from modt.energy.attribution import FitError
-    from modt.energy.instrumentation import CountingClassifier, padded_size
     from modt.energy.ledger import Ledger
     from modt.energy.window_fit_calibration import Workload
     from modt.geometry import FieldOfView
@@ -58,10 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
     loaded = choose(request.profile, scans[0], stream.info).config
     meters = metering.discovery(loaded.energy).choose(arguments.meter).meters
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
-    network = CountingClassifier(PointNet(limits, loaded.sensor), ledger, padded_size(limits))
+    network = PointNet(limits, loaded.sensor)
     segmenter = assembly.segmenter(loaded, FieldOfView(), kernel_choice.choose(loaded.segmentation.kernels))
     windows = metering.windows(meters, pinned, WindowConfig(min_s=1e9))
-    workload = Workload(scans, segmenter.segment, network.classify, ledger, windows)
+    workload = Workload(scans, segmenter.segment, network.classify, padded_size(limits), ledger, windows)
     try:
         found = workload.calibrate(arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))
     except FitError as error:

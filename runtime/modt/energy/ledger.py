@@ -35,6 +35,10 @@ class Ledger:
 
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args), timed as a span of the stage; its items are len(result), if defined."""
+        return self.timed(stage, function, *args, **kwargs)[0]
+
+    def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
+        """The same, and the CPU time of the span [ns]."""
         wall0, cpu0 = self._wall_ns(), self._cpu_ns()
         try:
             result = function(*args, **kwargs)
@@ -47,7 +51,7 @@ class Ledger:
         length = getattr(result, "__len__", None)
         if length is not None:
             row[_ITEMS] += length()
-        return result
+        return result, cpu1 - cpu0
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
         """Add work to the stage beyond the length of its result."""
@@ -109,9 +113,18 @@ class Ledger:
 class NullLedger:
     """Records nothing."""
 
+    def __init__(self, cpu_ns: Clock = time.thread_time_ns) -> None:
+        self._cpu_ns = cpu_ns
+
     def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
         """Result of function(*args)."""
         return function(*args, **kwargs)
+
+    def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
+        """Result of function(*args), and its CPU time [ns]."""
+        began_ns = self._cpu_ns()
+        result = function(*args, **kwargs)
+        return result, self._cpu_ns() - began_ns
 
     def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
         """No effect."""

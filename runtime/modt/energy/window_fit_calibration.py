@@ -35,7 +35,8 @@ class Workload:
 
     frames: Sequence[Frame]
     segment: Callable[[Float32], Proposals]
-    classify: Callable[[Float32, Proposals, Int], Float64]  # counts its points on the ledger
+    classify: Callable[[Float32, Proposals, Int], Float64]
+    size: Callable[[Int], int]  # points that the network processes for proposals of (R,) points
     ledger: Ledger
     windows: Windows  # closed explicitly
 
@@ -93,3 +94,4 @@ class Workload:
     def _classify(self, frame: Frame, proposals: Proposals, which: Int) -> None:
         if len(which):
             self.ledger.run("classification", self.classify, frame.points, proposals, which)
+            self.ledger.count("classification", points=self.size(proposals.count[which]))

@@ -9,8 +9,8 @@ from typing import Self
 import numpy as np
 
 from modt.classes import ObjectClass
+from modt.classification.padding import padded_each
 from modt.config import ClassificationConfig
-from modt.energy.instrumentation import padded_each
 from modt.evaluation.frame import JudgedFrame
 from modt.evaluation.matching import judge
 from modt.evaluation.rows import OBJECT, PROPOSAL, Rows, table

@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from modt import assembly, kernel_choice
+from modt.classification.padding import padded_size
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import LinearCost
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
-from modt.energy.instrumentation import Classifier, padded_size
 from modt.energy.ledger import NullLedger
 from modt.experiments.drives import Drive
 from modt.experiments.ideal_tracker import IdealTracking, viewed
@@ -21,7 +21,7 @@ from modt.experiments.judged import Judged
 from modt.experiments.played_back import PlayedBack, likelihoods
 from modt.experiments.segmented import SegmentedDrive, SegmentedFrame, segmented
 from modt.experiments.store import Store
-from modt.pipeline import Pipeline, Segmenter
+from modt.pipeline import Classifier, Pipeline, Segmenter
 from modt.profile import dump
 from modt.types import FrameResult
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from modt import profile
+from modt.classification.padding import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
-from modt.energy.instrumentation import padded_size
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.meters.meter import Kind
 from modt.energy.nonnegative import nonnegative_fit

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from modt.class_sizes import PersonSize
 from modt.config import SegmentationConfig, SensorConfig
 from modt.segmentation.car_merging import StripMerger
 from modt.segmentation.cells import Cells
@@ -88,10 +89,9 @@ class Clusterer:
 
     def _may_be_person(self, sizes: ClusterSizes) -> Bool:
         """(G,) parts of a person's size."""
-        c, extent, top = self.config.person_splitting, sizes.extent_m, sizes.top_m
-        may: Bool = (extent > c.min_extent_m) & (extent < c.max_extent_m) & (sizes.points >= c.min_points)
-        may &= (top > c.min_top_m) & (top < c.max_top_m) & (top - sizes.bottom_m > c.min_height_m)
-        return may
+        c = self.config.person_splitting
+        size = PersonSize(c.max_extent_m, c.min_height_m, c.min_top_m, c.max_top_m, c.min_extent_m)
+        return (sizes.points >= c.min_points) & size.fits(sizes.extent_m, sizes.bottom_m, sizes.top_m)
 
     def _beam_m(self, points: PointColumns) -> Float32:
         """(C,) vertical distance of neighbouring beams at each point [m]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.class_sizes import PersonSize
 from modt.config.segmentation import CarMergeConfig
 from modt.segmentation.groups import Groups
 from modt.segmentation.view_bounds import DIRECTION, ELEVATION, HEIGHT, RANGE, ViewBounds
@@ -51,10 +52,8 @@ def pairs(bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> tupl
 
 def person_like(bounds: ViewBounds, config: CarMergeConfig) -> Bool:
     """(G,) may be a person."""
-    top = bounds.max[HEIGHT]
-    person: Bool = bounds.width_m < config.max_person_width_m
-    person &= (top > config.min_person_top_m) & (top - bounds.min[HEIGHT] > config.min_person_height_m)
-    return person
+    size = PersonSize(config.max_person_width_m, config.min_person_height_m, config.min_person_top_m)
+    return size.fits(bounds.width_m, bounds.min[HEIGHT], bounds.max[HEIGHT])
 
 
 def fits(bounds: ViewBounds, config: CarMergeConfig) -> Bool:

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import CLASSES, ObjectClass
+from modt.class_sizes import IS_PERSON, MAX_PERSON_M, MAX_SIZE_M
+from modt.classes import ObjectClass
 from modt.config import FragmentConfig
 from modt.geometry.kdop import coverage
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -21,10 +22,6 @@ from modt.observations import Observations
 from modt.tracking.association import Matches
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int
-
-_MAX_SIZE_M = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
-_PERSON = np.array([spec.person for spec in CLASSES.values()])
-_PERSON_M = CLASSES[ObjectClass.PEDESTRIAN].max_length_m
 
 
 class NoReunion:
@@ -73,12 +70,12 @@ class Reunion:
         size = np.where(proposal_of_track == NONE, 0, observations.count[proposal_of_track])
         junior = (other == NONE) | (seniority[other] < seniority[senior])
         larger = (junior & (other != senior) & (observations.count[part] > size[senior])).nonzero()[0]
-        bulky = (observations.box[part[larger], 3] > _PERSON_M) & (tracks.box[senior[larger], 3] > _PERSON_M)
+        bulky = np.minimum(observations.box[part[larger], 3], tracks.box[senior[larger], 3]) > MAX_PERSON_M
         larger = larger[bulky | self._gives_way(tracks, senior[larger], other[larger])]
         i, senior, part = i[larger], senior[larger], part[larger]
         box = tracks.box.take(senior, axis=0)
         box[:, :2] += tracks.x.take(senior, axis=0)[:, :2] - tracks.anchor.take(senior, axis=0)
-        related = _fit_together(box, observations.box.take(part, axis=0), _MAX_SIZE_M[tracks.last_class[senior]])
+        related = _fit_together(box, observations.box.take(part, axis=0), MAX_SIZE_M[tracks.last_class[senior]])
         kdop = observations.kdop.take(part, axis=1)
         within = coverage(kdop, known.take(i, axis=1)) > self.config.min_coverage
         around = coverage(tracks.predicted_kdops(senior), kdop) > self.config.min_coverage
@@ -127,7 +124,7 @@ def _seniority(tracks: TrackTable) -> Int:
 def _may_be_one_class(tracks: TrackTable, senior: Int, other: Int) -> Bool:
     """(k,) whether two tracks (other NONE: no track) may be of one class: background and cars are easily confused."""
     a, b = tracks.last_class[senior], tracks.last_class[other]
-    one_class: Bool = (other == NONE) | (a == b) | ~(_PERSON[a] | _PERSON[b])
+    one_class: Bool = (other == NONE) | (a == b) | ~(IS_PERSON[a] | IS_PERSON[b])
     return one_class
 
 

@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import CLASSES, ObjectClass
+from modt.class_sizes import IS_PERSON, MAX_CAR_M, MAX_PERSON_M, PersonSize
+from modt.classes import ObjectClass
 from modt.config import MergeConfig
 from modt.geometry import yaw_of
 from modt.geometry.kdop import DIRECTIONS, coverage, widths
@@ -24,10 +25,8 @@ from modt.tracking.regrouping import Associated, Grouping, runs_of
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Int
 
-_PERSON = np.array([spec.person for spec in CLASSES.values()])
-_CAR_M, _PERSON_M = (CLASSES[c].max_length_m for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN))
-_PERSON_HEIGHT_M = 1.0
-"""Least height of a part that may be a person: a child of five."""
+_PERSON = PersonSize(MAX_PERSON_M, min_height_m=1.0)
+"""Size of a part that may be a person: from a child of five on."""
 
 
 class CarMerging:
@@ -105,21 +104,20 @@ def _cars(tracks: TrackTable, rows: Int) -> Bool:
 
 def _may_be_car(tracks: TrackTable, rows: Int) -> Bool:
     """(k,) which rows are cars, or background no longer than a car."""
-    short = widths(tracks.envelope.take(rows, axis=0).T).max(axis=0, initial=0.0) < _CAR_M
+    short = widths(tracks.envelope.take(rows, axis=0).T).max(axis=0, initial=0.0) < MAX_CAR_M
     may: Bool = _cars(tracks, rows) | (short & (tracks.last_class[rows] == ObjectClass.BACKGROUND.value))
     return may
 
 
 def _person_like(observations: Observations, parts: Int) -> Bool:
     """(k,) which parts are as slim and as tall as a person."""
-    tall = observations.top[parts] - observations.bottom[parts] > _PERSON_HEIGHT_M
-    slim: Bool = widths(observations.kdop.take(parts, axis=1)).max(axis=0, initial=0.0) < _PERSON_M
-    return tall & slim
+    extent = widths(observations.kdop.take(parts, axis=1)).max(axis=0, initial=0.0)
+    return _PERSON.fits(extent, observations.bottom[parts], observations.top[parts])
 
 
 def _may_take(tracks: TrackTable, rows: Int, owner: Int) -> Bool:
     """(k,) whether cars and background may take what the owners (NONE: no track) are matched with."""
-    person, older, car = _PERSON[tracks.last_class[owner]], owner < rows, _cars(tracks, owner)
+    person, older, car = IS_PERSON[tracks.last_class[owner]], owner < rows, _cars(tracks, owner)
     senior = np.where(_cars(tracks, rows), car & older, car | older)
     free: Bool = (owner == NONE) | ~(person | senior)
     return free

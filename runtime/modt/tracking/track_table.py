@@ -25,7 +25,6 @@ class TrackTable(Tracks):
     rest_position: Float64 = column(float, 2)  # at which the track was last known to rest [m, world]
     stationary: Bool = column(bool)  # the track is at rest
     unseen_s: Float64 = column(float)  # since the last proposal [s]
-    inherited: Bool = column(bool)  # the class is that of a remembered place, and no view has confirmed it
 
     def predicted_kdops(self, rows: Int | slice = slice(None)) -> Float64:
         """(8, R) k-DOPs last observed of the rows, of all by default, where the filter expects them now."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import CLASSES, N_CLASSES, ObjectClass
+from modt.class_sizes import MAX_SIZE_M
+from modt.classes import ObjectClass
 from modt.config import BackgroundMapConfig, TrackingConfig
 from modt.geometry.kdop import DIRECTIONS, widths
 from modt.geometry.kdop_displacement import AGREE_M
@@ -27,7 +28,6 @@ from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
 
 CREEPING = 0.1
 """Of the period: shorter steps are those of a clock that stands."""
-_MAX_LENGTH_M = np.array([spec.max_length_m for spec in CLASSES.values()])
 
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
@@ -146,11 +146,14 @@ class Tracker:
         """
         t = self._tracks
         if len(rows):
-            t.state[rows] = self.machine.transition(
-                t.state[rows], np.where(certain, Event.CLASSIFIED, Event.UNDECIDED)
-            )
-            t.final[rows] = self.machine.final[t.state[rows]]
+            self._advance(rows, np.where(certain, Event.CLASSIFIED, Event.UNDECIDED))
         return t.copy()
+
+    def _advance(self, rows: Int, events: Event | Int) -> None:
+        """Move rows to the states that events lead to; the state says whether the class is final."""
+        t = self._tracks
+        t.state[rows] = self.machine.transition(t.state[rows], events)
+        t.final[rows] = self.machine.final[t.state[rows]]
 
     def _lapse_s(self, stamp_s: float) -> float:
         """Time since the last frame, zero where the clock went back."""
@@ -191,7 +194,8 @@ class Tracker:
         heading = np.where(slow, np.arctan2(step_y, step_x), x[HEADING])
         x, P = kalman.update(*kalman.face(x, P, heading), z, R)
         t.x[rows], t.P[rows] = tracks_first(*kalman.turn_about(x, P))
-        t.state[rows] = self.machine.joined(self.machine.transition(t.state[rows], Event.ASSOCIATED))
+        self._advance(rows, Event.ASSOCIATED)
+        t.state[rows] = self.machine.joined(t.state[rows])
         t.missed[rows], t.unseen_s[rows] = 0, 0.0
         t.hits[rows] += 1
         t.end_variance[rows] = matches.end_variance
@@ -238,7 +242,7 @@ class Tracker:
         rows = lost.nonzero()[0]
         t.proposal[rows] = NONE
         t.missed[rows] += 1
-        t.state[rows] = self.machine.transition(t.state[rows], Event.UNASSOCIATED)
+        self._advance(rows, Event.UNASSOCIATED)
 
     def _near_rest(self) -> Bool:
         """(M,) tracks near their rest position."""
@@ -254,20 +258,16 @@ class Tracker:
     def _withdraw(self) -> None:
         """The class of a place does not hold away from it (e12), unless a view has confirmed it."""
         t = self._tracks
-        t.inherited &= ~t.viewed
         rows = (t.inherited & (t.proposal != NONE) & ~self._near_rest()).nonzero()[0]
-        if not len(rows):
-            return
-        t.state[rows] = self.machine.transition(t.state[rows], Event.WITHDRAWN)
-        t.final[rows], t.inherited[rows], t.posterior[rows] = self.machine.final[t.state[rows]], False, 1 / N_CLASSES
+        if len(rows):
+            self._advance(rows, Event.WITHDRAWN)
 
     def _expire(self) -> Int:
         """After the time of N frames a track is deleted (a9, a14), background into the map; rows (A,) kept."""
         t = self._tracks
         expired: Bool = (t.proposal == NONE) & (t.unseen_s > self._coasting_s(0.5))
-        rows = expired.nonzero()[0]
-        t.state[rows] = self.machine.transition(t.state[rows], Event.EXPIRED)
         self.background_map.add(t, (expired & self._background_at_rest()).nonzero()[0])
+        self._advance(expired.nonzero()[0], Event.EXPIRED)
         return (~expired).nonzero()[0]
 
     def _renew(self, kept: Int, matches: Matches, observations: Observations) -> None:
@@ -281,12 +281,9 @@ class Tracker:
         new = np.arange(len(kept), len(t))
         t.id[new] = self.next_id + np.arange(len(new))
         self.next_id += len(new)
-        event = np.where(known, Event.ASSOCIATED, Event.UNASSOCIATED)
-        t.state[new] = self.machine.transition(np.full(len(new), self.machine.proposal), event)
-        heirs = new[known]
-        t.state[heirs] = self.machine.transition(t.state[heirs], Event.JOINS_FINAL)
-        t.final[heirs] = t.inherited[heirs] = True
-        t.posterior[heirs] = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
+        t.state[new] = self.machine.proposal
+        self._advance(new, np.where(known, Event.ASSOCIATED, Event.UNASSOCIATED))
+        self._advance(new[known], Event.JOINS_FINAL)
         position = self.association.initial_position(observations)[proposals]
         t.x[new, :2] = t.rest_position[new] = position  # speed and heading begin at zero
         t.P[new] = self._P_new
@@ -298,6 +295,6 @@ def _oversized(object_class: Int, kdop: Float64) -> Int:
     """Indices of objects, by classes (n,) and k-DOPs (n, 8), that are longer than their class: merged with others."""
     objects: Int = (object_class != ObjectClass.BACKGROUND.value).nonzero()[0]
     longer: Bool = (
-        widths(kdop.take(objects, axis=0).T).max(axis=0, initial=0.0) > _MAX_LENGTH_M[object_class[objects]]
+        widths(kdop.take(objects, axis=0).T).max(axis=0, initial=0.0) > MAX_SIZE_M[object_class[objects], 0]
     )
     return objects[longer]

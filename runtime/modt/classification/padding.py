@@ -1,47 +1,14 @@
-"""A classifier that counts the points it processes."""
+"""Number of points that the network processes, padding included."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 
 from modt.config import ClassificationConfig
-from modt.energy.ledger import StageLedger
-from modt.types import Float32, Float64, Int, Proposals
-
-
-class Classifier(Protocol):
-    """Points to class likelihoods."""
-
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(Y|X) of the R proposals given by index."""
-        ...
-
-    def facts(self) -> dict[str, str]:
-        """File and hash of the model."""
-        ...
-
-
-class CountingClassifier:
-    """Adds the points processed by the network, padding included, to the ledger's classification entry.
-
-    Args:
-        classifier: that classifies.
-        ledger: that is added to.
-        size: points that the network processes for proposals of (R,) points.
-    """
-
-    def __init__(self, classifier: Classifier, ledger: StageLedger, size: Callable[[Int], int]) -> None:
-        self._classifier, self._ledger, self._size = classifier, ledger, size
-        self.facts = classifier.facts
-
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(Y|X) of the R proposals given by index, in their order."""
-        self._ledger.count("classification", points=self._size(proposals.count[which]))
-        return self._classifier.classify(points, proposals, which)
+from modt.types import Int
 
 
 def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:

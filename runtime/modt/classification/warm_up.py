@@ -1,10 +1,9 @@
-"""Measurement of the classifier's cost."""
+"""Classifications before the first frame, and what they cost."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import product
-from typing import Protocol
 
 import numpy as np
 
@@ -17,38 +16,11 @@ _CACHE_BYTES = 4 << 20
 """Written before each call of the warm-up: between two frames other stages fill the caches."""
 
 
-class Classifier(Protocol):
-    """Points to class likelihoods."""
-
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) class probabilities of the given proposals, in their order."""
-
-    def facts(self) -> dict[str, str]:
-        """Which model it is."""
+Classify = Callable[[Float32, Proposals, Int], Float64]
+"""Likelihoods (R, 4) of the proposals of a frame that are named by index."""
 
 
-class TimedClassifier:
-    """Classifier that reports the CPU time of every call to the cost model.
-
-    Args:
-        classifier: that is timed.
-        cost: model to update.
-        cpu_ns: CPU time of the calling thread [ns].
-    """
-
-    def __init__(self, classifier: Classifier, cost: LinearCost, cpu_ns: Callable[[], int]) -> None:
-        self._classifier, self._cost, self._cpu_ns = classifier, cost, cpu_ns
-        self.facts = classifier.facts
-
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) class probabilities of the given proposals, in their order."""
-        start_ns = self._cpu_ns()
-        likelihood = self._classifier.classify(points, proposals, which)
-        self._cost.update(proposals.count[which], (self._cpu_ns() - start_ns) / 1e6)
-        return likelihood
-
-
-def warm_up(classifier: Classifier, cost: LinearCost, max_points: int, batch: int, cpu_ns: Callable[[], int]) -> None:
+def warm_up(classify: Classify, cost: LinearCost, max_points: int, batch: int, cpu_ns: Callable[[], int]) -> None:
     """Classify small and large frames, so that no frame pays for what a first call sets up; the cost model learns."""
     for n, points in product((1, batch, 2 * batch), (min(_FEW_POINTS, max_points), max_points)):
         cloud, proposals = _columns(n, points)
@@ -56,7 +28,7 @@ def warm_up(classifier: Classifier, cost: LinearCost, max_points: int, batch: in
         for _ in range(_ROUNDS):
             np.ones(_CACHE_BYTES, np.uint8)
             start_ns = cpu_ns()
-            classifier.classify(cloud, proposals, np.arange(n))
+            classify(cloud, proposals, np.arange(n))
             times_ms.append((cpu_ns() - start_ns) / 1e6)
         cost.warmed_up(proposals.count, float(np.median(times_ms)))
 

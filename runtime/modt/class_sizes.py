@@ -1,0 +1,39 @@
+"""Sizes of the classes as arrays, and the test whether something may be a person by its size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.classes import CLASSES, ObjectClass
+from modt.types import Bool, Float32, Float64
+
+MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
+"""(4, 2) greatest length and width of each class."""
+MAX_CAR_M, MAX_PERSON_M = (CLASSES[c].max_length_m for c in (ObjectClass.CAR, ObjectClass.PEDESTRIAN))
+IS_PERSON: Bool = np.array([spec.person for spec in CLASSES.values()])
+"""(4,) whether the class is or carries a person, which is never part of a larger object."""
+
+
+@dataclass(frozen=True, slots=True)
+class PersonSize:
+    """Bounds, all exclusive, on what may be a person [m]: they differ by what is measured and what a mistake costs.
+
+    Attributes:
+        max_extent_m, min_extent_m: from above.
+        min_height_m: top less bottom of what is seen.
+        min_top_m, max_top_m: above ground.
+    """
+
+    max_extent_m: float
+    min_height_m: float
+    min_top_m: float = -np.inf
+    max_top_m: float = np.inf
+    min_extent_m: float = -np.inf
+
+    def fits(self, extent_m: Float32 | Float64, bottom_m: Float32 | Float64, top_m: Float32 | Float64) -> Bool:
+        """(k,) which objects may be a person, by (k,) extent from above, bottom and top."""
+        fits: Bool = (extent_m > self.min_extent_m) & (extent_m < self.max_extent_m)
+        fits &= (top_m > self.min_top_m) & (top_m < self.max_top_m) & (top_m - bottom_m > self.min_height_m)
+        return fits
