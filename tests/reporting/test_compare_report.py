@@ -13,6 +13,7 @@ from modt.energy.windows import Clocks, Windows
 from modt.reporting.compare_report import Basis, compare_tree
 from modt.reporting.compare_view import compare_document, compare_plots
 from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
+from modt.reporting.energy_plots import stage_energy_mJ
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
 from modt.types import UNLIMITED, Frame
@@ -134,6 +135,15 @@ def test_measured_energy_is_that_of_the_meter(measured, mode):
     assert found["net_J"].value == pytest.approx((BUSY_W - 1.0) * MEAN_MS[mode] / 1e3)
     assert found["gross_J"].kind is Kind.MEASURED
     assert found["gross_J"].low <= found["gross_J"].value <= found["gross_J"].high
+
+
+def test_energy_of_the_stages_is_the_meters(measured):
+    for mode in MODES:
+        found, shown = measured["modes"][mode], stage_energy_mJ(measured["series"][mode])
+        assert sum(s["energy_J"].value for s in found["stages"].values()) == pytest.approx(found["net_J"].value)
+        for stage, mJ in shown.items():
+            assert mJ.mean() == pytest.approx(1e3 * found["stages"][stage]["energy_J"].value)
+    assert measured["unit_costs"]["E_seg"].value == pytest.approx((BUSY_W - 1.0) * 10.975e-3)
 
 
 @pytest.mark.parametrize("mode", MODES[1:])

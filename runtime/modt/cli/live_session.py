@@ -154,7 +154,7 @@ class LiveSession:
         window = self._windows.add(line)
         if window is not None:
             self._ledger(window)
-            watts = self.power.add(window, self._followed.config.energy.idle_W)
+            watts = self.power.add(window, self._followed.config.energy)
             if watts is not None:
                 self.loop.power(watts)
         misses = self.stages.parts.config.sensor.reflectance != "none" and result.proposals.reflectance is None

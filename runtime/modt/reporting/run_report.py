@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from modt import profile
-from modt.config import ClassificationConfig, ProfileConfig
+from modt.config import ClassificationConfig, EnergyConfig, ProfileConfig
+from modt.energy.attribution import EnergySums
 from modt.energy.instrumentation import padded_size
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.meters.meter import Kind
@@ -17,10 +18,10 @@ from modt.energy.nonnegative import nonnegative_fit
 from modt.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
-from modt.pipeline import STAGES
+from modt.pipeline import CLASSIFICATION, SEGMENTATION, STAGES
 from modt.reporting.gamma import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt.reporting.quantity import estimate, quantity
-from modt.reporting.run_sums import COLUMNS, EnergySums, FrameSums
+from modt.reporting.run_sums import COLUMNS, FrameSums
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
@@ -29,6 +30,7 @@ from modt.types import Float64
 SCHEMA = "modt.report/2"
 _CONVENTIONAL = "conventional"
 _LIMITS = ("max_points", "min_points", "batch")
+_BOARD = ("board", "idle_W", "busy_W", "seg_J", "class_J", "point_J")
 
 
 def run_tree(run: Path) -> dict[str, Any]:
@@ -38,7 +40,8 @@ def run_tree(run: Path) -> dict[str, Any]:
         MisuseError: not a run directory, or without a complete frame so far.
     """
     facts = _facts(run)
-    limits, board, mode = facts["profile"]["classification"], facts["profile"]["energy"], facts["mode"]
+    limits, mode = facts["profile"]["classification"], facts["mode"]
+    board = EnergyConfig(**{key: facts["profile"]["energy"][key] for key in _BOARD})
     metered, modelled = EnergySums(board), EnergySums(board)
     for window in read_records(run / LEDGER, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}):
         metered.add_window(window)
@@ -46,12 +49,12 @@ def run_tree(run: Path) -> dict[str, Any]:
     lines = read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})
     for line, record in zip(lines, read_records(run / TRACKS, FRAME_SCHEMA), strict=False):
         sums.add(line, record)
-        modelled.add_modelled(line)
+        modelled.add_frame(line)
     sums.finish()
     if not sums.series.count:
         raise MisuseError(run, "no whole frame is recorded", "wait for the first, or give another run")
     used = metered if metered.count else modelled
-    saved, e1_s = _saved(mode, sums, board)
+    saved, e1_s = _saved(mode, sums, used)
     return {
         "schema": SCHEMA,
         "run": str(run),
@@ -60,14 +63,14 @@ def run_tree(run: Path) -> dict[str, Any]:
         "fov": facts["fov"],
         "frames": sums.series.count,
         "ended": (run / SUMMARY).is_file(),
-        "board": board["board"],
+        "board": board.board,
         "conditions": {**metered.conditions, "core": facts.get("core")},
         "test": (
             "Energy is assumed power times CPU time: this tests the counting, not the physics."
             if used.kind is Kind.ESTIMATED
             else "Energy is the meter's; its split over the stages is estimated."
         ),
-        **_energy(used, board["idle_W"]),
+        **_energy(used, board.idle_W),
         "dropped_windows": metered.dropped,
         "cpu": _times(sums),
         "ledger": _ledger(sums),
@@ -75,7 +78,7 @@ def run_tree(run: Path) -> dict[str, Any]:
         "marks": sorted(sums.marks | metered.marks),
         "series": _series(sums, e1_s)
         | {
-            "net_W": board["busy_W"] - board["idle_W"],
+            "stage_W": used.stage_watts(STAGES),
             "budget": None if mode == _CONVENTIONAL else facts["profile"]["scheduler"]["calls_per_frame"],
         },
     }
@@ -135,7 +138,7 @@ def _series(sums: FrameSums, e1_s: Float64) -> dict[str, Any]:
     column = dict(zip(COLUMNS, sums.series.means.T, strict=True))
     return {
         "kinds": dict.fromkeys(measured, Kind.MEASURED.value)
-        | dict.fromkeys(("net_W", "e1_cpu_ms"), Kind.ESTIMATED.value),
+        | dict.fromkeys(("stage_W", "e1_cpu_ms"), Kind.ESTIMATED.value),
         "frames": sums.series.frames.tolist(),
         "cpu_ms": {stage: (1e3 * column[stage]).round(4).tolist() for stage in STAGES},
         "e1_cpu_ms": (1e3 * e1_s).round(4).tolist(),
@@ -144,7 +147,7 @@ def _series(sums: FrameSums, e1_s: Float64) -> dict[str, Any]:
     }
 
 
-def _saved(mode: str, sums: FrameSums, board: dict[str, Any]) -> tuple[dict[str, Any], Float64]:
+def _saved(mode: str, sums: FrameSums, energy: EnergySums) -> tuple[dict[str, Any], Float64]:
     """Gamma by Equation 3 and in full from this run's own counts and costs; (points,) CPU seconds of E1."""
     run = sums.counts()
     cost = sums.series.total[: len(STAGES)] / run.frames
@@ -164,7 +167,7 @@ def _saved(mode: str, sums: FrameSums, board: dict[str, Any]) -> tuple[dict[str,
     if mode != _CONVENTIONAL:
         n, points = (series[:, COLUMNS.index(name)] for name in ("proposals", "all_points"))
         e1_s = run_s - series[:, CLASS] + costs.class_call + costs.class_item * n + costs.class_point * points
-    net_W = board["busy_W"] - board["idle_W"]
+    class_W = energy.watts(CLASSIFICATION)
     e1, e2 = (float(seconds @ sums.series.frames) / run.frames for seconds in (e1_s, run_s))
     gamma = e1 / e2 if e2 else None
     return {
@@ -173,9 +176,9 @@ def _saved(mode: str, sums: FrameSums, board: dict[str, Any]) -> tuple[dict[str,
         "beta": quantity(run.beta),
         "N_go": quantity(run.n_go, "frames"),
         "views": quantity(run.classified / run.tracks if run.tracks else None),
-        "E_seg": estimate(net_W * costs.seg, "J"),
-        "E_class": estimate(net_W * costs.e_class(every), "J"),
+        "E_seg": estimate(energy.watts(SEGMENTATION) * costs.seg, "J"),
+        "E_class": estimate(class_W * costs.e_class(every), "J"),
         **reconciliation_tree(found, gamma),
         "gamma_of_this_run": estimate(gamma),
-        "saved_J": estimate(net_W * (e1 - e2), "J"),
+        "saved_J": estimate(class_W * (e1 - e2), "J"),
     }, e1_s

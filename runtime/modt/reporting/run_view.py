@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from modt.pipeline import CLASSIFICATION
 from modt.reporting import energy_plots, svg
 from modt.reporting.document import Cell, Document, Table
 from modt.reporting.page import Plot
@@ -66,19 +67,17 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
     series, saved = tree["series"], tree["saved"]
     each = np.array(series["frames"], float)
     frames = np.cumsum(each) - each
-    parts_mJ = energy_plots.stage_energy_mJ(series, series["net_W"])
-    baseline = "E1, tracking-by-detection (computed)"
-    energy_mJ = {
-        baseline: series["net_W"] * np.array(series["e1_cpu_ms"], float),
-        "E2, this run": np.sum([*parts_mJ.values()], axis=0),
-    }
+    parts_mJ, basis = energy_plots.stage_energy_mJ(series), energy_plots.basis(tree["net_J"])
+    baseline, run_mJ = "E1, tracking-by-detection (computed)", np.sum([*parts_mJ.values()], axis=0)
+    further_ms = np.array(series["e1_cpu_ms"]) - np.sum([*series["cpu_ms"].values()], axis=0)  # of classification
+    energy_mJ = {baseline: run_mJ + series["stage_W"][CLASSIFICATION] * further_ms, "E2, this run": run_mJ}
     budget = [svg.Trace(key, frames, np.array(series[key], float)) for key in ("classified", "deferred")]
     if series["budget"] is not None:
         budget.append(svg.Trace("budget", frames[[0, -1]], np.full(2, float(series["budget"])), dashed=True))
     point = {tree["mode"]: (saved["N_go"], saved["gamma_of_this_run"])}
     return [
-        energy_plots.stage_energy("Energy by stage", parts_mJ, frames),
-        energy_plots.cumulative_energy(energy_mJ, each, "estimated", dashed=baseline),
+        energy_plots.stage_energy("Energy by stage", parts_mJ, frames, basis),
+        energy_plots.cumulative_energy(energy_mJ, each, f"E2: {basis}; E1: estimated", dashed=baseline),
         energy_plots.gamma_curve(saved["a"], saved["proposals"], point, "dot: this run"),
         energy_plots.life_histogram("Life of tracks", series["lives"]),
         ("Use of the budget", svg.lines(budget, "frame", "proposals"), "measured"),
