@@ -199,7 +199,7 @@ class LiveSession:
         self.recording.ledger(self._windows.close())
         status = self.status()
         run = _run(status) | self.stages.parts.pipeline.segmenter.facts()
-        lateness = self.loop.timing.lateness.beyond()
+        lateness = self.loop.timing.late_or_later()
         summary = self._summary.result() | {"run": run, "status": status, "lateness": lateness}
         self._writer.submit(self.recording.finish)
         self._writer.submit(lambda: self._write(status))

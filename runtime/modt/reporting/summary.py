@@ -12,7 +12,6 @@ from modt.reporting.histogram import MAX_EXACT, Histogram
 from modt.types import NONE, FrameResult
 
 _SCHEMA = "modt.summary/1"
-_QUANTILES = {"p50": 0.5, "p95": 0.95, "p99": 0.99}
 
 
 class TrackLives:
@@ -106,11 +105,7 @@ class Summary:
 
     def _stage(self, stage: str) -> dict[str, Any]:
         times = {
-            f"{clock}_ms": {
-                "mean": histogram.mean / 1e6,
-                **{name: histogram.quantile(q) / 1e6 for name, q in _QUANTILES.items()},
-                "max": histogram.maximum / 1e6,
-            }
+            f"{clock}_ms": histogram.figures(1e6, p50=0.5, p95=0.95, p99=0.99)
             for clock, histogram in self._times[stage].items()
         }
         return {"calls": self._calls[stage], "items": self._items[stage], **times}
