@@ -12,7 +12,7 @@ from modt.energy.meters.meter import Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
 from modt.reporting.compare_report import Basis, compare_tree
 from modt.reporting.compare_view import compare_document, compare_plots
-from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
+from modt.reporting.comparison import ModeRun, interleave
 from modt.reporting.energy_plots import stage_energy_mJ
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
@@ -59,36 +59,26 @@ class Board:
 class Steps:
     """Segments in 10 ms, tracks in 2, classifies in 1 and 1 a proposal."""
 
-    def __init__(self, board, ledger, recorder, every):
-        self.board, self.ledger, self.recorder, self.every = board, ledger, recorder, every
+    def __init__(self, board, ledger, every):
+        self.board, self.ledger, self.every = board, ledger, every
 
     def step(self, frame, budget=UNLIMITED):
         run, asked = self.ledger.run, frame.index % self.every == 0
-        found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}, classified=2 * asked)
+        found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR})
+        found = replace(found, classified=np.array([7, 8] * asked, np.int64))
         run("segmentation", self.board.work, 10.0 + frame.index % 3)
         run("tracking", self.board.work, 2.0)
         if asked:
-            run("classification", self.recorder.classify, frame.points, found.proposals, np.arange(2))
+            run("classification", self.board.work, 3.0, np.tile(CAR, (2, 1)))
         return found
-
-
-class Network:
-    def __init__(self, board):
-        self.board = board
-
-    def classify(self, points, proposals, which):
-        return self.board.work(1.0 + len(which), np.tile(CAR, (len(which), 1)))
-
-    def facts(self):
-        return {"file": "none"}
 
 
 def mode_run(name, metered):
     board = Board()
-    ledger, recorder = Ledger(lambda: board.now_ns, lambda: board.cpu_ns), RecordingClassifier(Network(board))
+    ledger = Ledger(lambda: board.now_ns, lambda: board.cpu_ns)
     windows = Windows([board], board.clocks(), Conditions(), WindowConfig(min_s=0.1)) if metered else None
-    steps = Steps(board, ledger, recorder, EVERY[name])
-    return ModeRun(steps, ledger, recorder, lambda index: UNLIMITED, windows)
+    steps = Steps(board, ledger, EVERY[name])
+    return ModeRun(steps, ledger, lambda index: UNLIMITED, windows)
 
 
 def tree_of(metered, coefficients=None):
