@@ -2,7 +2,7 @@ import json
 
 import pytest
 
-from modt.reporting.lateness_plot import lateness_plots
+from modt.reporting.run_report import lateness_plots
 from modt.service.timing import Timing
 from modt.sinks.run_directory import SUMMARY
 

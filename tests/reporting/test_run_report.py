@@ -13,9 +13,8 @@ from modt.errors import MisuseError
 from modt.reporting.energy_plots import stage_energy_mJ
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
-from modt.reporting.run_report import run_tree
+from modt.reporting.run_report import run_document, run_plots, run_tree
 from modt.reporting.run_sums import FrameSums
-from modt.reporting.run_view import run_document, run_plots
 
 
 def run_text(tree):
