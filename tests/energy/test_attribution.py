@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.config import WindowConfig
+from modt.config import EnergyConfig, WindowConfig
 from modt.energy.attribution import (
     CLASS,
     REGRESSORS,
     SEG,
+    EnergySums,
     Fit,
     FitError,
+    attribute,
     fit,
-    split_by_coefficients,
-    split_by_cpu_time,
     unit_energy_J,
 )
 from modt.energy.conditions import Conditions
@@ -26,6 +26,7 @@ from .simulated import SimulatedMachine
 
 TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
 NOISE = 0.1
+CALIBRATED = EnergyConfig(idle_W=3.0, seg_J=0.1, class_J=0.01, point_J=1e-3)
 
 
 def drive(machine: SimulatedMachine, windows: int, noise: float, faults: bool) -> list[dict[str, Any]]:
@@ -108,7 +109,11 @@ def line_of(energy_J: float | None, frames: int, load: int = 0, **more: Any) -> 
         "classification": {**row, "items": load, "points": 9 * load, "cpu_ns": 100_000_000},
     }
     base = {"energy_J": energy_J, "wall_ns": 10**9, "process_ns": 500_000_000, "stages": stages, "marks": []}
-    return {**base, **more}
+    return {**base, "kind": "measured", **more}
+
+
+def window_of(line: dict[str, Any]) -> dict[str, Any]:
+    return line | {"frames": [0, 1, 2], "conditions": {}, "resolution_J": 0.0, "meters": [{"name": "RAPL"}]}
 
 
 def test_loads_that_vary_together_are_refused() -> None:
@@ -171,15 +176,47 @@ def test_unit_energy_of_bursts_is_the_true_one(tmp_path: Path) -> None:
 @given(energy_J=st.floats(0, 20), frames=st.integers(0, 9), load=st.integers(0, 9))
 def test_parts_sum_to_the_window(energy_J: float, frames: int, load: int) -> None:
     line = line_of(energy_J, frames, load)
-    assert sum(split_by_cpu_time(line, 3.0).values()) == pytest.approx(energy_J)
-    by_fit = split_by_coefficients(line, {"idle_W": 3.0, "seg_J": 0.1, "class_J": 0.01})
-    assert sum(by_fit.values()) == pytest.approx(energy_J)
+    for board in (EnergyConfig(), CALIBRATED):
+        assert sum(attribute(line, board).values()) == pytest.approx(energy_J)
 
 
 def test_cpu_time_splits_the_energy_above_idling() -> None:
-    parts = split_by_cpu_time(line_of(5.0, 1), 3.0)
+    parts = attribute(line_of(5.0, 1), EnergyConfig())
     assert parts == pytest.approx({"idle": 3.0, "segmentation": 1.2, "classification": 0.4, "unattributed": 0.4})
-    assert split_by_cpu_time(line_of(None, 1), 3.0) == {}
+    assert attribute(line_of(None, 1), EnergyConfig()) == {}
+
+
+def test_coefficients_split_the_reading_of_a_calibrated_board_but_not_the_model() -> None:
+    parts = attribute(line_of(5.0, 2, 4), CALIBRATED)
+    expected = {"idle": 3.0, "segmentation": 0.2, "classification": 0.04 + 0.036, "unattributed": 1.724}
+    assert parts == pytest.approx(expected)
+    estimated = line_of(5.0, 2, 4, kind="estimated")
+    assert attribute(estimated, CALIBRATED) == attribute(estimated, EnergyConfig())
+
+
+def test_watts_of_a_stage_are_its_energy_over_its_cpu_time() -> None:
+    sums, calibrated = EnergySums(EnergyConfig()), EnergySums(CALIBRATED)
+    for each in (sums, calibrated):
+        each.add_window(window_of(line_of(5.0, 2, 4)))
+        each.add_window(window_of(line_of(None, 2, 4)))
+    assert (sums.gross_J, sums.dropped) == (5.0, 1)
+    assert sums.stage_watts(["segmentation", "fusion"]) == pytest.approx({"segmentation": 4.0, "fusion": 0.0})
+    assert sums.watts("segmentation", "classification") == pytest.approx(4.0)
+    assert calibrated.watts("segmentation") == pytest.approx(0.2 / 0.3)
+
+
+def test_the_model_gives_every_stage_the_same_watts_and_a_calibration_leaves_stages_without_a_part() -> None:
+    sums = EnergySums(EnergyConfig(idle_W=3.0, busy_W=8.0))
+    sums.add_frame(line_of(None, 1, frame=0, cpu_ns=500_000_000))
+    assert sums.gross_J == pytest.approx(3.0 + 2.5)
+    assert sums.stage_watts(["segmentation", "classification"]) == pytest.approx(
+        {"segmentation": 5.0, "classification": 5.0}
+    )
+    calibrated = EnergySums(CALIBRATED)
+    line = window_of(line_of(5.0, 1))
+    line["stages"]["tracking"] = line["stages"]["segmentation"]
+    calibrated.add_window(line)
+    assert calibrated.stage_watts(["tracking"]) == {}
 
 
 def test_regressors_count_the_work_of_a_window() -> None:

@@ -12,7 +12,8 @@ from modt.energy.meters.meter import Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
 from modt.reporting.compare_report import Basis, compare_tree
 from modt.reporting.compare_view import compare_document, compare_plots
-from modt.reporting.comparison import ModeRun, RecordingClassifier, interleave
+from modt.reporting.comparison import ModeRun, interleave
+from modt.reporting.energy_plots import stage_energy_mJ
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
 from modt.types import UNLIMITED, Frame
@@ -58,36 +59,26 @@ class Board:
 class Steps:
     """Segments in 10 ms, tracks in 2, classifies in 1 and 1 a proposal."""
 
-    def __init__(self, board, ledger, recorder, every):
-        self.board, self.ledger, self.recorder, self.every = board, ledger, recorder, every
+    def __init__(self, board, ledger, every):
+        self.board, self.ledger, self.every = board, ledger, every
 
     def step(self, frame, budget=UNLIMITED):
         run, asked = self.ledger.run, frame.index % self.every == 0
-        found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}, classified=2 * asked)
+        found = result(frame.index, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR})
+        found = replace(found, classified=np.array([7, 8] * asked, np.int64))
         run("segmentation", self.board.work, 10.0 + frame.index % 3)
         run("tracking", self.board.work, 2.0)
         if asked:
-            run("classification", self.recorder.classify, frame.points, found.proposals, np.arange(2))
+            run("classification", self.board.work, 3.0, np.tile(CAR, (2, 1)))
         return found
-
-
-class Network:
-    def __init__(self, board):
-        self.board = board
-
-    def classify(self, points, proposals, which):
-        return self.board.work(1.0 + len(which), np.tile(CAR, (len(which), 1)))
-
-    def facts(self):
-        return {"file": "none"}
 
 
 def mode_run(name, metered):
     board = Board()
-    ledger, recorder = Ledger(lambda: board.now_ns, lambda: board.cpu_ns), RecordingClassifier(Network(board))
+    ledger = Ledger(lambda: board.now_ns, lambda: board.cpu_ns)
     windows = Windows([board], board.clocks(), Conditions(), WindowConfig(min_s=0.1)) if metered else None
-    steps = Steps(board, ledger, recorder, EVERY[name])
-    return ModeRun(steps, ledger, recorder, lambda index: UNLIMITED, windows)
+    steps = Steps(board, ledger, EVERY[name])
+    return ModeRun(steps, ledger, lambda index: UNLIMITED, windows)
 
 
 def tree_of(metered, coefficients=None):
@@ -134,6 +125,15 @@ def test_measured_energy_is_that_of_the_meter(measured, mode):
     assert found["net_J"].value == pytest.approx((BUSY_W - 1.0) * MEAN_MS[mode] / 1e3)
     assert found["gross_J"].kind is Kind.MEASURED
     assert found["gross_J"].low <= found["gross_J"].value <= found["gross_J"].high
+
+
+def test_energy_of_the_stages_is_the_meters(measured):
+    for mode in MODES:
+        found, shown = measured["modes"][mode], stage_energy_mJ(measured["series"][mode])
+        assert sum(s["energy_J"].value for s in found["stages"].values()) == pytest.approx(found["net_J"].value)
+        for stage, mJ in shown.items():
+            assert mJ.mean() == pytest.approx(1e3 * found["stages"][stage]["energy_J"].value)
+    assert measured["unit_costs"]["E_seg"].value == pytest.approx((BUSY_W - 1.0) * 10.975e-3)
 
 
 @pytest.mark.parametrize("mode", MODES[1:])

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,50 +9,41 @@ from modt.energy.ledger import Ledger
 from modt.energy.meters.model import model_meter
 from modt.energy.windows import Clocks, Windows
 from modt.pipeline import STAGES
-from modt.reporting.comparison import COUNTS, ModeRun, RecordingClassifier, interleave, total
+from modt.reporting.comparison import COUNTS, ModeRun, interleave, total
 from modt.types import UNLIMITED, Budget, Frame
 from tests.results import CAR, result
 
 FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(6)]
 
 SCRIPT = [
-    result(0, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}, classified=2),
-    result(1, [3], {0: 7}, {7: CAR}, lost=(8,), classified=1),
-    result(2, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}, classified=1),
+    result(0, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}),
+    result(1, [3], {0: 7}, {7: CAR}, lost=(8,)),
+    result(2, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}),
     result(3, [5], {0: 9}),
     result(4, [], {}),
-    result(5, [5], {0: 9}, {9: CAR}, classified=1),
+    result(5, [5], {0: 9}, {9: CAR}),
 ]
-ASKED = [[0, 1], [0], [1], [], [], [0]]
+CLASSIFIED = [[7, 8], [7], [8], [], [], [9]]
 
 
 class Scripted:
     """A pipeline that classifies what the script says."""
 
-    def __init__(self, name, ledger, recorder, log):
-        self.name, self.ledger, self.recorder, self.log, self.budgets = name, ledger, recorder, log, []
+    def __init__(self, name, ledger, log):
+        self.name, self.ledger, self.log, self.budgets = name, ledger, log, []
 
     def step(self, frame, budget=UNLIMITED):
         self.log.append((self.name, frame.index))
         self.budgets.append(budget)
-        found = SCRIPT[frame.index]
-        if ASKED[frame.index]:
-            which = np.array(ASKED[frame.index])
-            self.ledger.run("classification", self.recorder.classify, frame.points, found.proposals, which)
-        return found
-
-
-class Network:
-    def classify(self, points, proposals, which):
-        return np.tile(CAR, (len(which), 1))
-
-    def facts(self):
-        return {"file": "none"}
+        classified = np.array(CLASSIFIED[frame.index], np.int64)
+        if len(classified):
+            self.ledger.run("classification", np.tile, CAR, (len(classified), 1))
+        return replace(SCRIPT[frame.index], classified=classified)
 
 
 def mode_run(name, log, budget=lambda index: UNLIMITED, windows=None):
-    ledger, recorder = Ledger(), RecordingClassifier(Network())
-    return ModeRun(Scripted(name, ledger, recorder, log), ledger, recorder, budget, windows)
+    ledger = Ledger()
+    return ModeRun(Scripted(name, ledger, log), ledger, budget, windows)
 
 
 def column(made, name):

@@ -33,6 +33,25 @@ def test_a_short_run_is_exact(values):
         assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1e-12)
 
 
+def test_no_values_and_negative_ones_have_figures():
+    spread = Histogram()
+    assert spread.figures(1.0, p50=0.5) == {"mean": 0, "p50": 0, "max": 0}
+    spread.add(-7)
+    spread.add(3)
+    assert spread.figures(0.5, p50=0.5) == {"mean": 3, "p50": 3, "max": 6}
+    assert spread.occurrences() == {"values": [0, 3], "counts": [1, 1]}
+
+
+@pytest.mark.parametrize("bits", [3, 5, 8])
+def test_fewer_bits_hold_fewer_values_within_the_stated_error(bits):
+    values, spread = long_run(1), Histogram(max_exact=0, bits=bits)
+    for value in values:
+        spread.add(value)
+    assert len(spread) <= 2 ** (bits - 1) * np.log2(2 * max(values) / min(values)) + 1
+    for share in QUANTILES:
+        assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=2.0**-bits)
+
+
 def test_without_exact_values_the_error_is_the_stated_one_from_the_start():
     values, spread = long_run(1, 500), Histogram(max_exact=0)
     for value in values:

@@ -10,11 +10,11 @@ from modt import profile
 from modt.classification.padding import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
+from modt.reporting.energy_plots import stage_energy_mJ
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
-from modt.reporting.run_report import run_tree
+from modt.reporting.run_report import run_document, run_plots, run_tree
 from modt.reporting.run_sums import FrameSums
-from modt.reporting.run_view import run_document, run_plots
 
 
 def run_text(tree):
@@ -150,6 +150,17 @@ def test_without_windows_energy_is_modelled(tmp_path):
     expected = sum(2e-9 * line["wall_ns"] + 4e-9 * line["cpu_ns"] for line in lines) / 20
     assert tree["gross_J"].value == pytest.approx(expected)
     assert "not the physics" in tree["test"]
+
+
+@pytest.mark.parametrize("calibration", [{}, {"seg_J": 0.1, "class_J": 0.01, "point_J": 1e-5}])
+def test_plots_show_the_energy_that_the_report_attributes(tmp_path, calibration):
+    tree = run_tree(write_run(tmp_path / "run", energy={"idle_W": 2.0, **calibration}))
+    shown = {stage: mJ.mean() for stage, mJ in stage_energy_mJ(tree["series"]).items()}
+    for stage in ("segmentation", "classification"):
+        assert shown[stage] == pytest.approx(1e3 * tree["parts_J"][stage].value, rel=1e-3)
+    assert ("tracking" in shown) is not bool(calibration)
+    assert tree["saved"]["E_seg"].value == pytest.approx(tree["parts_J"]["segmentation"].value)
+    assert "measured, its split over stages" in run_page(tree)
 
 
 def test_counts_and_terms(run):

@@ -5,8 +5,7 @@ from array import array
 import pytest
 
 from modt.reporting.histogram import MAX_EXACT
-from modt.reporting.summary import Summary, TrackLives
-from modt.reporting.summary_text import summary_text
+from modt.reporting.summary import Summary, TrackLives, summary_text
 from tests.results import CAR, result
 
 

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from modt.config import EnergyConfig
 from modt.service.power import Power
 from modt.service.prometheus import metrics_text, write_metrics
 from modt.service.status import Counts, one_line
@@ -76,9 +77,9 @@ def test_power_is_that_of_the_last_window_and_unknown_without_a_meter():
     power = Power()
     window = {"energy_J": 12.0, "kind": "measured", "wall_ns": 2_000_000_000, "frames": [0, 19, 20]}
     window |= {"process_ns": 400, "stages": {"segmentation": {"cpu_ns": 300}, "tracking": {"cpu_ns": 100}}}
-    assert power.add(window, idle_W=2.0) == pytest.approx(6.0)
+    assert power.add(window, EnergyConfig(idle_W=2.0)) == pytest.approx(6.0)
     assert power.report()["frame_J"] == pytest.approx(0.6)
     parts = {"idle": 0.2, "segmentation": 0.3, "tracking": 0.1, "unattributed": 0.0}
     assert power.report()["stages_J"] == pytest.approx(parts)
-    assert power.add(window | {"energy_J": None, "kind": "unavailable"}, idle_W=2.0) is None
+    assert power.add(window | {"energy_J": None, "kind": "unavailable"}, EnergyConfig(idle_W=2.0)) is None
     assert (power.report()["watts"], power.report()["stages_J"], power.unread) == (None, {}, 1)

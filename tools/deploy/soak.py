@@ -26,7 +26,6 @@ from modt import host
 from modt.cli import metering
 from modt.cli.assemble import Request, stream
 from modt.cli.live_session import LiveSession
-from modt.reporting.log_histogram import LogHistogram
 from modt.service.ladder import Step
 from modt.service.live_loop import NamedSink
 from modt.sinks.output import Health
@@ -176,9 +175,6 @@ def judge(witness: Witness, episodes: list[Episode], session: LiveSession) -> li
     memory_mb, late_mb = _thirds(witness.resident_mb)
     growth = late_mb / memory_mb - 1
     descriptors, late = _thirds(witness.descriptors)
-    gaps = LogHistogram()
-    for gap_s in gaps_s.tolist():
-        gaps.add(gap_s)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
     share = missed / max(int(clear.sum()), 1)
     print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.loop.timing.report()}")

@@ -154,7 +154,7 @@ class LiveSession:
         window = self._windows.add(line)
         if window is not None:
             self._ledger(window)
-            watts = self.power.add(window, self._followed.config.energy.idle_W)
+            watts = self.power.add(window, self._followed.config.energy)
             if watts is not None:
                 self.loop.power(watts)
         misses = self.stages.parts.config.sensor.reflectance != "none" and result.proposals.reflectance is None
@@ -199,7 +199,7 @@ class LiveSession:
         self.recording.ledger(self._windows.close())
         status = self.status()
         run = _run(status) | self.stages.parts.pipeline.segmenter.facts()
-        lateness = self.loop.timing.lateness.beyond()
+        lateness = self.loop.timing.late_or_later()
         summary = self._summary.result() | {"run": run, "status": status, "lateness": lateness}
         self._writer.submit(self.recording.finish)
         self._writer.submit(lambda: self._write(status))

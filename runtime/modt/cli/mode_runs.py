@@ -13,7 +13,7 @@ from modt.cli import assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter
-from modt.reporting.comparison import ModeRun, RecordingClassifier, RecordingFusion, Repetition, interleave
+from modt.reporting.comparison import ModeRun, RecordingFusion, Repetition, interleave
 from modt.reporting.prediction import OBSERVED
 from modt.types import UNLIMITED, Budget, Frame, Int
 
@@ -59,12 +59,10 @@ class Comparison:
         ledger = Ledger()
         fov = assemble.field_of_view(self.request, assemble.stream(self.request))
         pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
-        recorder = RecordingClassifier(pipeline.classifier)
         budget, window = mode.budget(self.profile), self.profile.energy.windows
         return ModeRun(
-            pipeline=replace(pipeline, classifier=recorder),
+            pipeline=pipeline,
             ledger=ledger,
-            recorder=recorder,
             budget=varied_load if name == VARIED else lambda _frame: budget,
             windows=metering.windows(self.meters, self.core, window) if self.meters else None,
         )

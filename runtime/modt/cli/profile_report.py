@@ -40,9 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _of_run(run: Path) -> tuple[dict[str, Any], Document, list[Plot]]:
     import numpy as np
 
-    from modt.reporting.lateness_plot import lateness_plots
-    from modt.reporting.run_report import run_tree
-    from modt.reporting.run_view import run_document, run_plots
+    from modt.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
     from modt.sinks.records import records_of
 
     with records_of(run), np.errstate(over="raise", invalid="raise"):

@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.cli.assemble import Request
     from modt.cli.progress import progress
     from modt.cli.session import Session
-    from modt.reporting.summary_text import summary_text
+    from modt.reporting.summary import summary_text
     from modt.supervisor import supervisor_of
 
     supervisor = supervisor_of(os.environ)

@@ -1,16 +1,23 @@
-"""Attribution of the energy of windows to work: non-negative least squares over counts, with bootstrap intervals.
+"""Attribution of the energy of windows to work: the coefficients of a board, and the joules of each stage.
 
-E_window = P_idle T + e_seg N_seg + e_class N_class + e_point N_point, over windows whose load was varied on purpose.
+E_window = P_idle T + e_seg N_seg + e_class N_class + e_point N_point, by non-negative least squares over windows
+whose load was varied on purpose, with bootstrap intervals. `attribute` is the one rule by which reports split energy.
 """
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from modt.config import EnergyConfig
 from modt.energy.ledger import Line
+from modt.energy.meters.meter import Kind
+from modt.energy.meters.model import model_J, model_name
 from modt.types import Float64
 
 _REJECTED_MARKS = frozenset({"suspended", "clock", "lost", "back", "reset", "implausible", "ambiguous"})
@@ -145,29 +152,91 @@ def unit_energy_J(lines: Sequence[Line], idle_W: float, work: Regressor) -> floa
     return float(np.median(each)) if each else None
 
 
-def split_by_coefficients(line: Line, values: dict[str, float]) -> dict[str, float]:
-    """Energy of idling and of each stage of a window by fitted coefficients, and the unattributed remainder [J].
+def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
+    """Energy of idling, of each stage, and of the rest of a window, unattributed [J]; none without a reading.
 
-    The parts sum to the window's energy where it is known.
+    With P_idle of the board, E and T of the window and t of its CPU time, in all and of a stage,
+
+        E_idle = min(P_idle T, E)
+        E_stage = (E - E_idle) t_stage / t
+
+    A reading of a calibrated board is split by the coefficients instead: E_idle = P_idle T,
+    E_segmentation = e_seg N_seg, E_classification = e_class N_class + e_point N_point, the rest is unattributed.
+    The parts sum to E.
     """
-    parts: dict[str, float] = {}
-    for regressor in REGRESSORS:
-        name = regressor.stage or "idle"
-        parts[name] = parts.get(name, 0.0) + values.get(regressor.name, 0.0) * regressor.count(line)
-    if line["energy_J"] is not None:
-        parts["unattributed"] = line["energy_J"] - sum(parts.values())
-    return parts
-
-
-def split_by_cpu_time(line: Line, idle_W: float) -> dict[str, float]:
-    """Energy of idling and of each stage of a window by CPU time, under the assumption of equal power in all [J]."""
     energy_J = line["energy_J"]
     if energy_J is None:
         return {}
-    idle_J = min(idle_W * IDLE.count(line), energy_J)
-    busy_ns = {stage: row["cpu_ns"] for stage, row in line["stages"].items()}
-    busy_ns["unattributed"] = max(line["process_ns"] - sum(busy_ns.values()), 0)
-    total_ns = sum(busy_ns.values())
+    if board.coefficients is not None and line["kind"] != Kind.ESTIMATED:
+        parts: dict[str, float] = {}
+        for regressor, value in zip(REGRESSORS, (board.idle_W, *board.coefficients), strict=True):
+            name = regressor.stage or "idle"
+            parts[name] = parts.get(name, 0.0) + value * regressor.count(line)
+        return parts | {"unattributed": energy_J - sum(parts.values())}
+    cpu_ns = {stage: row["cpu_ns"] for stage, row in line["stages"].items()}
+    cpu_ns["unattributed"] = max(line["process_ns"] - sum(cpu_ns.values()), 0)
+    total_ns = sum(cpu_ns.values())
     if not total_ns:
         return {"idle": energy_J}
-    return {"idle": idle_J, **{name: (energy_J - idle_J) * ns / total_ns for name, ns in busy_ns.items()}}
+    idle_J = min(board.idle_W * IDLE.count(line), energy_J)
+    return {"idle": idle_J, **{name: (energy_J - idle_J) * ns / total_ns for name, ns in cpu_ns.items()}}
+
+
+def modelled(line: Line, board: EnergyConfig) -> Line:
+    """A frame's ledger line as a window of one frame, with the energy of the power model."""
+    return line | {
+        "frames": [line["frame"], line["frame"], 1],
+        "process_ns": line["cpu_ns"],
+        "energy_J": model_J(board.idle_W, board.busy_W, line["wall_ns"], line["cpu_ns"]),
+        "kind": Kind.ESTIMATED.value,
+        "resolution_J": 0.0,
+        "meters": [{"name": model_name(board.idle_W, board.busy_W)}],
+    }
+
+
+class EnergySums:
+    """Energy of windows or of modelled frames, summed."""
+
+    def __init__(self, board: EnergyConfig) -> None:
+        self._board = board
+        self.count = self.frames = self.wall_ns = self.dropped = 0
+        self.gross_J = self.error2_J2 = 0.0
+        self.parts_J: Counter[str] = Counter()
+        self._cpu_ns: Counter[str] = Counter()  # of the stages
+        self.kind, self.meter = Kind.ESTIMATED, ""
+        self.conditions: dict[str, Any] = {}  # of the last window
+        self.marks: set[str] = set()
+
+    def add_window(self, window: Line) -> None:
+        """Add a line of modt.energy; one without a reading or with a rejected mark is counted as dropped."""
+        self.conditions = window["conditions"]
+        self.marks.update(window["marks"])
+        if not usable_windows([window]):
+            self.dropped += 1
+        elif window["frames"][2]:
+            self._add(window)
+
+    def add_frame(self, line: Line) -> None:
+        """Add a frame of the ledger by the power model."""
+        self._add(modelled(line, self._board))
+
+    def watts(self, *stages: str) -> float:
+        """Power above idling while the stages compute: their energy over their CPU time; NaN where it has no part."""
+        ran = [stage for stage in stages if self._cpu_ns[stage]]
+        joules = sum(self.parts_J.get(stage, math.nan) for stage in ran)
+        return 1e9 * joules / sum(self._cpu_ns[stage] for stage in ran) if ran else 0.0
+
+    def stage_watts(self, stages: Iterable[str]) -> dict[str, float]:
+        """The same of each of these stages, without those that have no part."""
+        return {stage: watts for stage in stages if not math.isnan(watts := self.watts(stage))}
+
+    def _add(self, window: Line) -> None:
+        if not self.count:
+            self.kind, self.meter = Kind(window["kind"]), window["meters"][0]["name"]
+        self.count += 1
+        self.frames += window["frames"][2]
+        self.wall_ns += window["wall_ns"]
+        self.gross_J += window["energy_J"]
+        self.error2_J2 += window["resolution_J"] ** 2
+        self.parts_J.update(attribute(window, self._board))
+        self._cpu_ns.update({stage: row["cpu_ns"] for stage, row in window["stages"].items()})

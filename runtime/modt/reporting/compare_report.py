@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from modt.config import EnergyConfig
-from modt.energy.attribution import usable_windows
+from modt.energy.attribution import EnergySums, usable_windows
 from modt.energy.meters.meter import Facts, Kind
 from modt.energy.savings import OtherCosts, UnitCosts, reconcile
-from modt.pipeline import STAGES
+from modt.pipeline import CLASSIFICATION, ODOMETRY, SEGMENTATION, STAGES, TRACKING
 from modt.reporting import gamma
-from modt.reporting.comparison import COUNTS, Repetition, total
+from modt.reporting.comparison import COUNTS, ModeRun, Repetition, total
 from modt.reporting.histogram import Histogram
 from modt.reporting.quantity import Quantity, estimate, quantity
 from modt.types import Float64
@@ -45,6 +45,7 @@ def compare_tree(
     passes = {name: [repetition[name] for repetition in repetitions] for name in (*modes, varied)}
     runs = {mode: gamma.RunCosts.median(passes[mode]) for mode in modes}
     windows = {mode: [line for run in passes[mode] for line in run.energy_lines] for mode in modes}
+    attributed = {name: _attributed(runs_of, basis.board) for name, runs_of in passes.items()}
     load_varied_run = gamma.RunCosts.median(passes[varied])
     baseline = runs[modes[0]]
     energy = {mode: _energy(run, windows[mode], basis, random) for mode, run in runs.items()}
@@ -62,13 +63,24 @@ def compare_tree(
         **about,
         "meter": {"name": meter.name, "kind": meter.kind.value, "idle_W": board.idle_W, "busy_W": board.busy_W},
         "test": _PHYSICS if metered else _COUNTING,
-        "modes": {mode: energy[mode] | _work(run, energy[mode]["net_J"], random) for mode, run in runs.items()},
-        "unit_costs": _costs(gamma.unit_costs(load_varied_run), baseline, board.active_W),
+        "modes": {mode: energy[mode] | _work(run, attributed[mode], random) for mode, run in runs.items()},
+        "unit_costs": _costs(gamma.unit_costs(load_varied_run), baseline, attributed[varied]),
         "savings": savings,
         "calibration": {name: _table(run) for name, run in (*runs.items(), (varied, load_varied_run))},
         "series_kind": Kind.MEASURED.value,
-        "series": {mode: _series(runs[mode], repetitions[0][mode].lives) for mode in modes},
+        "series": {mode: _series(runs[mode], attributed[mode], repetitions[0][mode].lives) for mode in modes},
     }
+
+
+def _attributed(runs: Sequence[ModeRun], board: EnergyConfig) -> EnergySums:
+    """Energy of a mode by stage: of the windows where a meter was read, else of the frames by the model."""
+    metered, modelled = EnergySums(board), EnergySums(board)
+    for run in runs:
+        for window in run.energy_lines:
+            metered.add_window(window)
+        for line in run.lines:
+            modelled.add_frame(line)
+    return metered if metered.count else modelled
 
 
 def _energy(
@@ -91,16 +103,15 @@ def _energy(
     return {key: gamma.mean(J, "J", Kind.ESTIMATED, random) for key, J in (("net_J", net_J), ("gross_J", gross_J))}
 
 
-def _work(run: gamma.RunCosts, net_J: Quantity, random: np.random.Generator) -> dict[str, Any]:
+def _work(run: gamma.RunCosts, energy: EnergySums, random: np.random.Generator) -> dict[str, Any]:
     def cpu_ms(cpu_s: Float64) -> Quantity:
         return gamma.mean(1e3 * cpu_s, "ms", Kind.MEASURED, random)
 
-    counts, total_s = total(run.counts), float(run.cost.sum(axis=1).mean())
-    share = None if net_J.value is None or not total_s else net_J.value / total_s
+    counts = total(run.counts)
     stages = {
         stage: {
             "cpu_ms": cpu_ms(run.cost[:, k]),
-            "energy_J": estimate(None if share is None else share * float(run.cost[:, k].mean()), "J"),
+            "energy_J": estimate(energy.watts(stage) * float(run.cost[:, k].mean()), "J"),
         }
         for k, stage in enumerate(STAGES)
     }
@@ -146,12 +157,12 @@ def _calibrated(baseline: gamma.RunCosts, run: gamma.RunCosts, basis: Basis) -> 
     return reconcile(total(baseline.counts), total(run.counts), costs, other1, other2).model.gamma
 
 
-def _costs(costs: UnitCosts, baseline: gamma.RunCosts, net_W: float) -> dict[str, Quantity]:
+def _costs(costs: UnitCosts, baseline: gamma.RunCosts, energy: EnergySums) -> dict[str, Quantity]:
     e_class = costs.e_class(total(baseline.counts))
     return {
-        "E_seg": estimate(net_W * costs.seg, "J"),
-        "E_class": estimate(net_W * e_class, "J"),
-        "E_track": estimate(net_W * costs.track, "J"),
+        "E_seg": estimate(energy.watts(SEGMENTATION) * costs.seg, "J"),
+        "E_class": estimate(energy.watts(CLASSIFICATION) * e_class, "J"),
+        "E_track": estimate(energy.watts(ODOMETRY, TRACKING) * costs.track, "J"),
         "seg_cpu_ms": quantity(1e3 * costs.seg, "ms"),
         "class_cpu_ms": estimate(1e3 * e_class, "ms"),
         "track_cpu_ms": quantity(1e3 * costs.track, "ms"),
@@ -170,8 +181,9 @@ def _table(run: gamma.RunCosts) -> dict[str, Any]:
     }
 
 
-def _series(run: gamma.RunCosts, lives: Histogram) -> dict[str, Any]:
+def _series(run: gamma.RunCosts, energy: EnergySums, lives: Histogram) -> dict[str, Any]:
     return {
+        "stage_W": energy.stage_watts(STAGES),
         "cpu_ms": {stage: (1e3 * run.cost[:, k]).round(4).tolist() for k, stage in enumerate(STAGES)},
         "proposals": run.counts[:, COUNTS.index("proposals")].tolist(),
         "classified": run.counts[:, COUNTS.index("classified")].tolist(),

@@ -13,30 +13,12 @@ from modt.classes import ObjectClass
 from modt.energy.ledger import Ledger, Line
 from modt.energy.savings import Counts
 from modt.energy.windows import Windows
-from modt.pipeline import CLASSIFICATION, STAGES, Classifier, Fusion, Pipeline
+from modt.pipeline import CLASSIFICATION, STAGES, Fusion, Pipeline
 from modt.reporting.histogram import Histogram
-from modt.types import NONE, Bool, Budget, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
+from modt.types import NONE, Bool, Budget, Float64, Frame, FrameResult, Int, Proposals, Tracks
 
 COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
 """Columns of a run's counts."""
-
-
-class RecordingClassifier:
-    """A classifier that records the (R,) proposals of its last call in `rows`."""
-
-    def __init__(self, classifier: Classifier) -> None:
-        self._classifier = classifier
-        self.facts = classifier.facts
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget the last call."""
-        self.rows: Int = np.zeros(0, np.int64)
-
-    def classify(self, points: Float32, proposals: Proposals, which: Int) -> Float64:
-        """(R, 4) P(Y|X) of the R proposals given by index."""
-        self.rows = which
-        return self._classifier.classify(points, proposals, which)
 
 
 class RecordingFusion:
@@ -67,7 +49,6 @@ class ModeRun:
 
     pipeline: Pipeline
     ledger: Ledger
-    recorder: RecordingClassifier  # the pipeline's classifier
     budget: Callable[[int], Budget]  # of the frame with that index
     windows: Windows | None = None  # None where no meter is read
     lines: list[Line] = field(default_factory=list)  # of the ledger
@@ -80,7 +61,6 @@ class ModeRun:
 
     def step(self, frame: Frame) -> None:
         """Process one frame; counting happens between the frames of the ledger."""
-        self.recorder.clear()
         result = self.pipeline.step(frame, self.budget(frame.index))
         line = self.ledger.close_frame(frame.index)
         self.lines.append(line)
@@ -120,8 +100,7 @@ class ModeRun:
     def _count(self, result: FrameResult, line: Line) -> None:
         tracks, row = result.tracks, line["stages"].get(CLASSIFICATION, {})
         visible = tracks.proposal != NONE
-        rows = tracks.row_of_proposal(len(result.proposals))[self.recorder.rows]
-        alive, seen, classified = (set(ids.tolist()) for ids in (tracks.id, tracks.id[visible], tracks.id[rows]))
+        alive, seen, classified = (set(ids.tolist()) for ids in (tracks.id, tracks.id[visible], result.classified))
         self._counts.append(
             (
                 len(result.proposals),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from modt.energy.equations import EnergyModel
+from modt.energy.meters.meter import Kind
 from modt.reporting import svg
 from modt.reporting.document import Table
 from modt.reporting.page import Plot
@@ -17,14 +18,20 @@ _MAX_LIFE = 1000.0
 """Upper end of the N_go axis of the curve of Equation 3 [frames]."""
 
 
-def stage_energy_mJ(series: dict[str, Any], net_W: float) -> dict[str, Float64]:
-    """(frames,) energy of each stage above idling [mJ] by its CPU time."""
-    return {stage: net_W * np.array(cpu_ms, float) for stage, cpu_ms in series["cpu_ms"].items()}
+def stage_energy_mJ(series: dict[str, Any]) -> dict[str, Float64]:
+    """(frames,) energy attributed to each stage [mJ]: its power above idling times its CPU time."""
+    return {stage: watts * np.array(series["cpu_ms"][stage], float) for stage, watts in series["stage_W"].items()}
 
 
-def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64) -> Plot:
+def basis(net_J: Quantity) -> str:
+    """Origin of the energy that the plots show."""
+    if net_J.kind is Kind.ESTIMATED:
+        return "estimated from CPU time, without idling"
+    return f"{net_J.kind}, its split over stages and frames estimated; without idling and what is unattributed"
+
+
+def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64, note: str) -> Plot:
     """Stacked energy of the stages over (points,) frames."""
-    note = "estimated from CPU time, without idling"
     return (title, svg.areas(frames, energy_mJ, "frame", "mJ a frame"), note)
 
 

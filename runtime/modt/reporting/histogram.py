@@ -6,25 +6,27 @@ from collections import Counter
 
 import numpy as np
 
+from modt.types import Int
+
 MAX_EXACT = 4096
 """Distinct values held exactly by default."""
-_BITS = 8
-"""Leading bits held of each value beyond that."""
+BITS = 8
+"""Leading bits held of each value beyond that, by default."""
 
 
 class Histogram:
-    """Count, sum, maximum and quantiles of non-negative integers.
+    """Count, sum, maximum and quantiles of integers; negative ones count as 0.
 
     Count, sum and maximum are exact. Quantiles are exact up to `max_exact` distinct values; then each value is
-    replaced by the middle of those that share its _BITS leading bits, an error below 1 / 256. Integers of 63 bits
-    have fewer than 8,000 such middles, which bounds the memory.
+    replaced by the middle of those that share its leading `bits`, an error below 2^-bits. Integers of 63 bits have
+    fewer than 2^(bits - 1) (65 - bits) such middles, which bounds the memory.
     """
 
-    def __init__(self, max_exact: int = MAX_EXACT) -> None:
+    def __init__(self, max_exact: int = MAX_EXACT, bits: int = BITS) -> None:
         self.count = self.total = self.maximum = 0
-        self._max_exact = max_exact
+        self._max_exact, self._bits = max_exact, bits
         self._occurrences: Counter[int] = Counter()
-        self._exact = True
+        self._exact = max_exact > 0
 
     def __len__(self) -> int:
         """Distinct values held."""
@@ -32,36 +34,49 @@ class Histogram:
 
     def add(self, value: int) -> None:
         """Add one value."""
+        value = max(value, 0)
         self.count += 1
         self.total += value
         self.maximum = max(self.maximum, value)
-        self._occurrences[value if self._exact else bucket_middle(value)] += 1
+        self._occurrences[value if self._exact else bucket_middle(value, self._bits)] += 1
         if self._exact and len(self) > self._max_exact:
             self._exact = False
             exact, self._occurrences = self._occurrences, Counter()
             for each, occurrences in exact.items():
-                self._occurrences[bucket_middle(each)] += occurrences
+                self._occurrences[bucket_middle(each, self._bits)] += occurrences
 
     def occurrences(self) -> dict[str, list[int]]:
         """The distinct values held, in order, and how often each occurred."""
-        values = sorted(self._occurrences)
-        return {"values": values, "counts": [self._occurrences[value] for value in values]}
+        values, counts = self._sorted()
+        return {"values": values.tolist(), "counts": counts.tolist()}
 
     @property
     def mean(self) -> float:
-        """Mean of all values."""
-        return self.total / self.count
+        """Mean of all values; 0 without values."""
+        return self.total / max(self.count, 1)
 
     def quantile(self, share: float) -> float:
-        """Quantile at that share, interpolated between neighbouring values."""
-        values = np.array(sorted(self._occurrences))
-        ends = np.cumsum([self._occurrences[value] for value in values.tolist()])
+        """Quantile at that share, interpolated between neighbouring values; 0 without values."""
+        if not self.count:
+            return 0.0
+        values, counts = self._sorted()
         below, part = divmod(share * (self.count - 1), 1.0)
-        low, high = values[np.searchsorted(ends, [below, min(below + 1, self.count - 1)], side="right")]
+        ranks = [below, min(below + 1, self.count - 1)]
+        low, high = values[np.searchsorted(np.cumsum(counts), ranks, side="right")]
         return min(float(low + part * (high - low)), float(self.maximum))
 
+    def figures(self, unit: float, **shares: float) -> dict[str, float]:
+        """Mean, quantiles at the named shares, and maximum, in a unit of so many."""
+        quantiles = {name: self.quantile(share) / unit for name, share in shares.items()}
+        return {"mean": self.mean / unit, **quantiles, "max": self.maximum / unit}
 
-def bucket_middle(value: int) -> int:
+    def _sorted(self) -> tuple[Int, Int]:
+        """(V,) distinct values held, in order, and how often each occurred."""
+        held = np.array(sorted(self._occurrences.items()), np.int64).reshape(-1, 2)
+        return held[:, 0], held[:, 1]
+
+
+def bucket_middle(value: int, bits: int = BITS) -> int:
     """Middle of all integers of this length that share its leading bits."""
-    dropped = max(value.bit_length() - _BITS, 0)
+    dropped = max(value.bit_length() - bits, 0)
     return (value >> dropped << dropped) + (1 << dropped >> 1)

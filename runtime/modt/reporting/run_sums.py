@@ -9,9 +9,6 @@ from typing import Any
 import numpy as np
 
 from modt.classes import CLASS_NAMES, ObjectClass
-from modt.energy.attribution import split_by_coefficients, split_by_cpu_time, usable_windows
-from modt.energy.meters.meter import Kind
-from modt.energy.meters.model import model_name
 from modt.energy.savings import Counts
 from modt.pipeline import CLASSIFICATION, STAGES
 from modt.reporting.frame_series import FrameSeries
@@ -21,57 +18,6 @@ from modt.types import Int
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
 COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")
 """Of the series: CPU time of the stages [s], counts, and points if all proposals were classified."""
-
-
-class EnergySums:
-    """Energy of windows, or of frames by the model, and its distribution."""
-
-    def __init__(self, board: dict[str, Any]) -> None:
-        self._board = board
-        self.count = self.frames = self.wall_ns = self.dropped = 0
-        self.gross_J = self.error2_J2 = 0.0
-        self.parts_J: Counter[str] = Counter()
-        self.kind, self.meter = Kind.ESTIMATED, ""
-        self.conditions: dict[str, Any] = {}  # of the last window
-        self.marks: set[str] = set()
-
-    def add_window(self, window: dict[str, Any]) -> None:
-        """Add a line of modt.energy; one without a reading or with a rejected mark is counted as dropped."""
-        self.conditions = window["conditions"]
-        self.marks.update(window["marks"])
-        if not usable_windows([window]):
-            self.dropped += 1
-        elif window["frames"][2]:
-            self._add(window)
-
-    def add_modelled(self, line: dict[str, Any]) -> None:
-        """Add a frame of the ledger by the board's model."""
-        idle_W, busy_W = self._board["idle_W"], self._board["busy_W"]
-        self._add(
-            line
-            | {
-                "frames": [line["frame"], line["frame"], 1],
-                "process_ns": line["cpu_ns"],
-                "energy_J": 1e-9 * (idle_W * line["wall_ns"] + (busy_W - idle_W) * line["cpu_ns"]),
-                "kind": Kind.ESTIMATED.value,
-                "resolution_J": 0.0,
-                "meters": [{"name": model_name(idle_W, busy_W)}],
-            }
-        )
-
-    def _add(self, window: dict[str, Any]) -> None:
-        if not self.count:
-            self.kind, self.meter = Kind(window["kind"]), window["meters"][0]["name"]
-        self.count += 1
-        self.frames += window["frames"][2]
-        self.wall_ns += window["wall_ns"]
-        self.gross_J += window["energy_J"]
-        self.error2_J2 += window["resolution_J"] ** 2
-        coefficients = {name: self._board[name] for name in ("idle_W", "seg_J", "class_J", "point_J")}
-        calibrated = self.kind is not Kind.ESTIMATED and None not in coefficients.values()
-        idle_W = self._board["idle_W"]
-        parts_J = split_by_coefficients(window, coefficients) if calibrated else split_by_cpu_time(window, idle_W)
-        self.parts_J.update(parts_J)
 
 
 class FrameSums:

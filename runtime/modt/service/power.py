@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from modt.energy.attribution import split_by_cpu_time
+from modt.config import EnergyConfig
+from modt.energy.attribution import attribute
 
 
 class Power:
@@ -14,7 +15,7 @@ class Power:
         watts: of the last window.
         kind: measured, integrated, estimated or unavailable.
         frame_J: energy a frame in it.
-        stages_J: the same of each stage, of idling and of the rest of the process, by their CPU time.
+        stages_J: the same of each stage, of idling and of the rest of the process (`attribute`).
         windows, unread: counts, of all and of those without energy.
     """
 
@@ -25,14 +26,14 @@ class Power:
         self.kind = "unavailable"
         self.windows = self.unread = 0
 
-    def add(self, window: dict[str, Any], idle_W: float) -> float | None:
-        """Add a line modt.energy/1 of a board that idles at some power [W]; the window's power [W]."""
+    def add(self, window: dict[str, Any], board: EnergyConfig) -> float | None:
+        """Add a line modt.energy/1; the window's power [W]."""
         energy_J, frames = window["energy_J"], window["frames"][2]
         self.windows, self.kind = self.windows + 1, window["kind"]
         self.unread += energy_J is None
         self.watts = None if energy_J is None else energy_J / (1e-9 * window["wall_ns"])
         self.frame_J = None if energy_J is None or not frames else energy_J / frames
-        split = split_by_cpu_time(window, idle_W) if frames else {}
+        split = attribute(window, board) if frames else {}
         self.stages_J = {stage: joules / frames for stage, joules in split.items()}
         return self.watts
 

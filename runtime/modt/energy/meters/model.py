@@ -8,7 +8,7 @@ from modt.energy.meters.meter import Facts, Kind, Meter, Scope
 
 
 def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns: Callable[[], int]) -> Meter:
-    """Energy = idle_W x wall time + (busy_W - idle_W) x CPU time of this process.
+    """A meter that computes the energy of this process by `model_J`.
 
     Args:
         idle_W: drawn while this process waits.
@@ -24,7 +24,12 @@ def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns
         scope=Scope.PROCESS,
         kind=Kind.ESTIMATED,
     )
-    return Meter(facts, lambda: 1e-9 * (idle_W * wall_ns() + (busy_W - idle_W) * cpu_ns()))
+    return Meter(facts, lambda: model_J(idle_W, busy_W, wall_ns(), cpu_ns()))
+
+
+def model_J(idle_W: float, busy_W: float, wall_ns: int, cpu_ns: int) -> float:
+    """E = P_idle T + (P_busy - P_idle) t of wall time T and CPU time t [J]."""
+    return 1e-9 * (idle_W * wall_ns + (busy_W - idle_W) * cpu_ns)
 
 
 def model_name(idle_W: float, busy_W: float) -> str:
