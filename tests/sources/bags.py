@@ -16,8 +16,12 @@ Recorded = list[tuple[str, str, float, bytes]]
 """Topic, type, time of the recording, message."""
 
 
-def write_rosbag2(path: Path, recorded: Recorded) -> Path:
-    writer = pytest.importorskip("rosbags.rosbag2").Writer(path, version=8)
+def write_rosbag2(path: Path, recorded: Recorded, compressed: str | None = None) -> Path:
+    """A folder; compressed with zstd as a "file" or by "message"."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2")
+    writer = rosbag2.Writer(path, version=8)
+    if compressed is not None:
+        writer.set_compression(rosbag2.CompressionMode[compressed.upper()], rosbag2.CompressionFormat.ZSTD)
     with writer as bag:
         connections = {}
         for topic, kind, recorded_s, data in recorded:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import threading
 
 import numpy as np
@@ -140,6 +141,56 @@ def test_a_recording_that_was_cut_off_is_read_up_to_there(tmp_path, chunked):
         stream = open_stream(path)
         assert len(list(stream)) == stream.info.n_frames == 3
         assert stream.faults.skipped == 1
+
+
+@pytest.mark.parametrize("compressed", ["file", "message"])
+def test_a_compressed_recording_has_the_frames_of_the_plain_one(compressed, tmp_path):
+    recorded = by_time(clouds(), poses())
+    plain = list(open_stream(write_rosbag2(tmp_path / "plain", recorded)))
+    folder = write_rosbag2(tmp_path / "packed", recorded, compressed)
+    (file,) = folder.glob("*.db3*")
+    assert file.name == ("packed.db3.zstd" if compressed == "file" else "packed.db3")
+    for path in (folder, file):  # with metadata.yaml and without
+        for a, b in zip(plain, open_stream(path), strict=True):
+            assert (a.index, a.stamp_s) == (b.index, b.stamp_s)
+            np.testing.assert_array_equal(a.points, b.points)
+            np.testing.assert_array_equal(a.T_world_sensor, b.T_world_sensor)
+
+
+def test_a_compressed_mcap_file_is_read_up_to_where_it_was_cut_off(tmp_path):
+    zstandard = pytest.importorskip("zstandard")
+    whole = write_mcap(tmp_path / "drive", clouds(), use_chunking=False).read_bytes()
+    packed = tmp_path / "cut.mcap.zstd"
+    packed.write_bytes(zstandard.compress(whole[:1700]))
+    assert len(list(open_stream(packed))) == 3
+
+
+def test_the_unpacked_file_goes_with_the_stream(tmp_path, monkeypatch):
+    folder = write_rosbag2(tmp_path / "drive", clouds(), "file")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    stream = open_stream(folder)
+    assert len(list(tmp_path.glob("*.db3"))) == 1
+    del stream
+    assert not list(tmp_path.glob("*.db3"))
+
+
+def test_a_message_that_claims_to_unpack_to_more_than_any_is_skipped(tmp_path, caplog):
+    zstandard = pytest.importorskip("zstandard")
+    recorded = clouds()
+    bomb = zstandard.compress(bytes(2**28 + 1))
+    recorded[1] = (*recorded[1][:3], bomb)
+    recorded[2] = (*recorded[2][:3], zstandard.compress(recorded[2][3])[:-9])
+    stream = open_stream(write_mcap(tmp_path / "drive", recorded))
+    assert [frame.index for frame in stream] == [0, 3]
+    assert caplog.text.count("it is not encoded in plain CDR; frame skipped") == 2
+
+
+@pytest.mark.parametrize("name", ["drive.db3.zstd", "drive.mcap.zstd"])
+def test_a_compressed_file_of_other_bytes_is_refused(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(b"no recording at all" * 10)
+    with pytest.raises(ModtError, match="cannot be read"):
+        open_stream(path)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):

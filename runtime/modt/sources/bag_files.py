@@ -1,25 +1,30 @@
-"""Files of ROS 2 recordings: rosbag2's SQLite databases, and MCAP."""
+"""Files of ROS 2 recordings: rosbag2's SQLite databases and MCAP, plain or compressed with zstd."""
 
 from __future__ import annotations
 
+import os
 import sqlite3
-import struct
+import tempfile
+import weakref
+from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, Protocol
+from typing import Any, BinaryIO, NamedTuple
 from urllib.parse import quote
 
 from modt.errors import MisuseError, ModtError
 
-REMEDY = "give a recording by rosbag2 (.db3 or .mcap) that was closed, and not compressed as a whole"
+REMEDY = "give a recording by rosbag2 (.db3 or .mcap) that was closed"
+ZSTD = ".zstd"
+"""Suffix of a file that rosbag2 compressed as a whole."""
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+"""First bytes of a message that rosbag2 compressed; no message in CDR begins with them."""
 
 MAX_RECORD_BYTES = 2**28
-"""Of an MCAP file: a chunk has a few megabytes."""
-TOO_LARGE = (MemoryError, OverflowError)
-"""Raised where a length in a file is none."""
+"""Largest record of an MCAP file and largest unpacked message; a chunk has a few megabytes."""
 
 
 class BagMessage(NamedTuple):
@@ -38,10 +43,23 @@ class BagTopic:
     count: int
 
 
-class BagFile(Protocol):
-    """One file of a recording."""
+class BagFile(ABC):
+    """One file of a recording.
 
-    path: Path
+    Raises:
+        MisuseError: a library that reads it is not installed.
+        ModtError: the file cannot be unpacked.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = self._plain = path
+        if path.suffix == ZSTD:
+            with self._refusals():
+                handle, unpacked = tempfile.mkstemp(suffix=_kind(path))
+                os.close(handle)
+                weakref.finalize(self, os.unlink, unpacked)
+                self._plain = Path(unpacked)
+                _unpack(path, unpacked)
 
     def topics(self) -> dict[str, BagTopic]:
         """Topics by name, of messages in CDR.
@@ -49,6 +67,8 @@ class BagFile(Protocol):
         Raises:
             ModtError: the file cannot be read.
         """
+        with self._refusals():
+            return {name: BagTopic(kind.replace("/msg/", "/"), count) for name, kind, count in self._topics()}
 
     def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
         """Messages of these topics in the order of their recording.
@@ -56,127 +76,96 @@ class BagFile(Protocol):
         Raises:
             ModtError: the file cannot be read, or not beyond the messages before.
         """
+        with self._refusals():
+            for name, recorded_ns, data in self._messages(topics):
+                yield BagMessage(name, 1e-9 * recorded_ns, _unpacked(data))
+
+    @abstractmethod
+    def _topics(self) -> Iterable[tuple[str, str, int]]:
+        """Name, type and number of messages of each topic."""
+
+    @abstractmethod
+    def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Topic, time of the recording [ns] and bytes of each message."""
+
+    @contextmanager
+    def _refusals(self) -> Iterator[None]:
+        """Any failure of a library as an error that names the file: its bytes may be anything."""
+        try:
+            yield
+        except ModtError:
+            raise
+        except ImportError as error:
+            raise MisuseError(self.path, f"needs the library {error.name}", "pip install 'modt[ros2]'") from None
+        except Exception as error:
+            raise ModtError(self.path, f"cannot be read ({str(error) or type(error).__name__})", REMEDY) from None
 
 
-class DatabaseFile:
+class DatabaseFile(BagFile):
     """A .db3 file."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def topics(self) -> dict[str, BagTopic]:
-        """Topics by name, of messages in CDR."""
-        query = (
+    def _topics(self) -> Iterator[tuple[str, str, int]]:
+        yield from self._rows(
             "SELECT name, type, (SELECT count(*) FROM messages WHERE topic_id = topics.id) FROM topics "
             "WHERE serialization_format = 'cdr'"
         )
-        with self._open() as database:
-            return {name: BagTopic(_type(kind), count) for name, kind, count in database.execute(query)}
 
-    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """Messages of these topics in the order of their recording."""
-        query = (
+    def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        yield from self._rows(
             "SELECT name, timestamp, data FROM messages JOIN topics ON topic_id = topics.id "
-            f"WHERE name IN ({', '.join('?' * len(topics))}) AND typeof(data) = 'blob' ORDER BY timestamp"
+            f"WHERE name IN ({', '.join('?' * len(topics))}) AND typeof(data) = 'blob' ORDER BY timestamp",
+            *topics,
         )
-        with self._open() as database:
-            for name, recorded_ns, data in database.execute(query, tuple(topics)):
-                yield BagMessage(name, 1e-9 * recorded_ns, data)
 
-    @contextmanager
-    def _open(self) -> Iterator[sqlite3.Connection]:
-        try:
-            address = f"file:{quote(str(self.path))}?immutable=1"
-            with closing(sqlite3.connect(address, uri=True, check_same_thread=False)) as database:
-                yield database
-        except (sqlite3.Error, UnicodeDecodeError, TypeError) as error:  # a column may hold anything
-            raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
+    def _rows(self, query: str, *values: str) -> Iterator[Any]:
+        address = f"file:{quote(str(self._plain))}?immutable=1"
+        with closing(sqlite3.connect(address, uri=True, check_same_thread=False)) as database:
+            yield from database.execute(query, values)
 
 
-class McapFile:
-    """An .mcap file; one that was cut off is read up to there.
+class McapFile(BagFile):
+    """An .mcap file; one that was cut off is read up to there."""
 
-    Raises:
-        MisuseError: the library `mcap` is not installed.
-    """
-
-    def __init__(self, path: Path) -> None:
-        try:
-            from mcap.exceptions import McapError
-            from mcap.reader import NonSeekingReader, SeekingReader
-            from zstandard import ZstdError
-        except ImportError:
-            raise MisuseError(path, "needs the library mcap", "pip install mcap, or 'modt[ros2]'") from None
-        # What the library and its decompressors raise where the bytes are no recording, or not all of one.
-        self.path, self._errors = (
-            path,
-            (McapError, ZstdError, struct.error, LookupError, ValueError, RuntimeError, *TOO_LARGE),
-        )
-        self._indexed, self._sequential = SeekingReader, NonSeekingReader
-
-    def topics(self) -> dict[str, BagTopic]:
-        """Topics by name, of messages in CDR."""
-        counts: Counter[int] = Counter()
-        with self._open() as file:
-            summary = self._summary(file)
+    def _topics(self) -> list[tuple[str, str, int]]:
+        with self._plain.open("rb") as file:
+            reader, summary = _open_mcap(file)
             if summary is not None:
-                counts.update(summary.statistics.channel_message_counts)
-                schemas, channels = summary.schemas, summary.channels
-                return _topics([(schemas.get(channel.schema_id), channel) for channel in channels.values()], counts)
-        with self._open() as file:
-            found: dict[int, Any] = {}
-            with suppress(*self._errors):  # at its end
-                for schema, channel, _ in self._sequential(file, record_size_limit=MAX_RECORD_BYTES).iter_messages(
-                    log_time_order=False
-                ):
-                    found[channel.id] = schema, channel
-                    counts[channel.id] += 1
+                counts = Counter(summary.statistics.channel_message_counts)
+                found = [(summary.schemas.get(channel.schema_id), channel) for channel in summary.channels.values()]
+            else:
+                counts, seen = Counter(), {}
+                with suppress(Exception):  # at its end
+                    for schema, channel, _ in reader.iter_messages(log_time_order=False):
+                        seen[channel.id] = schema, channel
+                        counts[channel.id] += 1
+                found = list(seen.values())
         if not found:
             raise ModtError(self.path, "holds no message", REMEDY)
-        return _topics(found.values(), counts)
+        return [
+            (channel.topic, schema.name, counts[channel.id])
+            for schema, channel in found
+            if schema is not None and channel.message_encoding == "cdr"
+        ]
 
-    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
-        """Messages of these topics in the order of their recording."""
-        with self._open() as file:
-            indexed = self._summary(file) is not None
-            file.seek(0)
-            reader = (self._indexed if indexed else self._sequential)(file, record_size_limit=MAX_RECORD_BYTES)
-            for _, channel, message in reader.iter_messages(topics=list(topics), log_time_order=indexed):
-                yield BagMessage(channel.topic, 1e-9 * message.log_time, message.data)
-
-    def _summary(self, file: BinaryIO) -> Any:
-        """Index and counts, None where the recording was not closed."""
-        with suppress(*self._errors, OSError):
-            summary = self._indexed(file, record_size_limit=MAX_RECORD_BYTES).get_summary()
-            return summary if summary is not None and summary.statistics is not None else None
-        return None
-
-    @contextmanager
-    def _open(self) -> Iterator[BinaryIO]:
-        try:
-            with self.path.open("rb") as file:
-                yield file
-        except (OSError, *self._errors) as error:
-            raise ModtError(self.path, f"cannot be read ({error})", REMEDY) from None
+    def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
+        with self._plain.open("rb") as file:
+            reader, summary = _open_mcap(file)
+            for _, channel, message in reader.iter_messages(list(topics), log_time_order=summary is not None):
+                yield channel.topic, message.log_time, message.data
 
 
-KINDS: dict[str, type[DatabaseFile] | type[McapFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
+KINDS: dict[str, type[BagFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
 
 
 def bag_files(path: Path) -> list[BagFile]:
     """The files of a recording, a file or a folder, in their order; none where there are none."""
-    paths = sorted(path.iterdir(), key=lambda p: (len(p.name), p.name)) if path.is_dir() else [path]
-    return [KINDS[file.suffix](file) for file in paths if file.suffix in KINDS and file.is_file()]
+    return [KINDS[_kind(file)](file) for file in sorted(_within(path), key=lambda p: (len(p.name), p.name))]
 
 
 def is_bag(path: Path) -> bool:
     """Whether a path is a recording: a file, or a folder that `metadata.yaml` joins, or of one file alone."""
-    if not path.is_dir():
-        return path.is_file() and path.suffix in KINDS
-    if (path / "metadata.yaml").is_file():
-        return any(p.suffix in KINDS for p in path.iterdir())
-    files = [p for p in path.iterdir() if p.is_file()]
-    return len(files) == 1 and files[0].suffix in KINDS
+    joined = not path.is_dir() or (path / "metadata.yaml").is_file()
+    return bool(_within(path)) and (joined or sum(p.is_file() for p in path.iterdir()) == 1)
 
 
 def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:
@@ -184,14 +173,44 @@ def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:
     return (message for file in files for message in file.messages(topics))
 
 
-def _type(name: str) -> str:
-    """PACKAGE/NAME of PACKAGE/msg/NAME."""
-    return name.replace("/msg/", "/")
+def _within(path: Path) -> list[Path]:
+    """The files at a path or in a folder that have the suffix of a recording."""
+    return [p for p in (path.iterdir() if path.is_dir() else [path]) if _kind(p) in KINDS and p.is_file()]
 
 
-def _topics(pairs: Any, counts: Counter[int]) -> dict[str, BagTopic]:
-    return {
-        channel.topic: BagTopic(_type(schema.name), counts[channel.id])
-        for schema, channel in pairs
-        if schema is not None and channel.message_encoding == "cdr"
-    }
+def _kind(path: Path) -> str:
+    """Suffix of a file, of the one within where it is compressed."""
+    return Path(path.name.removesuffix(ZSTD)).suffix
+
+
+def _open_mcap(file: BinaryIO) -> tuple[Any, Any]:
+    """Reader of an MCAP file, and its index and counts: None where the recording was not closed."""
+    from mcap.reader import NonSeekingReader, SeekingReader
+
+    with suppress(Exception):
+        indexed = SeekingReader(file, record_size_limit=MAX_RECORD_BYTES)
+        summary = indexed.get_summary()
+        if summary is not None and summary.statistics is not None:
+            return indexed, summary
+    file.seek(0)
+    return NonSeekingReader(file, record_size_limit=MAX_RECORD_BYTES), None
+
+
+def _unpack(path: Path, target: str) -> None:
+    """Write what a compressed file holds."""
+    from zstandard import ZstdDecompressor
+
+    with path.open("rb") as packed, open(target, "wb") as file:
+        ZstdDecompressor().copy_stream(packed, file)
+
+
+def _unpacked(data: bytes) -> bytes:
+    """A message, uncompressed; one that cannot be unpacked is left as it is."""
+    if not data.startswith(ZSTD_MAGIC):
+        return data
+    from zstandard import ZstdError, decompress, get_frame_parameters
+
+    with suppress(ZstdError, MemoryError):
+        if get_frame_parameters(data).content_size <= MAX_RECORD_BYTES:
+            return decompress(data)
+    return data
