@@ -60,9 +60,15 @@ def frames(seed: int, seconds: float) -> tuple[Frame, ...]:
     return tuple(SyntheticStream("street", "vlp-16", seconds, seed))
 
 
-def replay(stream: tuple[Frame, ...], config: ProfileConfig, mode: str = "accurate", view: Any = None) -> str:
+def replay(
+    stream: tuple[Frame, ...],
+    config: ProfileConfig,
+    mode: str = "accurate",
+    view: Any = None,
+    cpu_ns: Callable[[], int] = lambda: 0,
+) -> str:
     """Digest of the tracks, the proposals, the class frequency and the work of every frame."""
-    ledger = Ledger(lambda: 0, lambda: 0)
+    ledger = Ledger(lambda: 0, cpu_ns)
     pipeline = assembly.pipeline(assembly.MODES[mode], config, view or FieldOfView(), ledger)
     digest = hashlib.sha256()
     for frame in stream:
@@ -133,9 +139,10 @@ def two_ms(config: ProfileConfig, _folder: Path) -> str:
 
 def noisy_clock(config: ProfileConfig, _folder: Path) -> str:
     """A budget where the CPU time of a classification varies."""
-    ns = np.random.default_rng(0).integers(200_000, 1_400_000, 10_000).cumsum().tolist()
-    with mock.patch.object(assembly, "time", type("Clock", (), {"thread_time_ns": iter(ns).__next__})):
-        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 1.5))
+    ns = np.random.default_rng(0).integers(200_000, 1_400_000, 100_000).cumsum().tolist()
+    clock = iter(ns).__next__
+    with mock.patch.object(assembly, "time", type("Clock", (), {"thread_time_ns": clock})):
+        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 1.5), cpu_ns=clock)
 
 
 def model_without_frequency(config: ProfileConfig, _folder: Path) -> str:
@@ -180,13 +187,17 @@ def pose_socket(config: ProfileConfig, _folder: Path) -> str:
     return f"{placed}{report}"
 
 
-def report_of_a_run(config: ProfileConfig, folder: Path) -> str:
-    """What modt-profile report makes of a board with a calibration and a meter."""
+def report_of_a_run(config: ProfileConfig, folder: Path, *, metered: bool = True) -> str:
+    """What modt-profile report makes of a board with a calibration, and with a meter or without one."""
     coefficients = {"seg_J": 0.01, "class_J": 0.002, "point_J": 1e-5}
     given = dataclasses.asdict(config.energy)
     own = {name: value if given[name] is None else given[name] for name, value in coefficients.items()}
-    tree = run_tree(write_run(folder, energy=given | own))
+    tree = run_tree(write_run(folder, energy=given | own, windows=metered))
     return str({name: value for name, value in tree.items() if name != "run"})
+
+
+def report_without_meter(config: ProfileConfig, folder: Path) -> str:
+    return report_of_a_run(config, folder, metered=False)
 
 
 def described(config: ProfileConfig, _folder: Path) -> str:
@@ -300,6 +311,7 @@ RARE: dict[str, Scenario] = {
     "tracking.background_map.": long_street,
     "odometry.registration.max_turn_rad": turning,
     "energy.windows.": windows,
+    "energy.busy_W": report_without_meter,
 }
 """Scenario of what a second of the street has no occasion for, by the beginning of the path."""
 
