@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from modt.classes import CLASS_NAMES
-from modt.evaluation.class_score import ClassScore
-from modt.evaluation.evaluation import Evaluation, RangeScore
-from modt.evaluation.segmentation_score import SegmentationScore
-from modt.evaluation.track_score import TrackScore
+from modt_desk.evaluation.class_score import ClassScore
+from modt_desk.evaluation.evaluation import Evaluation, RangeScore
+from modt_desk.evaluation.segmentation_score import SegmentationScore
+from modt_desk.evaluation.track_score import TrackScore
 from modt.reporting.summary import Summary
 from modt.sinks.tracks import frame_record
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests import results
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import modt
-from modt import assembly
+from modt.app import assembly
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import NONE
 
 

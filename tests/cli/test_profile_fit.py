@@ -4,7 +4,7 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 from .commands import modt
 

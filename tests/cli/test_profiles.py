@@ -7,7 +7,7 @@ import yaml
 
 from modt import profile
 from modt.profile.schema import schema_text
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 from .commands import modt
 

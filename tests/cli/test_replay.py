@@ -16,7 +16,7 @@ from modt.classes import CLASS_NAMES
 from modt.reporting.run_report import run_tree
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 
 from .commands import begin, environment, modt

@@ -16,7 +16,7 @@ import yaml
 from modt import profile
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 from .commands import environment, modt
 

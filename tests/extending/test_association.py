@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from modt import assembly
+from modt.app import assembly
 from modt.config import FragmentConfig
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, transform
 from modt.profile import load
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.tracking.assignment import assign
 from modt.tracking.association import Matches
 from modt.tracking.states import ACCURATE

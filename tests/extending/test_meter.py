@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from modt.cli import metering
+from modt.app import metering
 from modt.config import EnergyConfig, WindowConfig
 from modt.energy.meters import discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Scope, file_meter, probe

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from modt import assembly
-from modt.cli.export import FORMS, Export
-from modt.evaluation.run_record import RunRecord
-from modt.experiments.store import Store, packed
+from modt.app import assembly
+from modt_desk.cli.export import FORMS, Export
+from modt_desk.evaluation.run_record import RunRecord
+from modt_desk.experiments.store import Store, packed
 from modt.pipeline import STAGES
-from modt.reporting.compare_report import SCHEMA as COMPARE_SCHEMA
-from modt.reporting.comparison import COUNTS
-from modt.reporting.prediction import forecast
-from modt.reporting.prediction_report import (
+from modt_desk.comparison.compare_report import SCHEMA as COMPARE_SCHEMA
+from modt_desk.comparison.comparison import COUNTS
+from modt_desk.comparison.prediction import forecast
+from modt_desk.comparison.prediction_report import (
     against,
     observed_tree,
     prediction_tree,
@@ -27,11 +27,11 @@ from modt.reporting.prediction_report import (
 )
 from modt.reporting.quantity import estimate, to_json
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.viewer.recorded_run import RecordedRun
-from modt.viewer.track_page import rows_of, track_page
+from modt_desk.viewer.recorded_run import RecordedRun
+from modt_desk.viewer.track_page import rows_of, track_page
 from tests.fuzz.runs import DESCRIPTION, described
 from tests.fuzz.target import Feed, of_file, target
-from tests.reporting.test_prediction import CALIBRATION, FRAMES, TEST
+from tests.desk.comparison.test_prediction import CALIBRATION, FRAMES, TEST
 from tests.reporting.test_run_report import ledger_line, track, window, write_run
 
 ITSELF = {"stream": "elsewhere", "path": "/elsewhere"}

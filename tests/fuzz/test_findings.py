@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from modt.errors import ModtError
-from modt.experiments.store import Store, packed
+from modt_desk.experiments.store import Store, packed
 from modt.ros2.cdr import CdrWriter
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan

@@ -5,7 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt import assembly, profile
+from modt.app import assembly
+from modt import profile
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.geometry.blind_sectors import BlindSectors

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from modt import assembly
+from modt.app import assembly
 from modt.classes import CLASSES
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import NONE, FrameResult
 
 FOLDER = Path(__file__).parent

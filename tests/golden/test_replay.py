@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from modt import assembly
+from modt.app import assembly
 
 from . import replay
 

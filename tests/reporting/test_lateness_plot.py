@@ -3,7 +3,7 @@ import json
 import pytest
 
 from modt.reporting.run_report import lateness_plots
-from modt.service.timing import Timing
+from modt.app.timing import Timing
 from modt.sinks.run_directory import SUMMARY
 
 

@@ -24,7 +24,7 @@ from modt.segmentation.kernels import NUMPY
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.point_columns import FAR_M, PointColumns
 from modt.segmentation.segmenter import Segmenter
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import NONE, UNRECORDED
 from tests.geometry.test_kdop_pairs import WEIGHTS, random_pairs
 from tests.segmentation.test_car_merging import strips

@@ -8,7 +8,7 @@ import numpy as np
 
 from modt.sensor_fit.finding import Recording
 from modt.sensor_fit.reflectance import SCALES
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 
 @cache

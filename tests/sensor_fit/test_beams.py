@@ -5,7 +5,7 @@ import pytest
 
 from modt.geometry import rotation_zyx
 from modt.sensor_fit.beams import COARSE_ORIGINS_M, find_beams
-from modt.simulation.sensors import sensor
+from modt_desk.simulation.sensors import sensor
 from modt.sources.scan_file import read_scan
 from tests.sensor_fit.recordings import recording
 

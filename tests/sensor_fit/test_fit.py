@@ -12,7 +12,7 @@ from modt.sensor_fit.finding import Finding, Recording
 from modt.sensor_fit.fit import FINDERS, cell_m, fit
 from modt.sensor_fit.profile_text import doubts, profile_text
 from modt.sensor_fit.reflectance import SCALES
-from modt.simulation.sensors import sensor
+from modt_desk.simulation.sensors import sensor
 from modt.sources.recognise import open_stream
 from tests.sensor_fit.recordings import recording, with_mast, with_scale
 

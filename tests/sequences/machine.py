@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
 
-from modt.assembly import MODES
+from modt.app.assembly import MODES
 from modt.errors import ScanError
 from modt.sinks.records import line, read_records
 from modt.sinks.tracks import SCHEMA

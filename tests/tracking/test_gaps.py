@@ -5,12 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt import assembly, profile
+from modt.app import assembly
+from modt import profile
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.tracking.states import ACCURATE, EFFICIENT
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 

@@ -18,8 +18,8 @@ def main() -> None:
     options.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
     arguments = options.parse_args()
     host.pin_to_core(host.last_core())
-    from modt import assembly
-    from modt.cli import assemble
+    from modt.app import assembly
+    from modt.app import request as assemble
     from modt.energy.ledger import STAGES, Ledger, NullLedger
 
     ledger = Ledger()

@@ -30,7 +30,7 @@ from scipy.spatial import cKDTree
 from modt import host, profile
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Float32
 
 OURS, BASELINE = "modt: ground + clusters + boxes", "Patchwork++: ground"

@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 
 

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.cli import track
+from modt_desk.cli import track
 from modt.config import OdometryConfig, TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.odometry.odometry import Odometry
-from modt.sources.detections import Detections, files, read
+from modt_desk.box_tracking.detections import Detections, files, read
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import Float64, Frame, Proposals

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from modt.cli.live_session import LiveSession
+from modt.app.live_session import LiveSession
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, MeterLostError, Scope
 from modt.pipeline import Pipeline

@@ -17,7 +17,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.deploy.install import main as install
 from tools.deploy.proof_steps import END
 from tools.options import parser

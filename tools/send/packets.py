@@ -24,7 +24,7 @@ from modt.cli.options import frames, real
 from modt.errors import ModtError
 from modt.sources.packets.open_capture import SUFFIXES, open_capture
 from modt.sources.recognise import open_stream
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 from tools.send.faults import PacketFaults, Timed
 from tools.send.loops import ouster_loop, velodyne_loop

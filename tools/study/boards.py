@@ -21,12 +21,13 @@ from pathlib import Path
 
 import numpy as np
 
-from modt import assembly, host, profile
+from modt.app import assembly
+from modt import host, profile
 from modt.cli.options import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
-from modt.simulation.sensors import SENSORS
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.sensors import SENSORS
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.docs.sections import replace_section
 from tools.options import parser
 

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from modt.cli.track import follow
-from modt.evaluation.rows import Association
-from modt.evaluation.track_score import track_metrics
+from modt_desk.cli.track import follow
+from modt_desk.evaluation.rows import Association
+from modt_desk.evaluation.track_score import track_metrics
 from modt.geometry.overlap import iou_3d
-from modt.sources.detections import Detections, boxes_from_kitti, files, merge, read
+from modt_desk.box_tracking.detections import Detections, boxes_from_kitti, files, merge, read
 from modt.types import Bool, Float64, Int
 from tools.options import parser
 

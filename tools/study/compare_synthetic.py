@@ -17,7 +17,7 @@ import numpy as np
 
 from modt import profile
 from modt.classes import CLASS_NAMES
-from modt.evaluation.overlap import FOOT_M
+from modt_desk.evaluation.overlap import FOOT_M
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
 from tools.options import parser

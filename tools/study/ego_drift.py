@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from modt import assembly
+from modt.app import assembly
 from modt.cli.options import frames as frame_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of

@@ -26,22 +26,22 @@ from pathlib import Path
 
 import numpy as np
 
-from modt import assembly
+from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
-from modt.evaluation.evaluation import ALL, Evaluation, score
-from modt.evaluation.frame import JudgedFrame
-from modt.evaluation.rules import CUBOID_RULES, Rules
-from modt.evaluation.truth import KITTI_TYPES, FrameTruth, Role
-from modt.evaluation.truth_files import open_truth
+from modt_desk.evaluation.evaluation import ALL, Evaluation, score
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.rules import CUBOID_RULES, Rules
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role
+from modt_desk.evaluation.truth_files import open_truth
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
-from modt.simulation import simulator
-from modt.simulation.kinds import TRUCK
+from modt_desk.simulation import simulator
+from modt_desk.simulation.kinds import TRUCK
 from modt.sources.recognise import open_stream
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Float64, Frame
 from tools.options import parser
 from tools.study import truth_replay

@@ -22,7 +22,7 @@ from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.segmentation.segmenter import Segmenter
-from modt.simulation.sensors import SENSORS
+from modt_desk.simulation.sensors import SENSORS
 from modt.types import Int
 from tools.options import parser
 from tools.train.build_crops import kitti

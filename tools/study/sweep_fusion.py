@@ -40,7 +40,7 @@ from modt.config import FusionConfig, ProfileConfig
 from modt.pipeline import Fusion
 from modt.reporting import page, svg
 from modt.sources.recognise import open_stream
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Frame
 from tools.options import parser
 from tools.study.fusion_replay import Outcome, replay

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt import assembly
+from modt.app import assembly
 from modt.cli.options import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.simulation.simulator import Truth
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.simulator import Truth
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import NONE, Float64, FrameResult, Int, Proposals
 
 

@@ -13,7 +13,7 @@ import json
 from itertools import chain, cycle
 from pathlib import Path
 
-from modt.simulation.sensors import SENSORS
+from modt_desk.simulation.sensors import SENSORS
 from tools.options import crops_parser
 from tools.train.build_crops import CropWriter
 from tools.train.dataset import SYNTHETIC

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.simulation import kinds, road, roadside
-from modt.simulation.builder import SceneBuilder
-from modt.simulation.motion import Path as Trajectory
-from modt.simulation.sensors import sensor
-from modt.simulation.simulator import Simulator
-from modt.simulation.street import furnish, residential
-from modt.simulation.world import World
+from modt_desk.simulation import kinds, road, roadside
+from modt_desk.simulation.builder import SceneBuilder
+from modt_desk.simulation.motion import Path as Trajectory
+from modt_desk.simulation.sensors import sensor
+from modt_desk.simulation.simulator import Simulator
+from modt_desk.simulation.street import furnish, residential
+from modt_desk.simulation.world import World
 
 CAMERA_AHEAD_M = 0.27
 N_FIELDS = 15

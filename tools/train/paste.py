@@ -15,7 +15,7 @@ from numpy.random import Generator
 
 from modt.classes import ObjectClass
 from modt.config import SensorConfig
-from modt.evaluation.overlap import PAD_M
+from modt_desk.evaluation.overlap import PAD_M
 from modt.geometry import FieldOfView
 from modt.types import Bool, Float32, Float64, Int
 from tools.train.labelled_scans import Scan

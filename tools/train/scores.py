@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import log_softmax, softmax
 
 from modt.classes import CLASS_NAMES, N_CLASSES
-from modt.evaluation.class_score import (
+from modt_desk.evaluation.class_score import (
     average_precision,
     expected_calibration_error,
     precision_recall,

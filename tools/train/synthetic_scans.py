@@ -10,8 +10,8 @@ import numpy as np
 
 from modt import profile
 from modt.geometry import FieldOfView
-from modt.simulation.simulator import Truth
-from modt.sources.synthetic_stream import CAMERA, SyntheticStream
+from modt_desk.simulation.simulator import Truth
+from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 from modt.types import Frame
 from tools.train.label_scenes import label_scene
 from tools.train.labelled_scans import TEST_DRIVE, Scan

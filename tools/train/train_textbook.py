@@ -22,7 +22,7 @@ import torch
 from scipy.special import softmax
 
 from modt.classes import CLASS_NAMES
-from modt.evaluation.class_score import average_precision
+from modt_desk.evaluation.class_score import average_precision
 from tools.options import make_torch_deterministic, parser
 from tools.train.augment import augment, subsample
 from tools.train.batches import BATCH_SIZE, draw_batch, sampling_pools

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import check, evaluate, export, profiles, replay, run, simulate, status, top, track, view
+from modt.cli import check, profiles, replay, run, status, top
+from modt_desk.cli import evaluate, export, simulate, track, view
 from modt.cli.command import dispatch
 
 COMMANDS = (replay, run, status, top, check, view, evaluate, export, simulate, track, profiles)

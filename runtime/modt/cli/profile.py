@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import profile_calibrate, profile_compare, profile_meters, profile_predict, profile_report
+from modt.cli import profile_calibrate, profile_meters, profile_report
+from modt_desk.cli import profile_compare, profile_predict
 from modt.cli.command import dispatch
 
 COMMANDS = (profile_meters, profile_calibrate, profile_report, profile_compare, profile_predict)

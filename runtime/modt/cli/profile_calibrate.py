@@ -38,11 +38,12 @@ def run(arguments: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from modt import assembly, kernel_choice, profile
+    from modt.app import assembly, kernel_choice
+    from modt import profile
     from modt.classification.padding import padded_size
     from modt.classification.pointnet import PointNet
-    from modt.cli import assemble, metering
-    from modt.cli.chosen_profile import choose
+    from modt.app import request as assemble, metering
+    from modt.app.chosen_profile import choose
     from modt.config import WindowConfig
     from modt.energy.attribution import FitError
     from modt.energy.ledger import Ledger

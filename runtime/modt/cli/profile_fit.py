@@ -37,7 +37,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def class_frequencies(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """The frequency of the classes among the proposals of a recording, as the decision estimates it."""
-    from modt import assembly
+    from modt.app import assembly
     from modt.energy.ledger import NullLedger
     from modt.geometry import FieldOfView
     from modt.sensor_fit.finding import Finding

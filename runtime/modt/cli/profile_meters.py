@@ -7,7 +7,8 @@ import json
 from typing import Any
 
 from modt import profile
-from modt.cli import metering, options
+from modt.app import metering
+from modt.cli import options
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Kind, Measurand, MeterLostError
 

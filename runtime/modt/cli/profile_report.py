@@ -49,8 +49,8 @@ def _of_run(run: Path) -> tuple[dict[str, Any], Document, list[Plot]]:
 
 
 def _of_comparisons(paths: list[Path]) -> tuple[dict[str, Any], Document, list[Plot]]:
-    from modt.reporting.regimes import regimes_tree
-    from modt.reporting.regimes_view import regimes_document, regimes_plots
+    from modt_desk.comparison.regimes import regimes_tree
+    from modt_desk.comparison.regimes_view import regimes_document, regimes_plots
 
     tree = regimes_tree(paths)
     return tree, regimes_document(tree), regimes_plots(tree)

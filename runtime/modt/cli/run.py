@@ -42,13 +42,13 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.cli.assemble import Request
-    from modt.cli.live_session import LiveSession
-    from modt.cli.live_source import open_source, recorded_path
-    from modt.service.live_loop import NamedSink
-    from modt.service.status import one_line
+    from modt.app.request import Request
+    from modt.app.live_session import LiveSession
+    from modt.app.live_source import open_source, recorded_path
+    from modt.app.live_loop import NamedSink
+    from modt.app.status import one_line
     from modt.sinks.addresses import open_sink
-    from modt.supervisor import supervisor_of
+    from modt.app.supervisor import supervisor_of
 
     supervisor = supervisor_of(os.environ)
     lacking = host.be_punctual()

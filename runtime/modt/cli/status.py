@@ -28,8 +28,8 @@ def add_directory(p: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the status; 0 while the service runs, else 1."""
-    from modt.service.status import STALE_S
-    from modt.service.status_text import status_text
+    from modt.app.status import STALE_S
+    from modt.app.status_text import status_text
     from modt.sinks.records import records_of
     from modt.sinks.service_directory import STATUS
 
@@ -48,7 +48,7 @@ def read(path: Path) -> dict[str, Any]:
     Raises:
         MisuseError: there is none.
     """
-    from modt.service.status import SCHEMA
+    from modt.app.status import SCHEMA
 
     try:
         status = json.loads(path.read_text(encoding="utf-8"))

@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         MisuseError: there is no status at the start.
     """
-    from modt.service.status_text import status_text
+    from modt.app.status_text import status_text
     from modt.sinks.service_directory import STATUS
 
     path = arguments.directory / STATUS
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _text(path: Path) -> str:
-    from modt.service.status_text import status_text
+    from modt.app.status_text import status_text
 
     try:
         return status_text(read(path), time.time())

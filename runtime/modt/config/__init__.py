@@ -1,7 +1,7 @@
 """Configuration: one frozen dataclass a stage, one nested in it a mechanism; every value is checked as it is made."""
 
 from modt.config.base import StageConfig, ValueRangeError
-from modt.config.box_tracking import BoxTrackingConfig
+from modt_desk.box_tracking.config import BoxTrackingConfig
 from modt.config.classification import (
     CallWorthConfig,
     ClassificationConfig,

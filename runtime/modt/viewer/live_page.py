@@ -13,7 +13,7 @@ from modt.errors import MisuseError
 from modt.types import FrameResult
 from modt.viewer.live_frame import STEP_CM, live_message
 from modt.viewer.live_server import LiveServer
-from modt.viewer.player import content, page
+from modt_desk.viewer.player import content, page
 
 log = logging.getLogger(__name__)
 

@@ -133,7 +133,7 @@ def test_a_drive_that_is_sent_is_received_as_it_is_on_disk(live, drive_0005):
 
 
 def test_a_sender_keeps_the_pace_of_the_stream():
-    from modt.sources.synthetic_stream import SyntheticStream
+    from modt_desk.simulation.synthetic_stream import SyntheticStream
 
     stream, sent = SyntheticStream("street", "vlp-16", 0.3, seed=0), []
     frames, octets = pace(looped(stream, 2), lambda frame, stamp_s: sent.append(stamp_s) or 10, rate=50.0)

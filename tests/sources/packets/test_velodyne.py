@@ -47,7 +47,7 @@ def test_sweeps_of_a_vlp_16():
 
 
 def test_points_are_those_of_the_scene_in_the_frame_of_the_sensor():
-    from modt.sources.synthetic_stream import SyntheticStream
+    from modt_desk.simulation.synthetic_stream import SyntheticStream
 
     scene = list(SyntheticStream("street", "vlp-16", 0.5, seed=1))
     for sweep, frame in zip(sweeps_of(packets())[0], scene[1:4], strict=True):

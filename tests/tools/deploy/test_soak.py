@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from modt.service.timing import Timing
+from modt.app.timing import Timing
 from modt.sources.live.sweep_reader import Sweep
 from tools.deploy.faults import FAULTS, FULL_DISK
 from tools.deploy.soak import Episode, Witness, judge

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modt.sources.synthetic_stream import SyntheticStream
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.study.filter_consistency import TrackLife, consistency, errors, lives, normalised, study
 from tools.study.truth_replay import replay
 

@@ -31,7 +31,7 @@ def test_the_ideal_tracker_takes_the_largest_fragment_of_an_object() -> None:
 @pytest.mark.slow
 def test_a_recording_has_one_track_per_body() -> None:
     from modt.classification.pointnet import PointNet
-    from modt.sources.synthetic_stream import SyntheticStream
+    from modt_desk.simulation.synthetic_stream import SyntheticStream
 
     config = profile.load()
     network = PointNet(config.classification, config.sensor)

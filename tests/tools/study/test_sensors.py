@@ -1,6 +1,6 @@
 """The table over sensors."""
 
-from modt.evaluation.evaluation import evaluation
+from modt_desk.evaluation.evaluation import evaluation
 from modt.geometry import FieldOfView
 from tools.study.leave_one_out import simulated
 from tools.study.sensors import row, run

@@ -10,7 +10,7 @@ import pytest
 from modt.classes import ObjectClass
 from modt.config import SensorConfig
 from modt.errors import MisuseError
-from modt.sources.synthetic_stream import K
+from modt_desk.simulation.synthetic_stream import K
 from tests.tools.train.datasets import scan_of, write_folder
 from tools.train.labelled_scans import (
     AT_SENSOR,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modt.evaluation.class_score import top_calibration_error
+from modt_desk.evaluation.class_score import top_calibration_error
 from tools.train.temperature_scaling import Calibration, fit_calibration
 
 

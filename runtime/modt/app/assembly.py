@@ -1,0 +1,138 @@
+"""The modes of the method, and the one place where the stages of a pipeline are put together."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from modt import host
+from modt.app import kernel_choice
+from modt.classification.decision import Decision
+from modt.classification.fusion import EveryFrame, KeyViews, OneView
+from modt.classification.padding import padded_size
+from modt.classification.pointnet import PointNet
+from modt.classification.prior import Prior, make_prior, with_background
+from modt.classification.scheduler import LinearCost, Scheduler
+from modt.classification.warm_up import warm_up
+from modt.config import FusionConfig, ProfileConfig
+from modt.energy.ledger import StageLedger
+from modt.geometry import FieldOfView
+from modt.geometry.blind_sectors import BlindSectors
+from modt.geometry.kernels import GeometryKernels
+from modt.odometry.odometry import Odometry
+from modt.pipeline import Classifier, Fusion, Pipeline
+from modt.pipeline import Segmenter as SegmenterStage
+from modt.segmentation.kernels import Kernels
+from modt.segmentation.segmenter import Segmenter
+from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
+from modt.tracking.tracker import Tracker
+from modt.types import UNLIMITED, Budget, Float32, Proposals
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """One way of the method over the same stages.
+
+    Attributes:
+        machine: the states that a track goes through.
+        fusion: which views are classified and what becomes of them.
+        budget: what a frame may spend.
+    """
+
+    machine: StateMachine
+    fusion: Callable[[FusionConfig, Prior], Fusion]
+    budget: Callable[[ProfileConfig], Budget]
+
+
+def _profile_budget(profile: ProfileConfig) -> Budget:
+    return Budget(profile.scheduler.calls_per_frame, profile.classification_ms)
+
+
+MODES = {
+    "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
+    "efficient": Mode(EFFICIENT, OneView, _profile_budget),
+    "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
+}
+"""Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
+
+
+@dataclass(frozen=True, slots=True)
+class SightedSegmenter:
+    """A segmenter to which points of blind sectors are no returns: they lie at the origin."""
+
+    segmenter: SegmenterStage
+    sectors: BlindSectors
+
+    def facts(self) -> dict[str, str]:
+        """Which kernels it runs on."""
+        return self.segmenter.facts()
+
+    def segment(self, points: Float32) -> Proposals:
+        """Proposals of (N, 4) points."""
+        kept = points.copy()
+        kept[self.sectors.contain(points), :3] = 0.0
+        return self.segmenter.segment(kept)
+
+
+def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> SegmenterStage:
+    """The first stage, the same in every mode."""
+    sensor, stage = profile.sensor, Segmenter(profile.segmentation, profile.sensor, fov, kernels)
+    if sensor.blind_sectors_deg is None:
+        return stage
+    return SightedSegmenter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
+
+
+def _check_budget(budget: Budget, cost: LinearCost) -> None:
+    least_ms = cost.cost_ms(np.ones(1, np.int64))
+    if budget.cpu_ms is not None and least_ms > budget.cpu_ms:
+        cause = f"{budget.cpu_ms:.2g} ms of CPU a frame pay for no classification on this machine ({least_ms:.2g} ms)"
+        log.warning("scheduler: %s; only one frame in a hundred has one; raise the budget", cause)
+
+
+def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
+    """The stages of a mode.
+
+    Raises:
+        MisuseError: the model cannot be used.
+    """
+    host.keep_freed_pages()
+    kernels = kernel_choice.choose(profile.segmentation.kernels)
+    limits = profile.classification
+    network = PointNet(limits, profile.sensor)
+    cost = LinearCost(limits.max_points, padded_size(limits), profile.scheduler.cost)
+    warm_up(network.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
+    _check_budget(mode.budget(profile), cost)
+    return stages(mode, profile, network, segmenter(profile, fov, kernels), network, cost, ledger, kernels)
+
+
+def stages(
+    mode: Mode,
+    profile: ProfileConfig,
+    network: PointNet,
+    segmenter: SegmenterStage,
+    classifier: Classifier,
+    cost: LinearCost,
+    ledger: StageLedger,
+    kernels: GeometryKernels,
+) -> Pipeline:
+    """A pipeline around a given segmenter and classifier: the network, or what stands for it at this cost."""
+    fusion = profile.fusion
+    if network.class_frequency is not None:
+        fusion = replace(fusion, prior=network.class_frequency)
+    prior = make_prior(network.box_scores, fusion.prior)
+    return Pipeline(
+        segmenter=segmenter,
+        odometry=Odometry(profile.odometry, kernels),
+        tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
+        fusion=mode.fusion(fusion, prior),
+        scheduler=Scheduler(profile.scheduler.worth, cost),
+        classifier=classifier,
+        decision=Decision(profile.decision, with_background(fusion.prior)),
+        ledger=ledger,
+    )

@@ -1,0 +1,112 @@
+"""Where the parts are put together."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Protocol
+
+from modt import profile
+from modt.config import OdometryConfig
+from modt.errors import MisuseError
+from modt.geometry import FieldOfView
+from modt.sources.pose_socket import PoseSocket, open_socket
+from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
+from modt.sources.recognise import open_stream
+from modt.sources.stream import Stream, StreamInfo
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+
+EMBEDDED_SECONDS = 10.0
+RECORDED, NONE = "recording", "none"
+"""Odometries that need no address."""
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Request:
+    """What a user asks for; each field is an option of `modt replay`."""
+
+    path: Path | None = None
+    capture: Sequence[tuple[str, str]] = ()
+    mode: str = "accurate"
+    profile: Sequence[str] = ()
+    sink: Sequence[str] = ()
+    fov: str = "full"
+    frames: tuple[int, int | None] = (0, None)
+    rate_hz: float | None = None
+    labels: bool = False
+    odometry: str = RECORDED
+    poses: Path | None = None
+
+    @classmethod
+    def of(cls, arguments: argparse.Namespace) -> Request:
+        """The options that a command has; the defaults of the others."""
+        names = {field.name for field in fields(cls)}
+        return cls(**{name: value for name, value in vars(arguments).items() if name in names})
+
+
+class Described(Protocol):
+    """A recorded or a live stream."""
+
+    info: StreamInfo
+
+
+def stream(request: Request) -> Stream:
+    """The stream asked for, the embedded one where no path is given.
+
+    Raises:
+        MisuseError: the path is no stream.
+    """
+    if request.path is None:
+        whole: Stream = SyntheticStream("street", "hdl-64e", EMBEDDED_SECONDS, seed=0)
+    else:
+        period_s = profile.load(request.profile).sensor.period_s
+        whole = open_stream(request.path, period_s, dict(request.capture))
+    cut = whole.between(*request.frames)
+    if cut.info.n_frames == 0:
+        first, last = request.frames
+        asked = f"{first}:{'' if last is None else last}"
+        raise MisuseError(whole.info.name, f"no frames in {asked}", f"it holds {whole.info.n_frames} frames")
+    return cut
+
+
+def identity(request: Request, stream: Described) -> dict[str, str | None]:
+    """Name and place of a stream: names of drives repeat."""
+    path = None if request.path is None else str(request.path.resolve())
+    return {"stream": stream.info.name, "path": path}
+
+
+def odometry(request: Request, stream: Described, config: OdometryConfig) -> PoseSource:
+    """Where the poses of a stream's frames come from.
+
+    Raises:
+        MisuseError: a file of poses that cannot be used, an address that cannot be bound or is none.
+    """
+    if request.poses is not None:
+        return PoseFile(request.poses, stream.info.camera, stream.info.end)
+    if request.odometry == RECORDED:
+        return RecordedPoses()
+    if request.odometry == NONE:
+        return NoPoses()
+    if request.odometry.startswith("ros2:"):
+        from modt.sources.pose_topic import open_topic
+
+        return open_topic(request.odometry, config)
+    return PoseSocket(open_socket(request.odometry), config, request.odometry)
+
+
+def field_of_view(request: Request, stream: Described) -> FieldOfView:
+    """The part of space to look at.
+
+    Raises:
+        MisuseError: the camera's is asked for and the stream has none.
+    """
+    if request.fov == "full":
+        return FieldOfView()
+    if stream.info.camera is None:
+        missing = next((n for n in stream.info.notes if "camera" in n), "it has no calibration")
+        raise MisuseError(stream.info.name, missing, "restore the calibration, or use --fov full")
+    return FieldOfView.of_camera(stream.info.camera)

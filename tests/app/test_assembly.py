@@ -1,0 +1,60 @@
+"""The pipeline that is put together: warmed up, and with a budget that buys something."""
+
+import dataclasses
+import itertools
+import logging
+
+import numpy as np
+import pytest
+
+from modt.app import assembly
+from modt import profile
+from modt.classification.pointnet import PointNet
+from modt.energy.ledger import NullLedger
+from modt.geometry import FieldOfView
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt.types import Budget
+
+BASE = profile.load("vlp-16")
+
+
+def pipeline(mode="accurate", **scheduler):
+    config = dataclasses.replace(BASE, scheduler=dataclasses.replace(BASE.scheduler, **scheduler))
+    return assembly.pipeline(assembly.MODES[mode], config, FieldOfView(), NullLedger())
+
+
+def test_the_network_has_run_on_every_size_of_batch_before_the_first_frame(monkeypatch):
+    batches, infer = set(), PointNet.infer
+    monkeypatch.setattr(PointNet, "infer", lambda self, batch: (batches.add(batch.shape[:2]), infer(self, batch))[1])
+    pipeline()
+    batch, most = BASE.classification.batch, BASE.classification.max_points
+    assert {(1, most), (batch, most)} <= batches
+    assert min(points for _, points in batches) < most
+
+
+@pytest.mark.parametrize(
+    ("mode", "scheduler", "warned"),
+    [
+        ("accurate", {"cpu_ms_per_frame": 0.5}, True),
+        ("efficient", {"energy_mJ_per_frame": 2.0}, True),
+        ("accurate", {"cpu_ms_per_frame": 1.0}, False),
+        ("conventional", {"cpu_ms_per_frame": 0.5}, False),
+        ("accurate", {}, False),
+    ],
+)
+def test_a_budget_that_buys_no_call_is_warned_of(mode, scheduler, warned, monkeypatch, caplog):
+    """With a clock by which a call takes 0.4 ms, and a margin of half of that."""
+    clock = type("Clock", (), {"thread_time_ns": itertools.count(0, 400_000).__next__})
+    monkeypatch.setattr(assembly, "time", clock)
+    with caplog.at_level(logging.WARNING):
+        pipeline(mode, **scheduler)
+    assert ("pay for no classification" in caplog.text) is warned
+
+
+@pytest.mark.parametrize(("budget", "learns"), [(Budget(cpu_ms=100.0), True), (Budget(calls=4), False)])
+def test_the_cost_of_calls_is_learnt_where_cpu_time_binds(budget, learns):
+    stages, points = pipeline("accurate"), np.array([100])
+    before_ms = stages.scheduler.cost.cost_ms(points)
+    for frame, _ in SyntheticStream("street", "vlp-16", 0.3, 0).sweeps():
+        assert len(stages.step(frame, budget).classified)
+    assert (stages.scheduler.cost.cost_ms(points) != before_ms) is learns

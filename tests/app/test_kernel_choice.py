@@ -1,0 +1,69 @@
+"""Which kernels segmentation runs on, and where that is said."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+
+from modt.app import assembly, kernel_choice
+from modt import profile
+from modt.energy.ledger import NullLedger
+from modt.errors import MisuseError
+from modt.geometry import FieldOfView
+from modt.native.library import NotAvailableError
+from modt.segmentation.kernels import NUMPY
+from modt.app import checks
+
+
+@pytest.fixture
+def none_compiled(monkeypatch):
+    monkeypatch.delenv(kernel_choice.VARIABLE, raising=False)
+
+    def load():
+        raise NotAvailableError("not compiled for riscv64; install modt again")
+
+    monkeypatch.setattr(kernel_choice, "load", load)
+
+
+def test_numpy_takes_their_place_with_a_warning(none_compiled, caplog):
+    with caplog.at_level(logging.WARNING):
+        assert kernel_choice.choose("auto") is NUMPY
+    assert "run on NumPy" in caplog.text
+    assert "not compiled for riscv64" in caplog.text
+
+
+def test_a_pipeline_warns_once(none_compiled, caplog):
+    config = profile.load("vlp-16")
+    with caplog.at_level(logging.WARNING):
+        assembly.pipeline(assembly.MODES["efficient"], config, FieldOfView(), NullLedger())
+    assert caplog.text.count("run on NumPy") == 1
+
+
+def test_numpy_where_it_is_asked_for_is_no_reason_to_warn(none_compiled, caplog):
+    assert kernel_choice.choose("numpy") is NUMPY
+    assert not caplog.text
+
+
+def test_compiled_ones_that_are_asked_for_and_missing_are_an_error(none_compiled):
+    with pytest.raises(MisuseError, match="native: not compiled for riscv64"):
+        kernel_choice.choose("native")
+
+
+def test_the_environment_wins(none_compiled, monkeypatch, caplog):
+    monkeypatch.setenv(kernel_choice.VARIABLE, "numpy")
+    assert kernel_choice.choose("native") is NUMPY
+    monkeypatch.setenv(kernel_choice.VARIABLE, "fast")
+    with pytest.raises(MisuseError, match="MODT_KERNELS: no kernels 'fast'; use one of: auto, native, numpy"):
+        kernel_choice.choose("numpy")
+
+
+@pytest.mark.parametrize(("name", "level"), [("numpy", checks.WARN), ("native (baseline)", checks.OK)])
+def test_the_check_says_which(name, level):
+    assert checks.kernels(lambda: name).level == level
+
+
+def test_the_check_fails_where_they_cannot_be_chosen(none_compiled):
+    finding = checks.kernels(lambda: kernel_choice.choose("native").name)
+    assert finding.level == checks.FAIL
+    assert "segmentation.kernels" in str(finding)

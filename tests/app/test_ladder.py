@@ -1,0 +1,125 @@
+"""The ladder: its table state by event, and when the events come."""
+
+import itertools
+
+import pytest
+
+from modt.app.ladder import (
+    CALM_S,
+    DEFERRED_EVERY,
+    GIVEN_UP,
+    MAX_PATIENCE_S,
+    TRANSITIONS,
+    Event,
+    Ladder,
+    Step,
+    budget_at,
+)
+from modt.types import Budget
+
+UP = (Event.OVERRUN, Event.OVER_POWER)
+
+
+@pytest.mark.parametrize("step", Step)
+@pytest.mark.parametrize("event", Event)
+def test_every_state_by_every_event(step, event):
+    after = TRANSITIONS.get((step, event), step)
+    expected = {
+        Event.OVERRUN: min(step + 1, Step.DROPPED),
+        Event.OVER_POWER: min(step + 1, Step.DROPPED),
+        Event.SLACK: max(step - 1, Step.ALL),
+        Event.AMPLE: Step.ALL,
+    }[event]
+    assert after == expected
+    assert step in GIVEN_UP
+
+
+class Frames:
+    """Frames at 10 Hz on a made-up clock."""
+
+    def __init__(self, power_W=None):
+        self.ladder, self.now, self.changes = Ladder(power_W), 0.0, []
+
+    def run(self, seconds, share):
+        end = self.now + seconds
+        while self.now < end - 1e-9:
+            self.now += 0.1
+            change = self.ladder.frame(self.now, share(self.ladder.step) if callable(share) else share)
+            if change is not None:
+                self.changes.append((round(self.now, 1), change.after))
+        return self
+
+
+def test_overruns_step_up_one_at_a_time_to_the_last_step():
+    frames = Frames().run(0.5, 1.2)
+    assert frames.changes == [(0.1, Step.DEFERRED), (0.2, Step.REDUCED), (0.3, Step.DROPPED)]
+
+
+def test_a_step_that_is_enough_is_the_last_one():
+    frames = Frames().run(0.5, lambda step: 1.1 if step < Step.REDUCED else 0.85)
+    assert frames.ladder.step is Step.REDUCED
+
+
+def test_a_second_of_ample_slack_gives_everything_back():
+    frames = Frames().run(0.5, 1.2)
+    frames.run(1.0, 0.3)
+    assert frames.ladder.step is Step.ALL
+    assert frames.changes[-1][0] - 0.5 <= 1.0
+
+
+def test_slack_that_becomes_ample_gives_everything_back_as_soon():
+    frames = Frames().run(0.3, 1.2).run(0.2, 0.75).run(CALM_S + 0.1, 0.3)
+    assert [step for _, step in frames.changes[3:]] == [Step.REDUCED, Step.ALL]
+
+
+def test_little_slack_is_tried_step_by_step():
+    frames = Frames().run(0.3, 1.2).run(5.0, 0.7)
+    assert [step for _, step in frames.changes[3:]] == [Step.REDUCED, Step.DEFERRED, Step.ALL]
+    times = [at for at, _ in frames.changes[2:]]
+    assert all(b - a >= CALM_S - 0.01 for a, b in itertools.pairwise(times))
+
+
+def test_no_slack_gives_nothing_back():
+    frames = Frames().run(0.3, 1.2).run(60.0, 0.9)
+    assert frames.ladder.step is Step.DROPPED
+
+
+def test_trials_that_fail_become_rare():
+    frames = Frames().run(120.0, lambda step: 1.1 if step < Step.REDUCED else 0.7)
+    trials = [at for at, step in frames.changes if step is Step.DEFERRED and at > 1]
+    gaps = [round(b - a, 1) for a, b in itertools.pairwise(trials)]
+    assert len(trials) < 12
+    assert gaps == sorted(gaps)
+    assert max(gaps) <= MAX_PATIENCE_S + 1.0
+
+
+def test_a_power_limit_is_kept_by_the_same_steps():
+    """Watts fall by a fifth with each step."""
+    frames, over = Frames(power_W=5.0), 0
+    for _second in range(120):
+        frames.run(1.0, 0.3)
+        watts = 7.0 - 1.4 * frames.ladder.step
+        over += watts > 5.0
+        frames.ladder.power(frames.now, watts)
+    assert over < 20  # of 120 windows: the first ones, and trials
+    assert frames.ladder.step in (Step.DEFERRED, Step.REDUCED)
+
+
+def test_below_the_limit_nothing_happens_and_without_one_neither():
+    for limit_W in (10.0, None):
+        frames = Frames(limit_W)
+        assert frames.ladder.power(0.0, 5.0) is None
+        assert frames.ladder.step is Step.ALL
+
+
+def test_the_budget_is_the_time_that_is_left_or_less():
+    assert budget_at(Step.ALL, Budget(16, None), 30.0, 0) == Budget(16, 30.0)
+    assert budget_at(Step.ALL, Budget(16, 5.0), 30.0, 0) == Budget(16, 5.0)
+    assert budget_at(Step.ALL, Budget(None, 5.0), 0.0, 0) == Budget(None, 0.0)
+
+
+@pytest.mark.parametrize("step", [Step.DEFERRED, Step.REDUCED, Step.DROPPED])
+def test_deferred_calls_are_made_now_and_then(step):
+    calls = [budget_at(step, Budget(16, None), 0.0, frame).calls for frame in range(2 * DEFERRED_EVERY)]
+    assert sum(calls) == 2
+    assert budget_at(step, Budget(0, None), 0.0, 0).calls == 0

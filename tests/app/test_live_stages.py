@@ -1,0 +1,178 @@
+"""The stages of a service: usable after a failure of any of them, exchanged without losing tracks."""
+
+import dataclasses
+from functools import cache
+
+import numpy as np
+import pytest
+
+from modt import profile
+from modt.app.request import Request
+from modt.app.live_stages import LiveStages, within
+from modt.errors import MisuseError
+from modt.app.containment import RENEW_AFTER, Containment
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt.types import NONE, UNLIMITED
+
+
+class Source:
+    info = SyntheticStream("street", "vlp-16", 2.0, 0).info
+    profile = None
+
+
+@cache
+def frames():
+    return tuple(dataclasses.replace(f, T_world_sensor=None) for f in SyntheticStream("street", "vlp-16", 2.0, 0))
+
+
+def stages_of(**request):
+    return LiveStages(Request(**{"profile": ("vlp-16",), **request}), Source())
+
+
+CALLS = ("segmenter.segment", "odometry.locate", "tracker.follow", "fusion.asks", "scheduler.select")
+CALLS += ("classifier.classify", "fusion.fuse", "decision.decide", "tracker.conclude")
+
+
+class Broken:
+    """A stage of which one method fails, before or after it has done its work."""
+
+    def __init__(self, stage, method, after):
+        self._stage, self._method, self._after = stage, method, after
+
+    def __getattr__(self, name):
+        real = getattr(self._stage, name)
+        if name != self._method:
+            return real
+
+        def fail(*arguments):
+            if self._after:
+                real(*arguments)
+            raise RuntimeError(name)
+
+        return fail
+
+
+def broken(pipeline, call, after):
+    stage, method = call.split(".")
+    return dataclasses.replace(pipeline, **{stage: Broken(getattr(pipeline, stage), method, after)})
+
+
+@pytest.mark.parametrize("after", [False, True], ids=["before its work", "after it"])
+@pytest.mark.parametrize("call", CALLS)
+def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after):
+    stages, failures = stages_of(), 0
+    ids, whole = {}, {}
+    undisturbed = stages_of()
+    for frame in frames():
+        whole[frame.index] = set(undisturbed.step(frame, UNLIMITED, reduced=False).tracks.id.tolist())
+        parts = stages.parts
+        if frame.index in (8, 9):
+            stages.parts = dataclasses.replace(parts, pipeline=broken(parts.pipeline, call, after))
+        try:
+            result = stages.step(frame, UNLIMITED, reduced=False)
+        except RuntimeError:
+            failures += 1
+            stages.parts = parts
+            stages.recover(anew=False)
+            continue
+        finally:
+            stages.parts = parts
+        tracks = result.tracks
+        ids[frame.index] = set(tracks.id.tolist())
+        assert len(ids[frame.index]) == len(tracks)
+        owned = tracks.proposal[tracks.proposal != NONE]
+        assert sorted(owned.tolist()) == list(range(len(result.proposals)))
+        assert np.isfinite(tracks.x).all()
+    assert failures in (1, 2)  # a call that no track asks for is not made
+    assert len(ids[7] & ids[10]) >= 0.8 * len(whole[7] & whole[10])
+
+
+def test_renewed_stages_begin_without_tracks_and_never_give_an_id_twice():
+    stages = stages_of()
+    before = [stages.step(frame, UNLIMITED, reduced=False) for frame in frames()[:5]]
+    stages.recover(anew=True)
+    after = stages.step(frames()[5], UNLIMITED, reduced=False)
+    assert not set(after.tracks.id.tolist()) & {i for r in before for i in r.tracks.id.tolist()}
+
+
+def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
+    own = tmp_path / "robot.yaml"
+    base = profile.load("vlp-16")
+    own.write_text(profile.to_yaml(profile.dump(base)))
+    stages = stages_of(profile=str(own))
+    for frame in frames()[:8]:
+        before = stages.step(frame, UNLIMITED, reduced=False)
+    text = own.read_text()
+    own.write_text(text.replace("calls_per_frame: 16", "calls_per_frame: 0"))
+    stages.reload()
+    assert stages.budget.calls == 0
+    after = stages.step(frames()[8], stages.budget, reduced=False)
+    kept, held = set(after.tracks.id.tolist()), set(before.tracks.id.tolist())
+    assert len(kept & held) >= 0.8 * len(held)
+    own.write_text(text.replace("calls_per_frame", "calls_per_fraem"))
+    with pytest.raises(MisuseError, match="calls_per_frame"):
+        stages.reload()
+    assert stages.budget.calls == 0
+    stages.step(frames()[9], stages.budget, reduced=False)
+
+
+def test_without_a_profile_the_first_sweep_decides(caplog):
+    stages = stages_of(profile=None)
+    stages.step(frames()[0], UNLIMITED, reduced=False)
+    assert stages.parts.name == "as found"
+    assert stages.parts.config.sensor != profile.load().sensor
+
+
+def test_a_profile_that_fits_keeps_its_stages():
+    stages = stages_of()
+    made = stages.parts.pipeline
+    stages.step(frames()[0], UNLIMITED, reduced=False)
+    assert stages.parts.pipeline is made
+
+
+def test_a_profile_that_the_source_names_is_the_base_of_what_is_found():
+    stages = LiveStages(Request(), Source())
+    stages._stream = type("Named", (Source,), {"profile": "vlp-16"})()
+    stages.step(frames()[0], UNLIMITED, reduced=False)
+    assert stages.parts.config.sensor.elevation_step_deg == profile.load("vlp-16").sensor.elevation_step_deg
+
+
+def test_a_reduced_frame_holds_what_is_near():
+    stages, frame = stages_of(), frames()[0]
+    reach_m = stages.parts.config.loop.range_share * stages.parts.config.sensor.max_range_m
+    result = stages.step(frame, UNLIMITED, reduced=True)
+    distance_m = np.hypot(*result.frame.points[:, :2].T)
+    assert distance_m.max() <= reach_m
+    assert len(result.frame.points) == np.count_nonzero(np.hypot(*frame.points[:, :2].T) <= reach_m)
+    assert len(within(frame.points, 1e9)) == len(frame.points)
+
+
+def test_failures_are_counted_by_kind_and_fatal_only_in_a_row(caplog):
+    failures = Containment()
+    for _ in range(3):
+        for _ in range(RENEW_AFTER):
+            failures.fail(ValueError("x"), "frame")
+        failures.succeed()
+    assert failures.counts == {"frame: ValueError": 3 * RENEW_AFTER}
+    assert len(caplog.records) == 1
+
+
+def test_another_sensor_is_noticed_and_followed(caplog):
+    stages, before = stages_of(profile=None), next(iter(SyntheticStream("street", "hdl-64e", 0.1, 0)))
+    stages.step(dataclasses.replace(before, T_world_sensor=None), UNLIMITED, reduced=False)
+    assert stages.parts.name == "hdl-64e"
+    for frame in frames():
+        stages.step(dataclasses.replace(frame, stamp_s=frame.stamp_s + 0.1), UNLIMITED, reduced=False)
+        if stages.looking is not None:
+            stages.looking.join()
+    assert stages.misfits == 1
+    assert stages.parts.name == "as found"
+    assert stages.parts.config.sensor.elevation_step_deg > 1.0 or stages.parts.config.sensor.elevations_deg
+
+
+def test_fewer_returns_of_the_same_sensor_change_nothing():
+    stages = stages_of()
+    for k, frame in enumerate(frames()):
+        some = frame.points if k < 3 else frame.points[frame.points[:, 0] > 0]
+        stages.step(dataclasses.replace(frame, points=some), UNLIMITED, reduced=False)
+    assert stages.misfits == 0

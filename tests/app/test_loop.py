@@ -1,0 +1,206 @@
+"""Pace, stop and the order of things in the loop."""
+
+import json
+import os
+import signal
+import socket
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.config import OdometryConfig
+from modt.energy.ledger import NullLedger
+from modt.app.loop import NAP_S, FixedPeriod, FullSpeed, Stop, drive
+from modt.sources.pose_socket import PoseSocket
+from modt.sources.pose_source import PosedStream
+from modt.sources.stream import Faults, StreamInfo
+from modt.types import UNLIMITED, Frame
+from tests.results import result
+
+
+class Time:
+    """A clock that only sleeping and working move."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def __call__(self):
+        return self.now
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.now += seconds
+
+
+def starts(work, period=0.1):
+    time = Time()
+    pace = FixedPeriod(period, time, time.sleep)
+    out = []
+    for seconds in work:
+        pace.wait()
+        out.append(time.now - 100.0)
+        time.now += seconds
+    return out, pace
+
+
+def test_frames_start_at_absolute_deadlines():
+    out, pace = starts([0.03, 0.09, 0.0, 0.05])
+    assert out == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert pace.report()["missed_deadlines"] == 0
+
+
+def test_a_stall_is_counted_and_no_burst_follows():
+    out, pace = starts([0.35, 0.01, 0.01, 0.01])
+    assert out == pytest.approx([0.0, 0.35, 0.45, 0.55])
+    assert pace.missed == 2
+    assert pace.report()["max_lateness_ms"] == pytest.approx(250)  # the stall is not hidden by starting anew
+
+
+def test_small_overrun_is_made_up():
+    out, pace = starts([0.12, 0.01, 0.01])
+    assert out == pytest.approx([0.0, 0.12, 0.2])
+    assert pace.missed == 0
+    assert pace.report()["max_lateness_ms"] == pytest.approx(20)
+
+
+def test_every_period_lost_is_counted():
+    out, pace = starts([0.15] * 301)
+    assert out[-1] == pytest.approx(45.0)
+    assert pace.missed == 150
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=30))
+def test_frames_never_start_early_nor_in_a_burst(work):
+    out, pace = starts(work)
+    for i, first in enumerate(out):
+        for steps, later in enumerate(out[i:]):
+            assert later - first >= (steps - 1) * 0.1 - 1e-6  # one frame at most is made up for, never a row of them
+    assert pace.missed >= sum(w > 0.21 for w in work[:-1])
+
+
+def test_full_speed_never_waits():
+    FullSpeed().wait()
+    assert FullSpeed().report() == {"rate_hz": None}
+
+
+class NullLines:
+    def write(self, record):
+        pass
+
+
+class Pipe:
+    ledger = NullLedger()
+
+    def __init__(self):
+        self.seen = []
+
+    def step(self, frame, budget):
+        self.seen.append((frame.index, budget))
+        return result(frame.index, [3], {0: 1})
+
+
+class Kept:
+    def __init__(self):
+        self.indices = []
+
+    def write(self, r):
+        self.indices.append(r.frame.index)
+
+    def close(self):
+        pass
+
+
+def test_every_frame_reaches_every_sink_and_the_observer():
+    pipe, sinks, observed = Pipe(), [Kept(), Kept()], []
+    frames = [result(i, [], {}).frame for i in range(4)]
+    done = drive(
+        frames, pipe, sinks, NullLines(), UNLIMITED, FullSpeed(), Stop(), lambda r, line: observed.append(line)
+    )
+    assert done == 4
+    assert [s.indices for s in sinks] == [[0, 1, 2, 3]] * 2
+    assert [line["frame"] for line in observed] == [0, 1, 2, 3]
+    assert pipe.seen == [(i, UNLIMITED) for i in range(4)]
+
+
+class Sender(Time):
+    """Time in which another process says where the sensor is whenever the loop has slept."""
+
+    def __init__(self, out):
+        super().__init__()
+        self.out = out
+
+    def sleep(self, seconds):
+        super().sleep(seconds)
+        stamp_s = self.now - 100.0
+        self.out.send(json.dumps({"stamp": stamp_s, "x": 8 * stamp_s, "y": 0.0, "yaw": 0.0}).encode())
+
+
+class Frames(list):
+    info = StreamInfo("frames", "made up", 0, 4, 0.125, None, False)
+    faults = Faults()
+
+
+def test_poses_received_while_waiting_apply_to_the_next_frame():
+    there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+    time, placed = Sender(there), []
+    frames = Frames(Frame(i, 0.125 * i, np.zeros((0, 4), np.float32)) for i in range(4))
+    stream = PosedStream(frames, PoseSocket(here, OdometryConfig(), "test"))
+
+    class Placed(Pipe):
+        def step(self, frame, budget):
+            placed.append(None if frame.T_world_sensor is None else frame.T_world_sensor[0, 3])
+            return super().step(frame, budget)
+
+    pace = FixedPeriod(0.125, time, time.sleep)
+    drive(stream, Placed(), [], NullLines(), UNLIMITED, pace, Stop(), lambda r, line: None)
+    assert placed == [None, 1.0, 2.0, 3.0]
+    there.close()
+    stream.odometry.close()
+
+
+def test_a_signal_ends_the_loop_after_the_frame_in_hand():
+    pipe, sink = Pipe(), Kept()
+    frames = [result(i, [], {}).frame for i in range(9)]
+
+    def interrupt(r, line):
+        if r.frame.index == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with Stop().on_signals() as stop:
+        done = drive(frames, pipe, [sink], NullLines(), UNLIMITED, FullSpeed(), stop, interrupt)
+    assert done == 3
+    assert sink.indices == [0, 1, 2]
+    assert stop.signal == "SIGINT"
+
+
+def test_a_signal_ends_a_long_sleep_within_a_nap():
+    time, naps = Time(), []
+
+    def nap(seconds):
+        naps.append(seconds)
+        time.sleep(seconds)
+        if len(naps) == 3:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with Stop(nap, time).on_signals() as stop:
+        stop.sleep(100.0)
+    assert len(naps) == 3
+    assert max(naps) <= NAP_S
+
+
+def test_naps_do_not_add_up_to_more_than_the_sleep():
+    time = Time()
+    stop = Stop(lambda seconds: time.sleep(seconds + 0.003), time)
+    stop.sleep(1.0)
+    assert time.now == pytest.approx(101.0, abs=0.004)
+
+
+def test_a_reload_is_asked_for_once_by_a_signal():
+    with Stop().on_signals(reload=True) as stop:
+        assert not stop.take_reload()
+        os.kill(os.getpid(), signal.SIGHUP)
+        assert stop.take_reload()
+        assert not stop.take_reload()
+        assert stop.signal is None

@@ -1,0 +1,85 @@
+"""Figures of the status, as JSON, as a line, and as metrics."""
+
+import json
+
+import pytest
+
+from modt.config import EnergyConfig
+from modt.app.power import Power
+from modt.app.prometheus import metrics_text, write_metrics
+from modt.app.status import Counts, one_line
+from tests.results import CAR, result
+
+
+def status(**loop):
+    return {
+        "schema": "modt.status/1",
+        "time_s": 1.0,
+        "up_s": 2.0,
+        "period_s": 0.1,
+        "source": "a",
+        "counts": {"frames": 20, "rate_hz": 9.96, "tracks": 7, "visible": {"background": 3, "car": 2, "cyclist": 0}},
+        "loop": {
+            "step": "all",
+            "missed_deadlines": 1,
+            "lateness_ms": {"p50": 0.1, "p99": 0.9},
+            "failures": {'frame: "x"': 2},
+            **loop,
+        },
+        "power": {"watts": 6.25, "kind": "estimated", "frame_J": None, "stages_J": {"tracking": 0.1}},
+        "sensor": {"lost_messages": 4, "silent": False, "refused_messages": {"too short": 3}},
+        "odometry": {"source": "none"},
+        "sinks": {"udp://x": {"sent": 5, "failing": None}},
+        "recording": {"lines": 40, "lost_lines": 0, "keep": "all"},
+        "host": {"resident_mb": 150.5, "lacking": []},
+    }
+
+
+def test_the_line_has_rate_tracks_and_watts():
+    assert one_line(status()) == "10.0 Hz, 7 tracks (2 car), 6.2 W estimated"
+    assert one_line(status(step="reduced")).endswith(", load: reduced")
+
+
+def test_metrics_are_valid_lines_with_one_type_each():
+    lines = metrics_text(status()).splitlines()
+    assert len([line for line in lines if line.startswith("# TYPE modt_loop_lateness_ms ")]) == 1
+    assert 'modt_loop_lateness_ms{quantile="p99"} 0.9' in lines
+    assert 'modt_counts_visible{class="car"} 2' in lines
+    assert 'modt_power_stages_J{stage="tracking"} 0.1' in lines
+    assert 'modt_sink_sent_total{sink="udp://x"} 5' in lines
+    assert 'modt_sensor_refused_messages_total{reason="too short"} 3' in lines
+    assert 'modt_loop_failures_total{kind="frame: \\"x\\""} 2' in lines
+    assert "modt_sensor_lost_messages_total 4" in lines
+    assert "# TYPE modt_sensor_lost_messages_total counter" in lines
+    assert not [line for line in lines if "None" in line or "frame_J" in line]
+
+
+def test_the_file_of_metrics_is_replaced_as_a_whole(tmp_path):
+    write_metrics(tmp_path / "modt.prom", status())
+    write_metrics(tmp_path / "modt.prom", status())
+    assert [p.name for p in tmp_path.iterdir()] == ["modt.prom"]
+    write_metrics(tmp_path / "missing" / "modt.prom", status())  # no error
+
+
+def test_counts_are_of_what_is_seen_and_the_rate_of_the_time_since_the_last_report():
+    counts = Counts(10.0)
+    for k in range(20):
+        counts.add(result(k, [5, 4], {0: 1, 1: 2}, {1: CAR}, lost=(3,), classified=1))
+    report = counts.report(12.0)
+    assert (report["frames"], report["rate_hz"], report["tracks"]) == (20, 10.0, 3)
+    assert report["visible"]["car"] == 1
+    assert report["classifications"] == 20
+    assert counts.report(13.0)["rate_hz"] == 0.0
+    json.dumps(report)
+
+
+def test_power_is_that_of_the_last_window_and_unknown_without_a_meter():
+    power = Power()
+    window = {"energy_J": 12.0, "kind": "measured", "wall_ns": 2_000_000_000, "frames": [0, 19, 20]}
+    window |= {"process_ns": 400, "stages": {"segmentation": {"cpu_ns": 300}, "tracking": {"cpu_ns": 100}}}
+    assert power.add(window, EnergyConfig(idle_W=2.0)) == pytest.approx(6.0)
+    assert power.report()["frame_J"] == pytest.approx(0.6)
+    parts = {"idle": 0.2, "segmentation": 0.3, "tracking": 0.1, "unattributed": 0.0}
+    assert power.report()["stages_J"] == pytest.approx(parts)
+    assert power.add(window | {"energy_J": None, "kind": "unavailable"}, EnergyConfig(idle_W=2.0)) is None
+    assert (power.report()["watts"], power.report()["stages_J"], power.unread) == (None, {}, 1)

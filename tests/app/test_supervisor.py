@@ -1,0 +1,95 @@
+"""Word to systemd, by real sockets."""
+
+import logging
+import os
+import socket
+
+import pytest
+
+from modt.errors import MisuseError
+from modt.app.supervisor import NoSupervisor, supervisor_of
+
+
+class Listener:
+    """Where systemd would listen."""
+
+    def __init__(self, address):
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(address)
+        self.socket.setblocking(False)
+
+    def heard(self):
+        """Messages so far."""
+        messages = []
+        while True:
+            try:
+                messages.append(self.socket.recv(4096).decode())
+            except BlockingIOError:
+                return messages
+
+
+@pytest.fixture(name="listen")
+def listeners():
+    made = []
+
+    def listen(address):
+        made.append(Listener(address))
+        return made[-1]
+
+    yield listen
+    for listener in made:
+        listener.socket.close()
+
+
+@pytest.mark.parametrize("abstract", [False, True])
+def test_ready_with_the_first_frame_and_watchdog_with_every_one(tmp_path, listen, abstract):
+    name = f"modt-test-{os.getpid()}"
+    systemd = listen(f"\0{name}" if abstract else str(tmp_path / "notify"))
+    told = supervisor_of({"NOTIFY_SOCKET": f"@{name}" if abstract else str(tmp_path / "notify")})
+    assert systemd.heard() == []
+    told.frame_done()
+    assert systemd.heard() == ["READY=1\nWATCHDOG=1"]
+    told.frame_done()
+    told.frame_done()
+    assert systemd.heard() == ["WATCHDOG=1"] * 2
+    told.close()
+    assert systemd.heard() == ["STOPPING=1"]
+
+
+@pytest.mark.parametrize("environment", [{}, {"NOTIFY_SOCKET": ""}])
+def test_without_a_socket_there_is_no_supervisor(environment):
+    told = supervisor_of(environment)
+    assert isinstance(told, NoSupervisor)
+    told.frame_done()
+    told.close()
+
+
+@pytest.mark.parametrize("place", ["notify", "/", "@", "vsock:2:1234"])
+def test_invalid_address_is_named(place):
+    with pytest.raises(MisuseError, match="NOTIFY_SOCKET"):
+        supervisor_of({"NOTIFY_SOCKET": place})
+
+
+def test_unreachable_supervisor_is_logged_once_and_retried(tmp_path, listen, caplog):
+    told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
+    with caplog.at_level(logging.WARNING):
+        told.frame_done()
+        told.frame_done()
+    assert [r.levelname for r in caplog.records] == ["WARNING"]
+    systemd = listen(str(tmp_path / "notify"))
+    told.frame_done()
+    assert systemd.heard() == ["READY=1\nWATCHDOG=1"]
+    told.close()
+
+
+def test_slow_supervisor_does_not_block(tmp_path, listen):
+    systemd = listen(str(tmp_path / "notify"))
+    told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
+    for _ in range(10_000):  # far more than a socket holds
+        told.frame_done()
+    heard = systemd.heard()
+    assert heard[0] == "READY=1\nWATCHDOG=1"
+    assert 1 < len(heard) < 10_000
+    told.frame_done()
+    assert systemd.heard() == ["WATCHDOG=1"]
+    told.close()

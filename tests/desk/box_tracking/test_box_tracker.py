@@ -1,0 +1,155 @@
+"""The box tracker, and its assignment against the best of all assignments."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt_desk.box_tracking.box_tracker import MAX_COST, BoxTracker, assign
+from modt.classes import OBJECTS
+from modt_desk.box_tracking.config import (
+    BoxConfidenceConfig,
+    BoxTrackingConfig,
+    box_tracking_config,
+)
+
+REPORT_ALL = BoxConfidenceConfig(report_above=-100.0)
+CONFIG = BoxTrackingConfig(confidence=REPORT_ALL)
+
+
+def confident(**values):
+    return BoxTrackingConfig(confidence=BoxConfidenceConfig(report_above=5.0, **values))
+
+
+def car(x, y, yaw=0.0):
+    return [x, y, -1.0, 4.0, 1.8, 1.5, yaw]
+
+
+def step(tracker, i, listed, score=5.0):
+    boxes = np.array(listed, np.float64).reshape(-1, 7)
+    scores = np.broadcast_to(np.asarray(score, np.float64), len(boxes))
+    return tracker.step(i * 0.1, boxes, scores, np.hypot(boxes[:, 0], boxes[:, 1]))
+
+
+def follow(frames, config=CONFIG, score=5.0):
+    tracker = BoxTracker(config)
+    for i, listed in enumerate(frames):
+        reported = step(tracker, i, listed, score)
+    return reported
+
+
+def test_two_cars_passing_each_other_keep_their_ids():
+    r = follow([[car(10 + i, 0), car(40 - i, 3.5, np.pi)] for i in range(25)])
+    order = np.argsort(r.box[:, 1])
+    assert list(r.id[order]) == [0, 1]
+    np.testing.assert_allclose(r.box[order, 0], [34, 16], atol=0.3)
+
+
+def test_a_track_outlives_missed_detections_unreported():
+    frames = [[car(10 + 1.5 * i, 0)] if i not in (8, 9) else [] for i in range(12)]
+    assert list(follow(frames[:10]).id) == []
+    assert list(follow(frames).id) == [0]
+
+
+@pytest.mark.parametrize(("missed", "ids"), [(5, [0]), (30, [0]), (31, [1])])
+def test_a_track_is_deleted_after_max_missed_frames(missed, ids):
+    assert list(follow([[car(10, 0)]] * 9 + [[]] * missed + [[car(10, 0)]]).id) == ids
+
+
+@pytest.mark.parametrize("missed", [0, 9, 29])
+def test_the_gate_does_not_widen_while_a_track_is_missed(missed):
+    seen = [[car(10, 0)]] * 9 + [[]] * missed
+    assert list(follow([*seen, [car(10, 2.5)]]).id) == [0]
+    assert list(follow([*seen, [car(10, 5.5)]]).id) == [1]
+
+
+def test_a_rotating_sensor_keeps_its_tracks():
+    """A parked car seen by a robot that turns at 1 rad/s: its heading in the sensor frame changes in every frame."""
+    bearing = np.pi / 4 - 0.1 * np.arange(12)
+    r = follow([[car(30 * np.cos(b), 30 * np.sin(b), b)] for b in bearing])
+    assert list(r.id) == [0]
+    np.testing.assert_allclose(r.box[0, :2], [30 * np.cos(bearing[-1]), 30 * np.sin(bearing[-1])], atol=0.2)
+
+
+def test_the_yaw_does_not_flip_by_pi():
+    r = follow([[car(10 + i, 0, np.pi * (i % 2))] for i in range(9)])
+    assert abs(np.cos(r.box[0, 6])) > 0.99
+    assert np.cos(r.box[0, 6]) > 0
+
+
+def test_a_low_score_continues_a_track_but_starts_none():
+    config = BoxTrackingConfig(min_birth_score=2.0, confidence=REPORT_ALL)
+    assert len(follow([[car(10, 0)]] * 3, config, score=1.0).id) == 0
+    tracker = BoxTracker(config)
+    for i, score in enumerate([3.0, 1.0, 1.0]):
+        reported = step(tracker, i, [car(10, 0)], score)
+    assert list(reported.id) == [0]
+    assert list(reported.source) == [0]
+
+
+def test_a_track_is_reported_by_its_score_or_its_age():
+    config = confident(range_bonus_per_m=0.0, age_bonus=1.0)
+    assert len(follow([[car(10, 0)]], config, score=4.0).id) == 0
+    assert len(follow([[car(10, 0)]], config, score=5.0).id) == 1
+    assert len(follow([[car(10, 0)]] * 2, config, score=4.0).id) == 0
+    assert len(follow([[car(10, 0)]] * 3, config, score=4.0).id) == 1
+
+
+def test_range_raises_the_confidence():
+    config = confident(range_bonus_per_m=0.1)
+    r = follow([[car(10, 0), car(40, 0)]], config, score=3.0)
+    np.testing.assert_allclose(r.box[:, 0], 40)
+    np.testing.assert_allclose(r.confidence, 3.0 + 0.1 * 40)
+
+
+def test_a_track_that_is_not_reported_for_a_frame_keeps_its_id():
+    config = confident(range_bonus_per_m=0.0, score_gain=1.0, age_bonus=0.0)
+    tracker = BoxTracker(config)
+    ids = [list(step(tracker, i, [car(10, 0)], s).id) for i, s in enumerate([6.0, 1.0, 6.0])]
+    assert ids == [[0], [], [0]]
+
+
+def test_a_lower_score_moves_a_track_less():
+    frames = [[car(10, 0)]] * 9
+    certain, uncertain = BoxTracker(CONFIG), BoxTracker(CONFIG)
+    for i, listed in enumerate(frames):
+        step(certain, i, listed)
+        step(uncertain, i, listed)
+    by_certain = step(certain, 9, [car(10.5, 0)], 12.0).box[0, 0]
+    by_uncertain = step(uncertain, 9, [car(10.5, 0)], 0.0).box[0, 0]
+    assert 10 < by_uncertain < by_certain - 0.1 < 10.4
+
+
+@given(st.lists(st.lists(st.tuples(st.floats(-30, 30), st.floats(-30, 30)), max_size=5), max_size=8))
+def test_each_detection_has_exactly_one_track(scene):
+    tracker = BoxTracker(CONFIG)
+    for i, places in enumerate(scene):
+        r = step(tracker, i, [car(x, y) for x, y in places])
+        assert sorted(r.source) == list(range(len(places)))
+        assert len(set(r.id)) == len(r.id)
+        assert np.isfinite(r.box).all()
+
+
+@pytest.mark.parametrize("object_class", OBJECTS)
+def test_every_class_has_a_configuration(object_class):
+    assert box_tracking_config(object_class).max_missed > 0
+
+
+def greatest_gain(cost):
+    """Greatest sum of MAX_COST - cost over all assignments, by enumeration."""
+    if not len(cost):
+        return 0.0
+    paired = [
+        MAX_COST - cost[0, j] + greatest_gain(np.delete(cost[1:], j, axis=1))
+        for j in np.flatnonzero(cost[0] < MAX_COST)
+    ]
+    return max([greatest_gain(cost[1:]), *paired])
+
+
+@given(st.integers(0, 4), st.integers(0, 4), st.integers(0, 2**16))
+def test_no_assignment_is_cheaper(n, k, seed):
+    cost = np.random.default_rng(seed).uniform(0, 2, (n, k))
+    rows, columns = assign(cost)
+    assert len(set(rows)) == len(set(columns)) == len(rows)
+    assert (cost[rows, columns] < MAX_COST).all()
+    np.testing.assert_allclose((MAX_COST - cost[rows, columns]).sum(), greatest_gain(cost), atol=1e-9)

@@ -1,0 +1,42 @@
+import numpy as np
+
+from modt_desk.box_tracking.whole_tracks import TrackedBoxes, bridged, confident, of_one_class
+
+
+def tracked(rows):
+    """Boxes of rows of frame, id, x, yaw and confidence."""
+    frame, ids, x, yaw, confidence = (np.array(column) for column in zip(*rows, strict=True))
+    box = np.tile([0, 0, -1, 4.0, 1.8, 1.5, 0], (len(rows), 1))
+    box[:, 0], box[:, 6] = x, yaw
+    return TrackedBoxes(frame, ids, np.repeat(x[:, None], 4, axis=1), box, confidence.astype(float))
+
+
+def test_a_track_is_kept_by_its_mean_confidence():
+    found = tracked([(0, 3, 0, 0, 2), (0, 5, 9, 0, 6), (1, 3, 0, 0, 8), (1, 5, 9, 0, 3)])
+    assert set(confident(found, 5.0).id) == {3}
+    assert set(confident(found, 4.5).id) == {3, 5}
+    assert len(confident(found.take(found.id == 7), 4.5).id) == 0
+
+
+def test_gaps_up_to_the_greatest_are_filled_on_the_line_between_their_ends():
+    found = tracked([(0, 1, 0.0, 3.0, 4), (3, 1, 6.0, -3.0, 7), (8, 1, 9.0, -3.0, 7), (4, 2, 1.0, 0.0, 5)])
+    filled = bridged(found, 3)
+    assert list(zip(filled.frame, filled.id, strict=True)) == [(0, 1), (1, 1), (2, 1), (3, 1), (4, 2), (8, 1)]
+    np.testing.assert_allclose(filled.box[:4, 0], [0, 2, 4, 6])
+    np.testing.assert_allclose(filled.image_box[:4, 2], [0, 2, 4, 6])
+    np.testing.assert_allclose(filled.confidence[:4], [4, 5, 6, 7])
+    assert (np.cos(filled.box[:4, 6]) < -0.98).all()  # across pi, not through 0
+    assert len(bridged(found, 4).frame) == len(filled.frame) + 4
+    assert len(bridged(found, 0).frame) == len(found.frame)
+
+
+def test_of_two_classes_on_one_object_the_surer_one_stays():
+    rows = [(i, number, x, 0, sure) for number, x, sure in ((1, 10, 4), (2, 10.5, 6), (4, 30, 3)) for i in range(4)]
+    found = tracked(rows)
+    assert set(of_one_class(found, found.id % 3).id) == {2, 4}
+    assert set(of_one_class(found, np.zeros(len(rows))).id) == {1, 2, 4}
+
+
+def test_a_track_that_crosses_a_surer_one_stays():
+    found = tracked([(i, 1, 10 + 3 * i, 0, 4) for i in range(6)] + [(i, 2, 10, 0, 6) for i in range(6)])
+    assert set(of_one_class(found, found.id).id) == {1, 2}

@@ -1,0 +1,98 @@
+"""`modt evaluate` from the outside."""
+
+import json
+import shutil
+
+import pytest
+
+from tests.viewer.chromium import LOADED, WIDE
+
+from .commands import modt
+
+DAY = "2020_01_01/2020_01_01_drive_0000_sync"
+
+
+@pytest.fixture(scope="module")
+def drives(tmp_path_factory):
+    """Two synthetic drives and the runs on them, by sensor."""
+    root = tmp_path_factory.mktemp("drives")
+    made = {}
+    for sensor in ("vlp-16", "hdl-32e"):
+        for command in (
+            ("simulate", "--sensor", sensor, "--seconds", "0.5", "--seed", "5", "--out", sensor),
+            ("replay", f"{sensor}/{DAY}", "--profile", sensor, "--labels", "--quiet", "--out", f"run-{sensor}"),
+        ):
+            done = modt(*command, cwd=root)
+            assert done.returncode == 0, done.stderr
+        made[sensor] = (root / f"run-{sensor}", root / sensor / DAY)
+    return made
+
+
+def test_runs_are_pooled_by_sensor(drives, tmp_path):
+    pairs = [path for pair in drives.values() for path in pair]
+    done = modt("evaluate", *pairs, "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["schema"] == "modt_desk.evaluation/1"
+    assert set(found["sensors"]) == {*drives, "all sensors"}
+    one, other, both = (found["sensors"][name] for name in (*drives, "all sensors"))
+    assert both["frames"] == one["frames"] + other["frames"] == 10
+    objects = [e["ranges"]["all"]["segmentation"]["car"]["objects"] for e in (one, other, both)]
+    assert objects[2] == objects[0] + objects[1] > 0
+    assert both["tracks"]["all"]["life"]["frames"] > 0
+    assert 0 < both["metrics"]["all"]["HOTA"] <= 1
+    summary = json.loads((drives["vlp-16"][0] / "summary.json").read_text())
+    assert one["beta"] == pytest.approx(summary["beta"], abs=1e-6)
+
+
+def test_report_and_what_else_counts(drives, tmp_path):
+    done = modt("evaluate", *drives["vlp-16"], cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for title in ("segmentation", "average precision", "precision of", "recall with", "tracks", "metrics"):
+        assert title in done.stdout
+    called = []
+    for options in ((), ("--sector", "180", "--count", "cut")):
+        done = modt("evaluate", *drives["vlp-16"], "--json", *options, cwd=tmp_path)
+        classes = json.loads(done.stdout)["sensors"]["vlp-16"]["ranges"]["all"]["classification"]
+        called.append(sum(score["called"] for score in classes.values()))
+    assert called[0] < called[1]
+
+
+def test_the_page_has_the_figures_and_their_plots(drives, tmp_path, chromium):
+    done = modt("evaluate", *drives["vlp-16"], "--html", "page.html", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with chromium.tab((tmp_path / "page.html").as_uri(), width=390, ready=LOADED) as tab:
+        assert not tab.value(WIDE)
+        assert done.stdout.strip() in tab.value("document.querySelector('pre').textContent")
+        titles = tab.value("[...document.querySelectorAll('.plots h2')].map((title) => title.textContent)")
+        assert len([title for title in titles if "by range" in title]) == 2
+        assert tab.value("document.querySelectorAll('polyline').length") >= 3
+
+
+def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):
+    run, truth = drives["vlp-16"]
+    bare, cut, odd = (shutil.copytree(run, tmp_path / name) for name in ("bare", "cut", "odd"))
+    shutil.rmtree(bare / "labels")
+    (cut / "labels" / "000003.label").unlink()
+    lines = (run / "tracks.jsonl").read_text().splitlines(keepends=True)
+    (odd / "tracks.jsonl").write_text(lines[0] + lines[1].replace('"proposals":', '"proposals_":', 1) + lines[2])
+    empty = shutil.copytree(run, tmp_path / "empty")
+    (empty / "tracks.jsonl").write_text("")
+    longer = shutil.copytree(run, tmp_path / "longer")
+    (longer / "tracks.jsonl").write_text("".join(lines) + lines[-1].replace('"frame":4', '"frame":9'))
+    for arguments, message in (
+        ((bare, truth), "modt replay --labels"),
+        ((cut, truth), "000003.label: cannot be read"),
+        ((odd, truth), "tracks.jsonl:2: no record of a frame"),
+        ((empty, truth), "no frames are recorded"),
+        ((longer, truth), "frame 9 is not in the truth"),
+        ((run, drives["hdl-32e"][1]), "labels for a scan of"),
+        ((run,), "are no pairs"),
+        ((tmp_path, truth), "describes no run"),
+        ((run, tmp_path), "holds no labels that are recognised"),
+        ((run, truth, "--sector", "0"), "is no half sector"),
+    ):
+        done = modt("evaluate", *arguments, cwd=tmp_path)
+        assert (done.returncode, done.stdout) == (2, "")
+        assert message in done.stderr
+        assert done.stderr.count("\n") == 1

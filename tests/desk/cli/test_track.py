@@ -1,0 +1,167 @@
+import argparse
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.classes import ObjectClass
+from modt_desk.cli import track
+from modt.errors import MisuseError
+from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
+from modt_desk.box_tracking.detections import T_LEVEL_CAMERA, Detections, boxes_to_kitti, read
+
+
+def run(*arguments):
+    parser = argparse.ArgumentParser()
+    track.add_parser(parser.add_subparsers())
+    parsed = parser.parse_args(["track", *map(str, arguments)])
+    return parsed.run(parsed)
+
+
+def parked(n, T_world_level):
+    """Boxes of a parked and of a moving car, from n poses."""
+    for i in range(n):
+        world = np.array([[20.0, 3.0, -1.0, 4.0, 1.8, 1.5, 0.2], [10.0 + i, -3.0, -1.0, 4.2, 1.7, 1.6, 0.0]])
+        yield transform_boxes(inverse(T_world_level(i)), world)
+
+
+def write(path, n=20, T_world_level=lambda i: np.eye(4), score=9):
+    with path.open("w") as out:
+        for i, boxes in enumerate(parked(n, T_world_level)):
+            for d in boxes_to_kitti(boxes):
+                print(i, 2, 100, 100, 200, 200, score, *d, 0, sep=",", file=out)
+
+
+def turning(i):
+    return se3(rotation_zyx(0, 0, 0.05 * i), np.array([0.8 * i, 0.0, 0.0]))
+
+
+def test_results_are_read_back(tmp_path, capsys):
+    source = tmp_path / "0003.txt"
+    write(source)
+    assert run(source, "--out", tmp_path / "out") == 0
+    (found,) = read([tmp_path / "out" / "0003.txt"])
+    assert found.n_frames == 20
+    np.testing.assert_allclose(found.box[found.frame == 19][:, :2], [[20, 3], [29, -3]], atol=0.2)
+    ids = {line.split()[1] for line in (tmp_path / "out" / "0003.txt").read_text().splitlines()}
+    assert len(ids) == 2
+    assert "20 frames, 2 tracks" in capsys.readouterr().out
+
+
+def test_poses_place_detections_in_the_world(tmp_path):
+    source, poses = tmp_path / "a.txt", tmp_path / "poses.txt"
+    write(source, T_world_level=turning)
+    T_camera = [inverse(T_LEVEL_CAMERA) @ turning(i) @ T_LEVEL_CAMERA for i in range(20)]
+    np.savetxt(poses, [T[:3].ravel() for T in T_camera])
+    run(source, "--out", tmp_path / "out", "--poses", poses, "--quiet")
+    (found,) = read([tmp_path / "out" / "a.txt"])
+    world = transform_boxes(turning(19), found.box[found.frame == 19])
+    np.testing.assert_allclose(world[:, :2], [[20, 3], [29, -3]], atol=0.2)
+
+
+def test_two_runs_are_identical(tmp_path):
+    write(tmp_path / "a.txt", T_world_level=turning)
+    for out in ("one", "two"):
+        run(tmp_path / "a.txt", "--out", tmp_path / out, "--quiet")
+    assert (tmp_path / "one/a.txt").read_bytes() == (tmp_path / "two/a.txt").read_bytes()
+
+
+def test_tracks_of_low_confidence_are_written_on_request(tmp_path, caplog):
+    write(tmp_path / "a.txt", score=1.5)
+    run(tmp_path / "a.txt", "--out", tmp_path / "none", "--quiet")
+    assert (tmp_path / "none/a.txt").read_text() == ""
+    assert "lower --sure" in caplog.text
+    run(tmp_path / "a.txt", "--out", tmp_path / "all", "--quiet", "--sure", "-1000")
+    assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
+
+
+def test_a_detector_with_probabilities_is_tracked(tmp_path):
+    for name, score in (("likely", 0.9), ("unlikely", 0.01)):
+        write(tmp_path / f"{name}.txt", score=score)
+    run(tmp_path, "--out", tmp_path / "out", "--quiet")
+    assert len((tmp_path / "out/likely.txt").read_text().splitlines()) == 2 * 20
+    assert (tmp_path / "out/unlikely.txt").read_text() == ""
+
+
+def test_a_track_is_judged_whole_but_online_frame_by_frame(tmp_path):
+    with (tmp_path / "a.txt").open("w") as out:
+        for i, boxes in enumerate(parked(20, lambda i: np.eye(4))):
+            for d in boxes_to_kitti(boxes[:1]):
+                print(i, 2, 100, 100, 200, 200, 6 if i < 5 else 11, *d, 0, sep=",", file=out)
+    lines = {}
+    for name, option in (("whole", []), ("online", ["--online"])):
+        run(tmp_path / "a.txt", "--out", tmp_path / name, "--quiet", "--sure", "10", *option)
+        lines[name] = [int(line.split()[0]) for line in (tmp_path / name / "a.txt").read_text().splitlines()]
+    assert lines["whole"] == list(range(20))
+    assert lines["online"] == list(range(5, 20))
+
+
+def test_a_short_gap_is_filled_but_not_online(tmp_path):
+    write(tmp_path / "a.txt")
+    lines = (tmp_path / "a.txt").read_text().splitlines()
+    (tmp_path / "a.txt").write_text("\n".join(line for line in lines if line.split(",")[0] not in ("8", "9")))
+    for name, option, frames in (("whole", [], 20), ("online", ["--online"], 18)):
+        run(tmp_path / "a.txt", "--out", tmp_path / name, "--quiet", *option)
+        assert len((tmp_path / name / "a.txt").read_text().splitlines()) == 2 * frames
+    (found,) = read([tmp_path / "whole/a.txt"])
+    np.testing.assert_allclose(found.box[found.frame == 9][:, :2], [[20, 3], [19, -3]], atol=0.2)
+
+
+def test_an_object_of_two_classes_is_written_as_the_surer_one(tmp_path):
+    box = np.array([[12.0, 1.0, -1.0, 1.0, 0.7, 1.7, 0.0]])
+    for kind, score in ((1, 5.0), (3, 7.0)):
+        (tmp_path / str(kind)).mkdir()
+        with (tmp_path / str(kind) / "a.txt").open("w") as out:
+            for i in range(9):
+                print(i, kind, 0, 0, 50, 99, score, *boxes_to_kitti(box)[0], 0, sep=",", file=out)
+    for detectors, types in (([1], {"Pedestrian"}), ([1, 3], {"Cyclist"})):
+        run(*(tmp_path / str(kind) for kind in detectors), "--out", tmp_path / "out", "--quiet")
+        assert {line.split()[2] for line in (tmp_path / "out/a.txt").read_text().splitlines()} == types
+
+
+def test_boxes_without_a_score_are_tracked(tmp_path):
+    lines = [f"{i} {k} Car 0 0 0 1 1 9 9 1.5 1.8 4 {5 * k} 1.6 12 0" for i in range(5) for k in range(2)]
+    (tmp_path / "a.txt").write_text("\n".join(lines))
+    run(tmp_path / "a.txt", "--out", tmp_path / "out", "--quiet")
+    assert len((tmp_path / "out/a.txt").read_text().splitlines()) == 2 * 5
+
+
+@given(
+    st.lists(st.lists(st.tuples(st.floats(-20, 20), st.floats(-2, 12)), max_size=4), min_size=2, max_size=9),
+    st.data(),
+)
+def test_online_the_results_of_a_frame_do_not_depend_on_later_frames(scene, data):
+    rows = [(i, x, score) for i, seen in enumerate(scene) for x, score in seen]
+    box = np.array([[x, 2.0, -1.0, 4.0, 1.8, 1.5, 0.0] for _, x, _ in rows]).reshape(-1, 7)
+    frame = np.array([i for i, _, _ in rows], np.int64)
+    score = np.array([s for _, _, s in rows], np.float64)
+    whole = Detections("a", frame, np.full(len(rows), ObjectClass.CAR), np.zeros((len(rows), 4)), score, box)
+    until = data.draw(st.integers(0, len(scene) - 1))
+    online = track.follow(whole, None, 0.1, online=True)[0].splitlines()
+    early = [line for line in online if int(line.split()[0]) <= until]
+    assert track.follow(whole.take(frame <= until), None, 0.1, online=True)[0].splitlines() == early
+
+
+@pytest.mark.parametrize(
+    ("options", "cause"),
+    [
+        (["--poses", "absent.txt"], "is missing"),
+        (["--poses", "short.txt"], "1 poses for 20 frames"),
+        (["--poses", "bad.txt"], r"bad.txt:1: 3 numbers"),
+    ],
+)
+def test_invalid_arguments_are_refused(tmp_path, monkeypatch, options, cause):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "a.txt")
+    np.savetxt("short.txt", np.eye(4)[:3].reshape(1, 12))
+    (tmp_path / "bad.txt").write_text("1 2 3\n")
+    with pytest.raises(MisuseError, match=cause):
+        run(tmp_path / "a.txt", "--out", tmp_path / "out", *options)
+
+
+@pytest.mark.parametrize("option", [("--period", "0"), ("--sure", "nan"), ("--sure", "-1001")])
+def test_numbers_out_of_range_are_refused(tmp_path, option, capsys):
+    with pytest.raises(SystemExit):
+        run(tmp_path, "--out", tmp_path / "out", *option)
+    assert "from" in capsys.readouterr().err

@@ -1,0 +1,118 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from modt.config import WindowConfig
+from modt.energy.conditions import Conditions
+from modt.energy.ledger import Ledger
+from modt.energy.meters.model import model_meter
+from modt.energy.windows import Clocks, Windows
+from modt.pipeline import STAGES
+from modt_desk.comparison.comparison import COUNTS, ModeRun, interleave, total
+from modt.types import UNLIMITED, Budget, Frame
+from tests.results import CAR, result
+
+FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(6)]
+
+SCRIPT = [
+    result(0, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}),
+    result(1, [3], {0: 7}, {7: CAR}, lost=(8,)),
+    result(2, [3, 4], {0: 7, 1: 8}, {7: CAR, 8: CAR}),
+    result(3, [5], {0: 9}),
+    result(4, [], {}),
+    result(5, [5], {0: 9}, {9: CAR}),
+]
+CLASSIFIED = [[7, 8], [7], [8], [], [], [9]]
+
+
+class Scripted:
+    """A pipeline that classifies what the script says."""
+
+    def __init__(self, name, ledger, log):
+        self.name, self.ledger, self.log, self.budgets = name, ledger, log, []
+
+    def step(self, frame, budget=UNLIMITED):
+        self.log.append((self.name, frame.index))
+        self.budgets.append(budget)
+        classified = np.array(CLASSIFIED[frame.index], np.int64)
+        if len(classified):
+            self.ledger.run("classification", np.tile, CAR, (len(classified), 1))
+        return replace(SCRIPT[frame.index], classified=classified)
+
+
+def mode_run(name, log, budget=lambda index: UNLIMITED, windows=None):
+    ledger = Ledger()
+    return ModeRun(Scripted(name, ledger, log), ledger, budget, windows)
+
+
+def column(made, name):
+    return made.counts()[:, COUNTS.index(name)].tolist()
+
+
+@pytest.fixture
+def one():
+    made = mode_run("one", [])
+    interleave(FRAMES, [made], turn=1)
+    return made
+
+
+def test_counts_of_first_further_and_reacquired_views(one):
+    assert column(one, "proposals") == [2, 1, 2, 1, 0, 1]
+    assert column(one, "tracks") == [2, 0, 0, 1, 0, 1]
+    assert column(one, "classified_tracks") == [2, 0, 0, 0, 0, 1]
+    assert column(one, "classified") == [2, 1, 1, 0, 0, 1]
+    assert column(one, "reacquired") == [0, 0, 1, 0, 0, 0]
+    assert column(one, "calls") == [1, 1, 1, 0, 0, 1]
+    assert column(one, "foreground") == [2, 1, 2, 0, 0, 1]
+
+
+def test_lives_are_frames_with_a_proposal(one):
+    assert one.lives.occurrences() == {"values": [1, 2, 3], "counts": [2, 1, 1]}
+    counts = total(one.counts())
+    assert counts.tracks == one.lives.count
+    assert counts.n_go == pytest.approx(one.lives.mean)
+
+
+def test_cpu_time_has_a_column_a_stage(one):
+    assert one.cpu_s().shape == (len(FRAMES), len(STAGES))
+    assert (one.cpu_s() >= 0).all()
+
+
+@pytest.mark.parametrize(
+    ("turn", "order"), [(1, "ab ba ab ba ab ba"), (2, "aabb bbaa aabb"), (10**9, "aaaaaabbbbbb")]
+)
+def test_every_run_has_every_frame_and_the_first_rotates(turn, order):
+    log = []
+    interleave(iter(FRAMES), [mode_run("a", log), mode_run("b", log)], turn)
+    assert "".join(name for name, _ in log) == order.replace(" ", "")
+    for name in "ab":
+        assert [index for who, index in log if who == name] == list(range(6))
+
+
+def test_each_frame_has_the_budget_of_its_index():
+    made = mode_run("a", [], budget=lambda index: Budget(calls=index))
+    interleave(FRAMES, [made], turn=2)
+    assert [b.calls for b in made.pipeline.budgets] == list(range(6))
+
+
+def test_meters_are_read_at_the_ends_of_turns():
+    now = [0]
+
+    def tick():
+        now[0] += 1_000_000
+        return now[0]
+
+    clocks = Clocks(tick, tick, tick, tick)
+    made = [
+        mode_run(
+            name,
+            [],
+            windows=Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), WindowConfig(min_s=1e9)),
+        )
+        for name in "ab"
+    ]
+    interleave(FRAMES, made, turn=3)
+    for each in made:
+        assert [line["frames"][2] for line in each.energy_lines] == [3, 3]
+        assert all(line["energy_J"] > 0 for line in each.energy_lines)

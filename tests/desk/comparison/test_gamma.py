@@ -1,0 +1,139 @@
+import numpy as np
+import pytest
+
+from modt.energy.meters.meter import Kind
+from modt.energy.savings import UnitCosts
+from modt.pipeline import STAGES
+from modt_desk.comparison.comparison import COUNTS
+from modt_desk.comparison.gamma import RunCosts, estimate_gamma, mean, unit_costs
+from modt.reporting.quantity import Quantity, format_number, quantity, to_json
+
+TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
+FRAMES, N = 120, 50
+
+
+def run(classified: np.ndarray, noise: float = 0.0, seed: int = 0) -> RunCosts:
+    """A run of known costs: so many of the 50 proposals classified in each frame."""
+    random = np.random.default_rng(seed)
+    counts = np.zeros((len(classified), len(COUNTS)), np.int64)
+    counts[:, COUNTS.index("proposals")] = N
+    counts[:, COUNTS.index("tracks")] = 2
+    counts[:, COUNTS.index("classified_tracks")] = 2
+    counts[:, COUNTS.index("classified")] = classified
+    counts[:, COUNTS.index("points")] = classified * random.integers(50, 200, len(classified))
+    counts[:, COUNTS.index("calls")] = classified > 0
+    cost = np.zeros((len(classified), len(STAGES)))
+    for stage, value in (
+        ("segmentation", TRUE.seg),
+        ("tracking", TRUE.track),
+        ("scheduling", 1e-4),
+        ("fusion", 2e-4),
+    ):
+        cost[:, STAGES.index(stage)] = value
+    used = counts[:, [COUNTS.index(name) for name in ("calls", "classified", "points")]]
+    cost[:, STAGES.index("classification")] = used @ [TRUE.class_call, TRUE.class_item, TRUE.class_point]
+    return RunCosts(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
+
+
+def varied(noise: float = 0.0) -> RunCosts:
+    return run(np.random.default_rng(7).integers(0, N, FRAMES), noise, seed=8)
+
+
+EVERY = np.full(FRAMES, N)
+FEW = np.full(FRAMES, 2)
+
+
+def test_unit_costs_are_found_from_varied_load() -> None:
+    found = unit_costs(varied())
+    for name in ("seg", "track", "class_call", "class_item", "class_point"):
+        assert getattr(found, name) == pytest.approx(getattr(TRUE, name), rel=1e-6)
+
+
+def test_reconciliation_equals_measurement_at_constant_unit_costs() -> None:
+    found = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0))
+    assert found.reconciled.value == pytest.approx(found.measured.value)
+    assert found.deviation.value == pytest.approx(0.0, abs=1e-9)
+    assert found.reconciliation.explain(found.measured.value)[-1].change == pytest.approx(0.0, abs=1e-6)
+
+
+def test_intervals_cover_the_truth_with_noise() -> None:
+    truth = estimate_gamma(run(EVERY), run(FEW), varied(), np.random.default_rng(0)).measured.value
+    found = estimate_gamma(run(EVERY, 0.1, 1), run(FEW, 0.1, 2), varied(0.1), np.random.default_rng(0))
+    assert found.measured.low < truth < found.measured.high
+    assert found.reconciled.low < truth < found.reconciled.high
+    assert found.deviation.low < 0 < found.deviation.high
+
+
+def test_uncounted_cost_is_unexplained() -> None:
+    dear = run(FEW)
+    dear.cost[:, STAGES.index("segmentation")] *= 2
+    found = estimate_gamma(run(EVERY), dear, varied(), np.random.default_rng(0))
+    terms = found.reconciliation.explain(found.measured.value)
+    assert terms[-1].change == pytest.approx(found.measured.value - found.reconciled.value)
+    assert terms[-1].change < -0.1
+    assert found.deviation.value > 0.05
+
+
+class Repeated:
+    """A pass whose budget of CPU time pays for more or less."""
+
+    def __init__(self, classified: int, slower: float = 1.0) -> None:
+        self._run = run(np.full(FRAMES, classified))
+        self._slower = slower
+
+    def counts(self) -> np.ndarray:
+        return self._run.counts
+
+    def cpu_s(self) -> np.ndarray:
+        return self._slower * self._run.cost
+
+
+def test_counts_and_costs_are_of_the_same_repetition() -> None:
+    passes = [Repeated(40), Repeated(3), Repeated(8)]
+    middle = RunCosts.median(passes)
+    np.testing.assert_array_equal(middle.counts, passes[2].counts())
+    np.testing.assert_array_equal(middle.cost, passes[2].cpu_s())
+    disturbed = RunCosts.median([Repeated(3), Repeated(3, slower=9.0), Repeated(3, slower=1.1)])
+    np.testing.assert_allclose(disturbed.cost, 1.1 * passes[1].cpu_s())
+
+
+def test_unit_costs_are_never_negative() -> None:
+    load = varied()
+    load.cost[:, STAGES.index("classification")] = 5e-3 - 1e-4 * load.counts[:, COUNTS.index("classified")]
+    found = unit_costs(load)
+    assert min(found.class_call, found.class_item, found.class_point) == 0.0
+    assert found.class_call > 0.0
+
+
+def test_nothing_classified_costs_nothing_to_classify() -> None:
+    found = unit_costs(run(np.zeros(20, np.int64)))
+    assert (found.class_call, found.class_item, found.class_point) == (0.0, 0.0, 0.0)
+
+
+def test_interval_of_a_constant_is_a_point() -> None:
+    found = mean(np.full(30, 2.5), "J", Kind.MEASURED, np.random.default_rng(0))
+    assert (found.low, found.value, found.high) == (2.5, 2.5, 2.5)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(0.0, "0"), (12345.6, "12346"), (0.01234, "0.0123"), (1.5e-7, "1.50e-07"), (None, "-")]
+)
+def test_numbers_have_three_digits(value: float | None, text: str) -> None:
+    assert format_number(value) == text
+
+
+def test_quantity_without_a_value_is_unavailable() -> None:
+    assert quantity(None, "J", Kind.MEASURED).kind is Kind.UNAVAILABLE
+    assert quantity(float("nan")).value is None
+    assert quantity(float("inf")).text() == "unavailable"
+    assert quantity(1.0, "J", Kind.ESTIMATED, (0.5, 1.5)).text() == "~1.00 J (0.500 to 1.50)"
+    assert quantity(440.0, "mJ", interval=(439.9, 440.1)).text() == "440 mJ"
+
+
+def test_trees_of_quantities_become_plain_data() -> None:
+    tree = {"a": [quantity(1.0)], "b": {"c": Quantity(2.0, "J", Kind.INTEGRATED, 1.0, 3.0)}, "d": "text"}
+    assert to_json(tree) == {
+        "a": [{"value": 1.0, "unit": "", "kind": "measured"}],
+        "b": {"c": {"value": 2.0, "unit": "J", "kind": "integrated", "low": 1.0, "high": 3.0}},
+        "d": "text",
+    }

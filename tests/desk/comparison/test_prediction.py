@@ -1,0 +1,135 @@
+"""A prediction from other streams, which holds where unit costs and counts do, and misses where they do not."""
+
+import numpy as np
+import pytest
+
+from modt.pipeline import STAGES
+from modt_desk.comparison.comparison import COUNTS
+from modt_desk.comparison.gamma import RunCosts
+from modt_desk.comparison.prediction import OBSERVED, Rates, Stream, expect, forecast, measured
+
+SEG_S, TRACK_S, SCHEDULE_S, CLASS_S = 5e-8, (1e-3, 5e-5, 2e-5), (2e-4, 1e-6), (5e-4, 4e-4, 1e-6)
+GAMMA = slice(3, None)
+FRAMES = 240
+
+
+def run(mode: str, seen: np.ndarray, n_go: float, random: np.random.Generator, noise: float = 0.05) -> RunCosts:
+    """A run of known costs on what is seen: (F, 3) proposals, new tracks, points of the sweep."""
+    proposals, started, sweep_points = seen.T
+    n = proposals.mean()
+    classified = {
+        "conventional": proposals,
+        "efficient": np.minimum(started, proposals),
+        "accurate": np.minimum(random.poisson(3 * n / n_go, FRAMES), proposals),
+        "varied": np.minimum(random.integers(0, 60, FRAMES), proposals),
+    }[mode]
+    network = np.array([random.integers(40, 160, k).sum() for k in classified])
+    values = {
+        "proposals": proposals,
+        "tracks": started,
+        "classified": classified,
+        "points": network,
+        "calls": classified > 0,
+        "sweep_points": sweep_points,
+        "alive": proposals + 2,
+    }
+    counts = np.zeros((FRAMES, len(COUNTS)), np.int64)
+    for name, value in values.items():
+        counts[:, COUNTS.index(name)] = value
+    cost = np.zeros((FRAMES, len(STAGES)))
+    cost[:, STAGES.index("segmentation")] = SEG_S * values["sweep_points"]
+    cost[:, STAGES.index("tracking")] = np.stack([np.ones(FRAMES), proposals, proposals + 2], 1) @ TRACK_S
+    cost[:, STAGES.index("scheduling")] = SCHEDULE_S[0] + SCHEDULE_S[1] * (proposals + 2)
+    cost[:, STAGES.index("classification")] = np.stack([classified > 0, classified, network], 1) @ CLASS_S
+    return RunCosts(counts, cost * (1 + noise * random.standard_normal(cost.shape)))
+
+
+def stream(seed: int, n: int = 40, n_go: float = 20.0, points: int = 100_000) -> Stream:
+    """Four in five new tracks ask for a class."""
+    random = np.random.default_rng(seed)
+    proposals = np.maximum(random.poisson(n, FRAMES), 1)
+    started = random.poisson(n / n_go, FRAMES)
+    started[0] = n
+    seen = np.column_stack([proposals, started, random.normal(points, points / 50, FRAMES).astype(int)])
+    modes = ("conventional", "efficient", "accurate", "varied")
+    runs = {mode: run(mode, seen, n_go, random) for mode in modes}
+    seen = runs["conventional"].counts[:, [COUNTS.index(name) for name in OBSERVED]]
+    asked = random.binomial(seen[:, OBSERVED.index("tracks")], 0.8)
+    return Stream(runs, np.column_stack([seen, asked, asked]))
+
+
+CALIBRATION = [stream(1, 30, 15.0, 110_000), stream(2, 50, 25.0, 90_000), stream(3, 25, 10.0, 120_000)]
+TEST = stream(9, 40, 30.0, 60_000)
+
+
+def predicted(calibration: list[Stream] = CALIBRATION, seen: Stream = TEST, share: float = 1 / 3):
+    observed = seen.observed[: int(FRAMES * share)]
+    return forecast(calibration, observed, FRAMES, np.random.default_rng(0))
+
+
+def covers(found, values: np.ndarray) -> np.ndarray:
+    return (found.low < values) & (values < found.high)
+
+
+def test_unit_costs_are_found() -> None:
+    found = Rates.fit(CALIBRATION)
+    assert found.segmentation @ [1.0, 60_000] == pytest.approx(60_000 * SEG_S, rel=0.02)
+    # points and proposals vary together from frame to frame: their sum is what counts
+    assert found.classification @ [1, 40, 4000] == pytest.approx(CLASS_S @ np.array([1, 40, 4000]), rel=0.02)
+    assert found.tracking["efficient"] @ [1, 40, 42] == pytest.approx(TRACK_S @ np.array([1, 40, 42]), rel=0.02)
+    assert found.views["accurate"].each == pytest.approx(3.0 / 0.8, rel=0.15)
+
+
+def test_sweeps_of_different_sizes_tell_the_constant_of_segmentation() -> None:
+    streams = [stream(1, points=120_000), stream(2, points=30_000)]
+    for each in streams:
+        for mode in each.runs.values():
+            mode.cost[:, STAGES.index("segmentation")] += 2e-3
+    np.testing.assert_allclose(Rates.fit(streams).segmentation, [2e-3, SEG_S], rtol=0.05)
+    assert Rates.fit(streams[:1]).segmentation[0] == 0.0
+
+
+@pytest.mark.parametrize("calibration", [CALIBRATION, CALIBRATION[:1]])
+def test_another_stream_is_predicted(calibration: list[Stream]) -> None:
+    found, truth = predicted(calibration), measured(TEST)
+    assert truth[GAMMA].min() > 2.5
+    np.testing.assert_allclose(found.expected.values, truth, rtol=0.12)
+    assert covers(found, truth).all()
+
+
+def test_it_is_nearer_than_what_one_would_guess() -> None:
+    found, truth = predicted(), measured(TEST)
+    equation = found.expected.equation
+    for k in (3, 4):
+        error = abs(np.log(found.expected.values[k] / truth[k]))
+        rivals = (equation.n_go, equation.gamma, found.copied[k])
+        assert all(error < 0.5 * abs(np.log(rival / truth[k])) for rival in rivals)
+
+
+def test_it_misses_where_the_life_of_tracks_is_wrong() -> None:
+    """The same proposals in tracks of a tenth of the life."""
+    broken = Stream(TEST.runs, TEST.observed.copy())
+    broken.observed[:, [OBSERVED.index("tracks"), -2, -1]] *= 10
+    assert not covers(predicted(seen=broken), measured(TEST))[GAMMA].any()
+
+
+def test_it_misses_where_tracking_costs_twice_as_much() -> None:
+    dear = Stream({name: RunCosts(each.counts, each.cost.copy()) for name, each in TEST.runs.items()}, TEST.observed)
+    for each in dear.runs.values():
+        each.cost[:, STAGES.index("tracking")] *= 2
+    assert not covers(predicted(), measured(dear)).any()
+
+
+def test_the_first_third_stands_for_the_whole() -> None:
+    """All tracks of the first frame are new: the rate of the others is what goes on."""
+    third, whole = predicted(share=1 / 3), predicted(share=1.0)
+    np.testing.assert_allclose(third.expected.values, whole.expected.values, rtol=0.1)
+    counts = TEST.runs["conventional"].counts
+    n_go = counts[:, COUNTS.index("proposals")].sum() / counts[:, COUNTS.index("tracks")].sum()
+    assert whole.expected.equation.n_go == pytest.approx(n_go)
+
+
+def test_a_stream_without_proposals_saves_nothing() -> None:
+    found = expect(Rates.fit(CALIBRATION), np.zeros((3, 7), np.int64), 10)
+    assert found.cost["conventional"] == pytest.approx(found.cost["efficient"], rel=0.05)
+    assert found.equation.gamma == 1.0

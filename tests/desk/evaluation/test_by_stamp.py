@@ -1,0 +1,39 @@
+"""The truth of a run whose frames are numbered as they arrived."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modt_desk.evaluation.by_stamp import by_stamp
+from modt_desk.evaluation.rules import KITTI_RULES
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Truth
+from modt.sources.scan_stream import ScanReference, ScanStream
+from modt.sources.stream import StreamInfo
+
+INFO = StreamInfo("drive", "folder", 0, None, 0.1, None, has_poses=False)
+
+
+def truth(stamps_s, labelled):
+    scans = [ScanReference(k, Path(f"{k}.bin"), s, None) for k, s in enumerate(stamps_s)]
+    frames = {k: FrameTruth.of(KITTI_TYPES, [k], ["Car"], np.zeros((1, 7))) for k in labelled}
+    return Truth(frames, ScanStream(INFO, scans), KITTI_RULES)
+
+
+@pytest.mark.parametrize("origin_s", [0.0, 1.7e9])
+def test_frames_have_the_labels_and_the_scan_of_their_stamp(origin_s):
+    found = by_stamp(
+        truth([5.0, 5.1, 5.2, 5.3], [0, 1, 3]), {7: origin_s + 5.01, 8: origin_s + 5.2, 20: origin_s + 9}
+    )
+    assert {number: labels.id.tolist() for number, labels in found.frames.items()} == {7: [0]}
+    assert [(scan.index, scan.path.name) for scan in found.scans.scans] == [(7, "0.bin"), (8, "2.bin")]
+
+
+def test_one_scan_is_enough():
+    found = by_stamp(truth([2.0], [0]), {3: 2.04, 4: 2.06})
+    assert list(found.frames) == [3]
+
+
+def test_without_scans_there_are_no_stamps():
+    bare = Truth({}, None, KITTI_RULES)
+    assert by_stamp(bare, {0: 0.0}) is bare

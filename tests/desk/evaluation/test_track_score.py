@@ -1,0 +1,123 @@
+import sys
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt_desk.evaluation.evaluation import collect, evaluation, score
+from modt_desk.evaluation.rows import Association
+from modt_desk.evaluation.rules import KITTI_RULES
+from modt_desk.evaluation.track_score import track_metrics
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
+from modt.types import NONE
+from tests.desk.evaluation.scenes import blob, car, cars, frame
+
+PLACES = (10.0, 20.0)
+
+
+def followed(*histories, points=30):
+    """Frames in which each of two cars is followed by these tracks, None for a miss, '-' where it is not labelled."""
+    frames = []
+    for index, tracks in enumerate(zip(*histories, strict=True)):
+        shown = [k for k, track in enumerate(tracks) if track != "-"]
+        truth = FrameTruth.of(KITTI_TYPES, shown, ["Car"] * len(shown), [car(PLACES[k]) for k in shown])
+        seen = [k for k in shown if tracks[k] is not None]
+        blobs = [(blob(points, PLACES[k]), seen.index(k) if k in seen else NONE) for k in shown]
+        frames.append(frame(truth, blobs, [(tracks[k], i, "car") for i, k in enumerate(seen)], index=index))
+    return frames
+
+
+def tracked(*histories, **more):
+    return score(followed(*histories, **more)).tracks["all"]
+
+
+def test_misses_count_as_misses():
+    found = tracked([1, 1, None, 1, "-"], [None] * 5)
+    assert (found.life.objects, found.life.frames) == (2, 9)
+    assert (found.life.life, found.life.ideal) == (1.5, 4.5)
+    assert found.life.ratio == pytest.approx(1 / 3)
+    assert (found.life_as_seen.objects, found.life_as_seen.life, found.life_as_seen.ideal) == (1, 3, 3)
+    assert found.followed == pytest.approx(1 / 3)
+    assert found.discontinuities == 0
+
+
+def test_discontinuities_and_where_the_next_track_comes_from():
+    found = tracked([1, 1, 2, 2, 1, 3], [3, 3, 3, 3, 3, 3])
+    assert (found.discontinuities, found.returned, found.taken_over) == (3, 1, 1)
+    assert found.life.life == 12 / (2 + 3)
+
+
+def test_mis_associations_need_three_frames_on_each():
+    assert tracked([1, 1, 1, 2, 2, 2], [5, 5, 5, 1, 1, 1]).mis_associations == 1
+    assert tracked([1, 1, 1, 2, 2, 2], [5, 5, 5, 5, 1, 1]).mis_associations == 0
+
+
+def test_labelled_frames_count_whatever_points_they_have():
+    found = tracked([1, 1], [2, "-"], points=9)
+    assert (found.life.objects, found.life.life) == (0, None)
+    assert (found.labelled.objects, found.labelled.ideal) == (2, 1.5)
+
+
+def test_objects_without_identity_have_no_life():
+    truth = FrameTruth.of(KITTI_TYPES, [NONE], ["Car"], [car(10.0)])
+    found = score([frame(truth, [(blob(30, 10), 0)], [(1, 0, "car")])])
+    assert (found.tracks, found.metrics) == ({}, None)
+
+
+def test_drives_are_pooled_and_their_identities_kept_apart():
+    one, two = followed([1, 1, 1], ["-"] * 3), followed([2, 2, 2], ["-"] * 3)
+    found = evaluation([collect(f, KITTI_RULES, k) for k, f in enumerate((one, two))])
+    assert (found.drives, found.frames, found.tracks["all"].life.objects) == (2, 6, 2)
+    assert found.tracks["all"].discontinuities == 0
+    assert found.metrics["car"]["HOTA"] == pytest.approx(1)
+
+
+@given(st.lists(st.sampled_from([None, 1, 2, 3]), min_size=1, max_size=12))
+def test_life_agrees_with_the_definition(history):
+    found = tracked(history, ["-"] * len(history))
+    seen = [track for track in history if track is not None]
+    breaks = sum(a != b for a, b in pairwise(seen))
+    assert found.discontinuities == breaks
+    assert found.life.life == len(seen) / (1 + breaks)
+    assert found.life.ideal == len(history)
+    assert found.life_as_seen.life == (len(seen) / (1 + breaks) if seen else None)
+
+
+def association(truth, tracks, similarity=1.0):
+    return Association(np.array(truth), np.array(tracks), similarity * np.eye(len(truth), len(tracks)))
+
+
+def test_metrics_of_what_is_right():
+    found = track_metrics([[association([5, 9], [1, 0])] * 10])
+    assert found["HOTA"] == found["MOTA"] == found["IDF1"] == pytest.approx(1)
+    assert found["id_switches"] == 0
+
+
+def test_a_switch_costs_association_only():
+    found = track_metrics([[association([5], [1 if i < 5 else 2]) for i in range(10)]])
+    assert found["id_switches"] == 1
+    assert found["DetA"] == pytest.approx(1)
+    assert found["AssA"] == pytest.approx(0.5)
+    assert found["MOTA"] == pytest.approx(0.9)
+
+
+def test_similarity_costs_detection():
+    found = track_metrics([[association([5], [1], 0.6)] * 10])
+    assert 0 < found["DetA"] < 0.8
+    assert found["MOTA"] == pytest.approx(1)
+
+
+def test_sequences_add_up_and_empty_ones_count_nothing():
+    right, nothing = [association([5], [1])] * 10, [association([], [])] * 10
+    assert track_metrics([right, nothing])["HOTA"] == pytest.approx(1)
+    assert track_metrics([[association([5], [])] * 10])["MOTA"] == pytest.approx(0)
+    assert track_metrics([nothing]) == {}
+
+
+def test_without_the_extra_the_rest_is_there(monkeypatch):
+    monkeypatch.setitem(sys.modules, "trackeval", None)
+    found = score([frame(cars(10.0), [(blob(30, 10), 0)], [(1, 0, "car")])])
+    assert found.metrics is None
+    assert found.tracks["car"].life.life == 1

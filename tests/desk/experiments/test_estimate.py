@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from modt.classes import ObjectClass
+from modt_desk.evaluation.class_score import class_scores
+from modt_desk.evaluation.rows import OBJECT, PROPOSAL, table
+from modt_desk.experiments.catalogue.estimate import Estimate, ratio
+from modt_desk.experiments.catalogue.figures import ObjectLives, TrackLives, latencies, precisions
+from modt_desk.experiments.judged import CALL, CENTRE, FRAME, Judged
+from modt.types import NONE
+
+CAR = int(ObjectClass.CAR)
+
+
+def judged(n_objects: int, n_frames: int, seed: int = 0) -> Judged:
+    """Cars that are found now and then, and as many tracks of other things."""
+    rng = np.random.default_rng(seed)
+    ids, frames = (grid.ravel() for grid in np.meshgrid(np.arange(n_objects), np.arange(n_frames)))
+    found = rng.random(len(ids)) < 0.8
+    judged_rows = {"to_classify": True, "to_follow": True, "class": CAR}
+    objects = table(OBJECT, len(ids), id=ids, frame=frames, track=np.where(found, ids, NONE), **judged_rows)
+    score = np.concatenate([rng.uniform(0.3, 1.0, found.sum()), rng.uniform(0.0, 0.6, len(ids))])
+    posterior = np.zeros((len(score), 4))
+    posterior[:, CAR], posterior[:, 0] = score, 1 - score
+    right = np.arange(len(score)) < found.sum()
+    proposals = table(
+        PROPOSAL,
+        len(score),
+        frame=np.concatenate([frames[found], frames]),
+        track=np.concatenate([ids[found], 100 + ids]),
+        posterior=posterior,
+        label=np.where(right, CAR, 0),
+        owner=np.where(right, CAR, 0),
+        to_classify=True,
+        to_call=True,
+        said=np.where(score > 0.5, CAR, 0),
+    )
+    calls = table(CALL, n_objects, track=np.arange(n_objects), points=10)
+    return Judged(np.zeros(n_frames, FRAME), objects, proposals, calls, np.zeros(0, CENTRE))
+
+
+def test_average_precision_is_that_of_the_judgement():
+    made = judged(5, 30)
+    expected = class_scores(made.objects, made.proposals)["car"].average_precision
+    car = next(f for f in precisions(made, "x") if f.quantity == "AP car").estimate
+    assert car.value == pytest.approx(expected)
+    assert car.n == 5
+    assert car.low < car.value < car.high
+
+
+def test_a_single_object_has_no_interval():
+    car = next(f for f in precisions(judged(1, 30), "x") if f.quantity == "AP car").estimate
+    assert car.value > 0
+    assert car.low is car.high is None
+
+
+def test_more_objects_have_a_narrower_interval():
+    few, many = (next(precisions(judged(n, 20), "x")).estimate for n in (4, 64))
+    assert many.high - many.low < few.high - few.low
+
+
+def test_ratio_is_one_of_sums_and_resamples_whole_objects():
+    assert ratio([1, 1], [1, 3]).value == 0.5
+    assert ratio([2, 2, 2], [4, 4, 4]) == Estimate(0.5, 0.5, 0.5, 3)
+    assert ratio([], []).value is None
+
+
+def test_lives_of_objects_count_breaks_and_frames_without_a_track():
+    objects = table(OBJECT, 6, id=[1, 1, 1, 1, 2, 2], frame=[0, 1, 2, 3, 0, 1], **{"class": CAR}, to_follow=True)
+    objects["track"] = [7, NONE, 8, 8, 9, 9]
+    made = Judged(*(np.zeros(0, kind) for kind in (FRAME, OBJECT, PROPOSAL, CALL, CENTRE)))
+    found = ObjectLives.of(Judged(made.frames, objects, made.proposals, made.calls, made.centres))
+    assert (found.wanted.tolist(), found.followed.tolist(), found.breaks.tolist()) == ([4, 2], [3, 2], [1, 0])
+
+
+def test_lives_of_tracks_tell_objects_from_background():
+    found = TrackLives.of(judged(3, 10))
+    assert found.on_object.tolist() == [True] * 3 + [False] * 3
+    assert found.calls.tolist() == [1] * 3 + [0] * 3
+
+
+def test_latency_is_counted_from_the_first_frame():
+    objects = table(OBJECT, 4, id=[1, 1, 1, 2], frame=[5, 6, 7, 5], **{"class": CAR}, to_classify=True)
+    objects["said"] = [NONE, 0, CAR, 0]
+    empty = Judged(*(np.zeros(0, kind) for kind in (FRAME, OBJECT, PROPOSAL, CALL, CENTRE)))
+    waited, ever = latencies(Judged(empty.frames, objects, empty.proposals, empty.calls, empty.centres), "x")
+    assert waited.estimate.value == 2.0
+    assert ever.estimate.value == 0.5

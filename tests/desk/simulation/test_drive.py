@@ -1,0 +1,90 @@
+"""A synthetic drive on disk, read back like a recorded one."""
+
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+
+from modt.cli.main import main
+from modt.geometry import inverse
+from modt_desk.simulation.kitti_raw import DATE, DriveWriter
+from modt.sources.recognise import open_stream
+from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drive")
+    stream = SyntheticStream("street", "vlp-16", 1.5, seed=4)
+    writer = DriveWriter(folder, CAMERA)
+    sweeps = list(stream.sweeps())
+    for frame, truth in sweeps:
+        writer.write(frame, truth)
+    writer.close()
+    return writer, stream, sweeps
+
+
+@pytest.mark.parametrize("layout", ["drive", "sequence"])
+def test_points_times_poses_and_camera_are_read_back(written, layout):
+    writer, stream, sweeps = written
+    read = open_stream(getattr(writer, layout))
+    frames = list(read)
+    assert [f.index for f in frames] == [f.index for f, _ in sweeps]
+    first_read, first = frames[0], sweeps[0][0]
+    for mine, (frame, _) in zip(frames, sweeps, strict=True):
+        np.testing.assert_array_equal(mine.points, frame.points)
+        assert mine.stamp_s == pytest.approx(frame.stamp_s, abs=1e-6)
+        np.testing.assert_allclose(
+            inverse(first_read.T_world_sensor) @ mine.T_world_sensor,
+            inverse(first.T_world_sensor) @ frame.T_world_sensor,
+            atol=1e-4,
+        )
+    np.testing.assert_allclose(read.info.camera.P_image_sensor, stream.info.camera.P_image_sensor, atol=1e-9)
+    assert read.info.notes == read.info.pose_notes == ()
+
+
+@pytest.mark.parametrize(("distort", "turn_s"), [(False, 0.0), (True, 0.1)])
+def test_the_timestamps_tell_whether_sweeps_are_distorted(tmp_path, distort, turn_s):
+    stream = SyntheticStream("street", "vlp-16", 0.3, seed=4, distort=distort)
+    writer = DriveWriter(tmp_path, CAMERA)
+    for frame, truth in stream.sweeps():
+        assert frame.turn_s == turn_s
+        writer.write(frame, truth)
+    writer.close()
+    read = open_stream(writer.drive)
+    assert read.info.notes == ()
+    np.testing.assert_allclose([f.turn_s for f in read], turn_s, atol=1e-9)
+    starts, stamps = ((writer.drive / "velodyne_points" / f"timestamps{k}.txt").read_text() for k in ("_start", ""))
+    assert (starts == stamps) is not distort
+
+
+def test_tracklets_hold_the_boxes_in_view_of_the_camera(written):
+    writer, _, sweeps = written
+    items = ET.parse(writer.drive / "tracklet_labels.xml").getroot().find("tracklets").findall("item")
+    assert len(items) > 3
+    assert {i.findtext("objectType") for i in items} <= {"Car", "Van", "Truck", "Pedestrian", "Cyclist"}
+    _, truth = sweeps[0]
+    places = truth.boxes[:, :2]
+    for item in items:
+        poses = item.find("poses").findall("item")
+        assert len(poses) == int(item.find("poses").findtext("count"))
+        if item.findtext("first_frame") == "0":
+            at = [float(poses[0].findtext(k)) for k in ("tx", "ty")]
+            assert np.linalg.norm(places - at, axis=1).min() < 1e-6
+            assert at[0] > 0
+
+
+def test_labels_hold_class_and_instance(written):
+    writer, _, sweeps = written
+    for frame, truth in sweeps[:3]:
+        packed = np.fromfile(writer.sequence / "labels" / f"{frame.index:06d}.label", np.uint32)
+        np.testing.assert_array_equal(packed & 0xFFFF, truth.semantic)
+        number = (packed >> 16).astype(int)
+        for row, body in enumerate(truth.bodies):
+            np.testing.assert_array_equal(number == row + 1, truth.instance == body)
+
+
+def test_an_existing_drive_is_not_overwritten(tmp_path, capsys):
+    (tmp_path / DATE).mkdir()
+    assert main(["simulate", "--out", str(tmp_path)]) == 2
+    assert "already" in capsys.readouterr().err

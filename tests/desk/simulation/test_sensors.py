@@ -1,0 +1,45 @@
+"""The sensor table against the profiles of the same names."""
+
+import numpy as np
+import pytest
+
+from modt import profile
+from modt_desk.simulation.scan_pattern import EveryRay
+from modt_desk.simulation.sensors import SENSORS, sensor
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+
+
+@pytest.mark.parametrize("model", SENSORS.values(), ids=SENSORS)
+def test_a_sensor_agrees_with_its_profile(model):
+    config = profile.load(model.name).sensor
+    elevation_deg = np.rad2deg(model.elevation_rad)
+    span_deg, around_deg = np.ptp(elevation_deg), len(model.azimuth_rad) * np.rad2deg(np.ptp(model.azimuth_rad[:2]))
+    if config.elevations_deg is not None:
+        assert np.sort(config.elevations_deg) == pytest.approx(elevation_deg[::-1])
+    elif isinstance(model.pattern, EveryRay):
+        assert config.elevation_step_deg == pytest.approx(span_deg / (model.shape[0] - 1), rel=0.02)
+    if isinstance(model.pattern, EveryRay):
+        assert config.azimuth_step_deg == pytest.approx(around_deg / model.shape[1], rel=0.02)
+    else:
+        fired = model.pattern.fires(*np.indices(model.shape).reshape(2, -1), 0)
+        spacing_deg = np.sqrt(span_deg * around_deg / fired.sum())
+        assert config.elevation_step_deg == config.azimuth_step_deg == pytest.approx(spacing_deg, rel=0.02)
+    assert config.period_s == model.period_s
+    assert config.height_m == model.height_m
+
+
+def test_a_non_repetitive_sensor_fires_other_rays_in_every_sweep():
+    model = sensor("mid-360")
+    row, column = np.indices(model.shape).reshape(2, -1)
+    sweeps = [model.pattern.fires(row, column, k).reshape(model.shape) for k in range(6)]
+    for fired in sweeps:
+        assert fired.sum() == pytest.approx(20_000, rel=0.01)
+        assert np.ptp(fired.sum(axis=0)) <= 1
+    assert (sweeps[0] & sweeps[1]).sum() < 0.1 * sweeps[0].sum()
+    assert np.logical_or.reduce(sweeps).sum() > 4.5 * sweeps[0].sum()
+
+
+def test_its_sweeps_differ_where_nothing_moves():
+    frames = list(SyntheticStream("hall", "mid-360", 0.2))
+    first, second = ({tuple(p) for p in np.round(f.points[:, :3], 1).tolist()} for f in frames)
+    assert len(first & second) < 0.5 * len(first)

@@ -1,0 +1,147 @@
+"""The synthetic stream: reproducible, with consistent ground truth."""
+
+import numpy as np
+import pytest
+
+from modt.classes import ObjectClass
+from modt.errors import MisuseError
+from modt.geometry import FieldOfView, inverse, transform, transform_boxes
+from modt_desk.simulation.sensors import SENSORS
+from modt_desk.simulation.simulator import N_SLICES, slice_delay_s
+from modt_desk.simulation.synthetic_stream import SCENES, SyntheticStream
+from modt.types import NONE
+
+
+@pytest.fixture(scope="module")
+def street():
+    return SyntheticStream(seconds=4.0, seed=3)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_the_same_seed_gives_the_same_bytes_in_any_order(scene):
+    a, b = (SyntheticStream(scene, "vlp-16", 0.4, seed=5) for _ in range(2))
+    frames = [f.points.tobytes() for f in a]
+    assert len(frames) == 4
+    assert frames[2] == next(iter(b.between(2, 3))).points.tobytes()
+    assert frames[2] != frames[1]
+    assert SyntheticStream(scene, "vlp-16", 0.4, seed=6).simulator.sweep(0)[0].points.tobytes() != frames[0]
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+def test_every_sensor_gives_valid_frames(sensor):
+    frame = next(iter(SyntheticStream("street", sensor, 0.2)))
+    assert frame.points.dtype == np.float32
+    assert frame.points.shape[1] == 4
+    assert len(frame.points) > 5000
+    assert np.isfinite(frame.points).all()
+    assert 0 <= frame.points[:, 3].min() <= frame.points[:, 3].max() <= 1
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_points_of_a_body_lie_in_its_box(scene):
+    stream = SyntheticStream(scene, "os1-64", 0.8, seed=1)
+    inside = total = 0
+    for frame, truth in stream.sweeps():
+        for body, box in zip(truth.bodies, truth.boxes, strict=True):
+            p = frame.points[truth.instance == body, :3] - box[:3]
+            c, s = np.cos(box[6]), np.sin(box[6])
+            u = np.stack([c * p[:, 0] + s * p[:, 1], c * p[:, 1] - s * p[:, 0], p[:, 2]], axis=1)
+            inside += int((np.abs(u) < box[3:6] / 2 + 0.2).all(axis=1).sum())
+            total += len(p)
+    assert total > 1000
+    assert inside > 0.98 * total
+
+
+def test_the_truth_covers_every_point(street):
+    frame, truth = next(street.sweeps())
+    assert len(truth.instance) == len(truth.semantic) == len(truth.object_class) == len(frame.points)
+    assert {40, 50, 70} <= set(truth.semantic.tolist())
+    assert (truth.object_class[truth.instance == NONE] == ObjectClass.BACKGROUND).all()
+    counted = [(truth.instance == b).sum() for b in truth.bodies]
+    assert truth.points.tolist() == counted
+
+
+def test_bodies_at_rest_stay_where_they_are_in_the_world(street):
+    (first, a), (last, b) = (street.simulator.sweep(i) for i in (0, 39))
+    world_a = transform_boxes(first.T_world_sensor, a.boxes)
+    world_b = transform_boxes(last.T_world_sensor, b.boxes)
+    still = (a.speed_mps == 0) & (b.speed_mps == 0)
+    np.testing.assert_allclose(world_a[still, :3], world_b[still, :3], atol=1e-6)
+    assert np.linalg.norm(world_a[~still, :2] - world_b[~still, :2], axis=1).max() > 5
+
+
+def test_the_ground_lies_beneath_the_sensor(street):
+    frame, truth = next(street.sweeps())
+    road = frame.points[(truth.semantic == 40) & (np.hypot(*frame.points[:, :2].T) < 10)]
+    assert np.median(road[:, 2]) == pytest.approx(-1.73, abs=0.15)
+
+
+def test_no_two_bodies_overlap(street):
+    world = street.simulator.world
+    u = np.stack(np.meshgrid(np.linspace(-0.45, 0.45, 9), np.linspace(-0.45, 0.45, 5)), axis=-1).reshape(-1, 2)
+    for time_s in (0.0, 2.0, 4.0):
+        boxes = world.boxes(time_s)[[i for i, b in enumerate(world.bodies) if b.kind.name]]
+        ego_x, ego_y, yaw = world.ego.at(time_s)
+        boxes = np.vstack([boxes, [ego_x, ego_y, 0, 4.0, 1.7, 1.5, yaw]])
+        for i, (x, y, _, length, width, _, yaw) in enumerate(boxes):
+            c, s = np.cos(yaw), np.sin(yaw)
+            spots = u * [length, width] @ np.array([[c, s], [-s, c]]) + [x, y]
+            others = np.delete(boxes, i, axis=0)
+            off = spots[None] - others[:, None, :2]
+            c, s = np.cos(others[:, 6])[:, None], np.sin(others[:, 6])[:, None]
+            along, across = c * off[..., 0] + s * off[..., 1], c * off[..., 1] - s * off[..., 0]
+            inside = (np.abs(along) < others[:, None, 3] / 2) & (np.abs(across) < others[:, None, 4] / 2)
+            assert not inside.any()
+
+
+def test_the_camera_looks_ahead(street):
+    fov = FieldOfView.of_camera(street.info.camera)
+    assert fov.contains(np.array([[10.0, 0, 0], [-10, 0, 0], [1, 10, 0]])).tolist() == [True, False, False]
+
+
+def test_distorted_scans_are_restored_by_the_motion_during_the_sweep():
+    plain, distorted = (SyntheticStream(seconds=1.0, seed=2, distort=d) for d in (False, True))
+    (a, truth), (b, _) = plain.simulator.sweep(5), distorted.simulator.sweep(5)
+    world, sensor = plain.simulator.world, plain.simulator.sensor
+    transformed = np.linalg.norm(a.points[:, :3] - b.points[:, :3], axis=1)
+    still = truth.instance == NONE
+    assert transformed[still].max() > 0.2
+    bearing = np.arctan2(a.points[:, 1], a.points[:, 0]) % (2 * np.pi)
+    column = (bearing / (2 * np.pi) * sensor.shape[1]).astype(np.int64)
+    part = column * N_SLICES // sensor.shape[1]
+    for k in range(N_SLICES):
+        rows = still & (part == k)
+        late_s = slice_delay_s(k, sensor.period_s)
+        T = inverse(world.ego_pose(a.stamp_s)) @ world.ego_pose(a.stamp_s + late_s)
+        mended = transform(T, b.points[rows, :3].astype(np.float64))
+        np.testing.assert_allclose(mended, a.points[rows, :3], atol=1e-4)  # what float32 leaves of 80 m
+
+
+def test_the_sensor_points_ahead_at_the_stamp_and_left_before():
+    late = [slice_delay_s(k, 0.1) for k in range(N_SLICES)]  # slices go counter-clockwise from straight ahead
+    assert abs(late[0]) < 0.001
+    assert late[N_SLICES // 4] == pytest.approx(-0.025, abs=0.001)
+    assert late[3 * N_SLICES // 4] == pytest.approx(0.025, abs=0.001)
+    assert (min(late), max(late)) == pytest.approx((-0.05, 0.05), abs=0.001)
+
+
+def test_a_sensor_without_rotation_is_not_distorted():
+    (frame, _), (plain, _) = (
+        SyntheticStream("street", "solid-state", 0.1, distort=d).simulator.sweep(0) for d in (True, False)
+    )
+    assert frame.turn_s == 0.0
+    assert frame.points.tobytes() == plain.points.tobytes()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("moon", "hdl-64e", 1.0, 0),
+        ("street", "eye", 1.0, 0),
+        ("street", "vlp-16", 0.0, 0),
+        ("street", "vlp-16", 1.0, -1),
+    ],
+)
+def test_invalid_arguments_are_refused(arguments):
+    with pytest.raises(MisuseError):
+        SyntheticStream(*arguments)

@@ -1,0 +1,1 @@
+"""The desk: simulation, evaluation, experiments and pictures of recorded runs; modt, the robot, never imports it."""

@@ -1,0 +1,1 @@
+"""Commands of the desk: argument parsing alone."""

@@ -1,0 +1,112 @@
+"""`modt evaluate --experiment`: the paper's experiments on a user's drives."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from modt import host
+from modt.cli import options
+from modt.cli.progress import bar
+from modt.errors import MisuseError
+
+if TYPE_CHECKING:
+    from modt.config import EnergyConfig
+
+
+def add_options(p: argparse.ArgumentParser) -> None:
+    """Options of the experiments."""
+    g = p.add_argument_group("experiments", "the paper's tables and figures on KITTI and simulated drives")
+    which = "experiments by name, or all (docs/evaluation.md)"
+    g.add_argument("--experiment", nargs="+", metavar="NAME", help=which)
+    g.add_argument("--kitti", type=Path, metavar="ROOT", help="folder below which labelled KITTI drives lie")
+    g.add_argument(
+        "--simulated", type=options.integer(0, 10_000, "drives"), default=0, metavar="N", help="simulated drives"
+    )
+    seconds = options.real(0.2, 3600, "seconds")
+    g.add_argument("--seconds", type=seconds, default=6.0, metavar="S", help="of each (default: %(default)g)")
+    options.add_profile_option(g, "on top of each drive's sensor; later ones win key by key")
+    beside = "the same again with this profile on top; repeatable"
+    g.add_argument("--beside", action="append", default=[], metavar="NAME|FILE", help=beside)
+    board = "from modt-profile calibrate, for the energy of the first profile; then of each beside; repeatable"
+    g.add_argument("--calibration", action="append", default=[], metavar="FILE", help=board)
+    g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: %(default)s")
+    g.add_argument("--cache", type=Path, metavar="DIR", help="of intermediate results (default: OUT/cache)")
+    where = g.add_mutually_exclusive_group()
+    jobs = options.integer(1, 1024, "processes")
+    where.add_argument("--jobs", type=jobs, default=1, metavar="N", help="processes (default: %(default)s)")
+    where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT")
+    g.add_argument("--quiet", action="store_true", help="no progress bar")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Make the experiments and write their results.
+
+    Raises:
+        MisuseError: no such experiment, or no drive.
+    """
+    host.pin_to_core(None)  # one thread a process: NumPy is imported from here on
+    from modt_desk.experiments.catalogue.every import chosen
+    from modt_desk.experiments.drives import Drive, kitti_drives, simulated_drives
+    from modt_desk.experiments.output.about import About
+    from modt_desk.experiments.output.files import write
+    from modt_desk.experiments.store import Store
+    from modt_desk.experiments.study import Study
+    from modt_desk.experiments.units import Cluster, Executor, Here, Processes
+
+    experiments = chosen(arguments.experiment)
+    drives: list[Drive] = [] if arguments.kitti is None else [*kitti_drives(arguments.kitti)]
+    drives += simulated_drives(arguments.simulated, arguments.seconds)
+    if not drives:
+        raise MisuseError("--experiment", "no drives", "give --kitti ROOT, --simulated N or both")
+    out: Path = arguments.out
+    base = tuple(arguments.profile)
+    profiles = [base, *((*base, name) for name in arguments.beside)]
+    if len(arguments.calibration) > len(profiles):
+        raise MisuseError("--calibration", "more of them than profiles", "give one, and one for each --beside")
+    boards = dict(zip(profiles, map(_board, arguments.calibration), strict=False))
+    study = Study(experiments, drives, profiles, Store((arguments.cache or out / "cache").resolve()), boards)
+    executor: Executor = Here() if arguments.jobs == 1 else Processes(arguments.jobs)
+    if arguments.scheduler:
+        executor = Cluster(arguments.scheduler)
+    with bar(study.missing, "replay", shown=not arguments.quiet and sys.stderr.isatty()) as tick:
+        study.complete(executor, lambda unit: tick(unit.drive.name))
+    about = About.of(_command(arguments), profiles, boards.values())
+    rows = study.rows()
+    if not rows:
+        raise MisuseError(
+            "--experiment", "none of the drives has the sweeps that it needs", "add them, or --simulated N"
+        )
+    write(out, about, experiments, rows)
+    print(f"{len(rows)} figures: {out / 'results.md'}, {out / 'index.html'}, {out / 'results.json'}")
+    return 0
+
+
+def _board(file: str) -> EnergyConfig:
+    """Coefficients of a calibration.
+
+    Raises:
+        MisuseError: the file has none.
+    """
+    from modt import profile
+
+    energy = profile.load((profile.DEFAULT, file)).energy
+    if energy.coefficients is None:
+        cause, remedy = "no energy of a classification", "write it by modt-profile calibrate"
+        raise MisuseError(f"--calibration {file}", cause, remedy)
+    return energy
+
+
+def _command(arguments: argparse.Namespace) -> str:
+    """As another user would write it."""
+    words = ["modt", "evaluate", "--experiment", *arguments.experiment]
+    words += ["--kitti", "ROOT"] if arguments.kitti else []
+    words += ["--simulated", str(arguments.simulated)] if arguments.simulated else []
+    words += ["--seconds", f"{arguments.seconds:g}"] if arguments.simulated else []
+    words += [word for name in arguments.profile for word in ("--profile", name)]
+    words += [word for name in arguments.beside for word in ("--beside", name)]
+    words += [word for name in arguments.calibration for word in ("--calibration", name)]
+    return shlex.join(words)

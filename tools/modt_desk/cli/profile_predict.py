@@ -1,0 +1,70 @@
+"""`modt-profile predict`: what the modes will cost on a stream, before any of them runs on it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+from modt import host
+from modt.cli import options
+from modt.errors import MisuseError
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("predict", help="predict energy and gamma of the modes from other streams")
+    options.add_stream_options(p)
+    options.add_fov_option(p)
+    p.add_argument("--json", action="store_true", help="print JSON")
+    calibration = "JSON of modt-profile compare of another stream; repeatable"
+    p.add_argument("--calibration", type=Path, action="append", required=True, metavar="FILE", help=calibration)
+    seen = "frames tracked, without classifying (default: %(default)s)"
+    p.add_argument("--observe", choices=("third", "all"), default="third", help=seen)
+    p.add_argument("--out", type=Path, metavar="PREDICTION", help="write the JSON for modt-profile compare --against")
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Predict."""
+    pinned = host.pin_to_core(arguments.core)
+    # NumPy is imported from here on, after the process is pinned.
+    import numpy as np
+
+    from modt.app import request as assemble
+    from modt.app.chosen_profile import choose
+    from modt_desk.comparison.mode_runs import observe
+    from modt_desk.comparison.prediction import forecast
+    from modt_desk.comparison.prediction_report import prediction_document, prediction_tree, read_calibration
+    from modt.reporting.quantity import to_json
+    from modt.sinks.output import writing
+
+    request = assemble.Request.of(arguments)
+    stream = assemble.stream(request)
+    info = stream.info
+    itself = assemble.identity(request, stream)
+    calibration = [read_calibration(path, itself, request.fov) for path in arguments.calibration]
+    loaded = choose(request.profile, next(iter(stream), None), info).config
+    share = 3 if arguments.observe == "third" and info.n_frames is not None else 1
+    first = None if info.n_frames is None else -(-info.n_frames // share)
+    seen = observe(request, loaded, first)
+    if len(seen) < 2:
+        raise MisuseError(info.name, "no two usable frames", "give a stream that modt replay can work on")
+    frames = info.n_frames or len(seen)
+    about = {
+        **itself,
+        "fov": request.fov,
+        "asked": list(request.frames),
+        "frames": frames,
+        "seen": len(seen),
+        "calibration": [name for name, _ in calibration],
+        "core": pinned,
+    }
+    found = forecast([stream for _, stream in calibration], seen, frames, np.random.default_rng(0))
+    tree = prediction_tree(found, loaded.energy.active_W, about)
+    text = json.dumps(to_json(tree), indent=2)
+    if arguments.out is not None:
+        with writing(arguments.out):
+            arguments.out.write_text(text + "\n", encoding="utf-8")
+    print(text if arguments.json else prediction_document(tree).text())
+    return 0

@@ -1,0 +1,1 @@
+"""Comparison of the modes of the method, and blind prediction of what they cost."""

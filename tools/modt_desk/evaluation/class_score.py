@@ -1,0 +1,97 @@
+"""How well proposals are classified: by posterior, and by the class that the program says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES, N_CLASSES
+from modt_desk.evaluation.rows import Outcome, Rows, ratio
+from modt_desk.evaluation.truth import Role
+from modt.types import Bool, Float64, Int
+
+BINS = 15
+"""Of confidence, equally wide."""
+CURVE_RECALLS = np.arange(1, 21) / 20
+
+
+@dataclass(frozen=True, slots=True)
+class ClassScore:
+    """Proposals of one class."""
+
+    objects: int  # of the class, one count an object and frame
+    average_precision: float | None  # area under the envelope of precision over recall
+    curve: tuple[tuple[float, float, float], ...]  # threshold, precision, recall at each new twentieth
+    called: int  # proposals that the program says are of the class
+    precision: float | None  # share of them that lie on an object of the class
+    segmentable: int  # objects of the class that are judged for segmentation
+    recall: float | None  # share of them that are found and said to be of the class
+    recall_of_found: float | None  # of those that are found, share said to be of the class
+    calibration_error: float | None  # of the class's posterior over all judged proposals
+
+
+def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
+    """The score of each class."""
+    judged, called = proposals[proposals["to_classify"]], proposals[proposals["to_call"]]
+    scores = {}
+    for c, name in enumerate(CLASS_NAMES[1:], 1):
+        of_class = objects[(objects["class"] == c) & (objects["role"] == Role.COUNTED)]
+        wanted = of_class[of_class["to_segment"]]
+        n, correct = int(of_class["to_classify"].sum()), int((wanted["said"] == c).sum())
+        said = called["said"] == c
+        score, hit = judged["posterior"][:, c], judged["label"] == c
+        curve = precision_recall(score, hit, n)
+        scores[name] = ClassScore(
+            objects=n,
+            average_precision=_area(*curve[1:]) if n else None,
+            curve=_sampled(*curve) if n else (),
+            called=int(said.sum()),
+            precision=ratio(int((said & (called["owner"] == c)).sum()), int(said.sum())),
+            segmentable=len(wanted),
+            recall=ratio(correct, len(wanted)),
+            recall_of_found=ratio(correct, int((wanted["outcome"] == Outcome.FOUND).sum())),
+            calibration_error=expected_calibration_error(score, hit),
+        )
+    return scores
+
+
+def precision_recall(score: Float64, hit: Bool, n: int) -> tuple[Float64, Float64, Float64]:
+    """(R,) scores from the greatest on, precision and recall of all that score as much; n objects are there."""
+    order = np.argsort(-score, kind="stable")
+    true = np.cumsum(hit[order])
+    return score[order], true / np.arange(1, len(true) + 1), true / max(n, 1)
+
+
+def _area(precision: Float64, recall: Float64) -> float:
+    envelope = np.maximum.accumulate(precision[::-1])[::-1]
+    return float(np.sum(np.diff(recall, prepend=0.0) * envelope))
+
+
+def _sampled(threshold: Float64, precision: Float64, recall: Float64) -> tuple[tuple[float, float, float], ...]:
+    at = np.searchsorted(recall, CURVE_RECALLS - 1e-9)
+    at = np.unique(at[at < len(recall)])
+    return tuple(zip(threshold[at].tolist(), precision[at].tolist(), recall[at].tolist(), strict=True))
+
+
+def average_precision(probability: Float64, label: Int, truth: Int) -> dict[str, float]:
+    """Area under the precision-recall curve of each class, given (R, 4) posteriors and (R,) classes of proposals.
+
+    An object without a proposal is a false negative; truth is the (4,) number of objects of each class.
+    """
+    curves = (precision_recall(probability[:, c], label == c, int(truth[c])) for c in range(1, N_CLASSES))
+    return {name: round(_area(*curve[1:]), 4) for name, curve in zip(CLASS_NAMES[1:], curves, strict=True)}
+
+
+def expected_calibration_error(confidence: Float64, correct: Bool) -> float | None:
+    """Mean distance of confidence from accuracy, over BINS of confidence weighted by their size (Naeini, 2015)."""
+    if not len(confidence):
+        return None
+    bins = np.minimum((confidence * BINS).astype(np.int64), BINS - 1)
+    gap = np.bincount(bins, confidence - correct, BINS)
+    return float(np.abs(gap).sum() / len(confidence))
+
+
+def top_calibration_error(posterior: Float64, label: Int) -> float | None:
+    """Expected calibration error of the most probable class of (R, 4) posteriors."""
+    return expected_calibration_error(posterior.max(axis=1, initial=0), posterior.argmax(axis=1) == label)

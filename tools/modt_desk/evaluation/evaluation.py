@@ -1,0 +1,117 @@
+"""The judgement of runs: every figure, from what became of each frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES
+from modt_desk.evaluation.class_score import ClassScore, class_scores, top_calibration_error
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.matching import judge
+from modt_desk.evaluation.rows import Association, Rows, ratio
+from modt_desk.evaluation.rules import KITTI_RULES, Rules
+from modt_desk.evaluation.segmentation_score import SegmentationScore, segmentation
+from modt_desk.evaluation.track_score import TrackScore, track_metrics, track_scores
+from modt.types import NONE
+
+SCHEMA = "modt_desk.evaluation/1"
+ALL = "all"
+RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0), "40-60": (40.0, 60.0)}
+"""Bands of range by name."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveRows:
+    """What became of the frames of one drive: how many, both tables, and by class the associations frame by frame."""
+
+    frames: int
+    n_proposals: int
+    classified: int
+    objects: Rows
+    proposals: Rows
+    associations: tuple[tuple[Association, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class RangeScore:
+    """Scores of what lies within a band of range, by class (segmentation: by labelled type, too)."""
+
+    segmentation: dict[str, SegmentationScore]
+    classification: dict[str, ClassScore]
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Scores of some drives; tracks and metrics are empty and None where labels have no identities."""
+
+    drives: int
+    frames: int
+    proposals: int
+    beta: float | None  # proposals classified over all
+    ranges: dict[str, RangeScore]  # by band of range
+    tracks: dict[str, TrackScore]  # of all objects, by class and by labelled type
+    metrics: dict[str, dict[str, float]] | None  # of all classes and each; None where trackeval is not installed
+    calibration_error: float | None  # expected, of the most probable class, over all judged proposals
+    calibration_error_of_objects: float | None  # over those that stand for an object
+
+
+def score(frames: Iterable[JudgedFrame], rules: Rules = KITTI_RULES) -> Evaluation:
+    """The evaluation of the frames of one drive, in order.
+
+    Raises:
+        ValueError: there are no frames.
+    """
+    return evaluation([collect(frames, rules)])
+
+
+def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> DriveRows:
+    """What became of a drive's frames; drives that are pooled need numbers of their own.
+
+    Raises:
+        ValueError: there are no frames.
+    """
+    judged, n_proposals, classified = [], 0, 0
+    for frame in frames:
+        judged.append(judge(frame, rules, drive))
+        n_proposals, classified = n_proposals + frame.n_proposals, classified + frame.classified
+    if not judged:
+        raise ValueError("no frames")
+    objects, proposals, associations = zip(*judged, strict=True)
+    tables = np.concatenate(objects), np.concatenate(proposals)
+    return DriveRows(len(judged), n_proposals, classified, *tables, tuple(zip(*associations, strict=True)))
+
+
+def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
+    """Every figure over all drives together."""
+    objects = np.concatenate([drive.objects for drive in drives])
+    proposals = np.concatenate([drive.proposals for drive in drives])
+    n_proposals, judged = sum(drive.n_proposals for drive in drives), proposals[proposals["to_classify"]]
+    on_objects = judged[judged["label"] > 0]
+    return Evaluation(
+        drives=len(drives),
+        frames=sum(drive.frames for drive in drives),
+        proposals=n_proposals,
+        beta=ratio(sum(drive.classified for drive in drives), n_proposals),
+        ranges={name: _in_range(objects, proposals, *band) for name, band in RANGES_M.items()},
+        tracks=track_scores(objects, proposals),
+        metrics=_metrics(drives) if (objects["id"] != NONE).any() else None,
+        calibration_error=top_calibration_error(judged["posterior"], judged["label"]),
+        calibration_error_of_objects=top_calibration_error(on_objects["posterior"], on_objects["label"]),
+    )
+
+
+def _in_range(objects: Rows, proposals: Rows, low_m: float, high_m: float) -> RangeScore:
+    seen, found = (rows[(rows["range_m"] >= low_m) & (rows["range_m"] < high_m)] for rows in (objects, proposals))
+    return RangeScore(segmentation(seen), class_scores(seen, found))
+
+
+def _metrics(drives: Sequence[DriveRows]) -> dict[str, dict[str, float]] | None:
+    if find_spec("trackeval") is None:
+        return None
+    by_class = {name: [drive.associations[k] for drive in drives] for k, name in enumerate(CLASS_NAMES[1:])}
+    groups = {ALL: [frames for drive in drives for frames in drive.associations], **by_class}
+    return {name: found for name, sequences in groups.items() if (found := track_metrics(sequences))}

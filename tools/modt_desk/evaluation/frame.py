@@ -1,0 +1,48 @@
+"""What was found in a frame beside what is true of it: all that is judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Self
+
+import numpy as np
+
+from modt_desk.evaluation.truth import FrameTruth
+from modt.geometry import FieldOfView
+from modt.types import NONE, Float32, Float64, FrameResult, Int
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFrame:
+    """What was found in a frame of N points and M tracks seen, and what is true of it."""
+
+    index: int
+    points: Float32  # (N, 4) sensor frame
+    proposal: Int  # (N,) of each point, NONE where it belongs to none
+    n_proposals: int
+    classified: int  # proposals classified in the frame
+    track: Int  # (M,) identities
+    of_track: Int  # (M,) proposals
+    said: Int  # (M,) classes
+    posterior: Float64  # (M, 4)
+    truth: FrameTruth
+    fov: FieldOfView = field(default_factory=FieldOfView)
+
+    @classmethod
+    def of_result(cls, result: FrameResult, truth: FrameTruth, fov: FieldOfView | None = None) -> Self:
+        """A result of the pipeline that is still in memory."""
+        tracks, proposals = result.tracks, result.proposals
+        seen = np.flatnonzero(tracks.proposal != NONE)
+        return cls(
+            index=result.frame.index,
+            points=result.frame.points,
+            proposal=proposals.label(len(result.frame.points)),
+            n_proposals=len(proposals),
+            classified=len(result.classified),
+            track=tracks.id[seen],
+            of_track=tracks.proposal[seen],
+            said=tracks.object_class[seen],
+            posterior=tracks.posterior[seen],
+            truth=truth,
+            fov=FieldOfView() if fov is None else fov,
+        )

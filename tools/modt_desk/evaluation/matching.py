@@ -1,0 +1,145 @@
+"""Proposals and tracks of a frame against its labelled objects, by the points that they share.
+
+What is compared and what is ignored is written down in docs/evaluation.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES, N_CLASSES
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
+from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
+from modt_desk.evaluation.rules import Rules
+from modt_desk.evaluation.truth import Role
+from modt.types import NONE, Bool, Float32, Int
+
+PARKED_PAD_M = 0.4
+"""A proposal is of a parked car if it lies in its box or up to this beyond."""
+
+
+def judge(
+    frame: JudgedFrame, rules: Rules, drive: int = 0, points: ObjectPoints | None = None
+) -> tuple[Rows, Rows, tuple[Association, ...]]:
+    """The rows of a frame's objects and of its tracked proposals, and what is to be associated of each class.
+
+    points: of the labelled objects, where they are known.
+    """
+    overlap = Overlap.of(frame, points)
+    row = np.full(len(overlap.size), NONE, np.int64)
+    row[frame.of_track] = np.arange(len(frame.track))
+    track, said = (np.append(column, NONE)[row] for column in (frame.track, frame.said))
+    objects = _objects(frame, overlap, rules)
+    proposals = _proposals(frame, overlap, objects, rules)
+    objects["drive"] = proposals["drive"] = drive
+    objects["frame"] = proposals["frame"] = frame.index
+    objects["said"] = np.where(objects["outcome"] == Outcome.FOUND, said[overlap.best], NONE)
+    objects["track"] = np.where(overlap.most > 0, track[overlap.best], NONE)
+    proposals["track"], proposals["said"] = track, said
+    proposals["posterior"] = np.append(frame.posterior, np.zeros((1, N_CLASSES)), axis=0)[row]
+    associations = []
+    for c in range(1, len(CLASS_NAMES)):
+        i = np.flatnonzero(objects["to_classify"] & (objects["class"] == c))
+        k = np.flatnonzero(proposals["to_associate"] & (said == c))
+        shared = overlap.shared[np.ix_(i, k)]
+        union = overlap.count[i, None] + overlap.size[k] - shared
+        associations.append(Association(objects["id"][i], track[k], shared / np.maximum(union, 1)))
+    return objects, proposals[row != NONE], tuple(associations)
+
+
+def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
+    truth, cut_counts = frame.truth, "cut" not in rules.ignored
+    range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
+    shown = frame.points[np.concatenate([np.zeros(0, np.int64), *overlap.own])]
+    of = np.repeat(np.arange(len(overlap.own)), overlap.count)
+
+    def most(which: Bool) -> Bool:
+        """(n,) whether most points of each object are so; nothing is said of one without points."""
+        times = np.bincount(of[which], minlength=len(overlap.own))
+        found: Bool = (times > 0.5 * overlap.count) | (overlap.count == 0)
+        return found
+
+    in_view, in_sector = most(frame.fov.contains(shown)), most(_in_sector(shown, rules))
+    wanted = (truth.role != Role.IGNORED) & (range_m <= rules.max_range_m)
+    to_follow = wanted & (truth.object_class > 0) & (overlap.count >= rules.min_points_followed)
+    whole = cut_counts | (in_view & in_sector)
+    return table(
+        OBJECT,
+        len(truth.id),
+        **{"id": truth.id, "type": truth.type_, "class": truth.object_class, "role": truth.role},
+        range_m=range_m,
+        in_view=in_view,
+        to_segment=wanted & (overlap.count >= rules.min_points) & (in_view | cut_counts),
+        to_classify=to_follow & whole & (truth.role == Role.COUNTED),
+        to_follow=to_follow,
+        outcome=_outcome(overlap),
+    )
+
+
+def _outcome(overlap: Overlap) -> Int:
+    """(n,) `Outcome` of each object."""
+    conditions = {
+        Outcome.FOUND: overlap.iou > 0.5,
+        Outcome.MISSED: overlap.shared.sum(axis=1) <= 0.5 * overlap.count,
+        Outcome.SPLIT: overlap.most < 0.5 * overlap.count,
+        Outcome.MERGED: ~overlap.most_of_proposal,
+    }
+    return np.select([*conditions.values()], [*map(int, conditions)], int(Outcome.PARTIAL))
+
+
+def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules) -> Rows:
+    truth, size, best = frame.truth, overlap.size, overlap.best
+    members = np.flatnonzero(frame.proposal >= 0)
+    of, points = frame.proposal[members], frame.points[members]
+
+    def most(which: Bool) -> Bool:
+        """(P,) whether more than half of each proposal's points are so."""
+        found: Bool = np.bincount(of[which], minlength=len(size)) > 0.5 * size
+        return found
+
+    # The object that a proposal stands for, and the one in whose box it lies.
+    pairs = overlap.iou > 0.5 if rules.by_iou else overlap.most_of_object & overlap.most_of_proposal
+    matched = objects["to_classify"] & pairs
+    label, owner = np.zeros((2, len(size)), np.int64)
+    label[best[matched]] = truth.object_class[matched]
+    range_m = np.bincount(of, np.hypot(points[:, 0], points[:, 1]), len(size)) / np.maximum(size, 1)
+    judged = most(_in_sector(points, rules)) & (range_m <= rules.max_range_m)
+    range_m[best[matched]] = objects["range_m"][matched]
+    held = overlap.held > 0.5 * size
+    role = np.full(len(size), Role.COUNTED, np.int64)
+    for i, k in zip(*np.nonzero(held & (truth.object_class > 0)[:, None]), strict=True):
+        owner[k], role[k] = truth.object_class[i], truth.role[i]
+
+    # On an object that is not judged for its class; where nothing is known.
+    excused = (truth.object_class > 0) & ~objects["to_classify"] & (objects["range_m"] <= rules.max_range_m)
+    if "few" not in rules.ignored:
+        excused &= (overlap.count >= rules.min_points_followed) | (truth.role != Role.COUNTED)
+    neutral = role != Role.COUNTED
+    neutral[best[excused & overlap.most_of_proposal]] = True
+    unknown = np.zeros(len(size), np.bool_)
+    if "parked" in rules.ignored:
+        placed = in_box_frame(points, truth) if len(truth.parked) else points
+        for box in truth.parked:
+            unknown |= most(inside(placed, box, PARKED_PAD_M))
+    if "dontcare" in rules.ignored and truth.regions is not None:
+        unknown |= most(truth.regions.contains(points))
+    to_call = judged & ~(unknown & (owner == 0)) & (role != Role.IGNORED)
+    no_object = label == 0
+    return table(
+        PROPOSAL,
+        len(size),
+        range_m=range_m,
+        label=label,
+        owner=owner,
+        to_classify=judged & ~((unknown | neutral) & no_object),
+        to_call=to_call,
+        to_associate=to_call & ~(neutral & no_object),
+    )
+
+
+def _in_sector(points: Float32, rules: Rules) -> Bool:
+    """(N,) whether each point lies in the labelled sector."""
+    if rules.sector_deg >= 180:
+        return np.ones(len(points), np.bool_)
+    return np.less(np.abs(np.arctan2(points[:, 1], points[:, 0])), np.deg2rad(rules.sector_deg))

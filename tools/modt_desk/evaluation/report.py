@@ -1,0 +1,78 @@
+"""An evaluation as a table that a person can read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from modt.classes import CLASS_NAMES
+from modt_desk.evaluation.evaluation import ALL, Evaluation
+
+CLASS_TABLES = (
+    ("average precision [%] by range [m]", "average_precision", "objects"),
+    ("precision of the classes that tracks were given [%]", "precision", "called"),
+    ("recall with the right class [%]", "recall", "segmentable"),
+)
+"""Title, figure and the count that it is a share of."""
+FAILURES = ("merged", "split", "partial", "missed", "cut")
+TRACKS = ["objects", "life", "ideal", "ratio", "life as seen", "its ideal", "labelled", "breaks", "taken", "mixed"]
+METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")
+EVENTS = ("id_switches", "fragmentations")
+LEGEND = "  Rows car, pedestrian, cyclist: classes (vans as cars, unless --classes paper); others: types of labels."
+
+
+def report(sensors: Mapping[str, Evaluation]) -> str:
+    """The evaluation of each sensor, one after the other."""
+    return "\n\n".join("\n".join(_lines(name, found)) for name, found in sensors.items())
+
+
+def _lines(name: str, e: Evaluation) -> Iterator[str]:
+    drives = "1 drive" if e.drives == 1 else f"{e.drives} drives"
+    yield f"{name}: {drives}, {e.frames} frames, {e.proposals} proposals, beta {_percent(e.beta)} %"
+    bands, whole = e.ranges.values(), e.ranges[ALL]
+    rows = []
+    for kind, s in whole.segmentation.items():
+        found = [band.segmentation.get(kind) for band in bands]
+        recall = [_percent(score.recall if score else None) for score in found]
+        rows.append([kind, *recall, s.objects, *(getattr(s, failure) for failure in FAILURES)])
+    if not whole.segmentation.keys() <= set(CLASS_NAMES):
+        yield LEGEND
+    yield from _table("segmentation: recall [%] by range [m], and counts", [*e.ranges, "objects", *FAILURES], rows)
+    for title, key, count in CLASS_TABLES:
+        shares = {c: [_percent(getattr(band.classification[c], key)) for band in bands] for c in whole.classification}
+        rows = [[c, *shares[c], getattr(score, count)] for c, score in whole.classification.items()]
+        yield from _table(title, [*e.ranges, count], rows)
+    errors = {"proposals": e.calibration_error, "objects": e.calibration_error_of_objects}
+    errors |= {c: score.calibration_error for c, score in whole.classification.items()}
+    yield from _table("calibration error [%]", [*errors], [["", *map(_percent, errors.values())]])
+    lives = []
+    for kind, t in e.tracks.items():
+        figures = (t.life.life, t.life.ideal, t.life_as_seen.life, t.life_as_seen.ideal, t.labelled.ideal)
+        life, ideal, *others = (_number(value) for value in figures)
+        counts = (t.discontinuities, t.taken_over, t.mis_associations)
+        lives.append([kind, t.life.objects, life, ideal, _number(t.life.ratio, 2), *others, *counts])
+    if lives:
+        yield from _table("tracks: mean life [frames], and counts", TRACKS, [row for row in lives if row[1]])
+        measured = (e.metrics or {}).items()
+        rows = [[k, *(_percent(m[n]) for n in METRICS), *(_number(m[n], 0) for n in EVENTS)] for k, m in measured]
+        if rows:
+            yield from _table("metrics [%], and counts", [*METRICS, *EVENTS], rows)
+        elif e.metrics is None:
+            yield f"\n  {', '.join(METRICS)}, {' and '.join(EVENTS)} need trackeval: pip install '.[evaluate]'"
+
+
+def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
+    """The title and lines of aligned columns, the first to the left."""
+    lines = [[str(cell) for cell in row] for row in (("", *head), *rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    yield from ("", f"  {title}")
+    for first, *row in lines:
+        cells = (f"{cell:>{width}}" for cell, width in zip(row, widths[1:], strict=True))
+        yield "  ".join([f"  {first:<{widths[0]}}", *cells])
+
+
+def _number(value: float | None, digits: int = 1) -> str:
+    return "-" if value is None else f"{value:.{digits}f}"
+
+
+def _percent(value: float | None) -> str:
+    return _number(None if value is None else 100 * value)

@@ -1,0 +1,92 @@
+"""What became of the objects and the proposals of a frame: tables that every figure is computed from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modt.classes import CLASS_NAMES, N_CLASSES
+from modt_desk.evaluation.truth import Role
+from modt.types import Bool, Float64, Int
+
+Rows = NDArray[np.void]
+"""A structured array: of OBJECT, a row an object and frame, or of PROPOSAL, a row a tracked proposal and frame."""
+
+
+class Outcome(IntEnum):
+    """What segmentation made of an object (docs/evaluation.md)."""
+
+    FOUND = 0
+    MERGED = 1
+    SPLIT = 2
+    PARTIAL = 3
+    MISSED = 4
+
+
+OBJECT = np.dtype(
+    [
+        ("drive", int),
+        ("frame", int),
+        ("id", int),
+        ("type", object),  # as labelled
+        ("class", int),
+        ("role", int),
+        ("range_m", float),  # of the box's centre
+        ("in_view", bool),  # most of its points are
+        ("to_segment", bool),  # judged for segmentation
+        ("to_classify", bool),  # judged for average precision
+        ("to_follow", bool),  # judged for life
+        ("outcome", int),
+        ("said", int),  # class of the proposal that found it, NONE where none did
+        ("track", int),  # that owns its best proposal, NONE where none does
+    ]
+)
+PROPOSAL = np.dtype(
+    [
+        ("drive", int),
+        ("frame", int),
+        ("track", int),
+        ("range_m", float),  # of the object that it stands for; of none, the mean of its points
+        ("posterior", float, N_CLASSES),
+        ("said", int),  # class that the program says
+        ("label", int),  # class of the object that it stands for, BACKGROUND for none
+        ("owner", int),  # class of the object in whose box most of its points lie, BACKGROUND for none
+        ("to_classify", bool),  # judged for average precision
+        ("to_call", bool),  # judged for the class that is said
+        ("to_associate", bool),  # judged for HOTA, CLEAR and Identity
+    ]
+)
+
+
+def table(dtype: np.dtype[np.void], n: int, **columns: Any) -> Rows:
+    """N rows of these columns, each an array or one value for all; those not given are zero."""
+    rows = np.zeros(n, dtype)
+    for name, column in columns.items():
+        rows[name] = column
+    return rows
+
+
+def kinds(objects: Rows) -> dict[str, Bool]:
+    """Which rows are of each class, of those that count, and of each labelled type."""
+    groups: dict[str, Bool] = {
+        name: (objects["class"] == c) & (objects["role"] == Role.COUNTED) for c, name in enumerate(CLASS_NAMES) if c
+    }
+    return groups | {name: objects["type"] == name for name in sorted(set(objects["type"].tolist()))}
+
+
+def ratio(part: float, whole: float) -> float | None:
+    """Part of a whole, None of nothing."""
+    return part / whole if whole else None
+
+
+@dataclass(frozen=True, slots=True)
+class Association:
+    """Identities of (n,) objects and (k,) tracks of one class in a frame, and the (n, k) similarity of each pair."""
+
+    truth: Int
+    track: Int
+    similarity: Float64

@@ -1,0 +1,161 @@
+"""A recorded run, read back frame by frame beside its truth."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES
+from modt.energy import ledger, windows
+from modt.errors import MisuseError
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.truth import Truth
+from modt.geometry import FieldOfView
+from modt.profile import from_yaml
+from modt.sinks.records import BROKEN, read_records
+from modt.sinks.run_directory import LEDGER, RUN, TRACKS
+from modt.sinks.tracks import SCHEMA
+from modt_desk.evaluation.frames_by_number import FramesByNumber
+from modt.sources.stream import Stream
+from modt.types import Float32, Float64, Int
+
+LABELS = "labels"
+Record = tuple[str, dict[str, Any]]
+"""Of a frame, after the place where it stands."""
+Proposed = Callable[[dict[str, Any], Float32], Int]
+"""(N,) proposal of each point, NONE where it belongs to none, by the record of a frame and its (N, 4) points."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunRecord:
+    """The directory of a run."""
+
+    path: Path
+    stream: Path | None  # where its scans lay, None for the embedded stream
+    fov: str  # camera or full
+    sensor: str  # name of its profile
+    live: bool  # of a live source, which no one can open again
+
+    @classmethod
+    def open(cls, path: Path) -> RunRecord:
+        """The run of a directory.
+
+        Raises:
+            MisuseError: it is none.
+        """
+        described = path / RUN
+        try:
+            facts = from_yaml(described.read_text(encoding="utf-8"), described)
+            stream, fov, sensor = facts["stream"]["path"], facts["fov"], facts["recognition"]["used"]
+            stream, sensor = Path(stream) if stream else None, Path(sensor).stem
+            live = stream is None and bool(facts.get("service", False))
+        except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
+            raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
+        return cls(path, stream, fov, sensor, live)
+
+    def records(self) -> Iterator[Record]:
+        """The record of every frame.
+
+        Raises:
+            MisuseError: the run is empty.
+        """
+        number = 0
+        for number, record in enumerate(read_records(self.path / TRACKS, SCHEMA), 1):
+            yield f"{self.path / TRACKS}:{number}", record
+        if not number:
+            raise MisuseError(self.path / TRACKS, "no frames are recorded", "give the directory of a longer run")
+
+    def ledger_lines(self) -> dict[int, list[dict[str, Any]]]:
+        """The lines of the ledger by the frame after which each was written; none where no ledger was kept."""
+        path, lines = self.path / LEDGER, defaultdict[int, list[dict[str, Any]]](list)
+        if path.exists():
+            for line in read_records(path, ledger.SCHEMA, {windows.SCHEMA}):
+                lines[line["frame"]].append(line)
+            for line in read_records(path, windows.SCHEMA, {ledger.SCHEMA}):
+                lines[line["frames"][1]].append(line)
+        return lines
+
+    def frames(
+        self,
+        truth: Truth,
+        proposed: Proposed | None = None,
+        stream: Stream | None = None,
+        records: Iterable[Record] | None = None,
+    ) -> Iterator[JudgedFrame]:
+        """Every recorded frame beside its truth.
+
+        Args:
+            truth: of the run's recording.
+            proposed: says which points are of which proposal; None: the labels that replay --labels has written.
+            stream: the recording; None: the scans of the truth.
+            records: those of frames that are labelled; None: all.
+
+        Raises:
+            MisuseError: the run is of another recording, empty or without labels, or a record is broken.
+        """
+        stream = truth.scans if stream is None else stream
+        if stream is None:
+            raise MisuseError(self.path, "its scans are not found", "bring them back to where the run read them")
+        camera = stream.info.camera
+        if self.fov == "camera" and camera is None:
+            raise MisuseError(self.path, "the camera of its field of view is not found", "restore the calibration")
+        fov = FieldOfView.of_camera(camera) if self.fov == "camera" and camera is not None else FieldOfView()
+        sweeps = FramesByNumber(stream)
+        for place, record in self.records() if records is None else records:
+            try:
+                index = int(record["frame"])
+                found = _found(record)
+            except BROKEN as error:
+                raise broken(place, error) from None
+            labels = truth.frames.get(index)
+            if labels is None:
+                cause = f"frame {index} is not in the truth, which has {len(truth.frames)} frames"
+                raise MisuseError(place, cause, "give the truth of the run's own recording")
+            sweep = sweeps.get(index)
+            if sweep is None:
+                cause = f"{stream.info.name} has no sweep {index} that can be read"
+                raise MisuseError(place, cause, "restore it, or give the truth of the run's own recording")
+            points = sweep.points
+            proposals = self.proposals(index) if proposed is None else proposed(record, points)
+            if len(proposals) != len(points):
+                cause = f"{len(proposals)} labels for a scan of {len(points)} points"
+                raise MisuseError(self._labels(index), cause, "give the truth of the run's own recording")
+            yield JudgedFrame(index, points, proposals, *found, labels, fov)
+
+    def proposals(self, index: int) -> Int:
+        """(N,) proposal of each point of a frame, NONE where it belongs to none.
+
+        Raises:
+            MisuseError: the run was made without --labels.
+        """
+        path = self._labels(index)
+        try:
+            return (np.fromfile(path, np.uint32) >> 16).astype(np.int64) - 1
+        except OSError as error:
+            cause = f"cannot be read ({error.strerror})"
+            raise MisuseError(path, cause, "run it again with `modt replay --labels`") from None
+
+    def _labels(self, index: int) -> Path:
+        return self.path / LABELS / f"{index:06d}.label"
+
+
+def broken(place: str, error: Exception) -> MisuseError:
+    """What is said of a record that lacks something."""
+    return MisuseError(place, f"no record of a frame ({error!r})", "run it again")
+
+
+def _found(record: dict[str, Any]) -> tuple[int, int, Int, Int, Int, Float64]:
+    """Proposals and those classified; identity, proposal, class and posterior of the tracks that are seen."""
+    n_proposals, n_classified = int(record["proposals"]), int(record["classifications"])
+    seen = [track for track in record["tracks"] if track["proposal"] is not None]
+    said = [CLASS_NAMES.index(track["class"]) for track in seen]
+    posterior = np.array([track["posterior"] for track in seen], np.float64).reshape(-1, len(CLASS_NAMES))
+    ids, proposals = (np.array([track[key] for track in seen], np.int64) for key in ("id", "proposal"))
+    if len(proposals) and not 0 <= proposals.min() <= proposals.max() < n_proposals:
+        raise ValueError("a track's proposal is none of the frame's")
+    return n_proposals, n_classified, ids, proposals, np.array(said, np.int64), posterior

@@ -1,0 +1,120 @@
+"""What is true of a frame: labelled objects, and where nothing is known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from modt.classes import CLASSES, ObjectClass
+from modt_desk.evaluation.rules import Rules
+from modt.geometry import Camera, inverse, transform_boxes
+from modt_desk.evaluation.kitti_labels import Label
+from modt.sources.scan_stream import ScanStream
+from modt.types import Bool, Float32, Float64, Int
+
+STILL_M, LEAST_FRAMES = 1.0, 3
+"""A car is parked if its centre stays within STILL_M, in x and in y, over LEAST_FRAMES or more."""
+
+
+class Role(IntEnum):
+    """What a labelled type is judged for."""
+
+    COUNTED = 0
+    NEUTRAL = 1
+    """To be segmented and followed; its class is free: neither an object for average precision nor a false one."""
+    IGNORED = 2
+    """Neither to be found nor wrong when found."""
+
+
+Types = Mapping[str, tuple[ObjectClass, Role]]
+"""Class and role of each labelled type; any other one is background, judged for segmentation alone."""
+
+KITTI_TYPES: Types = {name: (c, Role.COUNTED) for c, spec in CLASSES.items() for name in spec.kitti}
+PAPER_TYPES: Types = {
+    name: (c, Role.COUNTED if name == CLASSES[c].kitti[0] else Role.IGNORED) for name, (c, _) in KITTI_TYPES.items()
+}
+"""Table III counts Car, Pedestrian and Cyclist only."""
+PANDASET_CLASSES = {
+    ObjectClass.CAR: ("Car", "Pickup Truck", "TYPE_VEHICLE"),
+    ObjectClass.PEDESTRIAN: ("Pedestrian", "Pedestrian with Object", "TYPE_PEDESTRIAN"),
+    ObjectClass.CYCLIST: ("Motorcycle", "TYPE_CYCLIST"),
+}
+LARGE = "Medium-sized Truck", "Semi-truck", "Bus", "Towed Object", "Other Vehicle - Construction Vehicle"
+PANDASET_TYPES: Types = {
+    name: (c, Role.COUNTED) for c, names in PANDASET_CLASSES.items() for name in names
+} | dict.fromkeys(LARGE, (ObjectClass.CAR, Role.NEUTRAL))
+
+
+@dataclass(frozen=True, slots=True)
+class Regions:
+    """Image regions in which nothing is labelled (KITTI's DontCare)."""
+
+    edges: Float64  # (r, 4) left, top, right, bottom [pixel]
+    camera: Camera
+
+    def contains(self, points: Float32) -> Bool:
+        """(N,) whether each of (N, 4) points is seen in one of them."""
+        P = self.camera.P_image_sensor
+        uvw = points[:, :3] @ P[:, :3].T + P[:, 3]
+        uv = uvw[:, :2] / np.maximum(uvw[:, 2:], 1e-6)
+        low, high = self.edges[:, None, :2], self.edges[:, None, 2:]
+        within: Bool = ((uv > low) & (uv < high)).all(axis=2).any(axis=0) & (uvw[:, 2] > 1)
+        return within
+
+
+@dataclass(frozen=True, slots=True)
+class FrameTruth:
+    """The n objects of one frame; boxes are upright in a frame of their own, the sensor's by default."""
+
+    id: Int  # (n,) NONE where objects are not followed
+    type_: Sequence[str]  # (n,) as labelled
+    object_class: Int  # (n,) that each should be said to be
+    role: Int  # (n,) `Role`
+    box: Float64  # (n, 7) x, y, z of the centre, l, w, h [m], yaw [rad]
+    parked: Float64 = field(default_factory=lambda: np.zeros((0, 7)))  # (k, 7) parked cars that are not labelled here
+    regions: Regions | None = None  # where nothing is labelled, None for nowhere
+    T_box_sensor: Float64 = field(default_factory=lambda: np.eye(4))
+
+    @classmethod
+    def of(cls, types: Types, id_: Sequence[int], type_: Sequence[str], box: ArrayLike, **more: Any) -> FrameTruth:
+        """Objects of labelled types; more: the fields that have a default."""
+        table = np.array([types.get(name, (0, Role.COUNTED)) for name in type_], np.int64).reshape(-1, 2)
+        boxes = np.asarray(box, np.float64).reshape(-1, 7)
+        return cls(np.asarray(id_, np.int64), tuple(type_), table[:, 0], table[:, 1], boxes, **more)
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """The labels of a recording."""
+
+    frames: Mapping[int, FrameTruth]  # of each labelled frame, by its index
+    scans: ScanStream | None  # the recording itself, None where it is not found
+    rules: Rules  # by which its labels are judged, unless others are given
+
+
+def parked_outside(labels: Iterable[Label], types: Types, poses: Mapping[int, Float64]) -> dict[int, Float64]:
+    """By frame, (k, 7) boxes of parked cars that are not labelled in it, as they stood when last or next labelled.
+
+    Args:
+        labels: of a recording.
+        types: classes of their types.
+        poses: T_world_sensor by frame.
+    """
+    cars: dict[int, dict[int, Float64]] = {}
+    for label in labels:
+        if types.get(label.type_, (None,))[0] == ObjectClass.CAR and label.frame in poses:
+            placed = transform_boxes(poses[label.frame], label.box[None])
+            cars.setdefault(label.id, {})[label.frame] = placed[0]
+    found: dict[int, list[Float64]] = {}
+    for boxes in cars.values():
+        if len(boxes) < LEAST_FRAMES or np.ptp([box[:2] for box in boxes.values()], axis=0).max() > STILL_M:
+            continue
+        for frame in poses.keys() - boxes.keys():
+            nearest = boxes[min(boxes, key=lambda labelled: abs(labelled - frame))]
+            found.setdefault(frame, []).append(transform_boxes(inverse(poses[frame]), nearest[None])[0])
+    return {frame: np.array(boxes) for frame, boxes in found.items()}

@@ -1,0 +1,154 @@
+"""What became of the frames of a drive: tables that every figure of an experiment is computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Self
+
+import numpy as np
+
+from modt.classes import ObjectClass
+from modt.classification.padding import padded_each
+from modt.config import ClassificationConfig
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.matching import judge
+from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Rows, table
+from modt_desk.evaluation.rules import Rules
+from modt_desk.evaluation.truth import FrameTruth, Role
+from modt_desk.experiments.segmented import SegmentedFrame
+from modt_desk.experiments.store import Arrays
+from modt.geometry import FieldOfView, inverse, transform
+from modt.types import NONE, Float64, FrameResult
+
+_PLAIN_OBJECT = np.dtype([(name, "U32" if name == "type" else OBJECT[name]) for name in OBJECT.names or ()])
+"""Rows of objects that can be stored."""
+FRAME = np.dtype([("drive", int), ("frame", int), ("proposals", int)])
+CALL = np.dtype([("drive", int), ("frame", int), ("track", int), ("points", int)])
+"""A row a classification: points that the network processed, padding included."""
+CENTRE = np.dtype(
+    [
+        ("drive", int),
+        ("frame", int),
+        ("id", int),  # of a labelled car
+        ("truth", float, 2),  # centre of its box [m, world]
+        ("mean", float, 2),  # of the points of its track's proposal
+        ("box", float, 2),  # centre of their box
+        ("filter", float, 2),  # position of the track
+        ("start", float, 2),  # where the sensor was in the first frame
+    ]
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Tables of one drive or of several."""
+
+    frames: Rows
+    objects: Rows
+    proposals: Rows
+    calls: Rows
+    centres: Rows
+
+    @classmethod
+    def of_labels(cls, labels: Iterable[tuple[int, FrameTruth]]) -> Self:
+        """Where every labelled object is found, followed and called by itself."""
+        rows = []
+        for frame, truth in labels:
+            wanted = (truth.object_class > 0) & (truth.role != Role.IGNORED)
+            range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
+            columns = {"class": truth.object_class, "role": truth.role, "id": truth.id, "track": truth.id}
+            rows.append(
+                table(_PLAIN_OBJECT, len(truth.id), **columns, frame=frame, range_m=range_m, to_follow=wanted)
+            )
+        objects = np.concatenate([np.zeros(0, _PLAIN_OBJECT), *rows])
+        frames = np.array([(0, row["frame"][0] if len(row) else NONE, len(row)) for row in rows], FRAME)
+        return cls(frames, objects, np.zeros(0, PROPOSAL), np.zeros(0, CALL), np.zeros(0, CENTRE))
+
+    @classmethod
+    def of_results(
+        cls,
+        results: Iterable[tuple[FrameResult, SegmentedFrame]],
+        fov: FieldOfView,
+        rules: Rules,
+        limits: ClassificationConfig,
+    ) -> Self:
+        """Of a drive's results beside its labels."""
+        frames, objects, proposals, calls, centres = [], [], [], [], []
+        start: Float64 | None = None
+        for result, known in results:
+            truth = known.truth
+            seen, tracked, _ = judge(JudgedFrame.of_result(result, truth, fov), rules, points=known.objects)
+            index, pose = result.frame.index, result.frame.T_world_sensor
+            frames.append((0, index, len(result.proposals)))
+            objects.append(seen.astype(_PLAIN_OBJECT))
+            proposals.append(tracked)
+            calls.append(_calls(result, limits))
+            if pose is not None:
+                start = pose[:2, 3] if start is None else start
+                centres.append(_centres(result, truth, seen, pose, start))
+        return cls(
+            np.array(frames, FRAME),
+            np.concatenate([np.zeros(0, _PLAIN_OBJECT), *objects]),
+            np.concatenate([np.zeros(0, PROPOSAL), *proposals]),
+            np.concatenate([np.zeros(0, CALL), *calls]),
+            np.concatenate([np.zeros(0, CENTRE), *centres]),
+        )
+
+    @classmethod
+    def pooled(cls, drives: Sequence[Judged]) -> Self:
+        """Several drives, numbered."""
+        numbered = [drive._numbered(number) for number, drive in enumerate(drives)]
+        return cls(*(np.concatenate([getattr(d, f.name) for d in numbered]) for f in fields(cls)))
+
+    @classmethod
+    def of_arrays(cls, arrays: Arrays) -> Self:
+        """As stored."""
+        return cls(**{f.name: arrays[f.name] for f in fields(cls)})
+
+    def arrays(self) -> Arrays:
+        """To be stored."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def within(self, range_m: float) -> Judged:
+        """The objects within a range."""
+        return replace(self, objects=self.objects[self.objects["range_m"] <= range_m])
+
+    def _numbered(self, number: int) -> Judged:
+        tables = {f.name: getattr(self, f.name).copy() for f in fields(self)}
+        for rows in tables.values():
+            rows["drive"] = number
+        return Judged(**tables)
+
+
+def _calls(result: FrameResult, limits: ClassificationConfig) -> Rows:
+    tracks = result.tracks
+    rows = np.flatnonzero(np.isin(tracks.id, result.classified))
+    points = padded_each(result.proposals.count[tracks.proposal[rows]], limits)
+    return table(CALL, len(rows), frame=result.frame.index, track=tracks.id[rows], points=points)
+
+
+def _centres(result: FrameResult, truth: FrameTruth, objects: Rows, pose: Float64, start: Float64) -> Rows:
+    """The cars of a frame that are followed."""
+    tracks, proposals = result.tracks, result.proposals
+    cars = np.flatnonzero((objects["class"] == ObjectClass.CAR) & (objects["track"] != NONE))
+    row = {int(id_): k for k, id_ in enumerate(tracks.id)}
+    rows = np.array([row[id_] for id_ in objects["track"][cars].tolist()], np.int64)
+    own = tracks.proposal[rows]
+    T_world_box = pose @ inverse(truth.T_box_sensor)
+
+    def placed(T: Float64, xyz: Float64) -> Float64:
+        xy: Float64 = transform(T, xyz.reshape(-1, 3))[:, :2]
+        return xy
+
+    return table(
+        CENTRE,
+        len(cars),
+        frame=result.frame.index,
+        id=objects["id"][cars],
+        truth=placed(T_world_box, truth.box[cars, :3]),
+        mean=placed(pose, proposals.centroid[own]),
+        box=placed(pose, proposals.box[own, :3]),
+        filter=tracks.x[rows, :2],
+        start=start,
+    )

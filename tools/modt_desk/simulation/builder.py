@@ -1,0 +1,122 @@
+"""Builder of a scene: collects bodies and makes the world of those that do not collide."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt_desk.simulation import kinds, vehicles
+from modt_desk.simulation.collisions import without_collisions
+from modt_desk.simulation.kinds import Kind
+from modt_desk.simulation.materials import Material
+from modt_desk.simulation.motion import Path
+from modt_desk.simulation.people import People, Posture
+from modt_desk.simulation.solids import Solids, Triple, box
+from modt_desk.simulation.terrain import Terrain
+from modt_desk.simulation.world import Body, World
+from modt.types import Float64
+
+EGO_M = (4.6, 1.8)
+"""Length and width of the ego vehicle."""
+OVERHEAD_M = 2.2
+"""Parts of scenery above this height are not part of its footprint."""
+NONE_M = 1e-3
+"""Size of a coat or a backpack that a person does not have."""
+POSTURES = {kinds.SITTER: Posture.SIT, kinds.CYCLIST: Posture.RIDE}
+"""Postures of others than pedestrians."""
+STRIP_M, STRIP_SHARE, STRIP_SHARE_CYCLISTS = 0.07, 0.04, 0.1
+"""Height of a retroreflective strip, and the shares of pedestrians and of cyclists who wear one."""
+PITCH_RAD = (0.007, 0.005)
+"""Mean and standard deviation of the sensor's pitch: in KITTI's scans people 40 m ahead are 0.3 m too high."""
+
+
+class SceneBuilder:
+    """Bodies of a scene of a duration [s]."""
+
+    def __init__(self, rng: np.random.Generator, seconds: float) -> None:
+        self.rng, self.seconds = rng, seconds
+        self.bodies: list[Body] = []
+        self._people: list[tuple[float, ...]] = []
+        self._strip_rng = rng.spawn(1)[0]
+
+    def scenery(self, solids: Solids, x: float, y: float, heading_rad: float) -> None:
+        """Add something at rest that is not annotated."""
+        self.bodies.append(Body(kinds.SCENERY, _extent(solids), Path.standing(x, y, heading_rad), solids))
+
+    def vehicle(self, kind: Kind, path: Path, size: Triple | None = None) -> None:
+        """Add a car, a van or a truck, of random proportions and, where none is given, random size."""
+        random_size, make = {
+            kinds.CAR: (vehicles.car_size, vehicles.car),
+            kinds.VAN: (vehicles.van_size, vehicles.van),
+            kinds.TRUCK: (vehicles.truck_size, vehicles.truck),
+        }[kind]
+        size = size or random_size(self.rng)
+        self.bodies.append(Body(kind, size, path, make(self.rng, size)))
+
+    def parked_bicycle(self, x: float, y: float, heading_rad: float) -> None:
+        """Add a bicycle without a rider."""
+        path = Path.standing(x, y, heading_rad)
+        self.bodies.append(Body(kinds.BICYCLE, (1.75, 0.55, 1.05), path, vehicles.bicycle(self.rng)))
+
+    def pedestrian(self, path: Path, speed_mps: float = 0.0, height: float | None = None) -> None:
+        """Add a pedestrian, standing at speed zero."""
+        height = height or self._height(1.74, 0.09, 1.15, 2.0)
+        stride = 0.24 * height * (0.6 + 0.3 * speed_mps) if speed_mps else 0.0
+        rate = np.pi * speed_mps / (2 * stride) if speed_mps else 0.0
+        size = (0.45 + 1.4 * stride if speed_mps else 0.5, float(self.rng.uniform(0.55, 0.7)), height)
+        self._person(kinds.PEDESTRIAN, size, path, height, Solids.none(), rate, stride)
+
+    def sitter(self, path: Path) -> None:
+        """Add a seated person."""
+        height = self._height(1.72, 0.08, 1.5, 1.95)
+        seat = box((-0.02, 0.0, 0.22), (0.42, 0.42, 0.44), Material.WOOD)
+        self._person(kinds.SITTER, (0.8, 0.6, 1.32), path, height, seat)
+
+    def cyclist(self, path: Path, speed_mps: float, height: float | None = None) -> None:
+        """Add a cyclist."""
+        height = height or self._height(1.74, 0.08, 1.5, 1.95)
+        size = (1.76, 0.6, 0.93 + 0.3 * height * np.cos(0.55) + 0.24 * height)
+        bicycle = vehicles.bicycle(self.rng)
+        self._person(kinds.CYCLIST, size, path, height, bicycle, 2 * np.pi * speed_mps / 4.5)
+
+    def world(self, terrain: Terrain, ego: Path, height_m: float, sway_rad: float = 0.003) -> World:
+        """The world of the bodies that collide neither with the ego vehicle nor with one another.
+
+        Of two that collide, moving bodies take precedence over bodies at rest, earlier ones over later ones.
+        """
+        order = sorted(range(len(self.bodies)), key=lambda i: self.bodies[i].path.at_rest)
+        paths = [ego, *(self.bodies[i].path for i in order)]
+        footprint = np.array([EGO_M, *(self.bodies[i].size[:2] for i in order)])
+        kept = without_collisions(paths, footprint, self.seconds)[1:]
+        remaining = sorted(i for i, k in zip(order, kept, strict=True) if k)
+        number = {old: new for new, old in enumerate(remaining)}
+        rows = [(number[int(p[0])], *p[1:]) for p in self._people if int(p[0]) in number]
+        columns: Float64 = np.array(rows).reshape(-1, 10).T
+        people = People(columns[0].astype(np.int64), columns[1].astype(np.int64), *columns[2:])
+        mount = float(self.rng.normal(0.0, 0.004)), float(self.rng.normal(*PITCH_RAD))
+        return World(terrain, [self.bodies[i] for i in remaining], people, ego, height_m, sway_rad, mount)
+
+    def _height(self, mean: float, sigma: float, low: float, high: float) -> float:
+        return float(np.clip(self.rng.normal(mean, sigma), low, high))
+
+    def _person(
+        self, kind: Kind, size: Triple, path: Path, height: float, rigid: Solids, rate: float = 0, stride: float = 0
+    ) -> None:
+        posture = POSTURES.get(kind, Posture.WALK if rate else Posture.STAND)
+        girth = float(np.clip(self.rng.normal(1.0, 0.12), 0.75, 1.35))
+        phase = float(self.rng.uniform(0, 2 * np.pi))
+        coat = self.rng.uniform(0.16, 0.24) if self.rng.random() < 0.35 else NONE_M
+        pack = self.rng.uniform(0.08, 0.16) if self.rng.random() < 0.3 else NONE_M
+        share = STRIP_SHARE_CYCLISTS if posture == Posture.RIDE else STRIP_SHARE
+        strip = STRIP_M * (self._strip_rng.random() < share)
+        self._people.append((len(self.bodies), posture, height, girth, phase, rate, stride, coat, pack, strip))
+        self.bodies.append(Body(kind, size, path, rigid))
+
+
+def _extent(solids: Solids) -> Triple:
+    """Size of the smallest box centred on the origin that holds the opaque parts below OVERHEAD_M."""
+    low = solids.take((solids.centre[:, 2] - solids.half[:, 2] < OVERHEAD_M) & ~np.isfinite(solids.density))
+    if not len(low):
+        return 0.0, 0.0, 0.0
+    reach = np.abs(low.centre) + (np.abs(low.rotation) @ low.half[:, :, None])[:, :, 0]
+    length, width, height = (2 * reach.max(axis=0)).tolist()
+    return length, width, height / 2

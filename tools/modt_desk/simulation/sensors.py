@@ -1,0 +1,218 @@
+"""Table of the simulated sensors: beams, range, noise and intensity response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.errors import MisuseError
+from modt_desk.simulation.scan_pattern import EVERY_RAY, NonRepetitive, ScanPattern
+from modt.types import Float32, Float64
+
+
+@dataclass(frozen=True)
+class Response:
+    """Intensity that a sensor reports.
+
+    Received power is compressed logarithmically: attenuation subtracts from the intensity.
+    """
+
+    near_m: float = 0.0  # least range in focus of the optics
+    far_m: float = np.inf  # greatest range in focus of the optics
+    near_loss: float = 0.0  # subtracted per metre nearer [1/m]
+    far_loss: float = 0.0  # subtracted per metre farther [1/m]
+    least: float = 0.0  # lower intensities are reported as 0
+    most: float = 1.0  # greatest reported intensity
+    steps: int = 255  # of the scale from 0 to 1
+
+    def report(self, intensity: Float32, range_m: Float32) -> Float32:
+        """(n,) reported intensities [0, most] of returns by their intensities in focus and their ranges."""
+        short, beyond = np.maximum(self.near_m - range_m, 0), np.maximum(range_m - self.far_m, 0)
+        left = intensity - self.near_loss * short - self.far_loss * beyond
+        steps = np.rint(np.clip(left, 0, self.most) * self.steps)
+        return np.asarray((steps / self.steps * (left >= self.least)).astype(np.float32))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorModel:
+    """A LiDAR that samples a grid of beams and azimuths, by default one that rotates at 10 Hz."""
+
+    name: str  # of the sensor, and of the profile it is run with
+    elevation_rad: Float64  # (B,) of each beam, descending
+    azimuth_rad: Float64  # (A,) of each column, ascending, counter-clockwise from straight ahead
+    origin_m: Float64 | float = 0.0  # (B,) height of each beam's origin above the sensor's, or one for all
+    rotating: bool = True  # a sweep is one turn of the columns
+    pattern: ScanPattern = EVERY_RAY  # rays of the grid fired in a sweep
+    height_m: float  # usual mounting height above the ground
+    min_range_m: float  # of a return
+    max_range_m: float  # of a return
+    range_sigma_m: float = 0.015  # noise of a range
+    beam_sigma_m: float = 0.0075  # standard deviation of the constant range errors of the beams
+    azimuth_sigma_rad: float = 0.0003  # jitter of a firing
+    elevation_sigma_rad: float = 0.0  # the same in elevation
+    detect_m: float = 70.0  # distance at which half the returns of a reflectivity of 0.1 at normal incidence are lost
+    dropout: float = 0.01  # share of firings lost on any surface
+    beam_radius_m: float = 0.02  # radius of a beam at its origin
+    divergence_rad: float = 0.0015  # growth of the radius with range
+    mixed_share: float = 0.12  # share of the returns at a depth edge that lie between the surfaces
+    edge_delay_m: float = 0.06  # mean range error of a return from an edge that splits the beam
+    period_s: float = 0.1  # of a sweep
+    response: Response = Response()  # reported intensity
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Beams and columns."""
+        return len(self.elevation_rad), len(self.azimuth_rad)
+
+    @property
+    def tangent(self) -> Float32:
+        """(B,) rise of each beam over horizontal distance."""
+        return np.tan(self.elevation_rad).astype(np.float32)
+
+
+def _beams(top_deg: float, bottom_deg: float, n: int) -> Float64:
+    return np.deg2rad(np.linspace(top_deg, bottom_deg, n))
+
+
+def _columns(n: int) -> Float64:
+    return np.linspace(0.0, 2 * np.pi, n, endpoint=False) + np.pi / n
+
+
+def _table(*elevations_deg: float) -> Float64:
+    return np.asarray(np.deg2rad(np.sort(elevations_deg)[::-1]))
+
+
+PANDAR64_DENSE_DEG = (
+    2.046, 1.878, 1.706, 1.54, 1.369, 1.202, 1.031, 0.864, 0.693, 0.526, 0.355, 0.187, 0.018, -0.151, -0.319, -0.49,
+    -0.657, -0.827, -0.995, -1.166, -1.333, -1.504, -1.67, -1.842, -2.01, -2.18, -2.347, -2.518, -2.682, -2.855,
+    -3.022, -3.192, -3.357, -3.53, -3.694, -3.866, -4.032, -4.203, -4.367, -4.54, -4.702, -4.874, -5.039, -5.211,
+    -5.373, -5.547, -5.708, -5.88, -6.043,
+)  # fmt: skip
+PANDAR64_SPARSE_DEG = (
+    14.9, 11.05, 8.077, 5.075, 3.058, -7.045, -8.041, -9.042, -10.027, -11.014, -11.988, -12.956, -13.912, -18.871,
+    -24.879,
+)  # fmt: skip
+VLP_32C_DEG = (
+    15.0, 10.333, 7.0, 4.667, 3.333, 2.333, 1.667, 1.333, 1.0, 0.667, 0.333, 0.0, -0.333, -0.667, -1.0, -1.333,
+    -1.667, -2.0, -2.333, -2.667, -3.0, -3.333, -3.667, -4.0, -4.667, -5.333, -6.148, -7.254, -8.843, -11.31, -15.639,
+    -25.0,
+)  # fmt: skip
+
+
+def _ouster_os1(beams: int) -> SensorModel:
+    return SensorModel(
+        name=f"os1-{beams}",
+        elevation_rad=_beams(22.5, -22.5, beams),
+        azimuth_rad=_columns(1024),
+        height_m=1.0,
+        min_range_m=0.4,
+        max_range_m=100.0,
+        range_sigma_m=0.02,
+        beam_sigma_m=0.01,
+        detect_m=60.0,
+    )
+
+
+_MODELS = (
+    # Two blocks of 32 lasers at different heights. The intensity is not corrected for range: half of it is 0 at 45 m.
+    SensorModel(
+        name="hdl-64e",
+        elevation_rad=np.append(_beams(1.94, -8.71, 32), _beams(-9.03, -25.0, 32)),
+        azimuth_rad=_columns(2083),
+        origin_m=np.append(np.linspace(0.209, 0.198, 32), np.linspace(0.126, 0.116, 32)),
+        height_m=1.73,
+        min_range_m=2.0,
+        max_range_m=80.0,
+        response=Response(12.0, 17.0, near_loss=0.012, far_loss=0.009, least=0.08, most=0.99, steps=100),
+    ),
+    SensorModel(
+        name="hdl-32e",
+        elevation_rad=_beams(10.67, -30.67, 32),
+        azimuth_rad=_columns(2170),
+        height_m=1.5,
+        min_range_m=0.9,
+        max_range_m=80.0,
+    ),
+    SensorModel(
+        name="vlp-16",
+        elevation_rad=_beams(15.0, -15.0, 16),
+        azimuth_rad=_columns(1808),
+        height_m=0.8,
+        min_range_m=0.4,
+        max_range_m=90.0,
+    ),
+    SensorModel(
+        name="vlp-32c",
+        elevation_rad=_table(*VLP_32C_DEG),
+        azimuth_rad=_columns(1808),
+        height_m=1.5,
+        min_range_m=0.9,
+        max_range_m=100.0,
+    ),
+    SensorModel(
+        name="pandar64",
+        elevation_rad=_table(*PANDAR64_DENSE_DEG, *PANDAR64_SPARSE_DEG),
+        azimuth_rad=_columns(1800),
+        height_m=2.1,
+        min_range_m=0.9,
+        max_range_m=100.0,
+        response=Response(most=0.0),  # materials are not known on its scale
+    ),
+    SensorModel(
+        name="xt-32",
+        elevation_rad=_beams(15.0, -16.0, 32),
+        azimuth_rad=_columns(2000),
+        height_m=0.8,
+        min_range_m=0.3,
+        max_range_m=100.0,
+        range_sigma_m=0.01,
+        beam_sigma_m=0.005,
+    ),
+    *(_ouster_os1(beams) for beams in (32, 64, 128)),
+    # 200,000 points a second. The grid is finer than the spacing of one sweep, which takes each 17th ray.
+    SensorModel(
+        name="mid-360",
+        elevation_rad=_beams(52.0, -7.0, 237),
+        azimuth_rad=_columns(1440),
+        rotating=False,
+        pattern=NonRepetitive(17),
+        elevation_sigma_rad=0.0018,
+        height_m=0.5,
+        min_range_m=0.1,
+        max_range_m=70.0,
+        range_sigma_m=0.02,
+        beam_sigma_m=0.0,
+        detect_m=40.0,
+    ),
+    SensorModel(
+        name="solid-state",
+        elevation_rad=_beams(7.5, -17.5, 126),
+        azimuth_rad=(np.arange(600) - 299.5) * np.deg2rad(0.2),
+        rotating=False,
+        height_m=1.0,
+        min_range_m=0.5,
+        max_range_m=150.0,
+        range_sigma_m=0.02,
+        beam_sigma_m=0.005,
+        azimuth_sigma_rad=0.0002,
+        detect_m=120.0,
+        dropout=0.005,
+        beam_radius_m=0.005,
+        divergence_rad=0.001,
+        mixed_share=0.15,
+        edge_delay_m=0.04,
+    ),
+)
+SENSORS = {model.name: model for model in _MODELS}
+
+
+def sensor(name: str) -> SensorModel:
+    """A sensor model by name.
+
+    Raises:
+        MisuseError: there is none of that name.
+    """
+    if name not in SENSORS:
+        raise MisuseError(name, "no such sensor model", f"use one of {', '.join(SENSORS)}")
+    return SENSORS[name]

@@ -1,0 +1,105 @@
+"""How the class of a track was decided: a page of its states, its views, and what the posterior was after each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES, CLASSES
+from modt.errors import MisuseError
+from modt.reporting import svg
+from modt.reporting.page import Plot, page, plots, tiles
+from modt.sinks.tracks import BOX_KEYS
+from modt.sources.stream import Stream
+from modt.types import Float32
+from modt_desk.viewer.crop_picture import crop_picture
+from modt_desk.viewer.recorded_run import RecordedRun
+from modt.viewer.track_rows import COLUMNS, SCALE
+
+Row = dict[str, float]
+
+
+def rows_of(run: RecordedRun, id_: int) -> list[Row]:
+    """What is recorded of a track, frame by frame [m, rad, m/s].
+
+    Raises:
+        MisuseError: there is no such track.
+    """
+    table = run.tracks[run.tracks[:, COLUMNS.index("id")] == id_]
+    if not len(table):
+        raise MisuseError(f"--track {id_}", "is not recorded", "point at a box in the page of the run for its number")
+    scales = [SCALE.get(name, 1) for name in COLUMNS]
+    return [dict(zip(COLUMNS, row, strict=True)) for row in (table / scales).tolist()]
+
+
+def views(run: RecordedRun, rows: list[Row], stream: Stream | None) -> dict[int, Float32]:
+    """(N, 4) points of the sweeps in which a track was classified, by index of the frame."""
+    wanted = {run.numbers[int(row["at"])]: int(row["at"]) for row in rows if row["classified"]}
+    if stream is None or not wanted:
+        return {}
+    frames = stream.between(min(wanted), max(wanted) + 1)
+    return {wanted[frame.index]: frame.points for frame in frames if frame.index in wanted}
+
+
+def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> str:
+    """HTML of the page."""
+    first, last = rows[0], rows[-1]
+    number = {int(row["at"]): run.numbers[int(row["at"])] for row in rows}
+    classified = [row for row in rows if row["classified"]]
+    spent_mJ = sum(_call_mJ(run, row) for row in classified)
+    final = next((row for row in rows if row["final"]), None)
+    certain = (
+        (f"{number[int(final['at'])]}", "its class is settled") if final else ("never", "its class is not settled")
+    )
+    name = CLASS_NAMES[int(last["class"])]
+    facts = [
+        ("said at the end", name, f"posterior {100 * last[f'p_{name}']:.1f} %"),
+        ("followed", f"{len(rows)} frames", f"{number[int(first['at'])]} to {number[int(last['at'])]}"),
+        ("classifications", f"{len(classified)}", f"{sum(r['seen'] > 0 for r in rows)} by tracking by detection"),
+        ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated, by CPU time"),
+        ("certain from frame", *certain),
+    ]
+    blocks = [tiles(facts), plots(_plots(run, rows)), *_events(run, rows, sweeps)]
+    about = f"{run.facts['stream']['name']}, mode {run.facts['mode']}: from proposal to class"
+    return page(f"Track {first['id']:g}", about, blocks)
+
+
+def _plots(run: RecordedRun, rows: list[Row]) -> Iterator[Plot]:
+    frame = np.array([run.numbers[int(row["at"])] for row in rows], float)
+    traces = [
+        svg.Trace(c, frame, np.array([row[f"p_{c}"] for row in rows]), colour=spec.colour)
+        for c, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)
+    ]
+    yield "Posterior", svg.lines(traces, "frame", "probability"), "after each frame, of views and box sizes"
+    points = svg.Trace("", frame, np.array([row["points"] for row in rows]))
+    yield "Points", svg.lines([points], "frame", "points"), "of its last proposal"
+
+
+def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> Iterator[str]:
+    """A block for each change of state and each classification."""
+    before: Row | None = None
+    for row in rows:
+        at, said = int(row["at"]), []
+        if row["classified"]:
+            posterior = ", ".join(f"{c} {100 * row[f'p_{c}']:.1f} %" for c in CLASS_NAMES)
+            name = CLASS_NAMES[int(row["class"])]
+            was = "" if before is None else f"; {name} before: {100 * before[f'p_{name}']:.1f} %"
+            where = f"{np.hypot(row['x'], row['y']):.0f} m away, {row['l']:.1f} × {row['w']:.1f} × {row['h']:.1f} m"
+            said.append(f"Classified, {row['points']:g} points, {where}, {_call_mJ(run, row):.1f} mJ.")
+            said.append(f"Posterior: {posterior}{was}.")
+        if before is None or row["state"] != before["state"]:
+            state = run.states[int(row["state"])].replace("_", " ")
+            said.append(f"Begins as {state}." if before is None else f"Becomes {state}.")
+        if row["final"] and not (before and before["final"]):
+            said.append("Certain: the class is not asked for again unless the view improves.")
+        if said:
+            pictures = crop_picture([row[key] for key in BOX_KEYS], sweeps[at]) if at in sweeps else ""
+            lines = "<br>".join(map(escape, said))
+            yield f"<section><h2>Frame {run.numbers[at]}</h2><p>{lines}</p>{pictures}</section>"
+        before = row
+
+
+def _call_mJ(run: RecordedRun, row: Row) -> float:
+    return run.call_mJ(run.frames[int(row["at"])]).get("call_mJ", 0.0)
