@@ -12,8 +12,8 @@ from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import NONE
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 
 @pytest.fixture(scope="module", name="frames")

@@ -9,8 +9,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modt.app import assembly
 from modt import profile
+from modt.app import assembly
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger

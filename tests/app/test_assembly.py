@@ -7,13 +7,13 @@ import logging
 import numpy as np
 import pytest
 
-from modt.app import assembly
 from modt import profile
+from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Budget
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 BASE = profile.load("vlp-16")
 

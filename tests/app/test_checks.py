@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from modt.app import checks
 from modt.config import ClassificationConfig, ProfileConfig, RecordingConfig
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, Scope
 from modt.errors import MisuseError
-from modt.app import checks
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.stream import StreamInfo

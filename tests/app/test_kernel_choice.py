@@ -6,14 +6,13 @@ import logging
 
 import pytest
 
-from modt.app import assembly, kernel_choice
 from modt import profile
+from modt.app import assembly, checks, kernel_choice
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.native.library import NotAvailableError
 from modt.segmentation.kernels import NUMPY
-from modt.app import checks
 
 
 @pytest.fixture

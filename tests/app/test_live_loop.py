@@ -6,11 +6,11 @@ import signal
 import numpy as np
 import pytest
 
-from modt.errors import MisuseError, ModtError
-from modt.app.loop import Stop
 from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER
 from modt.app.ladder import Ladder, Step
 from modt.app.live_loop import WAIT_S, LiveLoop, NamedSink
+from modt.app.loop import Stop
+from modt.errors import MisuseError, ModtError
 from modt.sources.live.live_stream import Received
 from modt.sources.live.sweep_reader import StreamEndedError
 from modt.types import Budget, Frame

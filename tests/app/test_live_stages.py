@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from modt import profile
-from modt.app.request import Request
-from modt.app.live_stages import LiveStages, within
-from modt.errors import MisuseError
 from modt.app.containment import RENEW_AFTER, Containment
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt.app.live_stages import LiveStages, within
+from modt.app.request import Request
+from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 
 class Source:

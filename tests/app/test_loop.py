@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.app.loop import NAP_S, FixedPeriod, FullSpeed, Stop, drive
 from modt.config import OdometryConfig
 from modt.energy.ledger import NullLedger
-from modt.app.loop import NAP_S, FixedPeriod, FullSpeed, Stop, drive
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.pose_source import PosedStream
 from modt.sources.stream import Faults, StreamInfo

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from modt.config import EnergyConfig
 from modt.app.power import Power
 from modt.app.prometheus import metrics_text, write_metrics
 from modt.app.status import Counts, one_line
+from modt.config import EnergyConfig
 from tests.results import CAR, result
 
 

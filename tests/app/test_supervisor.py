@@ -6,8 +6,8 @@ import socket
 
 import pytest
 
-from modt.errors import MisuseError
 from modt.app.supervisor import NoSupervisor, supervisor_of
+from modt.errors import MisuseError
 
 
 class Listener:

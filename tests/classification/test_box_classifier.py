@@ -12,8 +12,8 @@ from modt.classification.crops import Crops, gather, ground_z_m
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import N_REFLECTANCE, Float64, Int
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.tools.train.datasets import data_of, truth_of
 from tools.train.box_features import crop_features, dataset_features
 from tools.train.dataset import Dataset, Sensors

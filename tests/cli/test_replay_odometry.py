@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import yaml
 
-from modt.app.request import Request
 from modt.app.replay_session import Session
+from modt.app.request import Request
+from modt.app.supervisor import NoSupervisor
 from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt.app.supervisor import NoSupervisor
 from tests.sources import layouts
 
 from .commands import modt

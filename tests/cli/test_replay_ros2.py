@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modt.app.request import Request
 from modt.app.replay_session import Session
+from modt.app.request import Request
+from modt.app.supervisor import NoSupervisor
 from modt.ros2 import odometry
 from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt.app.supervisor import NoSupervisor
 from tests.ros2.network import FAR, NEAR, until
 from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 

@@ -9,12 +9,12 @@ from modt.config import FragmentConfig
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, transform
 from modt.profile import load
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.tracking.assignment import assign
 from modt.tracking.association import Matches
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
 from modt.types import NONE
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 GATE_M, SIGMA_M = 2.0, 0.3
 

@@ -3,14 +3,14 @@
 import csv
 
 from modt.app import assembly
+from modt.app.loop import FullSpeed, Stop, drive
 from modt.classes import CLASS_NAMES
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
-from modt.app.loop import FullSpeed, Stop, drive
 from modt.profile import load
 from modt.sinks.output import LineFile
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import UNLIMITED, FrameResult
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 
 class ObjectTable(LineFile[FrameResult]):

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from modt_desk.evaluation.truth_files import open_truth
 from modt.geometry import Camera
-from modt_desk.box_tracking import detections as boxes
 from modt.sources import kitti_calibration, oxts
-from modt_desk.evaluation.kitti_labels import read_labels, read_tracklets
 from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_scans
 from modt.sources.scan_file import read_scan
+from modt_desk.box_tracking import detections as boxes
+from modt_desk.evaluation.kitti_labels import read_labels, read_tracklets
+from modt_desk.evaluation.truth_files import open_truth
 from tests.desk.evaluation.test_truth_files import CUBOID, ITEM, LABEL, POSE
 from tests.fuzz.target import Feed, of_file, target
 from tests.sources import layouts, point_clouds

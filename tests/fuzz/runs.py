@@ -13,13 +13,13 @@ import numpy as np
 import onnx
 
 from modt import assets, profile
+from modt.app.status import SCHEMA
 from modt.classification.pointnet import PointNet
 from modt.cli import profile_report, status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
+from modt.sinks.service_directory import STATUS
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.evaluation.truth_files import open_truth
-from modt.app.status import SCHEMA
-from modt.sinks.service_directory import STATUS
 from tests.desk.evaluation.test_truth_files import tracklets
 from tests.fuzz.target import Feed, of_file, target
 from tests.reporting.test_run_report import write_run

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from modt.errors import ModtError
-from modt_desk.experiments.store import Store, packed
 from modt.ros2.cdr import CdrWriter
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
+from modt_desk.experiments.store import Store, packed
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import SENSOR_BOMB, network
 from tests.fuzz.targets import TARGETS

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt.app import assembly
 from modt import profile
+from modt.app import assembly
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.geometry.blind_sectors import BlindSectors

@@ -2,8 +2,8 @@ import json
 
 import pytest
 
-from modt.reporting.run_report import lateness_plots
 from modt.app.timing import Timing
+from modt.reporting.run_report import lateness_plots
 from modt.sinks.run_directory import SUMMARY
 
 

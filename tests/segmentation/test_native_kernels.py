@@ -24,8 +24,8 @@ from modt.segmentation.kernels import NUMPY
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.point_columns import FAR_M, PointColumns
 from modt.segmentation.segmenter import Segmenter
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import NONE, UNRECORDED
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop_pairs import WEIGHTS, random_pairs
 from tests.segmentation.test_car_merging import strips
 from tests.segmentation.test_clusters import cloud

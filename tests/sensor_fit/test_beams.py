@@ -5,8 +5,8 @@ import pytest
 
 from modt.geometry import rotation_zyx
 from modt.sensor_fit.beams import COARSE_ORIGINS_M, find_beams
-from modt_desk.simulation.sensors import sensor
 from modt.sources.scan_file import read_scan
+from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording
 
 SENSORS = ("vlp-16", "vlp-32c", "hdl-32e", "hdl-64e", "os1-64", "pandar64", "xt-32", "solid-state")

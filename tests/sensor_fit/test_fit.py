@@ -12,8 +12,8 @@ from modt.sensor_fit.finding import Finding, Recording
 from modt.sensor_fit.fit import FINDERS, cell_m, fit
 from modt.sensor_fit.profile_text import doubts, profile_text
 from modt.sensor_fit.reflectance import SCALES
-from modt_desk.simulation.sensors import sensor
 from modt.sources.recognise import open_stream
+from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording, with_mast, with_scale
 
 PROFILES = [path.stem for path in sorted(assets.folder("profiles").glob("*.yaml"))]

@@ -9,8 +9,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from modt.app import assembly
 from modt import profile
+from modt.app import assembly
 from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import Scheduler, Selection
 from modt.config import ProfileConfig, TrackingConfig

@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from modt.app import assembly
 from modt import profile
+from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.tracking.states import ACCURATE, EFFICIENT
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
 N = TrackingConfig().max_missed

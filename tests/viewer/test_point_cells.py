@@ -1,8 +1,8 @@
 import numpy as np
 
 from modt.profile import load
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.viewer.point_cells import SIDE, Cells, Grid
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 
 def test_a_cell_shows_its_highest_point_and_ground_as_such():

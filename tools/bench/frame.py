@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.app import assembly
 from modt import host, profile
+from modt.app import assembly
 from modt.config.segmentation import NATIVE
 from modt.config.segmentation import NUMPY as NUMPY_KERNELS
 from modt.energy.ledger import Ledger

@@ -30,8 +30,8 @@ from scipy.spatial import cKDTree
 from modt import host, profile
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Float32
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 OURS, BASELINE = "modt: ground + clusters + boxes", "Patchwork++: ground"
 RADIUS_M, MIN_POINTS = 0.5, 5

@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt_desk.cli import track
 from modt.config import OdometryConfig, TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.odometry.odometry import Odometry
-from modt_desk.box_tracking.detections import Detections, files, read
 from modt.tracking.states import EFFICIENT
 from modt.tracking.tracker import Tracker
 from modt.types import Float64, Frame, Proposals
+from modt_desk.box_tracking.detections import Detections, files, read
+from modt_desk.cli import track
 from tools.options import parser
 
 POINTS = 80

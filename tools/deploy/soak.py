@@ -24,15 +24,15 @@ import numpy as np
 
 from modt import host
 from modt.app import metering
-from modt.app.request import Request, stream
-from modt.app.live_session import LiveSession
 from modt.app.ladder import Step
 from modt.app.live_loop import NamedSink
+from modt.app.live_session import LiveSession
+from modt.app.request import Request, stream
+from modt.app.supervisor import NoSupervisor
 from modt.sinks.output import Health
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.played_reader import PlayedReader
 from modt.sources.live.sweep_reader import StreamEndedError, Sweep
-from modt.app.supervisor import NoSupervisor
 from modt.types import FrameResult
 from tools.deploy.faults import FAULTS, FULL_DISK, Fault, World
 from tools.options import parser

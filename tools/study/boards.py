@@ -21,8 +21,8 @@ from pathlib import Path
 
 import numpy as np
 
-from modt.app import assembly
 from modt import host, profile
+from modt.app import assembly
 from modt.cli.options import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView

@@ -17,9 +17,9 @@ import numpy as np
 
 from modt import profile
 from modt.classes import CLASS_NAMES
-from modt_desk.evaluation.overlap import FOOT_M
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
+from modt_desk.evaluation.overlap import FOOT_M
 from tools.options import parser
 from tools.train.labelled_scans import Scan, object_scans
 from tools.train.synthetic_scans import simulated_scans

@@ -22,9 +22,9 @@ from scipy.stats import chi2
 
 from modt.classes import CLASS_NAMES
 from modt.geometry import wrap
-from modt_desk.simulation.world import MOVING_MPS
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Float64
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_desk.simulation.world import MOVING_MPS
 from tools.options import parser
 from tools.study.truth_replay import JudgedFrame, add_drives, replay
 

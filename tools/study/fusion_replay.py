@@ -12,9 +12,9 @@ from modt.classification.prior import Prior
 from modt.classification.scheduler import LinearCost, Scheduler
 from modt.config import SchedulerConfig
 from modt.energy.ledger import NullLedger
-from modt_desk.evaluation.class_score import average_precision
 from modt.pipeline import Fusion, Pipeline
 from modt.types import Bool, Float64, Frame, Int, Proposals, Tracks
+from modt_desk.evaluation.class_score import average_precision
 from tools.study.recording import Playback, Recording
 
 CALLS = ("first views", "first key views", "further views", "reviews")

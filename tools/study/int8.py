@@ -23,8 +23,8 @@ from modt.classes import N_CLASSES
 from modt.classification.crops import Crops, canonical
 from modt.classification.pointnet import PointNet
 from modt.config import ClassificationConfig, SensorConfig
-from modt_desk.evaluation.class_score import average_precision
 from modt.types import Float32, Float64, Int
+from modt_desk.evaluation.class_score import average_precision
 from tools.options import parser
 from tools.train.dataset import SHIPPED, Dataset, load
 

@@ -31,18 +31,18 @@ from modt.classification.pointnet import PointNet
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
+from modt.geometry import FieldOfView
+from modt.profile import DEFAULT, load
+from modt.sources.recognise import open_stream
+from modt.types import Float64, Frame
 from modt_desk.evaluation.evaluation import ALL, Evaluation, score
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.rules import CUBOID_RULES, Rules
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role
 from modt_desk.evaluation.truth_files import open_truth
-from modt.geometry import FieldOfView
-from modt.profile import DEFAULT, load
 from modt_desk.simulation import simulator
 from modt_desk.simulation.kinds import TRUCK
-from modt.sources.recognise import open_stream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt.types import Float64, Frame
 from tools.options import parser
 from tools.study import truth_replay
 from tools.study.filter_consistency import errors, lives

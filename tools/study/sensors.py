@@ -13,15 +13,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from modt.app import assembly
 from modt import profile
+from modt.app import assembly
 from modt.classes import CLASS_NAMES
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
+from modt.geometry import FieldOfView
 from modt_desk.evaluation.evaluation import ALL, DriveRows, Evaluation, collect, evaluation
 from modt_desk.evaluation.frame import JudgedFrame
-from modt.geometry import FieldOfView
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.synthetic_stream import CAMERA
 from tools.options import parser

@@ -40,8 +40,8 @@ from modt.config import FusionConfig, ProfileConfig
 from modt.pipeline import Fusion
 from modt.reporting import page, svg
 from modt.sources.recognise import open_stream
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Frame
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 from tools.study.fusion_replay import Outcome, replay
 from tools.study.recording import Recording, record

@@ -13,9 +13,9 @@ from modt.cli.options import frames as number_range
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
+from modt.types import NONE, Float64, FrameResult, Int, Proposals
 from modt_desk.simulation.simulator import Truth
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt.types import NONE, Float64, FrameResult, Int, Proposals
 
 
 @dataclass(frozen=True, slots=True)

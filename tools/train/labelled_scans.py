@@ -13,12 +13,12 @@ from modt import profile
 from modt.classes import CLASSES, ObjectClass, class_of_kitti
 from modt.config import ProfileConfig, SensorConfig
 from modt.errors import MisuseError
-from modt_desk.evaluation import overlap
-from modt_desk.evaluation.truth import PANDASET_TYPES, Regions, Role
 from modt.geometry import Camera, FieldOfView
 from modt.sources.kitti_calibration import camera_of_raw, camera_of_sequence
-from modt_desk.evaluation.kitti_labels import DONT_CARE, read_labels, read_tracklets
 from modt.types import Bool, Float32, Float64, Int
+from modt_desk.evaluation import overlap
+from modt_desk.evaluation.kitti_labels import DONT_CARE, read_labels, read_tracklets
+from modt_desk.evaluation.truth import PANDASET_TYPES, Regions, Role
 
 SEMANTIC_CLASS = {label: c for c, spec in CLASSES.items() for label in spec.semantic_kitti} | dict.fromkeys(
     (18, 258), ObjectClass.BACKGROUND

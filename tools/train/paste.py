@@ -15,9 +15,9 @@ from numpy.random import Generator
 
 from modt.classes import ObjectClass
 from modt.config import SensorConfig
-from modt_desk.evaluation.overlap import PAD_M
 from modt.geometry import FieldOfView
 from modt.types import Bool, Float32, Float64, Int
+from modt_desk.evaluation.overlap import PAD_M
 from tools.train.labelled_scans import Scan
 
 MIN_POINTS, CLEARANCE_M, OCCLUSION_MARGIN_M = 8, 0.4, 0.4

@@ -12,13 +12,13 @@ import numpy as np
 from scipy.special import log_softmax, softmax
 
 from modt.classes import CLASS_NAMES, N_CLASSES
+from modt.types import NONE, Bool, Float64, Int
 from modt_desk.evaluation.class_score import (
     average_precision,
     expected_calibration_error,
     precision_recall,
     top_calibration_error,
 )
-from modt.types import NONE, Bool, Float64, Int
 from tools.train.held_out import Validation
 from tools.train.temperature_scaling import fit_calibration
 

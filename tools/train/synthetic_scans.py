@@ -10,9 +10,9 @@ import numpy as np
 
 from modt import profile
 from modt.geometry import FieldOfView
+from modt.types import Frame
 from modt_desk.simulation.simulator import Truth
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
-from modt.types import Frame
 from tools.train.label_scenes import label_scene
 from tools.train.labelled_scans import TEST_DRIVE, Scan
 

@@ -10,16 +10,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from modt.errors import ModtError
-from modt.app.loop import Stop
-from modt.pipeline import SINK
 from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.ladder import GIVEN_UP, Change, Ladder, Step, budget_at
+from modt.app.loop import Stop
+from modt.app.supervisor import Supervisor
 from modt.app.timing import RestCost, Timing
+from modt.errors import ModtError
+from modt.pipeline import SINK
 from modt.sinks.output import Sink
 from modt.sources.live.live_stream import Received
 from modt.sources.live.sweep_reader import StreamEndedError
-from modt.app.supervisor import Supervisor
 from modt.types import Budget, Frame, FrameResult
 
 log = logging.getLogger(__name__)

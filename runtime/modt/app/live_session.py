@@ -12,17 +12,19 @@ from pathlib import Path
 from typing import Any
 
 from modt import host, profile
-from modt.app import request as assemble, metering
-from modt.app.live_stages import LiveStages
-from modt.app.parts import Parts
-from modt.energy.meters.meter import Kind
-from modt.app.loop import Stop
-from modt.reporting.summary import Summary
+from modt.app import metering
+from modt.app import request as assemble
 from modt.app.ladder import Ladder
 from modt.app.live_loop import LiveLoop, NamedSink
+from modt.app.live_stages import LiveStages
+from modt.app.loop import Stop
+from modt.app.parts import Parts
 from modt.app.power import Power
 from modt.app.prometheus import write_metrics
 from modt.app.status import SCHEMA, Counts, loop_report, one_line
+from modt.app.supervisor import Supervisor
+from modt.energy.meters.meter import Kind
+from modt.reporting.summary import Summary
 from modt.sinks.addresses import close_together
 from modt.sinks.job_thread import JobThread
 from modt.sinks.output import LedgerSink
@@ -30,7 +32,6 @@ from modt.sinks.recording import Recording
 from modt.sinks.run_directory import SUMMARY
 from modt.sinks.service_directory import STATUS, ServiceDirectory
 from modt.sources.live.live_stream import LiveStream
-from modt.app.supervisor import Supervisor
 from modt.types import FrameResult
 
 log = logging.getLogger(__name__)

@@ -12,11 +12,11 @@ from modt import host
 from modt.app import request as assemble
 from modt.app.chosen_profile import ChosenProfile, choose
 from modt.app.parts import Parts, pipeline_of
+from modt.app.sensor_watch import SensorWatch
 from modt.energy.ledger import Ledger
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Pipeline
 from modt.sensor_fit.recognition import recognise
-from modt.app.sensor_watch import SensorWatch
 from modt.sinks.output import Sink
 from modt.sources.pose_source import PoseSource
 from modt.tracking.track_table import TrackTable

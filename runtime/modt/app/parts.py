@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from modt.app import assembly
 from modt import host, profile
-from modt.classes import CLASS_NAMES
+from modt.app import assembly
 from modt.app import request as assemble
 from modt.app.chosen_profile import ChosenProfile
+from modt.classes import CLASS_NAMES
 from modt.config import ProfileConfig
 from modt.energy.ledger import StageLedger
 from modt.pipeline import Pipeline

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import re
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from modt import host, profile
-from modt.app import request as assemble, metering
+from modt.app import metering
+from modt.app import request as assemble
 from modt.app.chosen_profile import choose
-from modt.app.parts import Parts, pipeline_of
-from modt.cli.progress import Tick
-from modt.energy.ledger import Ledger
 from modt.app.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
+from modt.app.parts import Parts, pipeline_of
+from modt.app.supervisor import Supervisor
+from modt.energy.ledger import Ledger
 from modt.reporting.summary import Summary
 from modt.sinks.addresses import close_together, open_sink
 from modt.sinks.kitti import KittiResults
@@ -23,8 +25,10 @@ from modt.sinks.output import LedgerLines, Sink
 from modt.sinks.run_directory import RunDirectory
 from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_source import PosedStream
-from modt.app.supervisor import Supervisor
 from modt.types import FrameResult, Proposals
+
+Tick = Callable[[FrameResult], None]
+"""Called after every frame."""
 
 
 class Session:

@@ -6,6 +6,7 @@ import argparse
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from importlib import import_module
 from pathlib import Path
 from typing import Protocol
 
@@ -17,9 +18,9 @@ from modt.sources.pose_socket import PoseSocket, open_socket
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream, StreamInfo
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 
-EMBEDDED_SECONDS = 10.0
+STREET = "modt_desk.simulation.synthetic_stream"
+"""Module of the synthetic street, loaded only where no recording is given."""
 RECORDED, NONE = "recording", "none"
 """Odometries that need no address."""
 log = logging.getLogger(__name__)
@@ -61,7 +62,7 @@ def stream(request: Request) -> Stream:
         MisuseError: the path is no stream.
     """
     if request.path is None:
-        whole: Stream = SyntheticStream("street", "hdl-64e", EMBEDDED_SECONDS, seed=0)
+        whole: Stream = import_module(STREET).embedded_street()
     else:
         period_s = profile.load(request.profile).sensor.period_s
         whole = open_stream(request.path, period_s, dict(request.capture))

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from modt.classes import CLASS_NAMES
 from modt.app.live_loop import LiveLoop
+from modt.classes import CLASS_NAMES
 from modt.types import NONE, FrameResult
 
 SCHEMA = "modt.status/1"

@@ -26,12 +26,10 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.app import kernel_choice
     from modt import profile
-    from modt.classification.pointnet import PointNet
-    from modt.app import metering
+    from modt.app import checks, kernel_choice, metering
     from modt.app.live_source import open_source
-    from modt.app import checks
+    from modt.classification.pointnet import PointNet
 
     config = profile.load(arguments.profile)
     limits = config.classification

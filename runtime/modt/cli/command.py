@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import logging
 import sys
-from collections.abc import Sequence
-from types import ModuleType
+from collections.abc import Mapping, Sequence
+from importlib import import_module
 
 from modt import __version__
 from modt.errors import ModtError
@@ -15,16 +15,18 @@ INTERRUPTED = 130
 """Exit status after Ctrl-C, as in shells: 128 + SIGINT."""
 
 
-def dispatch(name: str, description: str, commands: Sequence[ModuleType], argv: Sequence[str] | None) -> int:
+def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Sequence[str] | None) -> int:
     """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted.
 
-    The add_parser of its module sets `run` to a function of the parsed arguments that returns the status.
+    `commands` holds the module of each. Only that of the command given is imported; its add_parser sets `run` to a
+    function of the parsed arguments that returns the status.
     """
     top = argparse.ArgumentParser(prog=name, description=description)
     top.add_argument("--version", action="version", version=f"modt {__version__}")
     choice = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for command in commands:
-        command.add_parser(choice)
+    given = next(iter(sys.argv[1:] if argv is None else argv), "")
+    for module in [commands[given]] if given in commands else commands.values():
+        import_module(module).add_parser(choice)
     arguments = top.parse_args(argv)
     logging.basicConfig(level=logging.WARNING, format="modt: %(message)s", stream=sys.stderr)
     try:

@@ -7,11 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import check, profiles, replay, run, status, top
-from modt_desk.cli import evaluate, export, simulate, track, view
 from modt.cli.command import dispatch
 
-COMMANDS = (replay, run, status, top, check, view, evaluate, export, simulate, track, profiles)
+COMMANDS = {
+    "replay": "modt.cli.replay",
+    "run": "modt.cli.run",
+    "status": "modt.cli.status",
+    "top": "modt.cli.top",
+    "check": "modt.cli.check",
+    "view": "modt_desk.cli.view",
+    "evaluate": "modt_desk.cli.evaluate",
+    "export": "modt_desk.cli.export",
+    "simulate": "modt_desk.cli.simulate",
+    "track": "modt_desk.cli.track",
+    "profile": "modt.cli.profiles",
+}
+"""Module of each command; those of the desk are named here alone."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

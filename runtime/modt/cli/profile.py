@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modt.cli import profile_calibrate, profile_meters, profile_report
-from modt_desk.cli import profile_compare, profile_predict
 from modt.cli.command import dispatch
 
-COMMANDS = (profile_meters, profile_calibrate, profile_report, profile_compare, profile_predict)
+COMMANDS = {
+    "meters": "modt.cli.profile_meters",
+    "calibrate": "modt.cli.profile_calibrate",
+    "report": "modt.cli.profile_report",
+    "compare": "modt_desk.cli.profile_compare",
+    "predict": "modt_desk.cli.profile_predict",
+    "regimes": "modt_desk.cli.profile_regimes",
+}
+"""Module of each command."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

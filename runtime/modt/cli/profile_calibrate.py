@@ -38,12 +38,12 @@ def run(arguments: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from modt.app import assembly, kernel_choice
     from modt import profile
+    from modt.app import assembly, kernel_choice, metering
+    from modt.app import request as assemble
+    from modt.app.chosen_profile import choose
     from modt.classification.padding import padded_size
     from modt.classification.pointnet import PointNet
-    from modt.app import request as assemble, metering
-    from modt.app.chosen_profile import choose
     from modt.config import WindowConfig
     from modt.energy.attribution import FitError
     from modt.energy.ledger import Ledger

@@ -1,7 +1,6 @@
 """Configuration: one frozen dataclass a stage, one nested in it a mechanism; every value is checked as it is made."""
 
 from modt.config.base import StageConfig, ValueRangeError
-from modt_desk.box_tracking.config import BoxTrackingConfig
 from modt.config.classification import (
     CallWorthConfig,
     ClassificationConfig,
@@ -29,7 +28,6 @@ from modt.config.tracking import (
 
 __all__ = [
     "BackgroundMapConfig",
-    "BoxTrackingConfig",
     "CallWorthConfig",
     "ClassificationConfig",
     "CostModelConfig",

@@ -25,9 +25,9 @@ from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, STAGES
 from modt.reporting import energy_plots, svg
 from modt.reporting.document import Cell, Document, Table
-from modt_desk.comparison.gamma import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt.reporting.page import Plot
 from modt.reporting.quantity import Quantity, estimate, quantity
+from modt.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
 from modt.reporting.run_sums import COLUMNS, FrameSums
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS

@@ -11,9 +11,9 @@ from modt.address import Address
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
 from modt.types import FrameResult
+from modt.viewer.html_page import content, page
 from modt.viewer.live_frame import STEP_CM, live_message
 from modt.viewer.live_server import LiveServer
-from modt_desk.viewer.player import content, page
 
 log = logging.getLogger(__name__)
 

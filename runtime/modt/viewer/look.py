@@ -1,4 +1,4 @@
-"""Colours of pictures: of classes, of states and of stages."""
+"""What pages and pictures share: the width that is shown, and the colours of classes, states and stages."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from modt.reporting.page import COLOURS
 Entry = dict[str, str]
 """`name` and `colour` of a line of a legend."""
 
+REACH_M = 45.0
+"""Half of the width that is shown [m]."""
 _GREY = COLOURS[5]
 _STATE_COLOURS = {
     "unmatched": _GREY,

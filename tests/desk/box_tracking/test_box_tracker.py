@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt_desk.box_tracking.box_tracker import MAX_COST, BoxTracker, assign
 from modt.classes import OBJECTS
+from modt_desk.box_tracking.box_tracker import MAX_COST, BoxTracker, assign
 from modt_desk.box_tracking.config import (
     BoxConfidenceConfig,
     BoxTrackingConfig,

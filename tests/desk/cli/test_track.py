@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
-from modt_desk.cli import track
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes
 from modt_desk.box_tracking.detections import T_LEVEL_CAMERA, Detections, boxes_to_kitti, read
+from modt_desk.cli import track
 
 
 def run(*arguments):

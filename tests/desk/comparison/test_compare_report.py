@@ -10,13 +10,13 @@ from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
-from modt_desk.comparison.compare_report import Basis, compare_tree
-from modt_desk.comparison.compare_view import compare_document, compare_plots
-from modt_desk.comparison.comparison import ModeRun, interleave
 from modt.reporting.energy_plots import stage_energy_mJ
 from modt.reporting.page import document_page
 from modt.reporting.quantity import to_json
 from modt.types import UNLIMITED, Frame
+from modt_desk.comparison.compare_report import Basis, compare_tree
+from modt_desk.comparison.compare_view import compare_document, compare_plots
+from modt_desk.comparison.comparison import ModeRun, interleave
 from tests.results import CAR, result
 
 from .test_run_report import KINDS, figures

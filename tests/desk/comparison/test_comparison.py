@@ -9,8 +9,8 @@ from modt.energy.ledger import Ledger
 from modt.energy.meters.model import model_meter
 from modt.energy.windows import Clocks, Windows
 from modt.pipeline import STAGES
-from modt_desk.comparison.comparison import COUNTS, ModeRun, interleave, total
 from modt.types import UNLIMITED, Budget, Frame
+from modt_desk.comparison.comparison import COUNTS, ModeRun, interleave, total
 from tests.results import CAR, result
 
 FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(6)]

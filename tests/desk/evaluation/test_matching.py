@@ -6,13 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.classes import ObjectClass
+from modt.geometry import Camera, FieldOfView, rotation_zyx, se3, transform
+from modt.types import NONE
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.overlap import Overlap, inside
 from modt_desk.evaluation.rows import Outcome
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import KITTI_TYPES, PANDASET_TYPES, PAPER_TYPES, FrameTruth, Regions
-from modt.geometry import Camera, FieldOfView, rotation_zyx, se3, transform
-from modt.types import NONE
 from tests.desk.evaluation.scenes import blob, car, cars, frame
 
 CAR, BACKGROUND = ObjectClass.CAR, ObjectClass.BACKGROUND

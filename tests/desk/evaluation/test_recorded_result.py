@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from modt_desk.evaluation.recorded_result import recorded_result
 from modt.geometry import wrap
 from modt.sinks.tracks import frame_record
 from modt.types import NONE
+from modt_desk.evaluation.recorded_result import recorded_result
 from tests.golden.replay import replay
 from tests.results import CAR, result
 

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from modt.types import NONE
 from modt_desk.evaluation.evaluation import collect, evaluation, score
 from modt_desk.evaluation.rows import Association
 from modt_desk.evaluation.rules import KITTI_RULES
 from modt_desk.evaluation.track_score import track_metrics
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
-from modt.types import NONE
 from tests.desk.evaluation.scenes import blob, car, cars, frame
 
 PLACES = (10.0, 20.0)

@@ -2,10 +2,10 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
+from modt.types import NONE
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import Role
 from modt_desk.evaluation.truth_files import open_truth
-from modt.types import NONE
 from tests.sources import layouts
 
 ITEM = """<item><objectType>{type}</objectType><h>1.5</h><w>2</w><l>4</l><first_frame>{first}</first_frame>

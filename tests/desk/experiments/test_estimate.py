@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from modt.classes import ObjectClass
+from modt.types import NONE
 from modt_desk.evaluation.class_score import class_scores
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, table
 from modt_desk.experiments.catalogue.estimate import Estimate, ratio
 from modt_desk.experiments.catalogue.figures import ObjectLives, TrackLives, latencies, precisions
 from modt_desk.experiments.judged import CALL, CENTRE, FRAME, Judged
-from modt.types import NONE
 
 CAR = int(ObjectClass.CAR)
 

@@ -2,10 +2,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.profile import load
 from modt_desk.experiments.catalogue.figures import ObjectLives
 from modt_desk.experiments.replays import NetworkReplay
 from modt_desk.experiments.store import Store
-from modt.profile import load
 from tests.desk.experiments.drives import short_drives
 
 DRIVE = short_drives(1, frames=6)[0]

@@ -4,11 +4,11 @@ import dataclasses
 
 import numpy as np
 
+from modt.profile import load
 from modt_desk.experiments.played_back import PlayedBack
 from modt_desk.experiments.replays import NetworkReplay
 from modt_desk.experiments.segmented import segmented
 from modt_desk.experiments.store import Store
-from modt.profile import load
 from tests.desk.experiments.drives import short_drives
 
 DRIVE = short_drives(1)[0]

@@ -5,13 +5,13 @@ import pytest
 
 from modt.app import assembly
 from modt.energy.ledger import NullLedger
+from modt.profile import load
+from modt.segmentation.kernels import NUMPY
 from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.experiments.replays import NetworkReplay
 from modt_desk.experiments.segmented import segmented
 from modt_desk.experiments.store import Store
-from modt.profile import load
-from modt.segmentation.kernels import NUMPY
 from tests.desk.experiments.drives import short_drives
 
 DRIVE = short_drives(1)[0]

@@ -7,8 +7,8 @@ import pytest
 
 from modt.cli.main import main
 from modt.geometry import inverse
-from modt_desk.simulation.kitti_raw import DATE, DriveWriter
 from modt.sources.recognise import open_stream
+from modt_desk.simulation.kitti_raw import DATE, DriveWriter
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 
 

@@ -19,8 +19,8 @@ from modt_desk.simulation.raycast import RayCaster
 from modt_desk.simulation.returns import Receiver
 from modt_desk.simulation.sensors import sensor
 from modt_desk.simulation.solids import box
-from modt_desk.simulation.vehicles import car, car_size, van, van_size
 from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt_desk.simulation.vehicles import car, car_size, van, van_size
 from tools.train.label_scenes import label_scene
 
 HDL = sensor("hdl-64e")

@@ -6,10 +6,10 @@ import pytest
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, transform, transform_boxes
+from modt.types import NONE
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.simulator import N_SLICES, slice_delay_s
 from modt_desk.simulation.synthetic_stream import SCENES, SyntheticStream
-from modt.types import NONE
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from modt_desk.viewer.canvas import REACH_M
-from modt_desk.viewer.extent import reach_m
+from modt.viewer.look import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
+from modt_desk.viewer.extent import reach_m
 
 
 def rows(x, y, seen=1):

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
 from modt.geometry import se3
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth
 from modt_desk.viewer.truth_marks import _objects, points_in_boxes
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import PacketDecoder
-from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt.types import Float32
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.send.faults import Timed
 from tools.send.velodyne_packets import LAYOUTS, packets_of
 

@@ -21,11 +21,12 @@ import numpy as np
 import pytest
 import yaml
 
-from modt.app import assembly, kernel_choice
 from modt import profile
-from modt.classification import pointnet
+from modt.app import assembly, kernel_choice
 from modt.app import request as assemble
+from modt.app.ladder import Ladder
 from modt.app.live_stages import within
+from modt.classification import pointnet
 from modt.config import ProfileConfig
 from modt.config.keys import Key, keys, value_of
 from modt.energy.conditions import Conditions
@@ -34,12 +35,11 @@ from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
 from modt.reporting.run_report import run_tree
 from modt.segmentation.sensor_height import HeightEstimator
-from modt.app.ladder import Ladder
 from modt.sinks.recording import Recording
 from modt.sinks.service_directory import MARK, ServiceDirectory
 from modt.sources.pose_socket import PoseSocket
-from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 from modt.types import Frame
+from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 from tests.reporting.test_run_report import write_run
 from tests.results import result
 from tools.docs.profile_keys import condition

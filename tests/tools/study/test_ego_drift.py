@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from modt.geometry import rotation_zyx, se3
-from modt_desk.simulation.kitti_raw import DriveWriter
 from modt.sources.recognise import open_stream
+from modt_desk.simulation.kitti_raw import DriveWriter
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 from tools.study import ego_drift
 

@@ -1,7 +1,7 @@
 """The table over sensors."""
 
-from modt_desk.evaluation.evaluation import evaluation
 from modt.geometry import FieldOfView
+from modt_desk.evaluation.evaluation import evaluation
 from tools.study.leave_one_out import simulated
 from tools.study.sensors import row, run
 

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from modt_desk.box_tracking import constant_velocity
-from modt.config import BoxTrackingConfig
 from modt.geometry import wrap
 from modt.types import NONE, Bool, Float64, Int
+from modt_desk.box_tracking import constant_velocity
+from modt_desk.box_tracking.config import BoxTrackingConfig
 
 MAX_COST = 1.0
 """Cost of a pair at the edge of the gate."""

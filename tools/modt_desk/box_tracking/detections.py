@@ -19,9 +19,9 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import wrap
-from modt_desk.evaluation.kitti_labels import MAX_FRAME
 from modt.sources.text_file import read_lines
 from modt.types import Bool, Float64, Int
+from modt_desk.evaluation.kitti_labels import MAX_FRAME
 
 DETECTED = (ObjectClass.PEDESTRIAN, ObjectClass.CAR, ObjectClass.CYCLIST)
 """Classes in the order of AB3DMOT's types, which count from 1."""

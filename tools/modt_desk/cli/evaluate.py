@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from modt_desk.cli import experiments
 from modt.errors import MisuseError
+from modt_desk.cli import experiments
 from modt_desk.evaluation.rules import IGNORABLE
 
 DIGITS = 6

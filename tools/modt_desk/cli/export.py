@@ -15,9 +15,9 @@ from modt.cli import options
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
-    from modt_desk.evaluation.run_record import RunRecord
     from modt.sources.stream import Stream
     from modt.types import FrameResult
+    from modt_desk.evaluation.run_record import RunRecord
 
 T = TypeVar("T")
 
@@ -113,8 +113,8 @@ class Export:
         Raises:
             MisuseError: there are none, or one lacks something.
         """
-        from modt_desk.evaluation.run_record import broken
         from modt.sinks.records import BROKEN
+        from modt_desk.evaluation.run_record import broken
 
         first, last = self._frames
         for place, record in self.run.records():

@@ -33,16 +33,17 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare."""
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.app import request as assemble, metering
+    from modt.app import metering
+    from modt.app import request as assemble
     from modt.app.chosen_profile import choose
-    from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, observe
     from modt.energy.conditions import Conditions
     from modt.energy.meters.meter import Kind
+    from modt.reporting.page import document_page, save
+    from modt.reporting.quantity import to_json
     from modt_desk.comparison.compare_report import Basis, compare_tree
     from modt_desk.comparison.compare_view import compare_document, compare_plots
-    from modt.reporting.page import document_page, save
+    from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
-    from modt.reporting.quantity import to_json
 
     request = assemble.Request.of(arguments)
     stream = assemble.stream(request)

@@ -11,10 +11,10 @@ from modt.cli import options
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
-    from modt_desk.box_tracking.box_tracker import BoxTracker
-    from modt_desk.box_tracking.whole_tracks import TrackedBoxes
-    from modt_desk.box_tracking.detections import Detections
     from modt.types import Float64
+    from modt_desk.box_tracking.box_tracker import BoxTracker
+    from modt_desk.box_tracking.detections import Detections
+    from modt_desk.box_tracking.whole_tracks import TrackedBoxes
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -81,13 +81,13 @@ def follow(
 
     import numpy as np
 
-    from modt_desk.box_tracking.box_tracker import BoxTracker
-    from modt_desk.box_tracking.whole_tracks import TrackedBoxes, bridged, confident, of_one_class
     from modt.classes import CLASSES
-    from modt_desk.box_tracking.config import box_tracking_config
     from modt.geometry import inverse, transform_boxes
     from modt.sinks.kitti import box_lines
+    from modt_desk.box_tracking.box_tracker import BoxTracker
+    from modt_desk.box_tracking.config import box_tracking_config
     from modt_desk.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, boxes_to_kitti
+    from modt_desk.box_tracking.whole_tracks import TrackedBoxes, bridged, confident, of_one_class
 
     T = None if poses is None else T_LEVEL_CAMERA @ poses @ inverse(T_LEVEL_CAMERA)
     classes = []
@@ -118,8 +118,8 @@ def _reports(
     """Reports of all frames, in the world frame."""
     import numpy as np
 
-    from modt_desk.box_tracking.whole_tracks import TrackedBoxes
     from modt.geometry import transform_boxes
+    from modt_desk.box_tracking.whole_tracks import TrackedBoxes
 
     reports = [TrackedBoxes.none()]
     for frame, rows in detections.frames():

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from modt.cli import options
-from modt_desk.cli.view_forms import FORMS, GIF, MP4, PICTURE, PLAYER, View
 from modt.errors import MisuseError, ModtError
+from modt_desk.cli.view_forms import FORMS, GIF, MP4, PICTURE, PLAYER, View
 
 if TYPE_CHECKING:
     from modt.sources.stream import Stream

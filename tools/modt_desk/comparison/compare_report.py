@@ -13,11 +13,12 @@ from modt.energy.attribution import EnergySums, usable_windows
 from modt.energy.meters.meter import Facts, Kind
 from modt.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt.pipeline import CLASSIFICATION, ODOMETRY, SEGMENTATION, STAGES, TRACKING
-from modt_desk.comparison import gamma
-from modt_desk.comparison.comparison import COUNTS, ModeRun, Repetition, total
 from modt.reporting.histogram import Histogram
 from modt.reporting.quantity import Quantity, estimate, quantity
+from modt.reporting.reconciliation import reconciliation_tree
 from modt.types import Float64
+from modt_desk.comparison import gamma
+from modt_desk.comparison.comparison import COUNTS, ModeRun, Repetition, total
 
 SCHEMA = "modt.compare/3"
 _COUNTING = "Energy is assumed power times CPU time: the reconciliation tests counts and unit costs, not the physics."
@@ -132,7 +133,7 @@ def _saving(found: gamma.GammaEstimate, energy1: dict[str, Quantity], energy2: d
     gamma_net, gamma_gross = (a / b if a is not None and b else None for a, b in (net, gross))
     saved_J = None if net[0] is None or net[1] is None else net[0] - net[1]
     kind, reconciled = energy1["net_J"].kind, found.reconciliation
-    return gamma.reconciliation_tree(reconciled, found.measured.value) | {
+    return reconciliation_tree(reconciled, found.measured.value) | {
         "short_form_error": estimate(reconciled.paper.short_form_error),
         "gamma_reconciled": found.reconciled,
         "gamma_measured_cpu": found.measured,

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
 from modt.energy.meters.meter import Kind
 from modt.energy.nonnegative import nonnegative_fit
 from modt.energy.savings import OtherCosts, Reconciliation, UnitCosts, reconcile
-from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
-from modt_desk.comparison.comparison import COUNTS, ModeRun, total
 from modt.reporting.quantity import Quantity, estimate, quantity
+from modt.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
 from modt.types import Float64, Int
+from modt_desk.comparison.comparison import COUNTS, ModeRun, total
 
 _BLOCK = 8
 """Frames resampled together, since neighbouring frames are correlated."""
 _RESAMPLES = 400
 _LOAD = [COUNTS.index(name) for name in ("calls", "classified", "points")]
-SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
-TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]
-SCHEDULE = [STAGES.index(SCHEDULING), STAGES.index(FUSION)]
 
 Interval = tuple[float, float]
 
@@ -93,20 +90,6 @@ def estimate_gamma(
         measured=quantity(ratio, "", Kind.MEASURED, _interval(ratios)),
         deviation=estimate(gamma / ratio - 1.0, "", _interval(gammas / ratios - 1.0)),
     )
-
-
-def reconciliation_tree(found: Reconciliation, gamma: float | None) -> dict[str, Any]:
-    """The paper's figures, the reconciled gamma, and the terms from N_go to the gamma of the runs."""
-    return {
-        "a": estimate(found.paper.a),
-        "gamma_short": estimate(found.paper.n_go),
-        "gamma_equation_3": estimate(found.paper.gamma),
-        "gamma_reconciled": estimate(found.model.gamma),
-        "terms": [
-            {"name": term.name, "change": estimate(term.change), "gamma": estimate(term.gamma)}
-            for term in found.explain(1.0 if gamma is None else gamma)
-        ],
-    }
 
 
 def interval(n: int, statistic: Callable[[Int], float], random: np.random.Generator) -> Interval:

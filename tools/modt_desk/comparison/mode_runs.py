@@ -7,15 +7,15 @@ from itertools import islice
 
 import numpy as np
 
-from modt.app import assembly
+from modt.app import assembly, metering
+from modt.app import request as assemble
 from modt.classification.padding import padded_size
-from modt.app import request as assemble, metering
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter
+from modt.types import UNLIMITED, Budget, Frame, Int
 from modt_desk.comparison.comparison import ModeRun, RecordingFusion, Repetition, interleave
 from modt_desk.comparison.prediction import OBSERVED
-from modt.types import UNLIMITED, Budget, Frame, Int
 
 BASELINE = "conventional"
 MODES = (BASELINE, "efficient", "accurate")

@@ -15,9 +15,10 @@ from scipy import stats
 
 from modt.energy.equations import EnergyModel
 from modt.energy.nonnegative import nonnegative_fit
-from modt_desk.comparison.comparison import COUNTS
-from modt_desk.comparison.gamma import CLASS, SCHEDULE, SEG, TRACK, RunCosts, blocks
+from modt.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
 from modt.types import Float64, Int
+from modt_desk.comparison.comparison import COUNTS
+from modt_desk.comparison.gamma import RunCosts, blocks
 
 Runs = dict[str, RunCosts]
 """A stream's runs: tracking-by-detection first, the run of varied load last, the modes between."""

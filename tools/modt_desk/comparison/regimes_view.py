@@ -11,8 +11,8 @@ from modt.reporting import svg
 from modt.reporting.document import Cell, Document, Table
 from modt.reporting.page import Plot
 from modt.reporting.quantity import Quantity, quantity
-from modt_desk.comparison.regimes import BLIND, FORMULAS
 from modt.types import Float64
+from modt_desk.comparison.regimes import BLIND, FORMULAS
 
 _ABOUT = (
     "gamma = N_go and Equation 3 take the counts and costs of the runs themselves; a blind prediction "

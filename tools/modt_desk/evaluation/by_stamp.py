@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from modt_desk.evaluation.truth import Truth
 from modt.sources.scan_stream import ScanStream
 from modt.types import NONE, Float64, Int
+from modt_desk.evaluation.truth import Truth
 
 
 def by_stamp(truth: Truth, stamps_s: Mapping[int, float]) -> Truth:

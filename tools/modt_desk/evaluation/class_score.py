@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.classes import CLASS_NAMES, N_CLASSES
+from modt.types import Bool, Float64, Int
 from modt_desk.evaluation.rows import Outcome, Rows, ratio
 from modt_desk.evaluation.truth import Role
-from modt.types import Bool, Float64, Int
 
 BINS = 15
 """Of confidence, equally wide."""

@@ -9,6 +9,7 @@ from importlib.util import find_spec
 import numpy as np
 
 from modt.classes import CLASS_NAMES
+from modt.types import NONE
 from modt_desk.evaluation.class_score import ClassScore, class_scores, top_calibration_error
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.matching import judge
@@ -16,7 +17,6 @@ from modt_desk.evaluation.rows import Association, Rows, ratio
 from modt_desk.evaluation.rules import KITTI_RULES, Rules
 from modt_desk.evaluation.segmentation_score import SegmentationScore, segmentation
 from modt_desk.evaluation.track_score import TrackScore, track_metrics, track_scores
-from modt.types import NONE
 
 SCHEMA = "modt_desk.evaluation/1"
 ALL = "all"

@@ -7,9 +7,9 @@ from typing import Self
 
 import numpy as np
 
-from modt_desk.evaluation.truth import FrameTruth
 from modt.geometry import FieldOfView
 from modt.types import NONE, Float32, Float64, FrameResult, Int
+from modt_desk.evaluation.truth import FrameTruth
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from modt.classes import CLASS_NAMES, N_CLASSES
+from modt.types import NONE, Bool, Float32, Int
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
 from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.truth import Role
-from modt.types import NONE, Bool, Float32, Int
 
 PARKED_PAD_M = 0.4
 """A proposal is of a parked car if it lies in its box or up to this beyond."""

@@ -8,10 +8,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.evaluation.truth import FrameTruth
 from modt.geometry import inverse, transform
 from modt.types import NONE, Bool, Float32, Float64, Int
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.truth import FrameTruth
 
 PAD_M, FOOT_M = 0.15, 0.25
 """Points of an object: up to PAD_M beyond its box, and FOOT_M above its foot."""

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modt.classes import CLASS_NAMES, N_CLASSES
-from modt_desk.evaluation.truth import Role
 from modt.types import Bool, Float64, Int
+from modt_desk.evaluation.truth import Role
 
 Rows = NDArray[np.void]
 """A structured array: of OBJECT, a row an object and frame, or of PROPOSAL, a row a tracked proposal and frame."""

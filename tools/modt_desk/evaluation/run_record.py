@@ -13,16 +13,16 @@ import numpy as np
 from modt.classes import CLASS_NAMES
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
-from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.evaluation.truth import Truth
 from modt.geometry import FieldOfView
 from modt.profile import from_yaml
 from modt.sinks.records import BROKEN, read_records
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA
-from modt_desk.evaluation.frames_by_number import FramesByNumber
 from modt.sources.stream import Stream
 from modt.types import Float32, Float64, Int
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.frames_by_number import FramesByNumber
+from modt_desk.evaluation.truth import Truth
 
 LABELS = "labels"
 Record = tuple[str, dict[str, Any]]

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from modt.types import NONE, Int
 from modt_desk.evaluation.rows import Association, Rows, kinds, ratio
 from modt_desk.evaluation.truth import Role
-from modt.types import NONE, Int
 
 SIMILARITY_THRESHOLD = 0.25
 """Similarity from which CLEAR and Identity count a match."""

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modt.classes import CLASSES, ObjectClass
-from modt_desk.evaluation.rules import Rules
 from modt.geometry import Camera, inverse, transform_boxes
-from modt_desk.evaluation.kitti_labels import Label
 from modt.sources.scan_stream import ScanStream
 from modt.types import Bool, Float32, Float64, Int
+from modt_desk.evaluation.kitti_labels import Label
+from modt_desk.evaluation.rules import Rules
 
 STILL_M, LEAST_FRAMES = 1.0, 3
 """A car is parked if its centre stays within STILL_M, in x and in y, over LEAST_FRAMES or more."""

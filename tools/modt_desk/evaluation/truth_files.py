@@ -11,6 +11,13 @@ from typing import Any
 import numpy as np
 
 from modt.errors import MisuseError
+from modt.geometry import Camera
+from modt.sources.kitti_calibration import camera_of_sequence
+from modt.sources.pose_file import read_poses
+from modt.sources.recognise import open_scans
+from modt.sources.scan_stream import ScanStream
+from modt.types import NONE
+from modt_desk.evaluation.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import (
     KITTI_TYPES,
@@ -22,13 +29,6 @@ from modt_desk.evaluation.truth import (
     Types,
     parked_outside,
 )
-from modt.geometry import Camera
-from modt.sources.kitti_calibration import camera_of_sequence
-from modt_desk.evaluation.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets
-from modt.sources.pose_file import read_poses
-from modt.sources.recognise import open_scans
-from modt.sources.scan_stream import ScanStream
-from modt.types import NONE
 
 TRACKLETS, CUBOIDS, POSES, SCANS = "tracklet_labels.xml", "truth.csv", "poses.txt", "scans"
 BOX_COLUMNS = (("x",), ("y",), ("z",), ("l", "length"), ("w", "width"), ("h", "height"), ("yaw",))

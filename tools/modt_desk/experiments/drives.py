@@ -14,14 +14,14 @@ from typing import Protocol
 import numpy as np
 
 from modt.errors import MisuseError
+from modt.geometry import FieldOfView
+from modt.profile import DEFAULT
+from modt.types import Frame
 from modt_desk.evaluation.rules import CUBOID_RULES, Rules
 from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role, Truth
 from modt_desk.evaluation.truth_files import TRACKLETS, open_truth
-from modt.geometry import FieldOfView
-from modt.profile import DEFAULT
 from modt_desk.simulation.kinds import TRUCK
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from modt.types import Frame
 
 KITTI, SIMULATED = "KITTI", "simulated"
 """Kinds of drives."""

@@ -12,11 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.config import ProfileConfig
-from modt_desk.evaluation.frame import JudgedFrame
-from modt_desk.evaluation.overlap import Overlap
-from modt_desk.experiments.played_back import within
-from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame
-from modt_desk.experiments.store import Store, key_of
 from modt.observations import Located, StaticTracks, observe
 from modt.odometry.odometry import Odometry
 from modt.placement import Placement
@@ -24,6 +19,11 @@ from modt.profile import dump
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks
+from modt_desk.evaluation.frame import JudgedFrame
+from modt_desk.evaluation.overlap import Overlap
+from modt_desk.experiments.played_back import within
+from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame
+from modt_desk.experiments.store import Store, key_of
 
 
 @dataclass(frozen=True, slots=True)

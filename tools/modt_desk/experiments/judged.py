@@ -11,6 +11,8 @@ import numpy as np
 from modt.classes import ObjectClass
 from modt.classification.padding import padded_each
 from modt.config import ClassificationConfig
+from modt.geometry import FieldOfView, inverse, transform
+from modt.types import NONE, Float64, FrameResult
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Rows, table
@@ -18,8 +20,6 @@ from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.truth import FrameTruth, Role
 from modt_desk.experiments.segmented import SegmentedFrame
 from modt_desk.experiments.store import Arrays
-from modt.geometry import FieldOfView, inverse, transform
-from modt.types import NONE, Float64, FrameResult
 
 _PLAIN_OBJECT = np.dtype([(name, "U32" if name == "type" else OBJECT[name]) for name in OBJECT.names or ()])
 """Rows of objects that can be stored."""

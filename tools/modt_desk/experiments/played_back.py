@@ -6,10 +6,10 @@ import numpy as np
 
 from modt.classification.pointnet import PointNet
 from modt.config import ProfileConfig
-from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame
-from modt_desk.experiments.store import Store, key_of
 from modt.profile import dump
 from modt.types import NONE, Bool, Float32, Float64, Int, Proposals
+from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame
+from modt_desk.experiments.store import Store, key_of
 
 
 def likelihoods(drive: SegmentedDrive, network: PointNet, config: ProfileConfig, store: Store) -> list[Float64]:

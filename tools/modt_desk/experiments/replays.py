@@ -15,15 +15,15 @@ from modt.classification.pointnet import PointNet
 from modt.classification.scheduler import LinearCost
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.energy.ledger import NullLedger
+from modt.pipeline import Classifier, Pipeline, Segmenter
+from modt.profile import dump
+from modt.types import FrameResult
 from modt_desk.experiments.drives import Drive
 from modt_desk.experiments.ideal_tracker import IdealTracking, viewed
 from modt_desk.experiments.judged import Judged
 from modt_desk.experiments.played_back import PlayedBack, likelihoods
 from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame, segmented
 from modt_desk.experiments.store import Store
-from modt.pipeline import Classifier, Pipeline, Segmenter
-from modt.profile import dump
-from modt.types import FrameResult
 
 
 class Replay(Protocol):

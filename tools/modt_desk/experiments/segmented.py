@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from modt.app import assembly, kernel_choice
 from modt.config import ProfileConfig
+from modt.geometry import Camera, FieldOfView
+from modt.profile import dump
+from modt.types import Bool, Float32, Frame, Proposals
 from modt_desk.evaluation.overlap import PAD_M, ObjectPoints, in_box_frame, inside
 from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.truth import FrameTruth, Regions
 from modt_desk.experiments.drives import Drive
 from modt_desk.experiments.store import Arrays, Store, key_of
-from modt.geometry import Camera, FieldOfView
-from modt.profile import dump
-from modt.types import Bool, Float32, Frame, Proposals
 
 _WIDE = {"members": np.int64, "offsets": np.int64}
 """Columns of proposals that are stored in four bytes."""

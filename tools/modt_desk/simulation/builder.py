@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.types import Float64
 from modt_desk.simulation import kinds, vehicles
 from modt_desk.simulation.collisions import without_collisions
 from modt_desk.simulation.kinds import Kind
@@ -13,7 +14,6 @@ from modt_desk.simulation.people import People, Posture
 from modt_desk.simulation.solids import Solids, Triple, box
 from modt_desk.simulation.terrain import Terrain
 from modt_desk.simulation.world import Body, World
-from modt.types import Float64
 
 EGO_M = (4.6, 1.8)
 """Length and width of the ego vehicle."""

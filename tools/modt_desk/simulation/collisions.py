@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from modt.geometry import corners
-from modt_desk.simulation.motion import Path
 from modt.types import Bool, Float64, Int
+from modt_desk.simulation.motion import Path
 
 STEP_S, MARGIN_M = 0.25, 0.1
 

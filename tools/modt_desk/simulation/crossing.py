@@ -6,13 +6,13 @@ import itertools
 
 import numpy as np
 
+from modt.types import Float64
 from modt_desk.simulation import roadside
 from modt_desk.simulation.builder import SceneBuilder
 from modt_desk.simulation.motion import Path, timetable
 from modt_desk.simulation.road import Road, terrain
 from modt_desk.simulation.street import furnish
 from modt_desk.simulation.world import World
-from modt.types import Float64
 
 REACH_M = 110.0
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modt.geometry import Camera, FieldOfView, inverse, se3
-from modt_desk.simulation.simulator import Truth
-from modt_desk.simulation.kitti_tracklets import Tracklets
 from modt.types import Float64, Frame
+from modt_desk.simulation.kitti_tracklets import Tracklets
+from modt_desk.simulation.simulator import Truth
 
 DATE, START = "2020_01_01", datetime(2020, 1, 1, 12)
 ORIGIN_DEG, EARTH_RADIUS_M = (49.0, 8.4), 6378137.0

@@ -7,9 +7,9 @@ from enum import IntEnum
 
 import numpy as np
 
+from modt.types import Bool, Float64, Int
 from modt_desk.simulation.materials import Material
 from modt_desk.simulation.solids import Solids
-from modt.types import Bool, Float64, Int
 
 
 class Posture(IntEnum):

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modt.types import Bool, Float32, Int
 from modt_desk.simulation.sensors import SensorModel
 from modt_desk.simulation.solids import Solids
-from modt.types import Bool, Float32, Int
 
 Int32 = NDArray[np.int32]
 

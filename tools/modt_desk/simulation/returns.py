@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from modt.types import Bool, Float32, Int
 from modt_desk.simulation.materials import DROPOUT, GRAZING_LOSS, INTENSITY, POINT_SIGMA, REFLECTIVITY
 from modt_desk.simulation.raycast import Int32
 from modt_desk.simulation.sensors import SensorModel
 from modt_desk.simulation.terrain import UInt8
-from modt.types import Bool, Float32, Int
 
 GLOSSY = np.float32(0.25)
 """Grazing loss above which the slope between beams counts as well: roofs and bonnets."""

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from modt.types import Float32, Float64
 from modt_desk.simulation.materials import Material
 from modt_desk.simulation.terrain import Terrain
-from modt.types import Float32, Float64
 
 CELL_M, MARGIN_M = 0.25, 80.0
 KERB_M, CAMBER, ROUGHNESS_M = 0.12, 0.02, 0.012

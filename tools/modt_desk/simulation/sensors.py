@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.errors import MisuseError
-from modt_desk.simulation.scan_pattern import EVERY_RAY, NonRepetitive, ScanPattern
 from modt.types import Float32, Float64
+from modt_desk.simulation.scan_pattern import EVERY_RAY, NonRepetitive, ScanPattern
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import inverse, transform, transform_boxes
+from modt.types import NONE, Float32, Float64, Frame, Int
 from modt_desk.simulation.kinds import Kind
 from modt_desk.simulation.materials import BODY_SIGMA, SEMANTIC
 from modt_desk.simulation.raycast import NO_SOLID, RayCaster
 from modt_desk.simulation.returns import Receiver
 from modt_desk.simulation.sensors import SensorModel
 from modt_desk.simulation.world import MOVING_MPS, World
-from modt.types import NONE, Float32, Float64, Frame, Int
 
 N_SLICES = 64
 """Sectors of a sweep within which nothing moves."""

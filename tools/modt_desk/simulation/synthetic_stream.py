@@ -11,13 +11,13 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
+from modt.sources.stream import Faults, StreamInfo
+from modt.types import Frame
 from modt_desk.simulation.crossing import crossing
 from modt_desk.simulation.sensors import sensor as sensor_model
 from modt_desk.simulation.simulator import Simulator, Truth
 from modt_desk.simulation.street import street
 from modt_desk.simulation.yard import hall, yard
-from modt.sources.stream import Faults, StreamInfo
-from modt.types import Frame
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0, 0.0]])
@@ -83,3 +83,8 @@ class SyntheticStream:
         part._indices = range(max(first, indices.start), indices.stop if last is None else min(last, indices.stop))
         part.info = replace(self.info, n_frames=len(part._indices), end=part._indices.stop)
         return part
+
+
+def embedded_street() -> SyntheticStream:
+    """The stream of `modt replay` without a path: ten seconds of the street, seen by an HDL-64E."""
+    return SyntheticStream("street", "hdl-64e", 10.0, seed=0)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modt_desk.simulation.raycast import RayCaster
 from modt.types import Float32, Float64, Int
+from modt_desk.simulation.raycast import RayCaster
 
 UInt8 = NDArray[np.uint8]
 

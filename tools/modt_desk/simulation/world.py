@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.geometry import inverse, rotation_zyx, se3
+from modt.types import Float64
 from modt_desk.simulation.kinds import Kind
 from modt_desk.simulation.motion import Path
 from modt_desk.simulation.people import People
 from modt_desk.simulation.solids import Solids
 from modt_desk.simulation.terrain import Terrain
-from modt.types import Float64
 
 MOVING_MPS = 0.3
 """Least speed of a body annotated as moving."""

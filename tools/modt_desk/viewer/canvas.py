@@ -6,8 +6,8 @@ from typing import Protocol
 
 from modt.types import Float64
 
-REACH_M, SIDE_M = 45.0, 32.0
-"""Half of what is shown along u and along v."""
+SIDE_M = 32.0
+"""Half of what is shown along v."""
 TEXT_M = 1.1
 """Height of text."""
 

@@ -8,7 +8,8 @@ from datetime import UTC, datetime
 import numpy as np
 
 from modt.viewer import look
-from modt_desk.viewer.canvas import REACH_M, SIDE_M, Canvas
+from modt.viewer.look import REACH_M
+from modt_desk.viewer.canvas import SIDE_M, Canvas
 from modt_desk.viewer.labels import LETTER_M, Labels
 from modt_desk.viewer.recorded_run import RecordedRun
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt_desk.evaluation.overlap import inside
 from modt.types import Float32, Float64
+from modt_desk.evaluation.overlap import inside
 
 METRE = 80
 """Pixels."""

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from modt.types import Int
-from modt_desk.viewer.canvas import REACH_M, SIDE_M
+from modt.viewer.look import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
+from modt_desk.viewer.canvas import SIDE_M
 
 RINGS_M = {6.0: 2, 10.0: 5, 15.0: 5, 20.0: 10, 30.0: 10, REACH_M: 20}
 """Ranges that a picture may reach, and the distance of the rings in it."""

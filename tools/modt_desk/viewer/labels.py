@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt_desk.viewer.canvas import REACH_M, SIDE_M, TEXT_M, Canvas
+from modt.viewer.look import REACH_M
+from modt_desk.viewer.canvas import SIDE_M, TEXT_M, Canvas
 
 LETTER_M = 0.55 * TEXT_M
 TRIES = 4

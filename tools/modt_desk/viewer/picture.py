@@ -11,13 +11,14 @@ from modt.geometry import corners
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64, Int
 from modt.viewer import look
-from modt_desk.viewer.canvas import REACH_M, SIDE_M, Canvas
+from modt.viewer.look import REACH_M
+from modt.viewer.point_cells import SIDE, Cells
+from modt.viewer.track_rows import COLUMNS, SCALE, SCALED
+from modt_desk.viewer.canvas import SIDE_M, Canvas
 from modt_desk.viewer.caption import caption
 from modt_desk.viewer.extent import RINGS_M, reach_m
 from modt_desk.viewer.labels import Labels
-from modt.viewer.point_cells import SIDE, Cells
 from modt_desk.viewer.recorded_run import RecordedRun
-from modt.viewer.track_rows import COLUMNS, SCALE, SCALED
 from modt_desk.viewer.zoomed import Zoomed
 
 TRAIL = 30

@@ -9,7 +9,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from modt.reporting.page import LIGHT
 from modt.types import Float64
-from modt_desk.viewer.canvas import REACH_M, SIDE_M, TEXT_M
+from modt.viewer.look import REACH_M
+from modt_desk.viewer.canvas import SIDE_M, TEXT_M
 
 SHARP = 2
 """Pixels drawn along each side of one that is shown."""

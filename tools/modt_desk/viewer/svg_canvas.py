@@ -6,7 +6,8 @@ from html import escape
 
 from modt.reporting.page import LIGHT, THEME
 from modt.types import Float64
-from modt_desk.viewer.canvas import REACH_M, SIDE_M, TEXT_M
+from modt.viewer.look import REACH_M
+from modt_desk.viewer.canvas import SIDE_M, TEXT_M
 
 _STYLE = f"""
 svg{{background:var(--paper);font-family:system-ui,sans-serif}}path,polyline,circle{{fill:none}}

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from modt_desk.evaluation.frames_by_number import FramesByNumber
 from modt.sources.stream import Stream
 from modt.viewer.point_cells import Cells, Grid
+from modt_desk.evaluation.frames_by_number import FramesByNumber
 
 NO_CELLS = Cells(np.zeros(0, np.int64), np.zeros(0, np.int64))
 

@@ -14,9 +14,9 @@ from modt.reporting.page import Plot, page, plots, tiles
 from modt.sinks.tracks import BOX_KEYS
 from modt.sources.stream import Stream
 from modt.types import Float32
+from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.crop_picture import crop_picture
 from modt_desk.viewer.recorded_run import RecordedRun
-from modt.viewer.track_rows import COLUMNS, SCALE
 
 Row = dict[str, float]
 

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 
 from modt.errors import MisuseError
+from modt.geometry import inverse, transform_boxes
+from modt.sinks.tracks import BOX_KEYS
+from modt.sources.stream import Stream
+from modt.types import NONE, Float32, Int
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.overlap import inside
 from modt_desk.evaluation.rows import Rows
 from modt_desk.evaluation.run_record import LABELS, RunRecord
 from modt_desk.evaluation.truth import FrameTruth, Truth
-from modt.geometry import inverse, transform_boxes
-from modt.sinks.tracks import BOX_KEYS
-from modt.sources.stream import Stream
-from modt.types import NONE, Float32, Int
 
 MARGIN_M = 0.02
 """Around the boxes of proposals, which are rounded."""

@@ -7,12 +7,12 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from modt.config import EnergyConfig, ProfileConfig
+from modt.types import Float64
 from modt_desk.experiments.catalogue.estimate import ratio
 from modt_desk.experiments.catalogue.experiment import Chart, Experiment, Label, changed
 from modt_desk.experiments.catalogue.figures import OBJECTS, Figure, TrackLives, latencies, precisions
 from modt_desk.experiments.judged import Judged
 from modt_desk.experiments.replays import NetworkReplay, Replay
-from modt.types import Float64
 
 BUDGETS = (0, 1, 2, 3, 4, 6, 8, 16)
 ACCURATE, CONVENTIONAL = "accurate", "conventional, no budget"

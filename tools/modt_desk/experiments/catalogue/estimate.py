@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modt_desk.evaluation.rows import Rows
 from modt.types import Bool, Float64, Int
+from modt_desk.evaluation.rows import Rows
 
 RESAMPLES, SEED, LEVEL = 200, 0, (2.5, 97.5)
 _TOGETHER = 8

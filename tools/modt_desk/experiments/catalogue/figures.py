@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.classes import CLASS_NAMES
+from modt.types import NONE, Bool, Float64, Int
 from modt_desk.evaluation.rows import Rows
 from modt_desk.evaluation.track_score import track_scores
 from modt_desk.evaluation.truth import Role
 from modt_desk.experiments.catalogue.estimate import Estimate, Ranking, ratio
 from modt_desk.experiments.judged import Judged
-from modt.types import NONE, Bool, Float64, Int
 
 OBJECTS = CLASS_NAMES[1:]
 NOTHING = Estimate(None)

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from modt.config import ProfileConfig
+from modt.types import Float64
 from modt_desk.evaluation.rows import Rows
 from modt_desk.evaluation.truth import LEAST_FRAMES, STILL_M
 from modt_desk.experiments.catalogue.estimate import Estimate, ratio
@@ -14,7 +15,6 @@ from modt_desk.experiments.catalogue.experiment import Chart, Experiment, Label
 from modt_desk.experiments.catalogue.figures import Figure
 from modt_desk.experiments.judged import Judged
 from modt_desk.experiments.replays import NetworkReplay, Replay
-from modt.types import Float64
 
 CENTRES = {"mean": "mean of the points (the paper's)", "box": "centre of the box", "filter": "position of the track"}
 MAX_DRAWN = 7

@@ -7,10 +7,10 @@ from html import escape
 
 import numpy as np
 
-from modt_desk.experiments.catalogue.experiment import Chart, Experiment
-from modt_desk.experiments.study import DEFAULT, Row
 from modt.reporting import svg
 from modt.reporting.page import COLOURS
+from modt_desk.experiments.catalogue.experiment import Chart, Experiment
+from modt_desk.experiments.study import DEFAULT, Row
 
 _LINE_PX = 16
 _STYLE = (  # fonts by name: what makes a PNG of it knows no system-ui

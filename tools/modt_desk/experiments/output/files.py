@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 
+from modt.sinks.output import writing
 from modt_desk.experiments.catalogue.experiment import Experiment
 from modt_desk.experiments.output import charts, png
 from modt_desk.experiments.output.about import About
 from modt_desk.experiments.output.html import html
 from modt_desk.experiments.output.markdown import markdown
 from modt_desk.experiments.study import Row
-from modt.sinks.output import writing
 
 SCHEMA = "modt_desk.experiments/1"
 

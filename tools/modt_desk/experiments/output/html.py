@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from html import escape
 
+from modt.reporting import page
 from modt_desk.experiments.catalogue.experiment import Experiment
 from modt_desk.experiments.output import charts
 from modt_desk.experiments.output.about import About
 from modt_desk.experiments.output.tables import Table, tables
 from modt_desk.experiments.study import Row
-from modt.reporting import page
 
 
 def html(about: About, experiments: Sequence[Experiment], rows: Sequence[Row]) -> str:

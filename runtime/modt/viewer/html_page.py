@@ -1,0 +1,47 @@
+"""The HTML page on which a run is seen: its shell, and what it knows of classes, states and stages."""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from modt.reporting.page import THEME
+from modt.viewer import look
+from modt.viewer.look import REACH_M
+from modt.viewer.point_cells import SIDE
+from modt.viewer.track_rows import COLUMNS, SCALE
+
+_PAGE = Path(__file__).parent / "page"
+_SCRIPTS = "data", "draw", "text", "input"
+
+
+def content(states: list[look.Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
+    """What each page knows: columns, legends, the budget of a frame, the width of a cell (None without points)."""
+    return {
+        "schema": "modt.player/2",
+        "columns": [(name, SCALE.get(name, 1)) for name in COLUMNS],
+        "classes": look.classes(),
+        "states": states,
+        "stages": look.stages(),
+        "budget": budget,
+        "points": None if step_cm is None else {"side": SIDE, "step_cm": step_cm},
+        "reach_m": REACH_M,
+        "frames": [],
+    }
+
+
+def page(name: str, about: str, known: dict[str, Any], script: str) -> tuple[str, str]:
+    """The page before its data and after them; the script says where its frames come from."""
+    css, body = ((_PAGE / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "html"))
+    scripts = "".join((_PAGE / f"{part}.js").read_text(encoding="utf-8") for part in (*_SCRIPTS, script))
+    text = json.dumps(known, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    head = (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(name)}</title><style>{THEME}{css}</style></head><body>\n"
+        f"<header><h1>{escape(name)}</h1><span>{escape(about)}</span></header>\n{body}"
+        f'<script type="application/json" id="run">{text}</script>\n'
+    )
+    return head, f"<script>\n{scripts}</script></body></html>\n"
