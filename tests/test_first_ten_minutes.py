@@ -13,7 +13,17 @@ import pytest
 from tests.test_assets import install
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = "runtime", "models", "profiles", "pyproject.toml", "hatch_build.py", "Makefile", "README.md", "LICENSE"
+COPIED = (
+    "runtime",
+    "tools",
+    "models",
+    "profiles",
+    "pyproject.toml",
+    "hatch_build.py",
+    "Makefile",
+    "README.md",
+    "LICENSE",
+)
 TIMEOUT_S = 600.0
 
 

@@ -7,13 +7,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-RUNTIME = Path(__file__).resolve().parents[2] / "runtime"
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = os.pathsep.join([str(ROOT / "runtime"), str(ROOT / "tools")])
 
 
 def environment() -> dict[str, str]:
-    """This one's, with the checkout's package and without sizes of thread pools."""
+    """This one's, with the checkout's packages and without sizes of thread pools."""
     own = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
-    return {**own, "PYTHONPATH": str(RUNTIME), "PYTHONWARNINGS": "error", "PYTHONUNBUFFERED": "1"}
+    return {**own, "PYTHONPATH": PACKAGES, "PYTHONWARNINGS": "error", "PYTHONUNBUFFERED": "1"}
 
 
 def modt(*arguments: object, cwd: Path, module: str = "modt.cli.main", **options) -> subprocess.CompletedProcess[str]:

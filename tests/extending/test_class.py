@@ -13,9 +13,6 @@ import pytest
 import yaml
 from onnx import TensorProto, helper, numpy_helper
 
-import modt
-
-PACKAGE = Path(modt.__file__).parent
 SHARES = np.array([0.02, 0.02, 0.02, 0.02, 0.92], np.float32)
 VALUE = "    CYCLIST = 3\n"
 ROW = '    ObjectClass.CYCLIST: ClassSpec(("Cyclist",)'
@@ -25,9 +22,11 @@ ROW = '    ObjectClass.CYCLIST: ClassSpec(("Cyclist",)'
 def a_package_with_trucks(tmp_path_factory):
     """A copy of the package whose table of classes has one row more."""
     source = tmp_path_factory.mktemp("source")
-    shutil.copytree(PACKAGE, source / "runtime" / "modt", ignore=shutil.ignore_patterns("__pycache__"))
+    root, unneeded = Path(__file__).parents[2], shutil.ignore_patterns("__pycache__")
+    for package in ("runtime/modt", "tools/modt_desk"):
+        shutil.copytree(root / package, source / package, ignore=unneeded)
     (source / "models").mkdir()
-    shutil.copytree(Path(__file__).parents[2] / "profiles", source / "profiles")
+    shutil.copytree(root / "profiles", source / "profiles")
     table = source / "runtime" / "modt" / "classes.py"
     text = table.read_text()
     assert text.count(VALUE) == text.count(ROW) == 1
@@ -61,7 +60,9 @@ def a_profile_with_a_model_of_five_outputs(source):
 
 
 def run(source, *arguments):
-    environment = os.environ | {"PYTHONPATH": str(source / "runtime")}
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(str(source / folder) for folder in ("runtime", "tools"))
+    }
     command = [sys.executable, "-m", *arguments]
     return subprocess.run(command, cwd=source, env=environment, capture_output=True, text=True, check=True).stdout
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterator
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 
@@ -20,8 +21,8 @@ def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
     """Summary and parser of each command."""
     for prog, commands in (("modt", modt.COMMANDS), ("modt-profile", modt_profile.COMMANDS)):
         choice = argparse.ArgumentParser(prog=prog).add_subparsers()
-        for command in commands:
-            command.add_parser(choice)
+        for module in commands.values():
+            import_module(module).add_parser(choice)
         yield from leaves(choice)
 
 

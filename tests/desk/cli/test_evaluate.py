@@ -5,9 +5,8 @@ import shutil
 
 import pytest
 
+from tests.cli.commands import modt
 from tests.viewer.chromium import LOADED, WIDE
-
-from .commands import modt
 
 DAY = "2020_01_01/2020_01_01_drive_0000_sync"
 

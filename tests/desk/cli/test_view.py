@@ -11,11 +11,10 @@ import pytest
 from modt.classes import CLASS_NAMES
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.recognise import open_scans
+from tests.cli.commands import environment, modt
 from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.viewer.chromium import LOADED, WIDE
 from tests.viewer.pages import Page
-
-from .commands import environment, modt
 
 FRAMES = 12
 

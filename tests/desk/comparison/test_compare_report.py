@@ -17,9 +17,8 @@ from modt.types import UNLIMITED, Frame
 from modt_desk.comparison.compare_report import Basis, compare_tree
 from modt_desk.comparison.compare_view import compare_document, compare_plots
 from modt_desk.comparison.comparison import ModeRun, interleave
+from tests.reporting.test_run_report import KINDS, figures
 from tests.results import CAR, result
-
-from .test_run_report import KINDS, figures
 
 MODES = ("conventional", "efficient", "accurate")
 FRAMES = [Frame(k, k / 10, np.zeros((40, 4), np.float32)) for k in range(40)]

@@ -9,7 +9,7 @@ import pytest
 Image = pytest.importorskip("PIL.Image", reason="needs the extra [view]")
 
 from modt.reporting.page import LIGHT  # noqa: E402
-from modt.viewer import film  # noqa: E402
+from modt_desk.viewer import film  # noqa: E402
 
 N, SIZE = 20, (40, 30)
 MOST_HELD = 4
