@@ -1,0 +1,57 @@
+"""What a robot loads: the desk's package is installed beside it, and no command of a robot imports it."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modt.cli.main import COMMANDS
+from tests.cli.commands import environment
+
+LOADED = """
+import atexit, sys
+from modt.cli.main import main
+atexit.register(lambda: print(*sorted(name for name in sys.modules if name.partition(".")[0].startswith("modt"))))
+raise SystemExit(main())
+"""
+
+
+def loaded(*arguments: object, cwd: Path, seconds: float | None = None) -> list[str]:
+    """Modules of the project that a command has loaded at its end, or when it is stopped."""
+    command = [sys.executable, "-c", LOADED, *map(str, arguments)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(), cwd=cwd) as running:
+        try:
+            running.wait(seconds)
+        except subprocess.TimeoutExpired:
+            running.send_signal(signal.SIGTERM)
+        printed, _ = running.communicate(timeout=60)
+    assert running.returncode == 0
+    return printed.split("\n")[-2].split()
+
+
+@pytest.fixture(name="scans")
+def a_folder_of_scans(tmp_path):
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    random = np.random.default_rng(0)
+    for number in range(2):
+        random.uniform((-20, -20, -2, 0), (20, 20, 2, 1), (2000, 4)).astype(np.float32).tofile(folder / f"{number:06d}.bin")
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arguments", "seconds"), [(("run", "velodyne://127.0.0.1:0"), 8.0), (("replay", "scans", "--quiet"), None)]
+)
+def test_a_robot_loads_nothing_of_the_desk(arguments, seconds, scans, tmp_path):
+    modules = loaded(*arguments, "--core", "none", "--out", "out", cwd=tmp_path, seconds=seconds)
+    assert "modt.pipeline" in modules
+    assert [name for name in modules if name.startswith("modt_desk")] == []
+
+
+def test_the_desks_commands_are_told_by_their_module():
+    desk = {name for name, module in COMMANDS.items() if module.startswith("modt_desk.")}
+    assert desk == {"view", "evaluate", "export", "simulate", "track"}
