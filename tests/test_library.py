@@ -41,6 +41,7 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
         boxes = result.proposals.box[result.tracks.proposal[found.visible]]
         np.testing.assert_array_equal(found.box_sensor[found.visible], boxes)
         assert np.isnan(found.box_sensor[~found.visible]).all()
+        np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
     assert len(found.objects()) > 0
     assert not (found.objects().object_class == 0).any()
 
@@ -54,6 +55,7 @@ def test_rows_are_arrays_with_names_and_dictionaries(frames):
     assert {row["object_class"] for row in rows} <= set(modt.CLASS_NAMES)
     assert rows[0]["box_sensor"] == found.box_sensor[0].tolist()
     assert found.take(np.array([1])).as_dicts() == rows[1:2]
+    np.testing.assert_array_equal(found.take(np.array([1])).T_world_sensor, np.eye(4))
 
 
 def test_points_without_reflectance_and_without_returns_are_taken(frames):
