@@ -10,7 +10,7 @@ import modt
 from modt import assembly
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
-from modt.geometry import FieldOfView
+from modt.geometry import FieldOfView, inverse
 from modt.profile import load
 from modt.sources.synthetic_stream import SyntheticStream
 from modt.types import NONE
@@ -44,6 +44,15 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
         np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
     assert len(found.objects()) > 0
     assert not (found.objects().object_class == 0).any()
+
+
+def test_without_poses_the_pose_is_the_registered_one(frames):
+    library = modt.Pipeline.from_profile("vlp-16")
+    start = inverse(frames[0].T_world_sensor)
+    for frame in frames:
+        found = library.step(frame.points, frame.stamp_s)
+        np.testing.assert_allclose(found.T_world_sensor, start @ frame.T_world_sensor, rtol=0, atol=0.2)
+    assert np.linalg.norm(found.T_world_sensor[:3, 3]) > 1.0
 
 
 def test_rows_are_arrays_with_names_and_dictionaries(frames):

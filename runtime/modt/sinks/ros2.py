@@ -42,7 +42,8 @@ class Ros2Sink:
 def open_sink(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink:
     """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME.
 
-    It publishes on PREFIX/detections, PREFIX/markers and /tf. An empty world_frame_id leaves /tf alone: a frame that has a parent already must not get another one.
+    It publishes on PREFIX/detections, PREFIX/markers and /tf. An empty world_frame_id leaves /tf alone, as a robot
+    needs it whose tree of frames has the sensor's already: a frame has one parent.
 
     Args:
         address: of the sink.

@@ -90,7 +90,7 @@ class Scene:
         self._stamp_ns = 0
 
     def write(self, result: FrameResult) -> None:
-        """Publish a frame: the sensor's pose, a cube, a text and an arrow for every object in view, and the points."""
+        """Publish a frame: the pose of the sensor, a cube, text and arrow for each object in view, and the points."""
         self._stamp_ns = round(1e9 * result.frame.stamp_s)
         stamp = Timestamp(*divmod(self._stamp_ns, 10**9))
         if self._transforms.has_sinks():
