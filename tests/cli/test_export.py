@@ -64,7 +64,7 @@ def test_mcap_holds_points_tracks_and_energy_of_every_frame(recorded, tmp_path):
     assert stamp_ns == round(1e9 * lines[-1]["stamp_s"])
     assert energy["mJ_per_frame"] == pytest.approx(1e3 * window["energy_J"] / window["frames"][2])
     counts = {topic: len(messages) for topic, messages in found.items()}
-    assert counts == dict.fromkeys(("/tracks", "/points", "/stages"), len(lines))
+    assert counts == dict.fromkeys(("/tf", "/tracks", "/points", "/stages"), len(lines))
     for (stamp_ns, update), (_, cloud), record in zip(found["/tracks"], found["/points"], lines, strict=True):
         assert stamp_ns == round(1e9 * record["stamp_s"])
         shown = objects(record)
