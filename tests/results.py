@@ -28,6 +28,7 @@ def result(
     n_points: int = 40,
     lost: tuple[int, ...] = (),
     classified: int = 0,
+    T_world_sensor: np.ndarray | None = None,
 ) -> FrameResult:
     """A frame in which track owners[proposal] holds each proposal, and the lost ones hold none."""
     ids = [*owners.values(), *lost]
@@ -40,7 +41,8 @@ def result(
         tracks.object_class[tracks.id == id_] = np.argmax(posterior)
     points = np.arange(n_points * 4, dtype=np.float32).reshape(-1, 4)
     frame = Frame(index, index / 10, points)
-    return FrameResult(frame, proposals(counts), tracks, STATES, 0, np.arange(classified))
+    T = np.eye(4) if T_world_sensor is None else T_world_sensor
+    return FrameResult(frame, T, proposals(counts), tracks, STATES, 0, np.arange(classified))
 
 
 CAR = [0.1, 0.7, 0.1, 0.1]

@@ -10,7 +10,7 @@ import modt
 from modt.app import assembly
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
-from modt.geometry import FieldOfView
+from modt.geometry import FieldOfView, inverse
 from modt.profile import load
 from modt.types import NONE
 from modt_desk.simulation.synthetic_stream import SyntheticStream
@@ -41,8 +41,18 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
         boxes = result.proposals.box[result.tracks.proposal[found.visible]]
         np.testing.assert_array_equal(found.box_sensor[found.visible], boxes)
         assert np.isnan(found.box_sensor[~found.visible]).all()
+        np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
     assert len(found.objects()) > 0
     assert not (found.objects().object_class == 0).any()
+
+
+def test_without_poses_the_pose_is_the_registered_one(frames):
+    library = modt.Pipeline.from_profile("vlp-16")
+    start = inverse(frames[0].T_world_sensor)
+    for frame in frames:
+        found = library.step(frame.points, frame.stamp_s)
+        np.testing.assert_allclose(found.T_world_sensor, start @ frame.T_world_sensor, rtol=0, atol=0.2)
+    assert np.linalg.norm(found.T_world_sensor[:3, 3]) > 1.0
 
 
 def test_rows_are_arrays_with_names_and_dictionaries(frames):
@@ -54,6 +64,7 @@ def test_rows_are_arrays_with_names_and_dictionaries(frames):
     assert {row["object_class"] for row in rows} <= set(modt.CLASS_NAMES)
     assert rows[0]["box_sensor"] == found.box_sensor[0].tolist()
     assert found.take(np.array([1])).as_dicts() == rows[1:2]
+    np.testing.assert_array_equal(found.take(np.array([1])).T_world_sensor, np.eye(4))
 
 
 def test_points_without_reflectance_and_without_returns_are_taken(frames):

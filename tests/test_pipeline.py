@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from modt.energy.ledger import Ledger, NullLedger
+from modt.geometry import rotation_zyx, se3
 from modt.observations import Located, observe
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING, Pipeline
 from modt.placement import Placement
@@ -41,7 +42,7 @@ class Stages:
     def locate(self, frame, found, static_tracks):
         self.calls.append(("locate", frame.index, len(found)))
         static_tracks(frame.stamp_s)
-        placement = Placement(np.eye(4))
+        placement = Placement(PLACED)
         return Located(placement, observe(found, placement.T_world_sensor))
 
     def follow(self, stamp_s, found, located):
@@ -83,6 +84,7 @@ class Stages:
 
 
 FRAME = Frame(7, 0.7, np.ones((9, 4), np.float32))
+PLACED = se3(rotation_zyx(0.0, 0.0, 0.3), np.array([4.0, -2.0, 0.1]))
 
 
 def pipeline(stages):
@@ -108,6 +110,7 @@ def test_the_stages_run_once_and_in_order():
     assert (len(result.classified), result.n_deferred) == (2, 0)
     assert result.proposals.count.tolist() == [4, 3]
     assert result.state_names == STATES
+    np.testing.assert_array_equal(result.T_world_sensor, PLACED)
     assert set(pipe.ledger.close_frame(7)["stages"]) == set(STAGES)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -41,6 +41,7 @@ class TrackedObjects:
         heading_rad, speed_mps: (n,) of the motion in the world.
         points: (n,) of the last proposal.
         age, missed: (n,) frames since birth, and since the last proposal.
+        T_world_sensor: (4, 4) pose of the sensor at the stamp of the frame: as given, or as registered.
     """
 
     id: Int
@@ -56,13 +57,14 @@ class TrackedObjects:
     points: Int
     age: Int
     missed: Int
+    T_world_sensor: Float64
 
     def __len__(self) -> int:
         return len(self.id)
 
     def take(self, rows: Int | Bool) -> Self:
         """The rows given, by index or mask."""
-        return type(self)(**{f.name: getattr(self, f.name)[rows] for f in fields(self)})
+        return replace(self, **{name: column[rows] for name, column in self._columns().items()})
 
     def objects(self) -> Self:
         """The rows whose class is not background and that are visible."""
@@ -70,9 +72,13 @@ class TrackedObjects:
 
     def as_dicts(self) -> list[dict[str, Any]]:
         """A dictionary a row, of plain numbers and lists; object_class is a name."""
-        columns = {f.name: getattr(self, f.name).tolist() for f in fields(self)}
+        columns = {name: column.tolist() for name, column in self._columns().items()}
         columns["object_class"] = [CLASS_NAMES[c] for c in self.object_class.tolist()]
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def _columns(self) -> dict[str, Any]:
+        """The fields with a row a track."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "T_world_sensor"}
 
 
 class Pipeline:
@@ -173,6 +179,7 @@ class Pipeline:
             points=tracks.points,
             age=tracks.age,
             missed=tracks.missed,
+            T_world_sensor=result.T_world_sensor,
         )
 
 

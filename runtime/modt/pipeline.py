@@ -132,7 +132,8 @@ class Pipeline:
         run(FUSION, self.decision.decide, tracks)
         final = run(TRACKING, self.tracker.conclude, rows, certain)
         names, classified = self.tracker.state_names, final.id[rows]
-        return FrameResult(frame, proposals, final, names, chosen.deferred, classified)
+        T_world_sensor = located.placement.T_world_sensor
+        return FrameResult(frame, T_world_sensor, proposals, final, names, chosen.deferred, classified)
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
         """(R, 4) likelihoods; the ledger counts the points, and the cost model learns where CPU time is limited."""

@@ -259,6 +259,7 @@ class FrameResult:
     """What is known after a frame."""
 
     frame: Frame
+    T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp, as the odometry placed it
     proposals: Proposals
     tracks: Tracks  # a copy of those alive after the frame
     state_names: tuple[str, ...]  # of each value of tracks.state

@@ -83,6 +83,7 @@ def frames() -> list[dict[str, Any]]:
     seen = {**track(3, 0, named=True), "box": dict.fromkeys(BOX_KEYS, 1.5), "world": dict.fromkeys(WORLD_KEYS, 2.5)}
     lost = {**seen, "id": 4, "proposal": None, "box": None, "state": "lost"}
     facts = {"schema": "modt.frame/3", "proposals": 1, "classifications": 1, "classified": [3], "deferred": 0}
+    facts["T_world_sensor"] = np.eye(4)[:3].ravel().tolist()
     return [{**facts, "frame": k, "stamp_s": 0.1 * k, "tracks": [seen, lost]} for k in range(2)]
 
 

@@ -101,6 +101,7 @@ class Run:
         self._bounded(result)
         self._tracks(result)
         self._posteriors(result)
+        self._placed(result)
         self._parts_are_the_whole(book)
         self.frames.append(frame_line(result))
         self.text += self.frames[-1] + line(book)
@@ -132,6 +133,11 @@ class Run:
         for column in (tracks.prior, tracks.posterior, tracks.key_prior, tracks.key_posterior, frequency[None]):
             assert (column >= 0).all()
             np.testing.assert_allclose(column.sum(axis=1), 1.0, rtol=0, atol=1e-9)
+
+    def _placed(self, result: FrameResult) -> None:
+        R = result.T_world_sensor[:3, :3]
+        assert np.isfinite(result.T_world_sensor).all()
+        np.testing.assert_allclose(R @ R.T, np.eye(3), rtol=0, atol=1e-6)
 
     def _bounded(self, result: FrameResult) -> None:
         """Nothing is remembered but what recent frames have shown, and a map of a fixed size."""

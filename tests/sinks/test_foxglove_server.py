@@ -19,7 +19,7 @@ from modt.sinks.foxglove_server import FoxgloveServer
 from tests.sinks.foxglove_messages import decoded
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving
 
-TOPICS = {"/tracks", "/points", "/energy", "/stages"}
+TOPICS = {"/tf", "/tracks", "/points", "/energy", "/stages"}
 
 
 class Client:
@@ -99,6 +99,7 @@ def test_a_client_sees_objects_points_and_energy(server, client):
         if seen.keys() == TOPICS:
             break
     assert [entity["id"] for entity in seen["/tracks"]["entities"]] == ["11", "12"]
+    assert seen["/tf"]["translation"] == {"x": 3.0, "y": -1.0, "z": 0.5}
     assert base64.b64decode(seen["/points"]["data"]) == moving(0).frame.points.tobytes()
     assert seen["/energy"]["mJ_per_frame"] == 50.0
     assert seen["/stages"]["tracking_ms"] == 2.0

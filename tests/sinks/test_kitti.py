@@ -1,5 +1,7 @@
 """KITTI tracking results, read back by the benchmark's definitions."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,8 +34,7 @@ def test_only_tracks_of_a_class_with_a_proposal_are_written(tmp_path):
 )
 def test_the_benchmark_decodes_the_same_box(tmp_path_factory, x, y, yaw, size):
     box = np.array([[x, y, -0.5, *size, yaw]])
-    shown = result(0, [5], {0: 1}, {1: CAR})
-    shown = type(shown)(shown.frame, proposals([5], box), shown.tracks, shown.state_names, 0, 0)
+    shown = replace(result(0, [5], {0: 1}, {1: CAR}), proposals=proposals([5], box))
     row = written(tmp_path_factory.mktemp("k"), shown, forward_camera())[0]
     h, w, length, cx, cy, cz, ry = map(float, row[10:17])
     # The benchmark's corners: x right, z forward, the box turned by ry about the downward axis.

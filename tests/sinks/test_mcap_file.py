@@ -14,6 +14,7 @@ from mcap.reader import NonSeekingReader, make_reader
 
 from modt.classes import CLASSES, ObjectClass
 from modt.errors import ModtError
+from modt.geometry import rotation_zyx, se3
 from modt.sinks.addresses import open_sink
 from modt.sinks.mcap_file import McapFile
 from tests.results import CAR, PEDESTRIAN, result
@@ -23,9 +24,10 @@ from tests.sinks.full_disk import files_of_at_most
 
 def moving(index, speed_mps=2.0):
     """A car and a pedestrian in view, a background in view and a lost car; the sensor looks along the world's y."""
-    made = result(index, [5, 4, 3], {0: 11, 1: 12, 2: 13}, {11: CAR, 12: PEDESTRIAN, 9: CAR}, lost=(9,))
-    made.tracks.box[:3] = made.proposals.box
-    made.tracks.box[:3, 6] += np.pi / 2
+    T = se3(rotation_zyx(0.0, 0.0, np.pi / 2), np.array([3.0, -1.0, 0.5]))
+    made = result(
+        index, [5, 4, 3], {0: 11, 1: 12, 2: 13}, {11: CAR, 12: PEDESTRIAN, 9: CAR}, lost=(9,), T_world_sensor=T
+    )
     made.tracks.x[:, 2], made.tracks.x[:, 3] = np.pi / 2, speed_mps
     return made
 
@@ -65,11 +67,21 @@ def test_topics_have_the_schemas_that_foxglove_knows(tmp_path):
     record(tmp_path / "a.mcap", moving(3), records=(WINDOW, LEDGER))
     found = {topic: (schema, stamp) for topic, schema, stamp, _ in read(tmp_path / "a.mcap")}
     assert found == {
+        "/tf": ("foxglove.FrameTransform", 300_000_000),
         "/tracks": ("foxglove.SceneUpdate", 300_000_000),
         "/points": ("foxglove.PointCloud", 300_000_000),
         "/energy": ("modt.Energy", 300_000_000),
         "/stages": ("modt.Stages", 300_000_000),
     }
+
+
+def test_the_pose_of_the_sensor_is_a_transform_from_the_world(tmp_path):
+    record(tmp_path / "a.mcap", moving(3))
+    ((*_, placed),) = read(tmp_path / "a.mcap", "/tf")
+    assert (placed["parent_frame_id"], placed["child_frame_id"]) == ("world", "sensor")
+    assert placed["translation"] == {"x": 3.0, "y": -1.0, "z": 0.5}
+    turned = [placed["rotation"].get(key, 0.0) for key in "xyzw"]
+    np.testing.assert_allclose(turned, [0, 0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-12)
 
 
 def test_an_object_in_view_has_a_cube_a_text_and_an_arrow_along_its_motion(tmp_path):
@@ -126,7 +138,7 @@ def test_points_can_be_left_out(tmp_path):
     sink = open_sink(f"mcap://{tmp_path}/a.mcap?points=none")
     sink.write(moving(3))
     sink.close()
-    assert {topic for topic, *_ in read(tmp_path / "a.mcap")} == {"/tracks"}
+    assert {topic for topic, *_ in read(tmp_path / "a.mcap")} == {"/tf", "/tracks"}
 
 
 def test_energy_a_frame_is_that_of_its_window(tmp_path):
@@ -190,4 +202,4 @@ def test_a_full_disk_is_an_error_and_the_recording_goes_on_when_there_is_room(tm
     sink.write(moving(4))
     sink.close()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.mcap", "a.mcap"]
-    assert [stamp for *_, stamp, _ in read(tmp_path / "a-1.mcap")] == [400_000_000]
+    assert [stamp for *_, stamp, _ in read(tmp_path / "a-1.mcap", "/tracks")] == [400_000_000]

@@ -7,7 +7,10 @@ import pytest
 
 from modt.address import parse_address
 from modt.errors import MisuseError
-from modt.sinks import ros2_detections, ros2_markers
+from modt.geometry import rotation_zyx, se3
+from modt.ros2.static_transforms import StaticTransforms
+from modt.sinks import ros2_detections, ros2_markers, ros2_transform
+from modt.sinks.schemes import SCHEMES
 from tests.results import CAR, PEDESTRIAN, result
 from tests.ros2 import messages
 from tests.ros2.network import FAR, NEAR, until
@@ -16,7 +19,15 @@ FRAMES = [
     result(0, [], {}),
     result(3, [5, 4, 7], {0: 1, 1: 12, 2: 1234567}, {1: CAR, 12: PEDESTRIAN}, lost=(99,)),
 ]
-OPTIONS = {"ros2": frozenset({"domain", "frame_id"})}
+PLACED = se3(rotation_zyx(0.1, -0.2, 2.0), np.array([10.0, -20.0, 0.5]))
+OPTIONS = {"ros2": SCHEMES["ros2"].options}
+
+
+TOPICS = (
+    ("/robot/detections", ros2_detections.TYPE),
+    ("/robot/markers", ros2_markers.TYPE),
+    ("/tf", ros2_transform.TYPE),
+)
 
 
 def detections(frame):
@@ -79,24 +90,44 @@ def test_objects_are_cubes_with_labels_and_those_before_are_deleted():
     assert [m.action for m in markers(FRAMES[0])] == [ros2_markers.DELETE_ALL]
 
 
+def test_the_pose_of_the_sensor_is_a_transform_from_the_world():
+    frame = result(3, [5], {0: 1}, T_world_sensor=PLACED)
+    encoded = ros2_transform.encode(frame, "velodyne", "map")
+    (found,) = messages.decode(encoded, "tf2_msgs/msg/TFMessage").transforms
+    assert (found.header.frame_id, found.child_frame_id) == ("map", "velodyne")
+    assert (found.header.stamp.sec, found.header.stamp.nanosec) == (0, 300_000_000)
+    at = found.transform.translation
+    assert (at.x, at.y, at.z) == (10.0, -20.0, 0.5)
+    tree = StaticTransforms()
+    tree.add(encoded)
+    np.testing.assert_allclose(tree.between("map", "velodyne"), PLACED, atol=1e-12)
+
+
 def test_a_frame_is_published_to_whom_has_subscribed(loopback):
     from modt.ros2 import dds
     from modt.sinks.ros2 import open_sink
 
-    sink = open_sink(parse_address(f"ros2:///robot?domain={NEAR}&frame_id=velodyne", OPTIONS))
+    sink = open_sink(parse_address(f"ros2:///robot?domain={NEAR}&frame_id=velodyne&world_frame_id=map", OPTIONS))
     joined = dds.participant(FAR)
-    seen = {
-        kind: dds.Subscription(joined, f"/robot/{topic}", kind, depth=1, reliable=True)
-        for topic, kind in (("detections", ros2_detections.TYPE), ("markers", ros2_markers.TYPE))
-    }
+    seen = {kind: dds.Subscription(joined, topic, kind, depth=1, reliable=True) for topic, kind in TOPICS}
     until(lambda: all(publication.receivers for publication, _ in sink._topics))
     until(lambda: all(subscription.senders for subscription in seen.values()))
     sink.write(FRAMES[1])
     assert [m.data for m in seen[ros2_detections.TYPE].take(20.0)] == [ros2_detections.encode(FRAMES[1], "velodyne")]
     assert [m.data for m in seen[ros2_markers.TYPE].take(20.0)] == [ros2_markers.encode(FRAMES[1], "velodyne")]
+    transform = ros2_transform.encode(FRAMES[1], "velodyne", "map")
+    assert [m.data for m in seen[ros2_transform.TYPE].take(20.0)] == [transform]
     assert sink.health() == {"unsent": 0}
     sink.close()
     sink.write(FRAMES[0])
+
+
+def test_without_the_name_of_a_world_tf_is_left_alone(loopback):
+    from modt.sinks.ros2 import open_sink
+
+    sink = open_sink(parse_address(f"ros2:///robot?domain={NEAR}&world_frame_id=", OPTIONS))
+    assert len(sink._topics) == len(TOPICS) - 1
+    sink.close()
 
 
 def test_a_domain_that_is_none_is_refused():

@@ -1,15 +1,18 @@
 """tracks.jsonl."""
 
+import json
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from modt.geometry import rotation_zyx, se3
 from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
 from modt.sinks.output import LineFile
-from modt.sinks.records import line, read_records
-from modt.sinks.tracks import SCHEMA, frame_line, frame_record
+from modt.sinks.records import BROKEN, line, read_records
+from modt.sinks.tracks import SCHEMA, frame_line, frame_record, recorded_pose
 from tests.results import CAR, result
 
 
@@ -18,6 +21,7 @@ def test_a_record_has_the_documented_fields():
     assert record["schema"] == SCHEMA
     assert (record["frame"], record["stamp_s"], record["proposals"]) == (3, 0.3, 2)
     assert (record["classifications"], record["deferred"]) == (2, 0)
+    assert record["T_world_sensor"] == np.eye(4)[:3].ravel().tolist()
     seen, unsure, lost = record["tracks"]
     assert seen == {
         "id": 11,
@@ -36,6 +40,24 @@ def test_a_record_has_the_documented_fields():
     assert unsure["class"] == "background"
     assert unsure["posterior"] == [0.25] * 4
     assert (lost["proposal"], lost["box"], lost["state"]) == (None, None, "lost")
+
+
+def test_the_pose_of_the_sensor_is_recorded_and_read_back():
+    T = se3(rotation_zyx(0.01, -0.02, 2.5), np.array([123.4567891, -1e4, 0.5]))
+    record = frame_record(result(3, [5], {0: 1}, T_world_sensor=T))
+    assert record["T_world_sensor"][3::4] == [123.456789, -1e4, 0.5]
+    np.testing.assert_allclose(recorded_pose(record), T, rtol=0, atol=5.1e-7)
+    assert (
+        json.loads(frame_line(result(3, [5], {0: 1}, T_world_sensor=T)))["T_world_sensor"] == record["T_world_sensor"]
+    )
+
+
+@pytest.mark.parametrize("pose", [[1.0] * 11, ["a"] * 12, None, [np.nan] * 12])
+def test_what_is_no_pose_is_a_broken_record(pose):
+    with pytest.raises(BROKEN):
+        recorded_pose({"T_world_sensor": pose})
+    with pytest.raises(BROKEN):
+        recorded_pose({})
 
 
 def test_an_empty_frame_has_a_record():

@@ -9,6 +9,7 @@ import pytest
 
 from modt.address import parse_address
 from modt.errors import MisuseError
+from modt.geometry import rotation_zyx, se3
 from modt.sinks.schemes import SCHEMES
 from modt.viewer.live_frame import live_cells
 from modt.viewer.live_page import open_view
@@ -89,9 +90,11 @@ def test_connections_are_bounded(live, read):
 
 def test_a_frame_reaches_who_looks(live, read):
     reader = read()
-    show(live, results.result(3, [5, 4], {0: 1, 1: 2}, {1: results.CAR}))
+    T = se3(rotation_zyx(0.0, 0.0, 0.3), np.array([10.0, 1.0, 2.0]))
+    show(live, results.result(3, [5, 4], {0: 1, 1: 2}, {1: results.CAR}, T_world_sensor=T))
     event = reader.event()
     assert (event["frame"]["frame"], event["frame"]["cpu_ms"]) == (3, {"tracking": 2.0})
+    assert event["frame"]["pose"] == [10.0, 1.0, 0.3]
     table = pages.table(event["tracks"], len(COLUMNS))
     assert table[:, COLUMNS.index("id")].tolist() == [1, 2]
     number, level = pages.cells(event["points"])
@@ -156,10 +159,11 @@ def test_what_cannot_be_bound_is_one_error(live, address):
 
 
 def test_rows_of_a_result_are_in_the_frame_of_the_sensor():
-    result = results.result(0, [5, 4], {0: 1}, {1: results.CAR}, lost=(9,))
+    T = se3(rotation_zyx(0.0, 0.0, np.pi / 2), np.array([10.0, 1.0, 0.0]))
+    result = results.result(0, [5, 4], {0: 1}, {1: results.CAR}, lost=(9,), T_world_sensor=T)
     result.tracks.x[:] = [[12.0, 1.0, 0.3, 2.0], [10.0, 4.0, 0.0, 0.0]]
     result.tracks.box[1] = [0, 0, -1, 4, 2, 1.5, 0.5 + np.pi / 2]
-    rows = result_rows(result, np.array([10.0, 1.0, np.pi / 2]))
+    rows = result_rows(result)
     seen, lost = (dict(zip(COLUMNS, row, strict=True)) for row in rows)
     assert (seen["seen"], lost["seen"], lost["id"]) == (1, 0, 9)
     assert seen["x"] == result.proposals.box[0, 0]

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from modt.classes import CLASS_NAMES
+from modt.geometry import rotation_zyx, se3
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
-from modt.viewer.track_rows import COLUMNS, frame_rows, track_table
+from modt.viewer.track_rows import COLUMNS, frame_rows, planar, track_table
 
 
 def track(id_, box, world, state="tracked", class_="car"):
@@ -26,9 +27,9 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     seen, lost = track(3, (4, 0, -1, 4.5, 1.8, 1.5, 0.5), (0, 4, 0, 1.0)), track(3, None, (0, 6, 0, 1.0), "lost")
     records = [{"tracks": [*posts(0.0), seen], "classified": [3]}, {"tracks": [lost, *posts(1.0)], "classified": []}]
     states: list[str] = []
-    table, poses = track_table(frame_rows(at, record, states) for at, record in enumerate(records))
+    poses = np.array([[0, 0, np.pi / 2], [1, 0, np.pi / 2]])
+    table = track_table((frame_rows(at, record, states) for at, record in enumerate(records)), poses)
     assert states == ["tracked", "lost"]
-    np.testing.assert_allclose(poses, [[0, 0, np.pi / 2], [1, 0, np.pi / 2]], atol=1e-9)
     rows = [dict(zip(COLUMNS, row, strict=True)) for row in table.tolist()]
     assert [(row["id"], row["at"]) for row in rows] == [(3, 0), (3, 1), (7, 0), (7, 1), (8, 0), (8, 1)]
     assert [(row["seen"], row["classified"], row["state"]) for row in rows[:2]] == [(1, 1, 0), (0, 0, 1)]
@@ -37,10 +38,15 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
 
 
 def test_a_record_without_identities_of_what_was_classified_is_read():
-    table, _ = track_table([frame_rows(0, {"tracks": posts(0.0)}, [])])
+    table = track_table([frame_rows(0, {"tracks": posts(0.0)}, [])], np.zeros((1, 3)))
     assert not table[:, COLUMNS.index("classified")].any()
 
 
 @pytest.mark.parametrize("frames", [[], [[]]])
 def test_no_track_is_no_row(frames):
-    assert track_table(frames)[0].shape == (0, len(COLUMNS))
+    assert track_table(frames, np.zeros((len(frames), 3))).shape == (0, len(COLUMNS))
+
+
+def test_a_planar_pose_is_position_and_yaw():
+    T = se3(rotation_zyx(0.05, -0.03, 2.9), np.array([3.5, -70.0, 1.0]))
+    np.testing.assert_allclose(planar(T), [3.5, -70.0, 2.9], atol=1e-12)

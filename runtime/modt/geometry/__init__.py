@@ -2,13 +2,14 @@
 
 from modt.geometry.boxes import corners, transform_boxes, upright_boxes
 from modt.geometry.field_of_view import Camera, FieldOfView
-from modt.geometry.transforms import inverse, rotation_zyx, se3, transform, wrap, yaw_of
+from modt.geometry.transforms import inverse, quaternion_of, rotation_zyx, se3, transform, wrap, yaw_of
 
 __all__ = [
     "Camera",
     "FieldOfView",
     "corners",
     "inverse",
+    "quaternion_of",
     "rotation_zyx",
     "se3",
     "transform",

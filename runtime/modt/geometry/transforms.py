@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from modt.types import Float64
 
@@ -41,6 +42,12 @@ def inverse(T: Float64) -> Float64:
 def yaw_of(T: Float64) -> float:
     """Heading of a rigid transform in the ground plane [rad]."""
     return float(np.arctan2(T[1, 0], T[0, 0]))
+
+
+def quaternion_of(T: Float64) -> Float64:
+    """(4,) rotation of a rigid transform as a quaternion x, y, z, w."""
+    quaternion: Float64 = Rotation.from_matrix(T[:3, :3]).as_quat()
+    return quaternion
 
 
 def transform(T: Float64, xyz: Float64) -> Float64:

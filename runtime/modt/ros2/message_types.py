@@ -27,12 +27,17 @@ DEFINITIONS = {
     "geometry_msgs/Quaternion": "float64 x, float64 y, float64 z, float64 w",
     "geometry_msgs/Pose": "geometry_msgs/Point position, geometry_msgs/Quaternion orientation",
     "geometry_msgs/PoseWithCovariance": "geometry_msgs/Pose pose, float64[36] covariance",
+    "geometry_msgs/Transform": "geometry_msgs/Vector3 translation, geometry_msgs/Quaternion rotation",
+    "geometry_msgs/TransformStamped": (
+        "std_msgs/Header header, string child_frame_id, geometry_msgs/Transform transform"
+    ),
     "geometry_msgs/Twist": "geometry_msgs/Vector3 linear, geometry_msgs/Vector3 angular",
     "geometry_msgs/TwistWithCovariance": "geometry_msgs/Twist twist, float64[36] covariance",
     "nav_msgs/Odometry": (
         "std_msgs/Header header, string child_frame_id, geometry_msgs/PoseWithCovariance pose, "
         "geometry_msgs/TwistWithCovariance twist"
     ),
+    "tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms",
     "vision_msgs/ObjectHypothesis": "string class_id, float64 score",
     "vision_msgs/ObjectHypothesisWithPose": (
         "vision_msgs/ObjectHypothesis hypothesis, geometry_msgs/PoseWithCovariance pose"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from modt.geometry import se3
+from modt.geometry import quaternion_of, se3
 from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
 from modt.types import Float64
 
@@ -62,6 +62,5 @@ def write_odometry(stamp_s: float, frame_id: str, child_frame_id: str, T_odom_ch
     cdr = CdrWriter()
     cdr.header(stamp_s, frame_id)
     cdr.text(child_frame_id)
-    quaternion = Rotation.from_matrix(T_odom_child[:3, :3]).as_quat()
-    cdr.record(("7d", UNKNOWN), *T_odom_child[:3, 3].tolist(), *quaternion.tolist())
+    cdr.record(("7d", UNKNOWN), *T_odom_child[:3, 3].tolist(), *quaternion_of(T_odom_child).tolist())
     return cdr.message()

@@ -1,31 +1,34 @@
-"""Topics of ROS 2: detections for programs, markers for the eye."""
+"""Topics of ROS 2: detections for programs, markers for the eye, the pose of the sensor."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from modt.address import Address
 from modt.ros2.address import domain_of, name_of
 from modt.ros2.dds import Publication, participant
-from modt.sinks import ros2_detections, ros2_markers
+from modt.sinks import ros2_detections, ros2_markers, ros2_transform
 from modt.sinks.output import Health
 from modt.types import FrameResult
 
-PREFIX, FRAME_ID = "modt", "lidar"
-"""Of an address that states none."""
+PREFIX, FRAME_ID, WORLD_FRAME_ID = "modt", "lidar", "world"
+"""Names that an address overrules."""
+Topic = tuple[Publication, Callable[[FrameResult], bytes]]
+"""Where messages go, and what makes them of a frame."""
 
 
 class Ros2Sink:
-    """Publishes each frame on PREFIX/detections and PREFIX/markers, where somebody has subscribed."""
+    """Publishes each frame on its topics, where somebody has subscribed."""
 
-    def __init__(self, detections: Publication, markers: Publication, frame_id: str) -> None:
+    def __init__(self, topics: list[Topic]) -> None:
         self._unsent = 0
-        self._frame_id = frame_id
-        self._topics = [(detections, ros2_detections.encode), (markers, ros2_markers.encode)]
+        self._topics = topics
 
     def write(self, result: FrameResult, /) -> None:
         """Publish a frame; never waits for a subscriber."""
         for publication, encode in self._topics:
             if publication.receivers:
-                self._unsent += not publication.write(encode(result, self._frame_id))
+                self._unsent += not publication.write(encode(result))
 
     def health(self) -> Health:
         """Messages that DDS did not take at once, because a reliable subscriber is behind."""
@@ -37,7 +40,14 @@ class Ros2Sink:
 
 
 def open_sink(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink:
-    """The sink of ros2:///PREFIX?domain=N&frame_id=NAME; `cores` for Cyclone's threads, None: where the caller runs.
+    """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME.
+
+    It publishes on PREFIX/detections, PREFIX/markers and /tf. An empty world_frame_id leaves /tf alone, as a robot
+    needs it whose tree of frames has the sensor's already: a frame has one parent.
+
+    Args:
+        address: of the sink.
+        cores: for Cyclone's threads, None: where the caller runs.
 
     Raises:
         MisuseError: Cyclone DDS is not installed, or no number of a domain.
@@ -45,6 +55,15 @@ def open_sink(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink
     """
     prefix = name_of(address) or PREFIX
     joined = participant(domain_of(address), cores)
-    detections = Publication(joined, f"{prefix}/detections", ros2_detections.TYPE)
-    markers = Publication(joined, f"{prefix}/markers", ros2_markers.TYPE)
-    return Ros2Sink(detections, markers, address.option("frame_id", FRAME_ID))
+    frame_id, world = address.option("frame_id", FRAME_ID), address.option("world_frame_id", WORLD_FRAME_ID)
+
+    def topic(name: str, kind: str, encode: Callable[..., bytes], *frames: str) -> Topic:
+        return Publication(joined, name, kind), lambda result: encode(result, *frames)
+
+    topics = [
+        topic(f"{prefix}/detections", ros2_detections.TYPE, ros2_detections.encode, frame_id),
+        topic(f"{prefix}/markers", ros2_markers.TYPE, ros2_markers.encode, frame_id),
+    ]
+    if world:
+        topics.append(topic(ros2_transform.TOPIC, ros2_transform.TYPE, ros2_transform.encode, frame_id, world))
+    return Ros2Sink(topics)

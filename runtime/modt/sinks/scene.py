@@ -8,11 +8,12 @@ from typing import Any
 
 import foxglove
 import numpy as np
-from foxglove.channels import PointCloudChannel, SceneUpdateChannel
+from foxglove.channels import FrameTransformChannel, PointCloudChannel, SceneUpdateChannel
 from foxglove.messages import (
     ArrowPrimitive,
     Color,
     CubePrimitive,
+    FrameTransform,
     KeyValuePair,
     PackedElementField,
     PackedElementFieldNumericType,
@@ -32,14 +33,15 @@ from modt.address import Address
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
+from modt.geometry import quaternion_of, yaw_of
 from modt.types import NONE, FrameResult
 
 logging.getLogger("foxglove").setLevel(
     logging.ERROR
 )  # it warns of each message that cannot be written, we count them
 
-FRAME = "sensor"
-"""Frame of reference of all messages."""
+FRAME, WORLD = "sensor", "world"
+"""Frame of reference of all other messages, and its parent in /tf."""
 MIN_ARROW_MPS = 0.3
 ENERGY = {"mJ_per_frame": "number", "watts": "number", "kind": "string"}
 STAGES = {"cpu_ms": "number", **{f"{stage}_ms": "number" for stage in ledger.STAGES}}
@@ -73,12 +75,14 @@ _EDGE = [_colour(class_, 1.0) for class_ in CLASSES]
 
 
 class Scene:
-    """Channels /tracks (foxglove.SceneUpdate), /points (foxglove.PointCloud), /energy and /stages (JSON).
+    """Channels /tf (foxglove.FrameTransform), /tracks (foxglove.SceneUpdate), /points (foxglove.PointCloud), /energy
+    and /stages (JSON).
 
     Times are the stamps of the frames. A message is made only while somebody takes it.
     """
 
     def __init__(self, context: foxglove.Context, *, points: bool) -> None:
+        self._transforms = FrameTransformChannel("/tf", context=context)
         self._tracks = SceneUpdateChannel("/tracks", context=context)
         self._points = PointCloudChannel("/points", context=context) if points else None
         self._energy = foxglove.Channel("/energy", schema=_json("modt.Energy", ENERGY), context=context)
@@ -86,9 +90,11 @@ class Scene:
         self._stamp_ns = 0
 
     def write(self, result: FrameResult) -> None:
-        """Publish a frame: a cube, a text and an arrow for every object in view, and the points."""
+        """Publish a frame: the pose of the sensor, a cube, text and arrow for each object in view, and the points."""
         self._stamp_ns = round(1e9 * result.frame.stamp_s)
         stamp = Timestamp(*divmod(self._stamp_ns, 10**9))
+        if self._transforms.has_sinks():
+            self._transforms.log(placed(result, stamp), log_time=self._stamp_ns)
         if self._tracks.has_sinks():
             everything = SceneEntityDeletion(timestamp=stamp, type=SceneEntityDeletionType.All)
             update = SceneUpdate(deletions=[everything], entities=entities(result, stamp))
@@ -110,9 +116,8 @@ def entities(result: FrameResult, stamp: Timestamp) -> list[SceneEntity]:
     tracks = result.tracks
     rows = np.flatnonzero((tracks.proposal != NONE) & (tracks.object_class != ObjectClass.BACKGROUND))
     boxes = result.proposals.box[tracks.proposal[rows]]
-    turn = boxes[:, 6] - tracks.box[rows, 6]  # of the world, seen from the sensor
     speed = tracks.x[rows, 3]
-    heading = tracks.x[rows, 2] + turn + np.pi * (speed < 0)
+    heading = tracks.x[rows, 2] - yaw_of(result.T_world_sensor) + np.pi * (speed < 0)
     columns = (tracks.id[rows], tracks.object_class[rows], np.abs(speed), heading, boxes)
     return [_entity(stamp, *row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 
@@ -142,6 +147,19 @@ def _entity(
         cubes=[cube],
         texts=[text],
         arrows=[arrow] if speed_mps >= MIN_ARROW_MPS else [],
+    )
+
+
+def placed(result: FrameResult, stamp: Timestamp) -> FrameTransform:
+    """The pose of the sensor in the world."""
+    x, y, z = result.T_world_sensor[:3, 3].tolist()
+    qx, qy, qz, qw = quaternion_of(result.T_world_sensor).tolist()
+    return FrameTransform(
+        timestamp=stamp,
+        parent_frame_id=WORLD,
+        child_frame_id=FRAME,
+        translation=Vector3(x=x, y=y, z=z),
+        rotation=Quaternion(x=qx, y=qy, z=qz, w=qw),
     )
 
 

@@ -40,5 +40,11 @@ SCHEMES = {
         depth=4,
     ),
     "view": Scheme("modt.viewer.live_page:open_view", "view://[HOST][:PORT]", depth=6),
-    "ros2": Scheme("modt.sinks.ros2:open_sink", "ros2:///PREFIX", frozenset({"domain", "frame_id"}), "ros2", depth=4),
+    "ros2": Scheme(
+        "modt.sinks.ros2:open_sink",
+        "ros2:///PREFIX",
+        frozenset({"domain", "frame_id", "world_frame_id"}),
+        "ros2",
+        depth=4,
+    ),
 }

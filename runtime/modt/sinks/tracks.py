@@ -15,7 +15,7 @@ import numpy as np
 from modt.classes import CLASS_NAMES
 from modt.sinks import json_columns as text
 from modt.sinks.records import line
-from modt.types import NONE, FrameResult, Int
+from modt.types import NONE, Float64, FrameResult, Int
 
 SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
@@ -23,7 +23,7 @@ WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 
 
 def frame_record(result: FrameResult) -> dict[str, Any]:
-    """One result as plain data: lengths rounded to 1e-3, probabilities to 1e-6."""
+    """One result as plain data: lengths rounded to 1e-3, probabilities and the pose to 1e-6."""
     tracks = result.tracks
     tracked = tracks.proposal != NONE
     box = np.zeros((len(tracks), len(BOX_KEYS)))
@@ -55,11 +55,25 @@ def _frame_fields(result: FrameResult) -> dict[str, Any]:
         "schema": SCHEMA,
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 6),
+        "T_world_sensor": np.round(result.T_world_sensor[:3], 6).ravel().tolist(),
         "proposals": len(result.proposals),
         "classifications": len(result.classified),
         "deferred": result.n_deferred,
         "classified": result.classified.tolist(),
     }
+
+
+def recorded_pose(record: dict[str, Any]) -> Float64:
+    """(4, 4) T_world_sensor of a record.
+
+    Raises:
+        one of modt.sinks.records.BROKEN: the record has none.
+    """
+    T = np.eye(4)
+    T[:3] = np.reshape(record["T_world_sensor"], (3, 4))
+    if not np.isfinite(T).all():
+        raise ValueError("T_world_sensor is not finite")
+    return T
 
 
 CLASSES = text.encode_table([json.dumps(name) for name in CLASS_NAMES])

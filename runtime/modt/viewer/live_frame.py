@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from modt.sinks.records import line
-from modt.types import NONE, Float64, FrameResult
+from modt.types import FrameResult
 from modt.viewer import look
 from modt.viewer.packed import packed_cells, packed_table
 from modt.viewer.point_cells import LEVEL_M, LEVELS, SIDE, Cells, occupied
-from modt.viewer.sensor_pose import sensor_pose
-from modt.viewer.track_rows import result_rows, scaled
+from modt.viewer.track_rows import planar, result_rows, scaled
 
 STEP_CM = 5
 MOST_CELLS = 50_000
@@ -20,28 +19,24 @@ FASTEST = 1
 """Level of the compression."""
 
 
-def live_message(result: FrameResult, costs: dict[str, Any], pose: Float64) -> tuple[str, Float64]:
-    """Line of JSON of a frame, and the pose of the sensor, given that of the frame before."""
-    tracks = result.tracks
-    seen = np.flatnonzero(tracks.proposal != NONE)
-    boxes = result.proposals.box[tracks.proposal[seen]]
-    pose = sensor_pose(boxes[:, :2], tracks.x[seen, :2], pose)
+def live_message(result: FrameResult, costs: dict[str, Any]) -> str:
+    """Line of JSON of a frame."""
     frame = {
         "frame": result.frame.index,
         "stamp_s": round(result.frame.stamp_s, 3),
         "proposals": len(result.proposals),
         "classifications": len(result.classified),
         "deferred": result.n_deferred,
-        "pose": pose.round(4).tolist(),
+        "pose": planar(result.T_world_sensor).round(4).tolist(),
         **costs,
     }
     content = {
         "frame": frame,
         "states": look.states(result.state_names),
-        "tracks": packed_table(scaled(result_rows(result, pose)), FASTEST),
+        "tracks": packed_table(scaled(result_rows(result)), FASTEST),
         "points": packed_cells(live_cells(result).thinned(MOST_CELLS), FASTEST),
     }
-    return line(content), pose
+    return line(content)
 
 
 def live_cells(result: FrameResult) -> Cells:

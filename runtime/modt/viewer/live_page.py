@@ -5,8 +5,6 @@ from __future__ import annotations
 import logging
 from typing import Any
 
-import numpy as np
-
 from modt.address import Address
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
@@ -29,7 +27,6 @@ class LivePage:
         self._server = LiveServer(host, port, (head + tail).encode())
         self.port = int(self._server.server_address[1])
         self._result: FrameResult | None = None
-        self._pose = np.zeros(3)
         self._energy: dict[str, Any] = {}
 
     def write(self, result: FrameResult, /) -> None:
@@ -46,8 +43,7 @@ class LivePage:
             result, self._result = self._result, None
             if result.frame.index == record["frame"]:
                 cpu_ms = {name: round(1e-6 * stage["cpu_ns"], 3) for name, stage in record["stages"].items()}
-                text, self._pose = live_message(result, {"cpu_ms": cpu_ms, **self._energy}, self._pose)
-                self._server.publish(text)
+                self._server.publish(live_message(result, {"cpu_ms": cpu_ms, **self._energy}))
 
     def close(self) -> None:
         """Leave everybody."""

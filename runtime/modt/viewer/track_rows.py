@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 
 from modt.classes import CLASS_NAMES
-from modt.geometry import wrap
+from modt.geometry import wrap, yaw_of
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt.types import NONE, Float64, FrameResult, Int
-from modt.viewer.sensor_pose import sensor_pose
 
 PLAIN = ("id", "at", "state", "class", "seen", "final", "classified", "points")
 P = tuple(f"p_{name}" for name in CLASS_NAMES)
@@ -50,14 +49,18 @@ def frame_rows(at: int, record: dict[str, Any], states: list[str]) -> list[list[
     return rows
 
 
-def track_table(frames: Iterable[Sequence[Sequence[float]]]) -> tuple[Int, Float64]:
-    """(R, COLUMNS) table, and (F, 3) pose of the sensor in the world x, y [m], yaw [rad], of the rows of F frames."""
+def planar(T_world_sensor: Float64) -> Float64:
+    """(3,) x, y [m], yaw [rad] of a pose."""
+    return np.array([*T_world_sensor[:2, 3], yaw_of(T_world_sensor)])
+
+
+def track_table(frames: Iterable[Sequence[Sequence[float]]], poses: Float64) -> Int:
+    """(R, COLUMNS) table of the rows of F frames, and of (F, 3) planar poses of the sensor."""
     parts = [np.array(rows, np.float64).reshape(-1, len(COLUMNS)) for rows in frames]
-    poses = _poses(parts)
     rows = np.concatenate(parts) if parts else np.zeros((0, len(COLUMNS)))
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
     _fill_lost(rows, poses)
-    return scaled(rows), poses
+    return scaled(rows)
 
 
 def scaled(rows: Float64) -> Int:
@@ -66,9 +69,9 @@ def scaled(rows: Float64) -> Int:
     return np.rint(rows).astype(np.int64)
 
 
-def result_rows(result: FrameResult, pose: Float64) -> Float64:
-    """(M, COLUMNS) rows of the tracks of a result, at frame 0; pose: (3,) x, y [m], yaw [rad] of the sensor."""
-    tracks = result.tracks
+def result_rows(result: FrameResult) -> Float64:
+    """(M, COLUMNS) rows of the tracks of a result, at frame 0."""
+    tracks, pose = result.tracks, planar(result.T_world_sensor)
     seen = tracks.proposal != NONE
     box = tracks.box.copy()
     c, s = np.cos(pose[2]), np.sin(pose[2])
@@ -86,15 +89,6 @@ def result_rows(result: FrameResult, pose: Float64) -> Float64:
         tracks.points,
     )
     return np.column_stack([*plain, tracks.posterior, box, tracks.x]).astype(np.float64)
-
-
-def _poses(parts: Sequence[Float64]) -> Float64:
-    seen, box, world = (COLUMNS.index(name) for name in ("seen", "x", "world_x"))
-    poses = np.zeros((len(parts), 3))
-    for at, rows in enumerate(parts):
-        shown = rows[rows[:, seen] > 0]
-        poses[at] = sensor_pose(shown[:, box : box + 2], shown[:, world : world + 2], poses[max(at - 1, 0)])
-    return poses
 
 
 def _fill_lost(rows: Float64, poses: Float64) -> None:

@@ -64,7 +64,7 @@ def test_mcap_holds_points_tracks_and_energy_of_every_frame(recorded, tmp_path):
     assert stamp_ns == round(1e9 * lines[-1]["stamp_s"])
     assert energy["mJ_per_frame"] == pytest.approx(1e3 * window["energy_J"] / window["frames"][2])
     counts = {topic: len(messages) for topic, messages in found.items()}
-    assert counts == dict.fromkeys(("/tracks", "/points", "/stages"), len(lines))
+    assert counts == dict.fromkeys(("/tf", "/tracks", "/points", "/stages"), len(lines))
     for (stamp_ns, update), (_, cloud), record in zip(found["/tracks"], found["/points"], lines, strict=True):
         assert stamp_ns == round(1e9 * record["stamp_s"])
         shown = objects(record)
@@ -173,10 +173,12 @@ def moved(run, folder):
 def test_misuse_is_one_line_with_the_remedy(recorded, tmp_path, capsys):
     run, _ = recorded
     gone = moved(run, tmp_path)
-    bare, odd, live = (shutil.copytree(run, tmp_path / name) for name in ("bare", "odd", "live"))
+    bare, odd, old, live = (shutil.copytree(run, tmp_path / name) for name in ("bare", "odd", "old", "live"))
     shutil.rmtree(bare / "labels")
     lines = (run / "tracks.jsonl").read_text().splitlines(keepends=True)
     (odd / "tracks.jsonl").write_text(lines[0] + json.dumps({"schema": SCHEMA, "frame": 1, "tracks": [{}]}) + "\n")
+    unplaced = [{k: v for k, v in record.items() if k != "T_world_sensor"} for record in records(run)]
+    (old / "tracks.jsonl").write_text("".join(json.dumps(record) + "\n" for record in unplaced))
     described = yaml.safe_load((live / "run.yaml").read_text())
     described["stream"]["path"], described["service"] = None, True
     (live / "run.yaml").write_text(yaml.safe_dump(described))
@@ -184,6 +186,7 @@ def test_misuse_is_one_line_with_the_remedy(recorded, tmp_path, capsys):
         (bare, "--semantickitti", "modt replay --labels"),
         (odd, "--csv", "tracks.jsonl:2: no record of a frame"),
         (odd, "--semantickitti", "tracks.jsonl:2: no record of a frame"),
+        (old, "--kitti", "tracks.jsonl:1: no record of a frame (KeyError('T_world_sensor'))"),
         (gone, "--kitti", "no such file or directory"),
         (tmp_path, "--csv", "describes no run"),
     ]

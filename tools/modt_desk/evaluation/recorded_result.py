@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from modt.classes import CLASS_NAMES
-from modt.geometry import wrap
-from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
+from modt.geometry import transform_boxes
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS, recorded_pose
 from modt.types import NONE, Float32, Float64, Frame, FrameResult, Proposals, Tracks
 
 MOST_PROPOSALS = 100_000
@@ -16,16 +16,17 @@ MOST_PROPOSALS = 100_000
 NO_POINTS: Float32 = np.zeros((0, 4), np.float32)
 
 
+@np.errstate(over="raise", invalid="raise")
 def recorded_result(record: dict[str, Any]) -> FrameResult:
     """The result that a line of tracks.jsonl is of.
 
-    Proposals have their boxes, no members, and none counts as truncated. The headings of the boxes in the world are
-    estimated from the positions of all tracks in view. Points, covariances and the views of the fusion stay blank.
+    Proposals have their boxes, no members, and none counts as truncated. Points, covariances, the views of the fusion
+    and the boxes of lost tracks stay blank.
 
     Raises:
         one of modt.sinks.records.BROKEN: the record lacks something.
     """
-    rows = record["tracks"]
+    rows, T_world_sensor = record["tracks"], recorded_pose(record)
     names = tuple(sorted({row["state"] for row in rows}))
     tracks = Tracks.blank(len(rows))
     tracks.id[:] = [row["id"] for row in rows]
@@ -40,7 +41,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     tracks.x[:] = _table([row["world"] for row in rows], WORLD_KEYS)
     seen = np.flatnonzero(tracks.proposal != NONE)
     boxes = _table([row["box"] for row in rows if row["proposal"] is not None], BOX_KEYS)
-    tracks.box[seen] = _in_the_world(boxes, tracks.x[seen])
+    tracks.box[seen] = transform_boxes(T_world_sensor, boxes)
     n_proposals = int(record["proposals"])
     if n_proposals > MOST_PROPOSALS:
         raise ValueError(f"{n_proposals} proposals")
@@ -48,21 +49,11 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     proposals.box[tracks.proposal[seen]] = boxes
     frame = Frame(int(record["frame"]), float(record["stamp_s"]), NO_POINTS)
     classified = np.array(record.get("classified", []), np.int64)
-    return FrameResult(frame, proposals, tracks, names, int(record["deferred"]), classified)
+    return FrameResult(frame, T_world_sensor, proposals, tracks, names, int(record["deferred"]), classified)
 
 
 def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:
     return np.array([[row[key] for key in keys] for row in rows], np.float64).reshape(-1, len(keys))
-
-
-@np.errstate(over="raise", invalid="raise")
-def _in_the_world(boxes: Float64, x: Float64) -> Float64:
-    """(n, 7) boxes as they lie in the world: the turn that takes their centres to the positions x of their tracks."""
-    if not len(boxes):
-        return boxes
-    here, there = boxes[:, 0] + 1j * boxes[:, 1], x[:, 0] + 1j * x[:, 1]
-    turn = np.angle(np.vdot(here - here.mean(), there - there.mean()))
-    return np.column_stack([x[:, :2], boxes[:, 2:6], wrap(boxes[:, 6] + turn)])
 
 
 def _proposals(n: int) -> Proposals:

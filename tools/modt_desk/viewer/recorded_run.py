@@ -19,9 +19,9 @@ from modt.profile import from_yaml
 from modt.profile.yaml_text import to_yaml
 from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
-from modt.sinks.tracks import SCHEMA
+from modt.sinks.tracks import SCHEMA, recorded_pose
 from modt.types import Float64, Int
-from modt.viewer.track_rows import frame_rows, track_table
+from modt.viewer.track_rows import frame_rows, planar, track_table
 
 COUNTS: dict[str, Callable[[Any], Any]] = {
     "frame": int,
@@ -64,7 +64,7 @@ class RecordedRun:
             _ = facts["stream"]["path"], facts["stream"]["name"], facts["mode"]
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        states = list[str]()
+        states, poses = list[str](), list[Float64]()
         with records_of(run / LEDGER):
             costs = _costs(run / LEDGER)
         frames, rows = list[dict[str, Any]](), list[list[list[float]]]()
@@ -72,6 +72,7 @@ class RecordedRun:
             try:
                 counts = {name: kind(record[name]) for name, kind in COUNTS.items()}
                 rows.append(frame_rows(number, record, states))
+                poses.append(planar(recorded_pose(record)))
                 frames.append({**counts, **costs.get(int(counts["frame"]), {})})
             except BROKEN as error:
                 place = f"{run / TRACKS}:{number + 1}"
@@ -79,7 +80,8 @@ class RecordedRun:
         if not frames:
             raise MisuseError(run / TRACKS, "no frames are recorded", "give the directory of a longer run")
         with records_of(run / TRACKS), np.errstate(over="raise", invalid="raise"):
-            return cls(facts, config, frames, states, *track_table(rows))
+            placed = np.stack(poses)
+            return cls(facts, config, frames, states, track_table(rows, placed), placed)
 
     @property
     def numbers(self) -> list[int]:
