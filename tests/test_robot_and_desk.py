@@ -38,7 +38,9 @@ def a_folder_of_scans(tmp_path):
     folder.mkdir()
     random = np.random.default_rng(0)
     for number in range(2):
-        random.uniform((-20, -20, -2, 0), (20, 20, 2, 1), (2000, 4)).astype(np.float32).tofile(folder / f"{number:06d}.bin")
+        random.uniform((-20, -20, -2, 0), (20, 20, 2, 1), (2000, 4)).astype(np.float32).tofile(
+            folder / f"{number:06d}.bin"
+        )
     return folder
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from modt import profile
 from modt.app.containment import RENEW_AFTER, Containment
+from modt.app.inputs import Request
 from modt.app.live_stages import LiveStages, within
-from modt.app.request import Request
 from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED
 from modt_desk.simulation.synthetic_stream import SyntheticStream

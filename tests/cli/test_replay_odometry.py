@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
+from modt.app.inputs import Request
 from modt.app.replay_session import Session
-from modt.app.request import Request
 from modt.app.supervisor import NoSupervisor
 from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records

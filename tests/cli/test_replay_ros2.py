@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from modt.app.inputs import Request
 from modt.app.replay_session import Session
-from modt.app.request import Request
 from modt.app.supervisor import NoSupervisor
 from modt.ros2 import odometry
 from modt.ros2.odometry import write_odometry

@@ -18,8 +18,7 @@ def main() -> None:
     options.add_argument("--repeat", type=int, default=2000, help="frames of empty stages")
     arguments = options.parse_args()
     host.pin_to_core(host.last_core())
-    from modt.app import assembly
-    from modt.app import request as assemble
+    from modt.app import assembly, inputs
     from modt.energy.ledger import STAGES, Ledger, NullLedger
 
     ledger = Ledger()
@@ -34,11 +33,11 @@ def main() -> None:
         empty_us[name] = 1e-3 * (time.thread_time_ns() - began_ns) / arguments.repeat
     cost_us = empty_us["ledger"] - empty_us["null"]
     print(f"a frame of {len(STAGES)} empty stages: {cost_us:.1f} us more than with the null ledger")
-    request = assemble.Request(path=arguments.path, fov=arguments.fov, frames=arguments.frames)
-    stream = assemble.stream(request)
+    request = inputs.Request(path=arguments.path, fov=arguments.fov, frames=arguments.frames)
+    stream = inputs.stream(request)
     for mode in assembly.MODES:
         chosen, loaded = assembly.MODES[mode], profile.load()
-        pipeline = assembly.pipeline(chosen, loaded, assemble.field_of_view(request, stream), ledger)
+        pipeline = assembly.pipeline(chosen, loaded, inputs.field_of_view(request, stream), ledger)
         count = cpu_ns = 0
         budget = chosen.budget(loaded)
         for frame in stream:

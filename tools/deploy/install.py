@@ -15,7 +15,7 @@ from pathlib import Path
 from tools.options import parser
 
 UNITS = Path(__file__).resolve().parents[2] / "systemd"
-UNIT = "modt.app"
+UNIT = "modt.service"
 DROP_INS = {path.stem: path for path in sorted(UNITS.glob("*.conf"))}
 MARK = "# installed by tools.deploy.install\n"
 

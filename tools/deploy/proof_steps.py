@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-UNIT = "modt.app"
+UNIT = "modt.service"
 PROFILE = Path("/srv/modt/robot.yaml")
 END = "end\n"
 RECORDS = Path("/var/lib/modt/run")

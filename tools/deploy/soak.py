@@ -24,10 +24,10 @@ import numpy as np
 
 from modt import host
 from modt.app import metering
+from modt.app.inputs import Request, stream
 from modt.app.ladder import Step
 from modt.app.live_loop import NamedSink
 from modt.app.live_session import LiveSession
-from modt.app.request import Request, stream
 from modt.app.supervisor import NoSupervisor
 from modt.sinks.output import Health
 from modt.sources.live.live_stream import LiveStream

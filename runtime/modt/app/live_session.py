@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from modt import host, profile
-from modt.app import metering
-from modt.app import request as assemble
+from modt.app import inputs, metering
 from modt.app.ladder import Ladder
 from modt.app.live_loop import LiveLoop, NamedSink
 from modt.app.live_stages import LiveStages
@@ -56,7 +55,7 @@ class LiveSession:
 
     def __init__(
         self,
-        request: assemble.Request,
+        request: inputs.Request,
         source: LiveStream,
         sinks: Sequence[NamedSink],
         out: Path,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from urllib.parse import parse_qsl
 
-from modt.app import request as assemble
+from modt.app import inputs
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.played_reader import PlayedReader
@@ -25,7 +25,7 @@ def open_source(text: str, cores: frozenset[int] | None) -> LiveStream:
         live: LiveStream = open_live(text, cores)
         return live
     path, loop = _recording(text)
-    stream = assemble.stream(assemble.Request(path=path))
+    stream = inputs.stream(inputs.Request(path=path))
     return LiveStream(stream.info, PlayedReader(stream, loop=loop), cores=cores)
 
 

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from modt import host
-from modt.app import request as assemble
+from modt.app import inputs
 from modt.app.chosen_profile import ChosenProfile, choose
 from modt.app.parts import Parts, pipeline_of
 from modt.app.sensor_watch import SensorWatch
@@ -24,7 +24,7 @@ from modt.tracking.tracker import Tracker
 from modt.types import Budget, Float32, Frame, FrameResult
 
 
-class LiveSource(assemble.Described, Protocol):
+class LiveSource(inputs.Described, Protocol):
     """A source that may know the profile of its sensor."""
 
     @property
@@ -45,7 +45,7 @@ class LiveStages:
         MisuseError: an invalid request.
     """
 
-    def __init__(self, request: assemble.Request, stream: LiveSource) -> None:
+    def __init__(self, request: inputs.Request, stream: LiveSource) -> None:
         self._request, self._stream = request, stream
         self._ledger = Ledger()
         self._seen = False  # the sensor
@@ -53,7 +53,7 @@ class LiveStages:
         self.looking: Thread | None = None
         self._found: list[ChosenProfile] = []  # by the thread that looks again
         self.parts = self._made(self._chosen(None))
-        self.odometry: PoseSource = assemble.odometry(request, stream, self.parts.config.odometry)
+        self.odometry: PoseSource = inputs.odometry(request, stream, self.parts.config.odometry)
         self._good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id after the last good frame
 
     @property

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from modt import host, profile
-from modt.app import assembly
-from modt.app import request as assemble
+from modt.app import assembly, inputs
 from modt.app.chosen_profile import ChosenProfile
 from modt.classes import CLASS_NAMES
 from modt.config import ProfileConfig
@@ -28,7 +27,7 @@ class Parts:
         pipeline: the stages.
     """
 
-    request: assemble.Request
+    request: inputs.Request
     chosen: ChosenProfile
     pipeline: Pipeline
 
@@ -83,8 +82,8 @@ class Parts:
 
 
 def pipeline_of(
-    request: assemble.Request, stream: assemble.Described, config: ProfileConfig, ledger: StageLedger
+    request: inputs.Request, stream: inputs.Described, config: ProfileConfig, ledger: StageLedger
 ) -> Pipeline:
     """The stages of a profile."""
-    fov = assemble.field_of_view(request, stream)
+    fov = inputs.field_of_view(request, stream)
     return assembly.pipeline(assembly.MODES[request.mode], config, fov, ledger)

@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from modt import host, profile
-from modt.app import metering
-from modt.app import request as assemble
+from modt.app import inputs, metering
 from modt.app.chosen_profile import choose
 from modt.app.loop import FixedPeriod, FullSpeed, Pace, Stop, drive
 from modt.app.parts import Parts, pipeline_of
@@ -39,11 +38,11 @@ class Session:
         ModtError: the run directory cannot be written.
     """
 
-    def __init__(self, request: assemble.Request, out: Path | None, core: int | None, command: list[str]) -> None:
+    def __init__(self, request: inputs.Request, out: Path | None, core: int | None, command: list[str]) -> None:
         self.request, self.core = request, core
-        found = PeekedStream(assemble.stream(request))
+        found = PeekedStream(inputs.stream(request))
         chosen = choose(request.profile, found.first, found.info)
-        self.odometry = assemble.odometry(request, found, chosen.config.odometry)
+        self.odometry = inputs.odometry(request, found, chosen.config.odometry)
         self.stream = PosedStream(found, self.odometry)
         self.parts = Parts(request, chosen, pipeline_of(request, self.stream, chosen.config, Ledger()))
         self.stop = Stop()

@@ -39,8 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
     import numpy as np
 
     from modt import profile
-    from modt.app import assembly, kernel_choice, metering
-    from modt.app import request as assemble
+    from modt.app import assembly, inputs, kernel_choice, metering
     from modt.app.chosen_profile import choose
     from modt.classification.padding import padded_size
     from modt.classification.pointnet import PointNet
@@ -51,8 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.geometry import FieldOfView
     from modt.sinks.output import writing
 
-    request = assemble.Request.of(arguments)
-    stream = assemble.stream(request)
+    request = inputs.Request.of(arguments)
+    stream = inputs.stream(request)
     scans = list(stream)
     if not scans:
         raise ModtError(stream.info.name, "no usable frame", "give a stream that modt replay can work on")

@@ -44,8 +44,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Replay; SIGTERM ends it with exit status 0, SIGINT with 130, both with complete records."""
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
+    from modt.app.inputs import Request
     from modt.app.replay_session import Session
-    from modt.app.request import Request
     from modt.app.supervisor import supervisor_of
     from modt.cli.progress import progress
     from modt.reporting.summary import summary_text

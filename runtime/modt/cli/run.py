@@ -42,10 +42,10 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
+    from modt.app.inputs import Request
     from modt.app.live_loop import NamedSink
     from modt.app.live_session import LiveSession
     from modt.app.live_source import open_source, recorded_path
-    from modt.app.request import Request
     from modt.app.status import one_line
     from modt.app.supervisor import supervisor_of
     from modt.sinks.addresses import open_sink

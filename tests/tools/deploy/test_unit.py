@@ -25,7 +25,7 @@ def analysis(tmp_path):
             path.write_text("")
             path.chmod(0o755)
         shutil.copytree(SYSTEM, tmp_path / SYSTEM.relative_to("/"), symlinks=True)
-        command = ["systemd-analyze", *verb, f"--root={tmp_path}", "modt.app"]
+        command = ["systemd-analyze", *verb, f"--root={tmp_path}", "modt.service"]
         return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
 
     return analyze
@@ -37,7 +37,7 @@ def analysis(tmp_path):
 )
 def test_the_exposure_is_small(analyze, drop_ins, most):
     done = analyze(["security", "--offline=true", "--no-pager", f"--threshold={round(10 * most)}"], *drop_ins)
-    found = re.search(r"exposure level for modt.app: ([\d.]+)", done.stdout)
+    found = re.search(r"exposure level for modt.service: ([\d.]+)", done.stdout)
     assert found, done.stderr
     assert float(found[1]) <= most
 

@@ -22,8 +22,7 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.app import assembly, kernel_choice
-from modt.app import request as assemble
+from modt.app import assembly, inputs, kernel_choice
 from modt.app.ladder import Ladder
 from modt.app.live_stages import within
 from modt.classification import pointnet
@@ -211,8 +210,8 @@ def scan_folder(config: ProfileConfig, folder: Path) -> str:
     for frame in frames(3, 1.0)[:2]:
         frame.points.tofile(folder / "scans" / f"{frame.index:06d}.bin")
     (folder / "own.yaml").write_text(profile.to_yaml(profile.dump(config)))
-    request = assemble.Request(path=folder / "scans", profile=[str(folder / "own.yaml")])
-    return str([frame.stamp_s for frame in assemble.stream(request)])
+    request = inputs.Request(path=folder / "scans", profile=[str(folder / "own.yaml")])
+    return str([frame.stamp_s for frame in inputs.stream(request)])
 
 
 def near_blind(config: ProfileConfig, _folder: Path) -> str:

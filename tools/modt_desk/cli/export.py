@@ -95,7 +95,7 @@ class Export:
         Raises:
             MisuseError: it is gone.
         """
-        from modt.app.request import Request, stream
+        from modt.app.inputs import Request, stream
 
         if self.run.live:
             return None

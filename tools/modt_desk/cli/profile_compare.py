@@ -33,8 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Compare."""
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.app import metering
-    from modt.app import request as assemble
+    from modt.app import inputs, metering
     from modt.app.chosen_profile import choose
     from modt.energy.conditions import Conditions
     from modt.energy.meters.meter import Kind
@@ -45,9 +44,9 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
 
-    request = assemble.Request.of(arguments)
-    stream = assemble.stream(request)
-    asked = {**assemble.identity(request, stream), "fov": request.fov, "asked": list(request.frames)}
+    request = inputs.Request.of(arguments)
+    stream = inputs.stream(request)
+    asked = {**inputs.identity(request, stream), "fov": request.fov, "asked": list(request.frames)}
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info).config
     board, info = loaded.energy, stream.info
@@ -64,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
     basis = Basis(board, meters[0].facts, info.period_s)
     about: dict[str, Any] = {
-        **assemble.identity(request, stream),
+        **inputs.identity(request, stream),
         "frames": frames,
         "fov": request.fov,
         "repeat": arguments.repeat,

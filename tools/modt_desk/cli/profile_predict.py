@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     # NumPy is imported from here on, after the process is pinned.
     import numpy as np
 
-    from modt.app import request as assemble
+    from modt.app import inputs
     from modt.app.chosen_profile import choose
     from modt.reporting.quantity import to_json
     from modt.sinks.output import writing
@@ -39,10 +39,10 @@ def run(arguments: argparse.Namespace) -> int:
     from modt_desk.comparison.prediction import forecast
     from modt_desk.comparison.prediction_report import prediction_document, prediction_tree, read_calibration
 
-    request = assemble.Request.of(arguments)
-    stream = assemble.stream(request)
+    request = inputs.Request.of(arguments)
+    stream = inputs.stream(request)
     info = stream.info
-    itself = assemble.identity(request, stream)
+    itself = inputs.identity(request, stream)
     calibration = [read_calibration(path, itself, request.fov) for path in arguments.calibration]
     loaded = choose(request.profile, next(iter(stream), None), info).config
     share = 3 if arguments.observe == "third" and info.n_frames is not None else 1

@@ -129,14 +129,14 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None, stre
 
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:
     """The stream that a run was made of, None where it was live or is not found any more."""
-    from modt.app import request as assemble
+    from modt.app import inputs
 
     if recorded.live:
         return None
     facts = recorded.facts["stream"]
     try:
         path = Path(facts["path"]) if facts["path"] else None
-        stream = assemble.stream(assemble.Request(path=path, capture=capture))
+        stream = inputs.stream(inputs.Request(path=path, capture=capture))
     except ModtError as error:
         print(f"modt: without points: {error}", file=sys.stderr)
         return None

@@ -7,8 +7,7 @@ from itertools import islice
 
 import numpy as np
 
-from modt.app import assembly, metering
-from modt.app import request as assemble
+from modt.app import assembly, inputs, metering
 from modt.classification.padding import padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, NullLedger
@@ -29,7 +28,7 @@ _LOADS = (0, 1, 2, 4, 8, 16, 32, 64, 128, None, None)
 class Comparison:
     """Parameters of a comparison."""
 
-    request: assemble.Request
+    request: inputs.Request
     profile: ProfileConfig
     core: int | None
     meters: tuple[Meter, ...]  # to read; none where energy follows from CPU time
@@ -47,7 +46,7 @@ class Comparison:
     def repetition(self) -> Repetition:
         """Every mode once through the stream, from its initial state; all repetitions do the same work."""
         runs = {name: self._mode_run(name) for name in (*MODES, VARIED)}
-        stream = assemble.stream(self.request)
+        stream = inputs.stream(self.request)
         for frame in islice(stream, 1):
             for mode_run in runs.values():
                 _warm_up(mode_run, frame)
@@ -57,7 +56,7 @@ class Comparison:
     def _mode_run(self, name: str) -> ModeRun:
         mode = assembly.MODES[BASELINE if name == VARIED else name]
         ledger = Ledger()
-        fov = assemble.field_of_view(self.request, assemble.stream(self.request))
+        fov = inputs.field_of_view(self.request, inputs.stream(self.request))
         pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
         budget, window = mode.budget(self.profile), self.profile.energy.windows
         return ModeRun(
@@ -68,7 +67,7 @@ class Comparison:
         )
 
 
-def observe(request: assemble.Request, profile: ProfileConfig, frames: int | None) -> Int:
+def observe(request: inputs.Request, profile: ProfileConfig, frames: int | None) -> Int:
     """(F, 7) of the first so many frames, tracked without a classification.
 
     Columns as prediction.OBSERVED, then of each mode but the baseline the tracks that ask for a class for the first
@@ -78,14 +77,14 @@ def observe(request: assemble.Request, profile: ProfileConfig, frames: int | Non
     return np.concatenate([columns[0][:, :-1], *(found[:, -1:] for found in columns[1:])], axis=1)
 
 
-def _tracked(request: assemble.Request, profile: ProfileConfig, frames: int | None, mode: str) -> Int:
+def _tracked(request: inputs.Request, profile: ProfileConfig, frames: int | None, mode: str) -> Int:
     """(F, 6) prediction.OBSERVED, and the tracks that ask for the first time."""
-    fov = assemble.field_of_view(request, assemble.stream(request))
+    fov = inputs.field_of_view(request, inputs.stream(request))
     pipeline = assembly.pipeline(assembly.MODES[mode], profile, fov, NullLedger())
     fusion = RecordingFusion(pipeline.fusion)
     pipeline, size, rows = replace(pipeline, fusion=fusion), padded_size(profile.classification), []
     alive: set[int] = set()
-    for frame in islice(assemble.stream(request), frames):
+    for frame in islice(inputs.stream(request), frames):
         result = pipeline.step(frame, Budget(calls=0))
         before, alive = alive, set(result.tracks.id.tolist())
         count = result.proposals.count

@@ -1,4 +1,4 @@
-"""Where the parts are put together."""
+"""What a user asks for, and the stream, the poses and the field of view that follow from it."""
 
 from __future__ import annotations
 
