@@ -147,6 +147,6 @@ class Watch:
 sys.meta_path.insert(0, Watch())
 import {module}
 """
-    env = permissive(PYTHONPATH=f"{ROOT / 'runtime'}:{ROOT}")
+    env = permissive(PYTHONPATH=f"{ROOT / 'runtime'}:{ROOT / 'tools'}:{ROOT}")
     done = subprocess.run([sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (0, "1\n"), done.stderr

@@ -73,7 +73,7 @@ def test_a_prediction_is_compared_with_what_is_measured(tmp_path):
         assert f"gamma, accurate: {name}" in done.stdout
     arguments = ("--frames", "6:12", "--repeat", 1, "--against", "blind.json", "--json")
     (tmp_path / "itself.json").write_text(modt_profile("compare", *arguments, cwd=tmp_path).stdout)
-    done = modt_profile("report", "itself.json", "other.json", "--html", "page.html", "--json", cwd=tmp_path)
+    done = modt_profile("regimes", "itself.json", "other.json", "--html", "page.html", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     regimes = json.loads(done.stdout)["regimes"]
     assert [(row["name"], row["mode"], "blind prediction" in row["said"]) for row in regimes] == [
@@ -104,7 +104,7 @@ def test_calibration_writes_a_profile_that_loads(tmp_path):
     ("arguments", "said"),
     [
         (("report", "nowhere"), "run.yaml"),
-        (("report", "nowhere", "neither"), "modt-profile compare --json"),
+        (("regimes", "nowhere", "neither"), "modt-profile compare --json"),
         (("compare", "nowhere"), "nowhere"),
         (("compare", "--meter", "wattmeter"), "wattmeter"),
         (("compare", "--repeat", "0"), "from 1 to 1000"),

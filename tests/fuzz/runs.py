@@ -93,7 +93,7 @@ def _report(run: Path) -> Callable[[], object]:
 
     def read() -> None:
         with redirect_stdout(StringIO()):
-            profile_report.run(Namespace(paths=[run], html=None, json=False))
+            profile_report.run(Namespace(run_directory=run, html=None, json=False))
 
     return read
 

@@ -32,7 +32,7 @@ def test_runs_are_pooled_by_sensor(drives, tmp_path):
     done = modt("evaluate", *pairs, "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert found["schema"] == "modt_desk.evaluation/1"
+    assert found["schema"] == "modt.evaluation/1"
     assert set(found["sensors"]) == {*drives, "all sensors"}
     one, other, both = (found["sensors"][name] for name in (*drives, "all sensors"))
     assert both["frames"] == one["frames"] + other["frames"] == 10

@@ -19,7 +19,7 @@ def results(tmp_path_factory):
 
 def test_results_are_written_in_every_form(results):
     found = json.loads((results / "results.json").read_text())
-    assert found["schema"] == "modt_desk.experiments/1"
+    assert found["schema"] == "modt.experiments/1"
     with (results / "budget.csv").open() as table:
         own = [row for row in found["rows"] if row["experiment"] == "budget"]
         assert len(list(csv.DictReader(table))) == len(own) > 9

@@ -17,7 +17,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("evaluate", help="judge recorded runs against labels")
     pairs = "run directories (of replay --labels) and their labels"
     p.add_argument("pairs", nargs="*", type=Path, metavar="RUN TRUTH", help=pairs)
-    p.add_argument("--json", action="store_true", help="write JSON, modt_desk.evaluation/1")
+    p.add_argument("--json", action="store_true", help="write JSON, modt.evaluation/1")
     p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots, too")
     vans = "KITTI's vans as cars (all), or ignored (paper)"
     p.add_argument("--classes", choices=("all", "paper"), default="all", help=vans)

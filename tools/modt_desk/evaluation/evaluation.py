@@ -18,7 +18,7 @@ from modt_desk.evaluation.rules import KITTI_RULES, Rules
 from modt_desk.evaluation.segmentation_score import SegmentationScore, segmentation
 from modt_desk.evaluation.track_score import TrackScore, track_metrics, track_scores
 
-SCHEMA = "modt_desk.evaluation/1"
+SCHEMA = "modt.evaluation/1"
 ALL = "all"
 RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0), "40-60": (40.0, 60.0)}
 """Bands of range by name."""

@@ -18,7 +18,7 @@ from modt_desk.experiments.output.html import html
 from modt_desk.experiments.output.markdown import markdown
 from modt_desk.experiments.study import Row
 
-SCHEMA = "modt_desk.experiments/1"
+SCHEMA = "modt.experiments/1"
 
 
 def write(out: Path, about: About, experiments: Sequence[Experiment], rows: Sequence[Row]) -> list[Path]:
