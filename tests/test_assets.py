@@ -18,7 +18,7 @@ import pathlib
 import modt
 from modt import assets, profile
 print(pathlib.Path(modt.__file__).parent)
-print(sorted(p.name for kind in ("models", "profiles") for p in assets.folder(kind).iterdir()))
+print([p.name for kind, suffix in (("models", ".onnx"), ("profiles", ".yaml")) for p in assets.shipped(kind, suffix)])
 profile.load()
 pipeline = modt.Pipeline.from_profile("vlp-16", mode="accurate")
 assert len(pipeline.step([[5.0, 0.0, 0.0, 0.0]], 0.0)) == 0

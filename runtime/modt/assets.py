@@ -1,4 +1,4 @@
-"""Files of the package: models/ and profiles/.
+"""Files of the package, models/ and profiles/, and the models of the desk's where it is installed.
 
 They lie beside runtime/ in a checkout and an editable install, and inside the package in a wheel.
 """
@@ -11,6 +11,7 @@ from modt.errors import MisuseError
 
 _PACKAGE = Path(__file__).resolve().parent
 _ROOTS = (_PACKAGE / "data", _PACKAGE.parents[1])
+_DESK = (_PACKAGE.parent / "modt_desk", _PACKAGE.parents[1] / "tools" / "modt_desk")
 
 
 def folder(kind: str) -> Path:
@@ -28,11 +29,17 @@ def find(kind: str, name: str, suffix: str, beside: Path = Path()) -> Path:
         if path.is_file():
             return path
         raise MisuseError(path, "no such file", f"give a {suffix} file, or a name: {_names(kind, suffix)}")
-    inside = folder(kind) / f"{name}{suffix}"
-    if not inside.is_file():
+    inside = {path.stem: path for path in shipped(kind, suffix)}
+    if name not in inside:
         raise MisuseError(name, f"not among the {kind}", f"use one of: {_names(kind, suffix)}")
-    return inside
+    return inside[name]
+
+
+def shipped(kind: str, suffix: str) -> list[Path]:
+    """Files of a kind, those of the desk included, by name."""
+    folders = (folder(kind), *(root / kind for root in _DESK))
+    return sorted((path for place in folders for path in place.glob(f"*{suffix}")), key=lambda path: path.name)
 
 
 def _names(kind: str, suffix: str) -> str:
-    return ", ".join(sorted(p.stem for p in folder(kind).glob(f"*{suffix}")))
+    return ", ".join(path.stem for path in shipped(kind, suffix))

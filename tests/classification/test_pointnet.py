@@ -140,7 +140,7 @@ def test_no_proposals_give_no_rows(shipped: PointNet) -> None:
     assert out.shape == (0, 4)
 
 
-@pytest.mark.parametrize("name", [path.stem for path in sorted(assets.folder("models").glob("*.onnx"))])
+@pytest.mark.parametrize("name", [path.stem for path in assets.shipped("models", ".onnx")])
 def test_every_model_has_a_card_with_its_hash_and_licence(name: str) -> None:
     net = network(name)
     card = net.path.with_suffix(".md").read_text(encoding="utf-8")
