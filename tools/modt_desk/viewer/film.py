@@ -49,9 +49,9 @@ def save_film(path: Path, figure: Figure, drawings: Iterable[Figure], period_s: 
 
 
 def _save_gif(path: Path, figure: Figure, drawings: Iterable[Figure], period_s: float) -> None:
-    first = _image(figure).quantize(method=Image.Quantize.MAXCOVERAGE)
-    rest = (_image(drawing).quantize(palette=first, dither=Image.Dither.NONE) for drawing in drawings)
-    first.save(path, save_all=True, append_images=rest, duration=round(1e3 * period_s), loop=0)
+    palette = _image(figure).quantize(method=Image.Quantize.MAXCOVERAGE)
+    images = (_image(f).quantize(palette=palette, dither=Image.Dither.NONE) for f in chain([figure], drawings))
+    next(images).save(path, save_all=True, append_images=images, duration=round(1e3 * period_s), loop=0)
 
 
 def _save_mp4(path: Path, figure: Figure, drawings: Iterable[Figure], period_s: float) -> None:

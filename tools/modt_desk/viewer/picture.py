@@ -31,7 +31,7 @@ from modt_desk.viewer.recorded_run import RecordedRun
 SIZE_IN = (12.8, 9.1)
 TRAIL = 30
 """Frames."""
-TRIES = 4
+TRIES = 6
 """Heights at which a label may stand above its box."""
 INK, SOFT, LINE, PAPER = (LIGHT[name] for name in ("ink", "soft", "line", "paper"))
 _TEXT_PT = 9.5
@@ -71,7 +71,7 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
     for radius in rings:
         axes.add_patch(Circle((0, 0), radius, fill=False, edgecolor=LINE, zorder=0))
     (sensor,) = axes.plot(0, 0, ">", color=INK, markersize=12)
-    said = _truth(axes, run, at) + _tracks(axes, run, at)
+    said = _tracks(axes, run, at) + _truth(axes, run, at)
     taken = [thing.get_window_extent() for thing in (_caption(axes, run, at), _legend(axes, run, at), sensor)]
     said += [(0.0, radius, f"{radius:g} m", SOFT) for radius in rings]
     _write(axes, reversed(said), [box.transformed(axes.transData.inverted()) for box in taken])
