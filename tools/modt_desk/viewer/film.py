@@ -19,9 +19,9 @@ from modt.errors import MisuseError, ModtError
 from modt.sinks.output import writing
 
 SHARP_DPI = 200
-"""Pixels of the points in an SVG."""
+"""Resolution of the points in an SVG [pixel/inch]."""
 _REPEATABLE = {"svg.fonttype": "none", "svg.hashsalt": "modt"}
-"""The same picture is the same bytes, its text is text."""
+"""Text stays text, and the same picture is the same bytes."""
 logging.getLogger("matplotlib").setLevel(logging.ERROR)  # an error of ffmpeg is reported once
 
 

@@ -112,7 +112,7 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
         autolim=False,
     )
     xy = np.column_stack([of["x"], of["y"]])
-    width = 2 * np.maximum(axes.viewLim.width / 90, 0.7 * of["l"])[of["classified"] > 0]
+    width = 2 * np.maximum(axes.viewLim.width / (2 * REACH_M), 0.7 * of["l"])[of["classified"] > 0]
     ring = {
         "offsets": xy[of["classified"] > 0],
         "offset_transform": axes.transData,
