@@ -13,7 +13,7 @@ from matplotlib.collections import EllipseCollection, LineCollection, PolyCollec
 from matplotlib.colors import to_rgba, to_rgba_array
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.patches import Circle, Patch
+from matplotlib.patches import Circle, Patch, Polygon
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
@@ -25,7 +25,7 @@ from modt.viewer import look
 from modt.viewer.look import REACH_M
 from modt.viewer.point_cells import SIDE, Cells
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_desk.viewer.extent import RINGS_M, SIDE_M, reach_m
+from modt_desk.viewer.extent import RINGS_M, reach_m
 from modt_desk.viewer.recorded_run import RecordedRun
 
 SIZE_IN = (12.8, 9.1)
@@ -63,8 +63,8 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
     figure.clear()
     axes, reach = figure.add_axes((0, 0, 1, 1)), reach_m(run.tracks)
     axes.set_axis_off()
-    axes.set(xlim=(-reach, reach), ylim=(-reach * SIDE_M / REACH_M, reach * SIDE_M / REACH_M))
-    axes.set_aspect("equal", adjustable="datalim")
+    side = reach * SIZE_IN[1] / SIZE_IN[0]  # a metre is as long as along x
+    axes.set(xlim=(-reach, reach), ylim=(-side, side))
     if cells is not None:
         _points(axes, cells, step_cm)
     rings = np.arange(RINGS_M[reach], math.hypot(*axes.viewLim.max), RINGS_M[reach]).tolist()
@@ -79,12 +79,10 @@ def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells |
 
 def _points(axes: Axes, cells: Cells, step_cm: int) -> None:
     x, y = ((v + 0.5 - SIDE / 2) * step_cm / 100 for v in (cells.cell % SIDE, cells.cell // SIDE))
-    metre_pt = 72 * SIZE_IN[0] / axes.viewLim.width
-    for name, colour, group in (("ground", LINE, cells.level == 0), ("above", SOFT, cells.level > 0)):
-        size = max(_LEAST_PT, metre_pt * step_cm / 100)
-        axes.plot(
-            x[group], y[group], "s", color=colour, markersize=size, markeredgewidth=0, rasterized=True, gid=name
-        )
+    size = max(_LEAST_PT, 72 * SIZE_IN[0] / axes.viewLim.width * step_cm / 100)
+    style = {"markersize": size, "markeredgewidth": 0, "rasterized": True, "zorder": 0.5}
+    for colour, group in ((LINE, cells.level == 0), (SOFT, cells.level > 0)):
+        axes.plot(x[group], y[group], "s", color=colour, **style)
 
 
 def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
@@ -98,37 +96,23 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     fill = to_rgba_array([entry["colour"] for entry in look.classes()])[kind]
     wrong = look.truth()["false"]["colour"]
     edge = to_rgba_array([entry["colour"] for entry in look.states(run.states)])[of["state"].astype(int)]
-    outline = np.where(false[:, None], to_rgba(wrong), edge)
-    box = corners(np.stack([of[key] for key in BOX_KEYS], axis=1))
-    axes.add_collection(
-        PolyCollection(
-            box,
-            facecolors=np.column_stack([fill[:, :3], np.where(is_object, 0.35, 0.1)]),
-            edgecolors=outline,
-            linewidths=np.where(false, 4.0, np.where(is_object, 2.0, 0.8)),
-            linestyles=np.where(of["seen"] > 0, "-", "--").tolist(),
-            gid="tracks",
-        ),
-        autolim=False,
-    )
-    xy = np.column_stack([of["x"], of["y"]])
-    width = 2 * np.maximum(axes.viewLim.width / (2 * REACH_M), 0.7 * of["l"])[of["classified"] > 0]
-    ring = {
-        "offsets": xy[of["classified"] > 0],
-        "offset_transform": axes.transData,
-        "units": "xy",
-        "gid": "classified",
-    }
-    axes.add_collection(
-        EllipseCollection(width, width, 0.0, facecolors="none", edgecolors=INK, **ring), autolim=False
-    )
+    box, xy = corners(np.stack([of[key] for key in BOX_KEYS], axis=1)), np.column_stack([of["x"], of["y"]])
+    boxes = PolyCollection(box, gid="tracks", linestyles=np.where(of["seen"] > 0, "-", "--").tolist())
+    boxes.set_facecolor(np.column_stack([fill[:, :3], np.where(is_object, 0.35, 0.1)]))
+    boxes.set_edgecolor(np.where(false[:, None], to_rgba(wrong), edge))
+    boxes.set_linewidth(np.where(false, 4.0, np.where(is_object, 2.0, 0.8)))
+    classified = of["classified"] > 0
+    width = 2 * np.maximum(axes.viewLim.width / (2 * REACH_M), 0.7 * of["l"][classified])
+    place = {"offsets": xy[classified], "offset_transform": axes.transData, "units": "xy"}
+    rings = EllipseCollection(width, width, 0, facecolors="none", edgecolors=INK, gid="classified", **place)
     trails = [_trail(run, at, id_) for id_ in rows[is_object, 0].tolist()]
-    axes.add_collection(LineCollection(trails, colors=fill[is_object], linewidths=1.5), autolim=False)
     moves = is_object & (of["world_speed_mps"] > 0.5)
     heading = of["world_heading"] - run.poses[at, 2]
     ahead = xy + of["world_speed_mps"][:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
-    speeds = np.stack([xy, ahead], axis=1)[moves]
-    axes.add_collection(LineCollection(list(speeds), colors=edge[moves], linewidths=1.5), autolim=False)
+    lines = LineCollection([*trails, *np.stack([xy, ahead], axis=1)[moves]], linewidths=1.5)
+    lines.set_color(np.concatenate([fill[is_object], edge[moves]]))
+    for shapes in (boxes, rings, lines):
+        axes.add_collection(shapes)
     labels = []
     for k in np.flatnonzero(is_object).tolist():
         name = names[kind[k]]
@@ -139,17 +123,14 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
 
 def _truth(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     """Outlines of the labelled objects; the labels of those that are missed."""
-    labelled = run.frames[at].get("truth", ())
-    box = [corners(np.array([[o["x"], o["y"], 0.0, o["l"], o["w"], 0.0, o["yaw"]]]))[0] for o in labelled]
-    colours = [look.truth()[o["outcome"]]["colour"] for o in labelled]
-    widths = [3.0 if o["outcome"] == "missed" else 1.2 for o in labelled]
-    style = {"facecolors": "none", "edgecolors": colours, "linewidths": widths, "linestyles": ":", "gid": "truth"}
-    axes.add_collection(PolyCollection(box, zorder=1.5, **style), autolim=False)
-    return [
-        (o["x"], corner[:, 1].max(), f"missed {look.classes()[o['class']]['name']}", colour)
-        for o, corner, colour in zip(labelled, box, colours, strict=True)
-        if o["outcome"] == "missed"
-    ]
+    labels = []
+    for o in run.frames[at].get("truth", ()):
+        box = corners(np.array([[o["x"], o["y"], 0.0, o["l"], o["w"], 0.0, o["yaw"]]]))[0]
+        colour, missed = look.truth()[o["outcome"]]["colour"], o["outcome"] == "missed"
+        axes.add_patch(Polygon(box, fill=False, edgecolor=colour, linewidth=3.0 if missed else 1.2, linestyle=":"))
+        if missed:
+            labels.append((o["x"], box[:, 1].max(), f"missed {look.classes()[o['class']]['name']}", colour))
+    return labels
 
 
 def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
