@@ -39,7 +39,7 @@ $(BIN)/python:
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
 $(VENV)/.run: $(BIN)/python pyproject.toml
-	$(BIN)/python -m pip install --quiet --editable '.[progress]'
+	$(BIN)/python -m pip install --quiet --editable '.[progress,view]'
 	@touch $@
 
 $(VENV)/.test: $(BIN)/python pyproject.toml

@@ -3,12 +3,15 @@
 import json
 import re
 import shutil
+from base64 import b64decode
+from io import BytesIO
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from modt.classes import CLASS_NAMES
+from modt.reporting.page import LIGHT
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.recognise import open_scans
 from tests.cli.commands import environment, modt
@@ -95,6 +98,7 @@ def test_stamps_from_1970_are_times_and_fit_a_narrow_page(run, records, tmp_path
     dated = shutil.copytree(run, tmp_path / "dated")
     lines = [json.dumps(record | {"stamp_s": record["stamp_s"] + 1_400_000_000}) for record in records]
     (dated / "tracks.jsonl").write_text("\n".join(lines) + "\n")
+    pytest.importorskip("matplotlib")
     for more in ([], ["--frame", 9]):
         done = modt("view", dated, *more, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
@@ -140,24 +144,34 @@ def test_the_page_may_begin_at_a_frame(run, tmp_path):
 
 
 def test_a_frame_as_a_picture(run, records):
-    done = modt("view", run, "--frame", 9, cwd=run)
-    assert done.returncode == 0, done.stderr
-    root = ElementTree.parse(run / "view-9.svg").getroot()
+    image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("matplotlib")
+    pictures = []
+    for _ in range(2):
+        done = modt("view", run, "--frame", 9, cwd=run)
+        assert done.returncode == 0, done.stderr
+        pictures.append((run / "view-9.svg").read_bytes())
+    assert pictures[0] == pictures[1]
+    root = ElementTree.fromstring(pictures[0])
     tag = "{http://www.w3.org/2000/svg}"
-    titles = [title.text for title in root.findall(f"{tag}polygon/{tag}title")]
-    assert len(titles) == len(records[9]["tracks"])
-    rings = [circle for circle in root.findall(f"{tag}circle") if circle.get("stroke") == "var(--ink)"]
-    assert len(rings) == records[9]["classifications"]
+    groups = {group.get("id"): group for group in root.iter(f"{tag}g")}
+    assert len(groups["tracks"].findall(f"{tag}path")) == len(records[9]["tracks"])
+    assert len(groups["classified"].findall(f"{tag}path")) == records[9]["classifications"]
     text = " ".join(node.text or "" for node in root.iter(f"{tag}text"))
     assert f"{records[9]['classifications']} classified, {records[9]['deferred']} deferred" in text
     assert "budget 16 calls" in text
     assert "mJ (" in text
-    ground, above = (path.get("d").count("M") for path in root.findall(f"{tag}path"))
-    assert min(ground, above) > 1000
+    (points,) = root.iter(f"{tag}image")
+    (encoded,) = (value for name, value in points.items() if name.endswith("href"))
+    with image.open(BytesIO(b64decode(encoded.partition(",")[2]))) as pixels:
+        colours = {colour: n for n, colour in pixels.getcolors(1 << 20)}
+    for ground_or_above in ("line", "soft"):
+        assert colours[(*bytes.fromhex(LIGHT[ground_or_above][1:]), 255)] > 1000
 
 
 def test_a_frame_as_pixels(run):
     Image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("matplotlib")
     done = modt("view", run, "--frame", 9, "--out", "view.png", cwd=run)
     assert done.returncode == 0, done.stderr
     with Image.open(run / "view.png") as image:
@@ -169,6 +183,7 @@ def test_a_frame_as_pixels(run):
 
 def test_a_film_has_every_frame(run):
     Image = pytest.importorskip("PIL.Image")
+    pytest.importorskip("matplotlib")
     done = modt("view", run, "--frame", 4, "--out", "view.gif", cwd=run)
     assert done.returncode == 0, done.stderr
     with Image.open(run / "view.gif") as film:
@@ -178,7 +193,7 @@ def test_a_film_has_every_frame(run):
 def test_a_film_by_ffmpeg(run):
     if shutil.which("ffmpeg") is None:
         pytest.skip("ffmpeg is not installed")
-    pytest.importorskip("PIL")
+    pytest.importorskip("matplotlib")
     done = modt("view", run, "--animate", cwd=run)
     assert done.returncode == 0, done.stderr
     assert (run / "view.mp4").read_bytes()[4:8] == b"ftyp"
@@ -208,14 +223,15 @@ def test_how_the_class_of_a_track_was_decided(run, records, chromium):
     assert (refused.returncode, "is not recorded" in refused.stderr) == (2, True)
 
 
-def test_what_a_film_needs_is_named(run, tmp_path):
+def test_what_a_picture_or_a_film_needs_is_named(run, tmp_path):
     (tmp_path / "broken").mkdir()
-    (tmp_path / "broken" / "PIL.py").write_text("raise ModuleNotFoundError('PIL', name='PIL')")
+    (tmp_path / "broken" / "matplotlib.py").write_text("raise ModuleNotFoundError('none', name='matplotlib')")
     without = {**environment(), "PYTHONPATH": f"{tmp_path / 'broken'}:{environment()['PYTHONPATH']}"}
-    done = modt("view", run, "--out", tmp_path / "view.png", cwd=tmp_path, env=without)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "needs PIL; pip install 'modt[view]'" in done.stderr
-    pytest.importorskip("PIL")
+    for more in (["--frame", 9], ["--out", tmp_path / "view.png"]):
+        done = modt("view", run, *more, cwd=tmp_path, env=without)
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+        assert "needs matplotlib; pip install 'modt[view]'" in done.stderr
+    pytest.importorskip("matplotlib")
     without = {**environment(), "PATH": str(tmp_path)}
     done = modt("view", run, "--out", tmp_path / "view.mp4", cwd=tmp_path, env=without)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)

@@ -1,56 +1,106 @@
-"""Films are written image by image."""
+"""Pictures and films of figures, and where the labels of a picture find room."""
 
-import gc
 import os
 
 import numpy as np
 import pytest
 
 Image = pytest.importorskip("PIL.Image", reason="needs the extra [view]")
+pytest.importorskip("matplotlib", reason="needs the extra [view]")
 
-from modt.reporting.page import LIGHT  # noqa: E402
-from modt_desk.viewer import film  # noqa: E402
+from matplotlib.transforms import Bbox  # noqa: E402
 
-N, SIZE = 20, (40, 30)
-MOST_HELD = 4
-"""Images: the first and the last one, each as drawn and in the colours of the film."""
+from modt.errors import ModtError  # noqa: E402
+from modt_desk.viewer import film, picture  # noqa: E402
 
-
-def alive():
-    """Images that something still holds."""
-    return sum(isinstance(thing, Image.Image) for thing in gc.get_objects())
+N, WIDTH, SIZE = 5, 128, (128, 91)
+BLUE = (0, 0, 255)
 
 
-def drawing(k):
-    """Paper, and a square that stays a while in each place."""
-    image = Image.new("RGB", SIZE, LIGHT["paper"])
-    image.paste(LIGHT["ink"], (k // 2, 5, k // 2 + 8, 15))
-    return image
+def drawings(figure):
+    """A square that stays where it is for two frames."""
+    for k in range(N):
+        figure.clear()
+        axes = figure.add_axes((0, 0, 1, 1))
+        axes.set_axis_off()
+        axes.plot((0.2 + 0.1 * (k // 2),), (0.5,), "s", color="blue", markersize=90)
+        axes.set(xlim=(0, 1), ylim=(0, 1))
+        yield figure
 
 
-def images():
-    """All but the first one, each asked for when those before are gone."""
-    before = alive()
-    for k in range(1, N):
-        assert alive() <= before + MOST_HELD
-        yield drawing(k)
+def left_edge(image):
+    """Column where the square begins."""
+    return np.flatnonzero((np.asarray(image.convert("RGB")) == BLUE).all(axis=2).any(axis=0))[0]
 
 
-def test_a_gif_holds_few_images_and_shows_all(tmp_path):
-    film.save_gif(tmp_path / "film.gif", drawing(0), images(), 0.1)
+def film_of(path):
+    figure = picture.new_figure(WIDTH)
+    rest = drawings(figure)
+    film.save_film(path, next(rest), rest, 0.1)
+
+
+def test_a_gif_shows_every_drawing_as_long_as_it_stays(tmp_path):
+    film_of(tmp_path / "film.gif")
     with Image.open(tmp_path / "film.gif") as shown:
-        assert (shown.n_frames, shown.info["loop"], shown.size) == (N, 0, SIZE)
-        for k in range(N):
+        assert (shown.n_frames, shown.info["loop"], shown.size) == (3, 0, SIZE)
+        seen = []
+        for k in range(shown.n_frames):
             shown.seek(k)
-            assert shown.info["duration"] == 100
-            np.testing.assert_array_equal(np.asarray(shown.convert("RGB")), np.asarray(drawing(k)))
+            seen.append((shown.info["duration"], left_edge(shown)))
+    durations, edges = zip(*seen, strict=True)
+    assert durations == (200, 200, 100)
+    assert np.all(np.diff(edges) > 0.08 * WIDTH)
 
 
-def test_an_mp4_is_piped_image_by_image(tmp_path, monkeypatch):
-    encoder = tmp_path / "bin" / "ffmpeg"
-    encoder.parent.mkdir()
-    encoder.write_text('#!/bin/sh\nfor out; do :; done\nexec cat > "$out"\n')
-    encoder.chmod(0o755)
-    monkeypatch.setenv("PATH", str(encoder.parent), prepend=os.pathsep)
-    film.save_mp4(tmp_path / "film.mp4", drawing(0), images(), 0.1)
-    assert (tmp_path / "film.mp4").read_bytes() == b"".join(drawing(k).tobytes() for k in range(N))
+@pytest.fixture
+def ffmpeg(tmp_path, monkeypatch):
+    """Installs a script in its place."""
+
+    def install(script):
+        encoder = tmp_path / "bin" / "ffmpeg"
+        encoder.parent.mkdir()
+        encoder.write_text(f"#!/bin/sh\n{script}\n")
+        encoder.chmod(0o755)
+        monkeypatch.setenv("PATH", str(encoder.parent), prepend=os.pathsep)
+
+    return install
+
+
+def test_an_mp4_is_piped_image_by_image(tmp_path, ffmpeg):
+    ffmpeg('for out; do :; done\nexec cat > "$out"')
+    film_of(tmp_path / "film.mp4")
+    width, height = SIZE[0], SIZE[1] // 2 * 2
+    images = np.fromfile(tmp_path / "film.mp4", np.uint8).reshape(N, height, width, 4)
+    edges = [left_edge(Image.fromarray(image)) for image in images]
+    assert edges[0] == edges[1] < edges[2] == edges[3] < edges[4]
+
+
+def test_what_ffmpeg_says_is_the_error(tmp_path, ffmpeg):
+    ffmpeg("echo no room >&2; exit 1")
+    with pytest.raises(ModtError, match=r"cannot be written by ffmpeg \(no room\)"):
+        film_of(tmp_path / "film.mp4")
+
+
+def labels_of(points, taken=()):
+    """Texts that are written, with the left, right and lower end of each."""
+    axes = picture.new_figure(1280).add_axes((0, 0, 1, 1))
+    axes.set(xlim=(-45, 45), ylim=(-32, 32))
+    picture._write(axes, [(x, y, text, picture.INK) for x, y, text in points], list(taken))
+    boxes = [text.get_window_extent().transformed(axes.transData.inverted()) for text in axes.texts]
+    return {text.get_text(): box for text, box in zip(axes.texts, boxes, strict=True)}, axes.lines
+
+
+def test_a_label_that_moves_up_is_tied_to_where_it_belongs_and_the_last_is_left_out():
+    written, lines = labels_of([(3.0, 10.0, f"#{k}") for k in range(picture.TRIES + 1)])
+    assert list(written) == [f"#{k}" for k in range(picture.TRIES)]
+    feet = [box.y0 for box in written.values()]
+    assert np.all(np.diff(feet) >= min(box.height for box in written.values()) - 1e-9)
+    np.testing.assert_allclose([line.get_xydata() for line in lines], [[[3, 10], [3, foot]] for foot in feet[1:]])
+
+
+def test_labels_keep_off_what_is_taken_and_stay_in_the_picture():
+    block = Bbox([[-1.0, -1.0], [1.0, 1.0]])
+    written, _ = labels_of([(0.5, 0.3, "#1"), (20.0, 0.3, "#2"), (44.9, 5.0, "#3"), (50.0, 5.0, "#4")], [block])
+    assert list(written) == ["#1", "#2", "#3"]
+    assert written["#1"].y0 >= 1.0 > written["#2"].y0
+    assert written["#3"].x1 <= 45.0 + 1e-9

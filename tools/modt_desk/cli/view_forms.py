@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from modt.errors import MisuseError
 
 if TYPE_CHECKING:
-    from PIL import Image
+    from matplotlib.figure import Figure
 
     from modt.sources.stream import Stream
     from modt.viewer.point_cells import Cells, Grid
@@ -38,24 +38,21 @@ class View:
 
         return None if self.stream is None else sweeps(numbers, self.stream, self.grid, most)
 
-    def images(self, width: int, n: int | None = None) -> Iterator[Image.Image]:
-        """Of the frames from the first one on.
+    def drawings(self, width: int, n: int | None = None) -> Iterator[Figure]:
+        """One figure, drawn anew for each frame from the first one on.
 
         Raises:
-            MisuseError: Pillow is not installed.
+            MisuseError: Matplotlib or Pillow is not installed.
         """
         try:
-            from modt_desk.viewer.pixel_canvas import PixelCanvas
+            from modt_desk.viewer.picture import draw, new_figure
         except ModuleNotFoundError as error:
             raise MisuseError(self.out, f"needs {error.name}", "pip install 'modt[view]'") from None
-        from modt_desk.viewer.picture import draw
-
-        numbers = self.run.numbers[self.at :][:n]
+        figure, numbers = new_figure(width), self.run.numbers[self.at :][:n]
         cells = self.cells(numbers, sys.maxsize)
         for at in range(self.at, self.at + len(numbers)):
-            canvas = PixelCanvas(width)
-            draw(canvas, self.run, at, self.grid.step_cm, None if cells is None else next(cells))
-            yield canvas.image()
+            draw(figure, self.run, at, self.grid.step_cm, None if cells is None else next(cells))
+            yield figure
 
     @property
     def period_s(self) -> float:
@@ -71,41 +68,19 @@ def _player(view: View) -> None:
     save_player(view.out, view.run, view.at, view.grid.step_cm, view.cells(numbers, most_cells(len(numbers))))
 
 
-def _svg(view: View) -> None:
-    from modt.reporting.page import save
-    from modt_desk.viewer.picture import MOST_CELLS, draw
-    from modt_desk.viewer.svg_canvas import SvgCanvas
+def _picture(view: View) -> None:
+    figure = next(view.drawings(PICTURE_WIDTH, 1))  # names a missing library before the next module needs it
+    from modt_desk.viewer.film import save_picture
 
-    canvas, number = SvgCanvas(), view.run.numbers[view.at]
-    cells = view.cells([number], MOST_CELLS)
-    draw(canvas, view.run, view.at, view.grid.step_cm, None if cells is None else next(cells))
-    save(view.out, canvas.document(f"{view.run.facts['stream']['name']}, frame {number}"))
+    save_picture(view.out, figure, f"{view.run.facts['stream']['name']}, frame {view.run.numbers[view.at]}")
 
 
-def _png(view: View) -> None:
-    from modt.sinks.output import writing
+def _film(view: View) -> None:
+    drawings = view.drawings(FILM_WIDTH)
+    first = next(drawings)
+    from modt_desk.viewer.film import save_film
 
-    image = next(view.images(PICTURE_WIDTH, 1))
-    from modt_desk.viewer.film import few_colours
-
-    with writing(view.out):
-        few_colours(image).save(view.out, optimize=True)
+    save_film(view.out, first, drawings, view.period_s)
 
 
-def _gif(view: View) -> None:
-    images = view.images(FILM_WIDTH)
-    first = next(images)  # says that Pillow is missing before the module that needs it is imported
-    from modt_desk.viewer.film import save_gif
-
-    save_gif(view.out, first, images, view.period_s)
-
-
-def _mp4(view: View) -> None:
-    images = view.images(FILM_WIDTH)
-    first = next(images)
-    from modt_desk.viewer.film import save_mp4
-
-    save_mp4(view.out, first, images, view.period_s)
-
-
-FORMS = {PLAYER: _player, PICTURE: _svg, PIXELS: _png, GIF: _gif, MP4: _mp4}
+FORMS = {PLAYER: _player, PICTURE: _picture, PIXELS: _picture, GIF: _film, MP4: _film}

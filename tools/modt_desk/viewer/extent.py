@@ -7,8 +7,9 @@ import numpy as np
 from modt.types import Int
 from modt.viewer.look import REACH_M
 from modt.viewer.track_rows import COLUMNS, SCALE
-from modt_desk.viewer.canvas import SIDE_M
 
+_SIDE_M = 32.0
+"""Half of what is shown along y, where REACH_M is shown along x."""
 RINGS_M = {6.0: 2, 10.0: 5, 15.0: 5, 20.0: 10, 30.0: 10, REACH_M: 20}
 """Ranges that a picture may reach, and the distance of the rings in it."""
 _NEARLY = 0.95
@@ -16,10 +17,10 @@ _NEARLY = 0.95
 
 
 def reach_m(tracks: Int) -> float:
-    """Half of what is shown along u, to see nearly all of (R, COLUMNS) rows of tracks; REACH_M at most."""
+    """Half of what is shown along x, to see nearly all of (R, COLUMNS) rows of tracks; REACH_M at most."""
     seen = tracks[tracks[:, COLUMNS.index("seen")] > 0]
     if not len(seen):
         return REACH_M
     x, y = (np.abs(seen[:, COLUMNS.index(name)]) / SCALE[name] for name in ("x", "y"))
-    needed = np.quantile(np.maximum(x, y * REACH_M / SIDE_M), _NEARLY)
+    needed = np.quantile(np.maximum(x, y * REACH_M / _SIDE_M), _NEARLY)
     return next((reach for reach in RINGS_M if reach >= needed), REACH_M)

@@ -1,135 +1,194 @@
-"""A frame of a run, x forward to the right, drawn on a canvas."""
+"""A frame of a run seen from above, x forward to the right, drawn by Matplotlib."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterable
+from datetime import UTC, datetime
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import EllipseCollection, LineCollection, PolyCollection
+from matplotlib.colors import to_rgba, to_rgba_array
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.patches import Circle, Patch, Polygon
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 
 from modt.geometry import corners
+from modt.reporting.page import LIGHT
 from modt.sinks.tracks import BOX_KEYS
-from modt.types import Float64, Int
+from modt.types import Float64
 from modt.viewer import look
 from modt.viewer.look import REACH_M
 from modt.viewer.point_cells import SIDE, Cells
-from modt.viewer.track_rows import COLUMNS, SCALE, SCALED
-from modt_desk.viewer.canvas import SIDE_M, Canvas
-from modt_desk.viewer.caption import caption
+from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.extent import RINGS_M, reach_m
-from modt_desk.viewer.labels import Labels
 from modt_desk.viewer.recorded_run import RecordedRun
-from modt_desk.viewer.zoomed import Zoomed
 
+SIZE_IN = (12.8, 9.1)
 TRAIL = 30
 """Frames."""
-MOST_CELLS = 50_000
-"""Of a sweep, to keep an SVG file below a megabyte or so."""
+TRIES = 6
+"""Heights at which a label may stand above its box."""
+INK, SOFT, LINE, PAPER = (LIGHT[name] for name in ("ink", "soft", "line", "paper"))
+_TEXT_PT = 9.5
+_PANEL = {"facecolor": PAPER, "edgecolor": "none", "alpha": 0.75, "pad": 0.5}
+_LEAST_PT = 0.8
+"""Width of a point, at least."""
+_DATES_S = 1e8
+"""Stamps from here on count from 1970."""
 Label = tuple[float, float, str, str]
-_LEAST_M = 0.1
-_GAP_M = 0.3
-"""Between a box and its label."""
 
 
-def draw(canvas: Canvas, run: RecordedRun, at: int, step_cm: int, cells: Cells | None) -> None:
-    """Draw points, tracks, truth, and what the frame cost.
+def new_figure(width: int) -> Figure:
+    """An empty picture, SIZE_IN large, of a width [pixel]."""
+    figure = Figure(SIZE_IN, width / SIZE_IN[0], facecolor=PAPER)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def draw(figure: Figure, run: RecordedRun, at: int, step_cm: int, cells: Cells | None) -> None:
+    """Draw points, tracks, truth, and what the frame cost, in place of what the figure holds.
 
     Args:
-        canvas: drawn on.
+        figure: drawn on.
         run: what is recorded.
         at: index of the frame.
         step_cm: width of a cell.
         cells: of the sweep, None without points.
     """
-    reach = reach_m(run.tracks)
-    scene, labels = Zoomed(canvas, REACH_M / reach), Labels(canvas)
-    rings = np.arange(RINGS_M[reach], math.hypot(reach, reach * SIDE_M / REACH_M), RINGS_M[reach]).tolist()
-    for radius in rings:
-        scene.circle(0, 0, radius, "line", 0.1)
+    figure.clear()
+    axes, reach = figure.add_axes((0, 0, 1, 1)), reach_m(run.tracks)
+    axes.set_axis_off()
+    side = reach * SIZE_IN[1] / SIZE_IN[0]  # a metre is as long as along x
+    axes.set(xlim=(-reach, reach), ylim=(-side, side))
     if cells is not None:
-        _points(scene, cells, step_cm)
+        _points(axes, cells, step_cm)
+    rings = np.arange(RINGS_M[reach], math.hypot(*axes.viewLim.max), RINGS_M[reach]).tolist()
     for radius in rings:
-        labels.write(0.0, -scene.factor * radius, f"{radius:g} m", "soft")
-    canvas.polygon(np.array([[1, 0], [-0.7, 0.6], [-0.7, -0.6]]), "ink", 1.0, "ink", 0.05)
-    labels.keep_free(-1.0, 1.0, 0.6)
-    rows = run.tracks[run.tracks[:, COLUMNS.index("at")] == at]
-    false = set(run.frames[at].get("false", ()))
-    said = []
-    for row in rows[np.argsort(rows[:, COLUMNS.index("class")], kind="stable")]:
-        said += _track(scene, run, at, row, int(row[0]) in false)
-    for labelled in run.frames[at].get("truth", ()):
-        said += _truth(scene, labelled)
-    caption(canvas, labels, run, at)
-    for u, v, text, colour in reversed(said):
-        labels.write(scene.factor * u, scene.factor * v - _GAP_M, text, colour)
+        axes.add_patch(Circle((0, 0), radius, fill=False, edgecolor=LINE, zorder=0))
+    (sensor,) = axes.plot(0, 0, ">", color=INK, markersize=12)
+    said = _tracks(axes, run, at) + _truth(axes, run, at)
+    taken = [thing.get_window_extent() for thing in (_caption(axes, run, at), _legend(axes, run, at), sensor)]
+    said += [(0.0, radius, f"{radius:g} m", SOFT) for radius in rings]
+    _write(axes, reversed(said), [box.transformed(axes.transData.inverted()) for box in taken])
 
 
-def _points(scene: Zoomed, cells: Cells, step_cm: int) -> None:
+def _points(axes: Axes, cells: Cells, step_cm: int) -> None:
     x, y = ((v + 0.5 - SIDE / 2) * step_cm / 100 for v in (cells.cell % SIDE, cells.cell // SIDE))
-    shown = (np.abs(x) < REACH_M / scene.factor) & (np.abs(y) < SIDE_M / scene.factor)
-    for colour, group in (("line", cells.level == 0), ("soft", cells.level > 0)):
-        which = shown & group
-        width = max(_LEAST_M / scene.factor, step_cm / 100)
-        scene.dots(np.stack([x[which], -y[which]], axis=1), colour, width)
+    size = max(_LEAST_PT, 72 * SIZE_IN[0] / axes.viewLim.width * step_cm / 100)
+    style = {"markersize": size, "markeredgewidth": 0, "rasterized": True, "zorder": 0.5}
+    for colour, group in ((LINE, cells.level == 0), (SOFT, cells.level > 0)):
+        axes.plot(x[group], y[group], "s", color=colour, **style)
 
 
-def _track(scene: Zoomed, run: RecordedRun, at: int, row: Int, false: bool) -> list[Label]:
-    """Box, trail and ring of a row of the table; its label."""
-    value = dict(zip(COLUMNS, row.tolist(), strict=True)) | _scaled(row)
-    name, colour = look.classes()[int(value["class"])].values()
-    state = look.states(run.states)[int(value["state"])]
-    is_object, wrong = value["class"] > 0, look.truth()["false"]["colour"]
-    box = _outline([value[key] for key in BOX_KEYS])
-    scene.polygon(
-        box,
-        colour,
-        0.35 if is_object else 0.1,
-        wrong if false else state["colour"],
-        (0.4 if false else 0.2) if is_object else 0.08,
-        dash=0 if value["seen"] else 0.5,
-        title=f"#{value['id']:g} {name}, {state['name']}",
-    )
-    x, y = value["x"], -value["y"]
-    if value["classified"]:
-        scene.circle(x, y, max(1.0 / scene.factor, 0.7 * value["l"]), "ink", 0.12)
-    if not is_object:
-        return []
-    scene.line(_trail(run, at, int(value["id"])), colour, 0.15)
-    if value["world_speed_mps"] > 0.5:
-        heading, reach = value["world_heading"] - run.poses[at, 2], value["world_speed_mps"]
-        ahead = [x + reach * np.cos(heading), y - reach * np.sin(heading)]
-        scene.line(np.array([[x, y], ahead]), state["colour"], 0.15)
-    said = f"{'false: ' if false else ''}#{value['id']:g} {name} {100 * value[f'p_{name}']:.0f} %"
-    return [(x, _top(box), said, wrong if false else "ink")]
+def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
+    """Boxes, trails, speeds and rings of the tracks; the labels of the objects."""
+    rows = run.tracks[run.tracks[:, COLUMNS.index("at")] == at]
+    rows = rows[np.argsort(rows[:, COLUMNS.index("class")], kind="stable")]
+    of = {name: column / SCALE.get(name, 1) for name, column in zip(COLUMNS, rows.T, strict=True)}
+    kind, is_object = of["class"].astype(int), of["class"] > 0
+    false = is_object & np.isin(of["id"], run.frames[at].get("false", ()))
+    names = [entry["name"] for entry in look.classes()]
+    fill = to_rgba_array([entry["colour"] for entry in look.classes()])[kind]
+    wrong = look.truth()["false"]["colour"]
+    edge = to_rgba_array([entry["colour"] for entry in look.states(run.states)])[of["state"].astype(int)]
+    box, xy = corners(np.stack([of[key] for key in BOX_KEYS], axis=1)), np.column_stack([of["x"], of["y"]])
+    boxes = PolyCollection(box, gid="tracks", linestyles=np.where(of["seen"] > 0, "-", "--").tolist())
+    boxes.set_facecolor(np.column_stack([fill[:, :3], np.where(is_object, 0.35, 0.1)]))
+    boxes.set_edgecolor(np.where(false[:, None], to_rgba(wrong), edge))
+    boxes.set_linewidth(np.where(false, 4.0, np.where(is_object, 2.0, 0.8)))
+    classified = of["classified"] > 0
+    width = 2 * np.maximum(axes.viewLim.width / (2 * REACH_M), 0.7 * of["l"][classified])
+    place = {"offsets": xy[classified], "offset_transform": axes.transData, "units": "xy"}
+    rings = EllipseCollection(width, width, 0, facecolors="none", edgecolors=INK, gid="classified", **place)
+    trails = [_trail(run, at, id_) for id_ in rows[is_object, 0].tolist()]
+    moves = is_object & (of["world_speed_mps"] > 0.5)
+    heading = of["world_heading"] - run.poses[at, 2]
+    ahead = xy + of["world_speed_mps"][:, None] * np.column_stack([np.cos(heading), np.sin(heading)])
+    lines = LineCollection([*trails, *np.stack([xy, ahead], axis=1)[moves]], linewidths=1.5)
+    lines.set_color(np.concatenate([fill[is_object], edge[moves]]))
+    for shapes in (boxes, rings, lines):
+        axes.add_collection(shapes)
+    labels = []
+    for k in np.flatnonzero(is_object).tolist():
+        name = names[kind[k]]
+        text = f"{'false: ' if false[k] else ''}#{rows[k, 0]} {name} {100 * of[f'p_{name}'][k]:.0f} %"
+        labels.append((xy[k, 0], box[k, :, 1].max(), text, wrong if false[k] else INK))
+    return labels
 
 
-def _truth(scene: Zoomed, labelled: dict[str, Any]) -> list[Label]:
-    colour, missed = look.truth()[labelled["outcome"]]["colour"], labelled["outcome"] == "missed"
-    box = _outline([labelled["x"], labelled["y"], 0.0, labelled["l"], labelled["w"], 0.0, labelled["yaw"]])
-    scene.polygon(box, colour, 0.0, colour, 0.3 if missed else 0.12, dash=0.25)
-    text = f"missed {look.classes()[labelled['class']]['name']}"
-    return [(labelled["x"], _top(box), text, colour)] if missed else []
-
-
-def _top(box: Float64) -> float:
-    return float(box[:, 1].min())
-
-
-def _outline(box: list[float]) -> Float64:
-    """(4, 2) corners on the canvas of a box in the frame of the sensor."""
-    outline: Float64 = corners(np.array([box]))[0] * [1, -1]
-    return outline
-
-
-def _scaled(row: Int) -> dict[str, float]:
-    return {name: row[COLUMNS.index(name)] / SCALE[name] for name in SCALED}
+def _truth(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
+    """Outlines of the labelled objects; the labels of those that are missed."""
+    labels = []
+    for o in run.frames[at].get("truth", ()):
+        box = corners(np.array([[o["x"], o["y"], 0.0, o["l"], o["w"], 0.0, o["yaw"]]]))[0]
+        colour, missed = look.truth()[o["outcome"]]["colour"], o["outcome"] == "missed"
+        axes.add_patch(Polygon(box, fill=False, edgecolor=colour, linewidth=3.0 if missed else 1.2, linestyle=":"))
+        if missed:
+            labels.append((o["x"], box[:, 1].max(), f"missed {look.classes()[o['class']]['name']}", colour))
+    return labels
 
 
 def _trail(run: RecordedRun, at: int, id_: int) -> Float64:
-    """(n, 2) past positions of a track on the canvas, as seen from the sensor now."""
+    """(n, 2) past positions of a track, as seen from the sensor now."""
     now, world = run.tracks[:, COLUMNS.index("at")], COLUMNS.index("world_x")
     rows = run.tracks[(run.tracks[:, 0] == id_) & (now <= at) & (now >= at - TRAIL)]
     x, y, yaw = run.poses[at]
-    dx, dy = (rows[:, world : world + 2] / 100 - [x, y]).T
     c, s = np.cos(yaw), np.sin(yaw)
-    return np.stack([c * dx + s * dy, s * dx - c * dy], axis=1)
+    trail: Float64 = (rows[:, world : world + 2] / SCALE["world_x"] - [x, y]) @ np.array([[c, -s], [s, c]])
+    return trail
+
+
+def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
+    """What the frame was and cost."""
+    frame = run.frames[at]
+    facts = [f"frame {frame['frame']}, {_time(frame['stamp_s'])}, mode {run.facts['mode']}"]
+    facts.append(f"{frame['proposals']} proposals, budget {run.budget}")
+    facts.append(f"{frame['classifications']} classified, {frame['deferred']} deferred")
+    if "cpu_ms" in frame:
+        facts.append(f"{sum(frame['cpu_ms'].values()):.1f} ms of CPU time")
+    if "energy_mJ" in frame:
+        facts.append(f"{frame['energy_mJ']:.0f} mJ ({frame['kind']})")
+    style = {"va": "top", "color": INK, "fontsize": _TEXT_PT, "linespacing": 1.5, "bbox": _PANEL}
+    return axes.text(0.01, 0.985, "\n".join(facts), transform=axes.transAxes, **style)
+
+
+def _legend(axes: Axes, run: RecordedRun, at: int) -> Legend:
+    """Colours of the classes, the states and, where the frame has truth, of what became of it."""
+    outlines = look.states(run.states) + (list(look.truth().values()) if "truth" in run.frames[at] else [])
+    entries = [(entry, True) for entry in look.classes()] + [(entry, False) for entry in outlines]
+    patches = [Patch(fill=f, color=e["colour"], linewidth=2, label=e["name"].replace("_", " ")) for e, f in entries]
+    style = {"facecolor": PAPER, "edgecolor": "none", "labelcolor": SOFT, "fontsize": _TEXT_PT}
+    return axes.legend(handles=patches, loc="lower left", handlelength=1, handleheight=1, **style)
+
+
+def _write(axes: Axes, labels: Iterable[Label], taken: list[Bbox]) -> None:
+    """Write each label above its point, or further up with a line to it; one without room is left out."""
+    view = axes.viewLim
+    for x, y, text, colour in labels:
+        if not view.contains(x, y):
+            continue
+        style = {"ha": "center", "va": "bottom", "color": colour, "fontsize": _TEXT_PT, "bbox": _PANEL}
+        label = axes.text(x, y, text, **style)
+        box = label.get_window_extent().transformed(axes.transData.inverted())
+        inward = max(view.x0 - box.x0, 0.0) + min(view.x1 - box.x1, 0.0)
+        tried = [box.translated(inward, k * box.height) for k in range(TRIES)]
+        place = next((place for place in tried if not place.count_overlaps(taken)), None)
+        if place is None:
+            label.remove()
+            continue
+        taken.append(place)
+        label.set_position((x + inward, place.y0))
+        if place is not tried[0]:
+            axes.plot([x, x], [y, place.y0], color=SOFT, linewidth=0.8)
+
+
+def _time(stamp_s: float) -> str:
+    """Seconds from the begin of a recording, or a date."""
+    if stamp_s < _DATES_S:
+        return f"{stamp_s:.2f} s"
+    return f"{datetime.fromtimestamp(stamp_s, UTC):%Y-%m-%d %H:%M:%S.%f}"[:-4]
