@@ -25,7 +25,7 @@ from modt_desk.experiments.drives import Drive
 
 @dataclass(frozen=True, slots=True)
 class SegmentedFrame:
-    """A sweep: the points that matter, its proposals and their likelihoods, its labels and the points of its objects."""
+    """A sweep: the points that matter, proposals and their likelihoods, labels, and the points of labelled objects."""
 
     frame: Frame
     proposals: Proposals
