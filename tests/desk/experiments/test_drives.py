@@ -3,7 +3,8 @@ from __future__ import annotations
 import pytest
 
 from modt.errors import MisuseError
-from modt_desk.experiments.catalogue.ideal_lives import FIGURE_8, TABLE_III
+from modt_desk.experiments.catalogue.lives import TABLE_III
+from modt_desk.experiments.catalogue.ranges import FIGURE_8
 from modt_desk.experiments.drives import kitti_drives
 from modt_desk.experiments.study import Study
 

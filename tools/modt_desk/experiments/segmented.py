@@ -25,7 +25,7 @@ from modt_desk.experiments.drives import Drive
 
 @dataclass(frozen=True, slots=True)
 class SegmentedFrame:
-    """A sweep: the points that matter, proposals and their likelihoods, labels, and the points of labelled objects."""
+    """A sweep: the points that matter, proposals and their likelihoods, labels, and the points of its objects."""
 
     frame: Frame
     proposals: Proposals

@@ -6,7 +6,6 @@ import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from itertools import chain
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,7 +15,7 @@ from modt.config import EnergyConfig
 from modt_desk.experiments import paper
 from modt_desk.experiments.catalogue.experiment import Experiment, Label
 from modt_desk.experiments.catalogue.figures import Figure
-from modt_desk.experiments.drives import KITTI, SIMULATED, Drive
+from modt_desk.experiments.drives import KITTI, Drive, KittiDrive
 from modt_desk.experiments.judged import Judged
 from modt_desk.experiments.replays import Replay
 
@@ -111,8 +110,10 @@ class Study:
             for label, replay in _replays(experiment, drive, names).items():
                 found.setdefault(label, []).append(pickle.loads(files[drive, replay].read_bytes()))
         outcomes = {label: Judged.pooled(judged) for label, judged in found.items()}
-        board = self.boards.get(names, EnergyConfig())
-        return chain(experiment.figures(outcomes), experiment.energies(outcomes, board))
+        for label, judged in outcomes.items():
+            yield from experiment.figures(judged, *label)
+        for label, judged in outcomes.items():
+            yield from experiment.energies(judged, *label, self.boards.get(names, EnergyConfig()))
 
     def _compared(self, experiment: Experiment) -> Sequence[Profiles]:
         return self.profiles if experiment.scans else self.profiles[:1]
@@ -124,10 +125,10 @@ class Study:
     def _streams(self, experiment: Experiment) -> Iterator[tuple[str, Sequence[Drive]]]:
         """Names of drives that are pooled, with these."""
         suited = self._suited(experiment)
-        simulated = [drive for drive in suited if drive.kind == SIMULATED]
+        simulated = [drive for drive in suited if not isinstance(drive, KittiDrive)]
         if simulated:
             yield f"{len(simulated)} simulated drives", simulated
-        recorded = [drive for drive in suited if drive.kind == KITTI]
+        recorded = [drive for drive in suited if isinstance(drive, KittiDrive)]
         once = list({drive.number: drive for drive in recorded}.values())
         if len(once) > 1:
             yield f"{len(once)} KITTI drives", once
