@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
+import numpy as np
 from matplotlib.figure import Figure
 
 from modt_desk.experiments.catalogue.experiment import Chart, Experiment
@@ -37,10 +38,11 @@ def _draw(path: Path, title: str, chart: Chart, rows: Sequence[Row]) -> None:
     for variant, quantity in dict.fromkeys((row.variant, row.quantity) for row in rows):
         own = [row for row in rows if (row.variant, row.quantity) == (variant, quantity)]
         name = f"{variant}, {quantity}" if len(chart.quantities) > 1 else variant
+        at, value = np.array([(row.at, row.value) for row in own], np.float64).T
         if own[0].at is None:
-            axes.plot((min(swept), max(swept)), [own[0].value] * 2, "--", label=name)
+            axes.plot((min(swept), max(swept)), value.repeat(2), "--", label=name)
         else:
-            axes.plot([row.at for row in own], [row.value for row in own], label=name)
+            axes.plot(at, value, label=name)
     axes.set(title=title, xlabel=chart.x_label, ylabel=chart.y_label)
     axes.grid(alpha=0.3)
     axes.legend()
