@@ -63,13 +63,14 @@ def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str
         variant = f"{row.variant}, profile {row.profile}" if several else row.variant
         line = (row.streams, variant, *([row.quantity] if swept else []))
         lines.setdefault(line, {})[row.at if swept else row.quantity] = _cell(row)
+    columns: dict[str | float | None, str] = {}
     if swept:
-        across = {at: f"{at:g}" for at in _spread(swept)}
-        across[swept[0]] = f"{experiment.charts[0].x_label} {swept[0]:g}"
-        unswept = {None: "not swept"} if any(row.at is None for row in rows) else {}
-        columns: dict[str | float | None, str] = {**unswept, **across}
+        if any(row.at is None for row in rows):
+            columns[None] = "not swept"
+        columns.update((at, f"{at:g}") for at in _spread(swept))
+        columns[swept[0]] = f"{experiment.charts[0].x_label} {swept[0]:g}"
     else:
-        columns = {row.quantity: row.quantity for row in rows}
+        columns.update((row.quantity, row.quantity) for row in rows)
     head = ("streams", "variant", *(["quantity"] if swept else []), *columns.values())
     yield from (head, ["---"] * len(head))
     for line, cell in lines.items():
