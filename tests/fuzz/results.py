@@ -1,4 +1,4 @@
-"""What the package has written itself, and others may have changed: comparisons, predictions, stored results."""
+"""What the package has written itself, and others may have changed: comparisons and predictions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,6 @@ from modt_desk.comparison.prediction_report import (
     read_prediction,
 )
 from modt_desk.evaluation.run_record import RunRecord
-from modt_desk.experiments.store import Store, packed
 from modt_desk.viewer.recorded_run import RecordedRun
 from modt_desk.viewer.track_page import rows_of, track_page
 from tests.desk.comparison.test_prediction import CALIBRATION, FRAMES, TEST
@@ -67,15 +66,6 @@ def predictions(folder: Path) -> Feed:
     modes = {name: {"cpu_ms": estimate(7.0, "ms")} for name in assembly.MODES}
     savings = {name: {"gamma_measured_cpu": estimate(1.5)} for name in assembly.MODES}
     return of_file(path, lambda: against(read_prediction(path, ABOUT), modes, savings), json.dumps(tree))
-
-
-@target()
-def stored_results(folder: Path) -> Feed:
-    store, arrays = Store(folder), {"rows": np.arange(12.0).reshape(3, 4), "names": np.array(["car", "cyclist"])}
-    seeds = [packed(arrays, compressed=compressed) for compressed in (True, False)]
-    store.put("ab", seeds[0])
-    (path,) = folder.rglob("*.npz")
-    return of_file(path, lambda: store.get("ab"), *seeds)
 
 
 def frames() -> list[dict[str, Any]]:
@@ -125,4 +115,4 @@ def exported_run(folder: Path) -> Feed:
     return of_file(run / "tracks.jsonl", read, json_lines(frames()))
 
 
-TARGETS = (calibrations, predictions, stored_results, viewed_run, exported_run)
+TARGETS = (calibrations, predictions, viewed_run, exported_run)

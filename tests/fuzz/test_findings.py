@@ -13,7 +13,6 @@ from modt.errors import ModtError
 from modt.ros2.cdr import CdrWriter
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
-from modt_desk.experiments.store import Store, packed
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import SENSOR_BOMB, network
 from tests.fuzz.targets import TARGETS
@@ -160,16 +159,6 @@ def test_a_weight_of_400_digits_is_refused(tmp_path: Path) -> None:
     (seed,), call = TARGETS["model_metadata"].prepare(tmp_path)
     with limits(), pytest.raises(ModtError, match="malformed box or reflectance classifier"):
         call(seed.replace(b"0.1", b"1" + b"0" * 400, 1))
-
-
-@pytest.mark.parametrize("compressed", [True, False])
-def test_a_stored_result_that_is_damaged_counts_as_missing(compressed: bool, tmp_path: Path) -> None:
-    store, arrays = Store(tmp_path), {"rows": np.arange(12.0)}
-    whole = packed(arrays, compressed=compressed)
-    for at in range(len(whole)):
-        store.put("ab", whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
-        found = store.get("ab")
-        assert found is None or next(iter(found.values())).tolist() == arrays["rows"].tolist()
 
 
 @pytest.mark.parametrize("without", [b'"asked"', b'"accurate"', b'"gamma"', b'"value"'])

@@ -22,7 +22,7 @@ def test_cars_that_drive_do_not_count():
 def test_wander_is_measured_from_the_mean_place_and_from_frame_to_frame():
     still = centres(1, [5, 5, 5, 5], [4, 6, 4, 6])
     tables = [np.zeros(1, FRAME), *(np.zeros(0, kind) for kind in (OBJECT, PROPOSAL, CALL))]
-    figures = list(FIGURE_15.figures({("accurate", None): Judged(*tables, still)}))
+    figures = list(FIGURE_15.figures(Judged(*tables, still), "accurate", None))
     of_mean = {f.quantity: f.estimate.value for f in figures if f.variant.startswith("mean")}
     assert of_mean["rms from their mean [m]"] == pytest.approx(1.0)
     assert of_mean["step from frame to frame [m]"] == pytest.approx(2.0)

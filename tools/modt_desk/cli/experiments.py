@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,8 +15,9 @@ from modt.cli import options
 from modt.cli.progress import bar
 from modt.errors import MisuseError
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # NumPy is imported once the process is pinned
     from modt.config import EnergyConfig
+    from modt_desk.experiments.study import Row
 
 
 def add_options(p: argparse.ArgumentParser) -> None:
@@ -34,11 +37,8 @@ def add_options(p: argparse.ArgumentParser) -> None:
     board = "from modt-profile calibrate, for the energy of the first profile; then of each beside; repeatable"
     g.add_argument("--calibration", action="append", default=[], metavar="FILE", help=board)
     g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: %(default)s")
-    g.add_argument("--cache", type=Path, metavar="DIR", help="of intermediate results (default: OUT/cache)")
-    where = g.add_mutually_exclusive_group()
     jobs = options.integer(1, 1024, "processes")
-    where.add_argument("--jobs", type=jobs, default=1, metavar="N", help="processes (default: %(default)s)")
-    where.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT")
+    g.add_argument("--jobs", type=jobs, default=1, metavar="N", help="processes (default: %(default)s)")
     g.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
@@ -49,13 +49,12 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: no such experiment, or no drive.
     """
     host.pin_to_core(None)  # one thread a process: NumPy is imported from here on
+    from modt.sinks.output import writing
     from modt_desk.experiments.catalogue.every import chosen
     from modt_desk.experiments.drives import Drive, kitti_drives, simulated_drives
-    from modt_desk.experiments.output.about import About
-    from modt_desk.experiments.output.files import write
-    from modt_desk.experiments.store import Store
+    from modt_desk.experiments.markdown import markdown
+    from modt_desk.experiments.sources import sources
     from modt_desk.experiments.study import Study
-    from modt_desk.experiments.units import Cluster, Executor, Here, Processes
 
     experiments = chosen(arguments.experiment)
     drives: list[Drive] = [] if arguments.kitti is None else [*kitti_drives(arguments.kitti)]
@@ -68,21 +67,37 @@ def run(arguments: argparse.Namespace) -> int:
     if len(arguments.calibration) > len(profiles):
         raise MisuseError("--calibration", "more of them than profiles", "give one, and one for each --beside")
     boards = dict(zip(profiles, map(_board, arguments.calibration), strict=False))
-    study = Study(experiments, drives, profiles, Store((arguments.cache or out / "cache").resolve()), boards)
-    executor: Executor = Here() if arguments.jobs == 1 else Processes(arguments.jobs)
-    if arguments.scheduler:
-        executor = Cluster(arguments.scheduler)
-    with bar(study.missing, "replay", shown=not arguments.quiet and sys.stderr.isatty()) as tick:
-        study.complete(executor, lambda unit: tick(unit.drive.name))
-    about = About.of(_command(arguments), profiles, boards.values())
-    rows = study.rows()
+    study = Study(experiments, drives, profiles, boards)
+    with bar(len(study.tasks()), "replay", shown=not arguments.quiet and sys.stderr.isatty()) as tick:
+        rows = study.rows(arguments.jobs, tick)
     if not rows:
         raise MisuseError(
             "--experiment", "none of the drives has the sweeps that it needs", "add them, or --simulated N"
         )
-    write(out, about, experiments, rows)
-    print(f"{len(rows)} figures: {out / 'results.md'}, {out / 'index.html'}, {out / 'results.json'}")
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+        _write_table(out / "results.csv", rows)
+        text = markdown(_command(arguments), sources(profiles, boards.values()), experiments, rows)
+        (out / "results.md").write_text(text, encoding="utf-8")
+        if find_spec("matplotlib"):
+            from modt_desk.experiments.charts import draw
+
+            for experiment in experiments:
+                draw(out, experiment, [row for row in rows if row.experiment == experiment.name])
+        else:
+            print("modt: no charts; pip install 'modt[report]' to have them", file=sys.stderr)
+    print(f"{len(rows)} figures: {out / 'results.md'}, {out / 'results.csv'}")
     return 0
+
+
+def _write_table(path: Path, rows: Sequence[Row]) -> None:
+    import csv
+    from dataclasses import asdict
+
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.DictWriter(file, list(asdict(rows[0])), lineterminator="\n")
+        table.writeheader()
+        table.writerows(map(asdict, rows))
 
 
 def _board(file: str) -> EnergyConfig:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -29,56 +27,13 @@ DRIVE_OF_SEQUENCE = dict(
     enumerate(("0005", "0009", "0011", "0013", "0014", "0015", "0018", "0022", "0032", "0036", "0056", "0059"))
 )
 """Raw drive of 2011_09_26 that each of KITTI's first tracking sequences is of."""
-HAD_A_SAY = frozenset({"0005"})
+DEVELOPMENT_DRIVES = frozenset({"0005"})
 """Drives that choices of this project were confirmed on."""
 FIRST_SEED = 7000
-"""Of simulated drives; nothing is trained or settled on these."""
+"""First seed of the simulated drives; nothing is trained or chosen on these."""
 SCENES = ("street", "crossing")
 SIMULATED_TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTRAL)}
 _NO_LABELS = frozenset({"velodyne_points", "velodyne", "oxts", "image_00", "image_01", "image_02", "image_03"})
-
-
-class Drive(Protocol):
-    """A labelled drive; scans: whether its sweeps are there, too."""
-
-    @property
-    def name(self) -> str:
-        """Of the drive."""
-
-    @property
-    def number(self) -> str:
-        """Of the recording, whatever labels it is judged by."""
-
-    @property
-    def kind(self) -> str:
-        """KITTI or SIMULATED."""
-
-    @property
-    def scans(self) -> bool:
-        """Whether most of its sweeps are there."""
-
-    @property
-    def had_a_say(self) -> bool:
-        """Whether choices of this project were confirmed on it."""
-
-    @property
-    def sensor(self) -> str:
-        """Profile of its sensor."""
-
-    def digest(self) -> str:
-        """Of all that is read of it."""
-
-    def labels(self) -> dict[int, FrameTruth]:
-        """By frame."""
-
-    def rules(self) -> Rules:
-        """By which it is judged."""
-
-    def fov(self) -> FieldOfView:
-        """Where it is labelled."""
-
-    def sweeps(self) -> Iterator[tuple[Frame, FrameTruth]]:
-        """Its labelled sweeps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,21 +55,12 @@ class KittiDrive:
     sensor: str = DEFAULT
 
     @property
-    def had_a_say(self) -> bool:
-        """Whether choices were confirmed on it."""
-        return self.number in HAD_A_SAY
-
-    def digest(self) -> str:
-        """Of the contents of its files."""
-        if self.path.is_dir():
-            return _digest([*sorted(self.path.parent.glob("calib*.txt")), *_files(self.path)])
-        root = self.path.parents[1]
-        places = [root / kind / self.path.stem for kind in ("velodyne", "oxts", "calib")]
-        beside = [place.with_suffix(".txt") for place in places if place.with_suffix(".txt").is_file()]
-        return _digest([self.path, *beside, *(file for place in places for file in _files(place))])
+    def development(self) -> bool:
+        """Whether choices of this project were confirmed on it."""
+        return self.number in DEVELOPMENT_DRIVES
 
     def labels(self) -> dict[int, FrameTruth]:
-        """By frame; vans and sitting people are ignored, as in the paper."""
+        """Labels by frame; vans and sitting people are ignored, as in the paper."""
         return dict(_truth(self.path).frames)
 
     def rules(self) -> Rules:
@@ -145,24 +91,15 @@ class SimulatedDrive:
     sensor: str = DEFAULT
     kind: str = SIMULATED
     scans: bool = True
-    had_a_say: bool = False
+    development: bool = False
 
     @property
     def name(self) -> str:
         """Scene and seed."""
         return f"{self.scene} {self.seed}"
 
-    @property
-    def number(self) -> str:
-        """The same."""
-        return self.name
-
-    def digest(self) -> str:
-        """Of its description: the same one gives the same bytes."""
-        return f"{self.scene}, {self.sensor}, {self.seconds:g} s, seed {self.seed}"
-
     def labels(self) -> dict[int, FrameTruth]:
-        """By frame."""
+        """Labels by frame."""
         return {frame.index: truth for frame, truth in self.sweeps()}
 
     def rules(self) -> Rules:
@@ -179,6 +116,9 @@ class SimulatedDrive:
             seen = np.flatnonzero(truth.points)
             names = [truth.kinds[k].name for k in seen]
             yield frame, FrameTruth.of(SIMULATED_TYPES, truth.bodies[seen].tolist(), names, truth.boxes[seen])
+
+
+Drive = KittiDrive | SimulatedDrive
 
 
 def kitti_drives(root: Path) -> list[KittiDrive]:
@@ -233,19 +173,3 @@ def _drive(path: Path) -> KittiDrive:
 @cache
 def _truth(path: Path) -> Truth:
     return open_truth(path, paper=True)
-
-
-def _digest(files: list[Path]) -> str:
-    found = hashlib.blake2b(digest_size=16)
-    for file in files:
-        found.update(f"{file.name} {file.stat().st_size}\n".encode())
-        with file.open("rb") as content:
-            while block := content.read(1 << 20):
-                found.update(block)
-    return found.hexdigest()
-
-
-def _files(folder: Path) -> list[Path]:
-    """Below a folder, images left out."""
-    files = (f for f in sorted(folder.rglob("*")) if not any(p.startswith("image_") for p in f.parts))
-    return [f for f in files if f.is_file()]

@@ -7,47 +7,33 @@ stage.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from modt.config import ProfileConfig
+from modt.config import OdometryConfig, ProfileConfig, TrackingConfig
 from modt.observations import Located, StaticTracks, observe
 from modt.odometry.odometry import Odometry
 from modt.placement import Placement
-from modt.profile import dump
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
 from modt.types import NONE, Bool, Float32, Float64, Frame, Int, Proposals, TrackedFrame, Tracks
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.overlap import Overlap
-from modt_desk.experiments.played_back import within
-from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame
-from modt_desk.experiments.store import Store, key_of
+from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame, within
 
 
-@dataclass(frozen=True, slots=True)
-class ViewedFrame:
-    """A frame whose proposals are all classified and followed."""
-
-    segmented: SegmentedFrame
-    likelihood: Float64  # (P, 4) of the network
-    track: Int  # (P,) row of the ideal track of each
-
-
-def viewed(drive: SegmentedDrive, found: list[Float64], config: ProfileConfig, store: Store) -> list[ViewedFrame]:
-    """Every proposal of a drive with the likelihood found and its ideal track; from the store where it was before."""
-    described = dump(config)
-    key = key_of("ideal tracks", drive.key, [described[name] for name in ("tracking", "odometry", "sensor")])
-    tracks = store.made(key, lambda: dict(_tracks(drive, config)))
-    return [ViewedFrame(*of, tracks[str(k)]) for k, of in enumerate(zip(drive.frames, found, strict=True))]
+@lru_cache(maxsize=2)
+def _ideal_tracks(
+    drive: SegmentedDrive, tracking: TrackingConfig, odometry: OdometryConfig, period_s: float
+) -> tuple[Int, ...]:
+    """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
+    return tuple(_tracks(drive, Tracker(tracking, ACCURATE, regroupings=(), period_s=period_s), Odometry(odometry)))
 
 
-def _tracks(drive: SegmentedDrive, config: ProfileConfig) -> Iterator[tuple[str, Int]]:
-    odometry = Odometry(config.odometry)
-    tracker = Tracker(config.tracking, ACCURATE, regroupings=(), period_s=config.sensor.period_s)
+def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: Odometry) -> Iterator[Int]:
     rows: dict[tuple[str, int], int] = {}
-    for k, made in enumerate(drive.frames):
+    for made in drive.frames:
         frame, proposals = made.frame, made.proposals
         located = odometry.locate(frame, proposals, tracker.static_tracks)
         tracks = tracker.follow(frame.stamp_s, proposals, located).tracks
@@ -55,7 +41,7 @@ def _tracks(drive: SegmentedDrive, config: ProfileConfig) -> Iterator[tuple[str,
         keys = [
             ("object", owner) if owner != NONE else ("other", i) for owner, i in zip(_owner(made), own, strict=True)
         ]
-        yield str(k), np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
+        yield np.array([rows.setdefault(key, len(rows)) for key in keys], np.int64)
 
 
 def _owner(made: SegmentedFrame) -> list[int]:
@@ -78,21 +64,23 @@ class IdealTracking:
     """Segmenter, odometry, tracker and classifier of a pipeline that return what is known of a drive.
 
     Args:
-        frames: of the drive.
-        range_m: range of interest: what is farther is not there.
+        drive: segmented drive that is replayed.
+        config: profile of the tracker that follows background and further fragments.
+        range_m: range of interest; proposals beyond it are left out.
     """
 
     state_names = ("followed",)
 
-    def __init__(self, frames: list[ViewedFrame], range_m: float = np.inf) -> None:
-        self._frames, self._range_m = iter(frames), range_m
-        self._tracks = Tracks.blank(1 + max((int(f.track.max(initial=-1)) for f in frames), default=-1))
+    def __init__(self, drive: SegmentedDrive, config: ProfileConfig, range_m: float = np.inf) -> None:
+        rows = _ideal_tracks(drive, config.tracking, config.odometry, config.sensor.period_s)
+        self._frames, self._range_m = zip(drive.frames, rows, strict=True), range_m
+        self._tracks = Tracks.blank(1 + max((int(row.max(initial=-1)) for row in rows), default=-1))
         self._tracks.id[:] = np.arange(len(self._tracks))
 
     def segment(self, points: Float32) -> Proposals:
-        """Those of the next frame."""
-        self._now = next(self._frames)
-        proposals = self._now.segmented.proposals
+        """Proposals of the next frame."""
+        self._now, self._rows = next(self._frames)
+        proposals = self._now.proposals
         self._which = np.flatnonzero(within(proposals, self._range_m))
         return proposals.take(self._which)
 
@@ -111,7 +99,7 @@ class IdealTracking:
 
     def follow(self, stamp_s: float, proposals: Proposals, located: Located) -> TrackedFrame:
         """The table with a row for each track of the drive."""
-        t, rows = self._tracks, self._now.track[self._which]
+        t, rows = self._tracks, self._rows[self._which]
         t.proposal[:] = NONE
         t.proposal[rows] = np.arange(len(rows))
         t.points[rows] = proposals.count

@@ -19,10 +19,7 @@ from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Rows, table
 from modt_desk.evaluation.rules import Rules
 from modt_desk.evaluation.truth import FrameTruth, Role
 from modt_desk.experiments.segmented import SegmentedFrame
-from modt_desk.experiments.store import Arrays
 
-_PLAIN_OBJECT = np.dtype([(name, "U32" if name == "type" else OBJECT[name]) for name in OBJECT.names or ()])
-"""Rows of objects that can be stored."""
 FRAME = np.dtype([("drive", int), ("frame", int), ("proposals", int)])
 CALL = np.dtype([("drive", int), ("frame", int), ("track", int), ("points", int)])
 """A row a classification: points that the network processed, padding included."""
@@ -58,10 +55,8 @@ class Judged:
             wanted = (truth.object_class > 0) & (truth.role != Role.IGNORED)
             range_m = np.hypot(*(truth.box[:, :2] - truth.T_box_sensor[:2, 3]).T)
             columns = {"class": truth.object_class, "role": truth.role, "id": truth.id, "track": truth.id}
-            rows.append(
-                table(_PLAIN_OBJECT, len(truth.id), **columns, frame=frame, range_m=range_m, to_follow=wanted)
-            )
-        objects = np.concatenate([np.zeros(0, _PLAIN_OBJECT), *rows])
+            rows.append(table(OBJECT, len(truth.id), **columns, frame=frame, range_m=range_m, to_follow=wanted))
+        objects = np.concatenate([np.zeros(0, OBJECT), *rows])
         frames = np.array([(0, row["frame"][0] if len(row) else NONE, len(row)) for row in rows], FRAME)
         return cls(frames, objects, np.zeros(0, PROPOSAL), np.zeros(0, CALL), np.zeros(0, CENTRE))
 
@@ -81,7 +76,7 @@ class Judged:
             seen, tracked, _ = judge(JudgedFrame.of_result(result, truth, fov), rules, points=known.objects)
             index, pose = result.frame.index, result.frame.T_world_sensor
             frames.append((0, index, len(result.proposals)))
-            objects.append(seen.astype(_PLAIN_OBJECT))
+            objects.append(seen)
             proposals.append(tracked)
             calls.append(_calls(result, limits))
             if pose is not None:
@@ -89,7 +84,7 @@ class Judged:
                 centres.append(_centres(result, truth, seen, pose, start))
         return cls(
             np.array(frames, FRAME),
-            np.concatenate([np.zeros(0, _PLAIN_OBJECT), *objects]),
+            np.concatenate([np.zeros(0, OBJECT), *objects]),
             np.concatenate([np.zeros(0, PROPOSAL), *proposals]),
             np.concatenate([np.zeros(0, CALL), *calls]),
             np.concatenate([np.zeros(0, CENTRE), *centres]),
@@ -97,28 +92,16 @@ class Judged:
 
     @classmethod
     def pooled(cls, drives: Sequence[Judged]) -> Self:
-        """Several drives, numbered."""
-        numbered = [drive._numbered(number) for number, drive in enumerate(drives)]
-        return cls(*(np.concatenate([getattr(d, f.name) for d in numbered]) for f in fields(cls)))
-
-    @classmethod
-    def of_arrays(cls, arrays: Arrays) -> Self:
-        """As stored."""
-        return cls(**{f.name: arrays[f.name] for f in fields(cls)})
-
-    def arrays(self) -> Arrays:
-        """To be stored."""
-        return {f.name: getattr(self, f.name) for f in fields(self)}
+        """Several drives, numbered in their tables."""
+        tables = {f.name: [getattr(drive, f.name) for drive in drives] for f in fields(cls)}
+        pooled = cls(**{name: np.concatenate(parts) for name, parts in tables.items()})
+        for name, parts in tables.items():
+            getattr(pooled, name)["drive"] = np.repeat(np.arange(len(parts)), [len(rows) for rows in parts])
+        return pooled
 
     def within(self, range_m: float) -> Judged:
         """The objects within a range."""
         return replace(self, objects=self.objects[self.objects["range_m"] <= range_m])
-
-    def _numbered(self, number: int) -> Judged:
-        tables = {f.name: getattr(self, f.name).copy() for f in fields(self)}
-        for rows in tables.values():
-            rows["drive"] = number
-        return Judged(**tables)
 
 
 def _calls(result: FrameResult, limits: ClassificationConfig) -> Rows:

@@ -1,28 +1,31 @@
-"""Experiments on drives: which replays they need, and the rows of figures that follow."""
+"""Experiments on drives: the replays that they need, and the figures that follow."""
 
 from __future__ import annotations
 
-import json
+import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from itertools import chain
-from types import MappingProxyType
-
-import numpy as np
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from modt import profile
 from modt.config import EnergyConfig
 from modt_desk.experiments import paper
 from modt_desk.experiments.catalogue.experiment import Experiment, Label
 from modt_desk.experiments.catalogue.figures import Figure
-from modt_desk.experiments.drives import KITTI, SIMULATED, Drive
+from modt_desk.experiments.drives import KITTI, Drive, KittiDrive
 from modt_desk.experiments.judged import Judged
-from modt_desk.experiments.store import Arrays, Store, catalogue_digest, key_of
-from modt_desk.experiments.units import Executor, Unit
+from modt_desk.experiments.replays import Replay
 
 DIGITS = 6
 DEFAULT = "default"
+_CHUNK = 16
+"""Consecutive tasks of one process, which segments a drive once for all of them."""
 Profiles = tuple[str, ...]
+"""Names or files on top of the profile of a drive's sensor."""
+Task = tuple[Drive, Replay]
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +34,10 @@ class Row:
 
     Attributes:
         experiment: its name.
-        streams: drives that it is of.
+        streams: drives that are pooled.
         kind: KITTI or simulated.
         profile: names of the profiles on top of that of the sensor, DEFAULT for none.
-        had_a_say: whether a choice of this project was confirmed on sweeps of one of them.
+        development: whether a choice of this project was confirmed on sweeps of one of them.
         variant, at, quantity: as in Figure.
         value, low, high: the figure and its 95 % interval, None where there is none.
         n: objects or tracks that were resampled.
@@ -45,7 +48,7 @@ class Row:
     streams: str
     kind: str
     profile: str
-    had_a_say: bool
+    development: bool
     variant: str
     at: float | None
     quantity: str
@@ -58,142 +61,110 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Streams:
-    """Drives whose objects are pooled."""
-
-    name: str
-    drives: tuple[Drive, ...]
-
-    @property
-    def had_a_say(self) -> bool:
-        """Whether one of them had."""
-        return any(drive.had_a_say for drive in self.drives)
-
-
 class Study:
     """Some experiments on some drives.
 
-    Args:
+    Attributes:
         experiments: to make.
         drives: to make them on.
-        profiles: each some names or files on top of that of a drive's sensor, compared with one another; labels
-            alone follow from none of them.
-        store: of results.
+        profiles: each on top of that of a drive's sensor, compared with one another; labels alone need the first.
         boards: calibrations, of the networks of such profiles.
     """
 
-    def __init__(
-        self,
-        experiments: Sequence[Experiment],
-        drives: Sequence[Drive],
-        profiles: Sequence[Profiles],
-        store: Store,
-        boards: Mapping[Profiles, EnergyConfig] = MappingProxyType({}),
-    ) -> None:
-        self._experiments, self._profiles, self._store = experiments, profiles, store
-        self._boards = boards
-        self._digests = {drive: drive.digest() for drive in drives}
-        sensors = {drive.sensor for drive in drives}
-        configs = {(sensor, names): profile.load((sensor, *names)) for sensor in sensors for names in profiles}
-        self._units: dict[tuple[str, Profiles, Drive], dict[Label, Unit]] = {
-            (e.name, names, drive): {
-                label: Unit.of(drive, self._digests[drive], replay)
-                for label, replay in e.replays(configs[drive.sensor, names]).items()
-            }
-            for e in experiments
-            for names in self._compared(e)
-            for drive in _suited(e, drives)
-        }
+    experiments: Sequence[Experiment]
+    drives: Sequence[Drive]
+    profiles: Sequence[Profiles]
+    boards: Mapping[Profiles, EnergyConfig]
 
-    @property
-    def units(self) -> list[Unit]:
-        """All that are needed, each once, drive by drive, and what has a basis in common together."""
-        found = {unit.key: unit for units in self._units.values() for unit in units.values()}
-        order = list(self._digests)
-        return sorted(found.values(), key=lambda unit: (order.index(unit.drive), unit.basis))
+    def tasks(self) -> list[Task]:
+        """Every replay once, drive by drive, so that those with the same segmentation follow one another."""
+        needed = (
+            (drive, replay)
+            for drive in self.drives
+            for names in self.profiles
+            for e in self.experiments
+            if names in self._compared(e) and drive in self._suited(e)
+            for replay in _replays(e, drive, names).values()
+        )
+        return list(dict.fromkeys(needed))
 
-    def complete(self, executor: Executor, tick: Callable[[Unit], None]) -> None:
-        """Work off the units whose outcomes are missing; those that are ready stay, should it be interrupted."""
-        missing = [unit for unit in self.units if not self._store.has(unit.key)]
-        for unit, outcome in executor.outcomes(missing, self._store.folder):
-            self._store.put(unit.key, outcome)
-            tick(unit)
+    def rows(self, jobs: int, tick: Callable[[str], None]) -> list[Row]:
+        """Figures of every experiment, streams of development last; tick is called with the drive of each replay."""
+        with TemporaryDirectory() as folder:
+            files = {task: Path(folder, f"{k}.pickle") for k, task in enumerate(self.tasks())}
+            for name in _replayed(files, jobs):
+                tick(name)
+            return [
+                _row(e, streams, drives, names, figure)
+                for e in self.experiments
+                for streams, drives in self._streams(e)
+                for names in self._compared(e)
+                for figure in self._figures(e, drives, names, files)
+            ]
 
-    @property
-    def missing(self) -> int:
-        """Units without an outcome."""
-        return sum(not self._store.has(unit.key) for unit in self.units)
-
-    def rows(self) -> list[Row]:
-        """Of every experiment, streams that had no say in choices first."""
-        return [
-            row
-            for e in self._experiments
-            for streams in self._streams(e)
-            for names in self._compared(e)
-            for row in self._rows(e, streams, names)
-        ]
+    def _figures(
+        self, experiment: Experiment, drives: Sequence[Drive], names: Profiles, files: Mapping[Task, Path]
+    ) -> Iterator[Figure]:
+        found: dict[Label, list[Judged]] = {}
+        for drive in drives:
+            for label, replay in _replays(experiment, drive, names).items():
+                found.setdefault(label, []).append(pickle.loads(files[drive, replay].read_bytes()))
+        outcomes = {label: Judged.pooled(judged) for label, judged in found.items()}
+        for label, judged in outcomes.items():
+            yield from experiment.figures(judged, *label)
+        for label, judged in outcomes.items():
+            yield from experiment.energies(judged, *label, self.boards.get(names, EnergyConfig()))
 
     def _compared(self, experiment: Experiment) -> Sequence[Profiles]:
-        return self._profiles if experiment.scans else self._profiles[:1]
+        return self.profiles if experiment.scans else self.profiles[:1]
 
-    def _streams(self, experiment: Experiment) -> Iterator[Streams]:
-        suited = _suited(experiment, list(self._digests))
-        simulated = tuple(drive for drive in suited if drive.kind == SIMULATED)
+    def _suited(self, experiment: Experiment) -> list[Drive]:
+        """Drives with sweeps where they are needed; for labels alone, KITTI's."""
+        return [drive for drive in self.drives if (drive.scans if experiment.scans else drive.kind == KITTI)]
+
+    def _streams(self, experiment: Experiment) -> Iterator[tuple[str, Sequence[Drive]]]:
+        """Names of drives that are pooled, with these."""
+        suited = self._suited(experiment)
+        simulated = [drive for drive in suited if not isinstance(drive, KittiDrive)]
         if simulated:
-            yield Streams(f"{len(simulated)} simulated drives", simulated)
-        recorded = [drive for drive in suited if drive.kind == KITTI]
-        once = tuple({drive.number: drive for drive in recorded}.values())
+            yield f"{len(simulated)} simulated drives", simulated
+        recorded = [drive for drive in suited if isinstance(drive, KittiDrive)]
+        once = list({drive.number: drive for drive in recorded}.values())
         if len(once) > 1:
-            yield Streams(f"{len(once)} KITTI drives", once)
-        for drive in sorted(recorded, key=lambda drive: drive.had_a_say):
-            yield Streams(drive.name, (drive,))
-
-    def _rows(self, experiment: Experiment, streams: Streams, names: Profiles) -> list[Row]:
-        units = [self._units[experiment.name, names, drive] for drive in streams.drives]
-        keys = [[unit.key for unit in of_drive.values()] for of_drive in units]
-        unit_J = self._board(names).coefficients
-        key = key_of("figures", catalogue_digest(), experiment.name, streams.name, names, keys, unit_J)
-
-        def make() -> Arrays:
-            return {
-                "rows": np.array(json.dumps([asdict(row) for row in self._made(experiment, streams, names, units)]))
-            }
-
-        return [Row(**row) for row in json.loads(str(self._store.made(key, make)["rows"]))]
-
-    def _made(
-        self, experiment: Experiment, streams: Streams, names: Profiles, units: Sequence[Mapping[Label, Unit]]
-    ) -> list[Row]:
-        outcomes = {
-            label: Judged.pooled([self._outcome(of_drive[label]) for of_drive in units]) for label in units[0]
-        }
-        figures = chain(experiment.figures(outcomes), experiment.energies(outcomes, self._board(names)))
-        return [_row(experiment, streams, names, figure) for figure in figures]
-
-    def _board(self, names: Profiles) -> EnergyConfig:
-        return self._boards.get(names, EnergyConfig())
-
-    def _outcome(self, unit: Unit) -> Judged:
-        """As stored; made again if that is broken."""
-        made = self._store.made(unit.key, lambda: unit.replay.judged(unit.drive, unit.digest, self._store).arrays())
-        return Judged.of_arrays(made)
+            yield f"{len(once)} KITTI drives", once
+        for drive in sorted(recorded, key=lambda drive: drive.development):
+            yield drive.name, [drive]
 
 
-def _suited(experiment: Experiment, drives: Sequence[Drive]) -> list[Drive]:
-    """With sweeps where they are needed; of labels alone, KITTI's."""
-    return [drive for drive in drives if (drive.scans if experiment.scans else drive.kind == KITTI)]
+def _replays(experiment: Experiment, drive: Drive, names: Profiles) -> Mapping[Label, Replay]:
+    return experiment.replays(profile.load((drive.sensor, *names)))
 
 
-def _row(experiment: Experiment, streams: Streams, names: Profiles, figure: Figure) -> Row:
-    estimate, kind = figure.estimate, streams.drives[0].kind
-    stated = paper.figure(experiment.name, streams.name, figure.variant, figure.at, figure.quantity)
+def _replayed(files: Mapping[Task, Path], jobs: int) -> Iterator[str]:
+    """The drive of each task, once its outcome is in its file."""
+    if jobs == 1:
+        yield from map(_replay, files, files.values())
+        return
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        yield from pool.map(_replay, files, files.values(), chunksize=_CHUNK)
+
+
+def _replay(task: Task, file: Path) -> str:
+    drive, replay = task
+    file.write_bytes(pickle.dumps(replay.judged(drive)))
+    return drive.name
+
+
+def _row(experiment: Experiment, streams: str, drives: Sequence[Drive], names: Profiles, figure: Figure) -> Row:
+    estimate, kind = figure.estimate, drives[0].kind
+    stated = paper.figure(experiment.name, streams, figure.variant, figure.at, figure.quantity)
+    paper_value, paper_over = stated if stated and kind == KITTI else (None, None)
     return Row(
         experiment=experiment.name,
-        streams=streams.name,
+        streams=streams,
         kind=kind,
         profile=" + ".join(names) or DEFAULT,
-        had_a_say=experiment.scans and streams.had_a_say,
+        development=experiment.scans and any(drive.development for drive in drives),
         variant=figure.variant,
         at=figure.at,
         quantity=figure.quantity,
@@ -201,8 +172,8 @@ def _row(experiment: Experiment, streams: Streams, names: Profiles, figure: Figu
         low=_rounded(estimate.low),
         high=_rounded(estimate.high),
         n=estimate.n,
-        paper=stated[0] if stated and kind == KITTI else None,
-        paper_over=stated[1] if stated and kind == KITTI else None,
+        paper=paper_value,
+        paper_over=paper_over,
     )
 
 

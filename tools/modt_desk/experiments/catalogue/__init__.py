@@ -1,1 +1,1 @@
-"""The experiments, one file each, and the statistics that they share."""
+"""The experiments, and the statistics that they share."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from modt.config import EnergyConfig, ProfileConfig
 from modt.types import Float64
 from modt_desk.experiments.catalogue.estimate import ratio
 from modt_desk.experiments.catalogue.experiment import Chart, Experiment, Label, changed
-from modt_desk.experiments.catalogue.figures import OBJECTS, Figure, TrackLives, latencies, precisions
+from modt_desk.experiments.catalogue.figures import PRECISIONS, Figure, TrackLives, latencies, precisions
 from modt_desk.experiments.judged import Judged
 from modt_desk.experiments.replays import NetworkReplay, Replay
 
@@ -26,23 +26,21 @@ def _replays(config: ProfileConfig) -> dict[Label, Replay]:
     return swept | {(CONVENTIONAL, None): NetworkReplay(config, "conventional")}
 
 
-def _figures(outcomes: Mapping[Label, Judged]) -> Iterator[Figure]:
-    for (variant, at), judged in outcomes.items():
-        yield from precisions(judged, variant, at)
-        yield from latencies(judged, variant, at)
-        tracks, frames = _tracks(judged)
-        yield Figure(variant, at, "calls a frame", ratio(tracks.calls, frames))
-        yield Figure(variant, at, "points classified a frame", ratio(tracks.points, frames))
+def _figures(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
+    yield from precisions(judged, variant, at)
+    yield from latencies(judged, variant, at)
+    tracks, frames = _tracks(judged)
+    yield Figure(variant, at, "calls a frame", ratio(tracks.calls, frames))
+    yield Figure(variant, at, "points classified a frame", ratio(tracks.points, frames))
 
 
-def _energies(outcomes: Mapping[Label, Judged], board: EnergyConfig) -> Iterator[Figure]:
+def _energies(judged: Judged, variant: str, at: float | None, board: EnergyConfig) -> Iterator[Figure]:
     """By what a classification and a point cost: times would not be the same bytes twice."""
     if board.coefficients is None:
         return
     _, class_J, point_J = board.coefficients
-    for (variant, at), judged in outcomes.items():
-        tracks, frames = _tracks(judged)
-        yield Figure(variant, at, ENERGY, ratio(1e3 * (class_J * tracks.calls + point_J * tracks.points), frames))
+    tracks, frames = _tracks(judged)
+    yield Figure(variant, at, ENERGY, ratio(1e3 * (class_J * tracks.calls + point_J * tracks.points), frames))
 
 
 def _tracks(judged: Judged) -> tuple[TrackLives, Float64]:
@@ -58,9 +56,7 @@ BUDGET = Experiment(
     _replays,
     _figures,
     (
-        Chart(
-            "average precision", "most calls a frame", "average precision", tuple(f"AP {name}" for name in OBJECTS)
-        ),
+        Chart("average precision", "most calls a frame", "average precision", PRECISIONS),
         Chart("latency", "most calls a frame", "frames to a correct class", ("frames to a correct class",)),
         Chart("work", "most calls a frame", "points classified a frame", ("points classified a frame",)),
         Chart("energy", "most calls a frame", ENERGY, (ENERGY,)),

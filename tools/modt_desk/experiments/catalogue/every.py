@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from modt.errors import MisuseError
-from modt_desk.experiments.catalogue.accuracy import FIGURE_9, FIGURE_14, TABLE_IV, TABLE_V
+from modt_desk.experiments.catalogue.accuracy import FIGURE_9, FIGURE_10, FIGURE_11, FIGURE_14, TABLE_IV, TABLE_V
 from modt_desk.experiments.catalogue.budget import BUDGET
 from modt_desk.experiments.catalogue.experiment import Experiment
-from modt_desk.experiments.catalogue.ideal_lives import FIGURE_8, TABLE_III
-from modt_desk.experiments.catalogue.ranges import FIGURE_12, FIGURE_13
-from modt_desk.experiments.catalogue.sweeps import FIGURE_10, FIGURE_11
-from modt_desk.experiments.catalogue.tracker import ALARMS, TABLE_VI
+from modt_desk.experiments.catalogue.lives import ALARMS, TABLE_III, TABLE_VI
+from modt_desk.experiments.catalogue.ranges import FIGURE_8, FIGURE_12, FIGURE_13
 from modt_desk.experiments.catalogue.variants import ASSOCIATION, FUSION, ODOMETRY
 from modt_desk.experiments.catalogue.wander import FIGURE_15
 

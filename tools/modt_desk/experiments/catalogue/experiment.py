@@ -33,7 +33,7 @@ class Experiment:
         name: on the command line.
         title: the table or figure of the paper, and what it shows.
         replays: by label, given the profile of a drive.
-        figures: of the outcomes of all replays, of one drive or several pooled.
+        figures: of the outcome of a replay, of one drive or several pooled, and its label.
         charts: to draw.
         scans: whether sweeps are needed, not labels alone.
         note: what must be known to read it.
@@ -43,20 +43,18 @@ class Experiment:
     name: str
     title: str
     replays: Callable[[ProfileConfig], Mapping[Label, Replay]]
-    figures: Callable[[Mapping[Label, Judged]], Iterator[Figure]]
+    figures: Callable[[Judged, str, float | None], Iterator[Figure]]
     charts: tuple[Chart, ...] = ()
     scans: bool = True
     note: str = ""
-    energies: Callable[[Mapping[Label, Judged], EnergyConfig], Iterator[Figure]] = lambda _outcomes, _board: iter(())
+    energies: Callable[[Judged, str, float | None, EnergyConfig], Iterator[Figure]] = lambda *_: iter(())
 
 
 def changed(config: ProfileConfig, **values: Any) -> ProfileConfig:
     """With values by the paths of their keys, dots written as two underscores: fusion__memory."""
-    found: Any = config
     for path, value in values.items():
-        found = _changed(found, path.split("__"), value)
-    assert isinstance(found, ProfileConfig)
-    return found
+        config = _changed(config, path.split("__"), value)
+    return config
 
 
 def _changed(config: Any, path: list[str], value: Any) -> Any:

@@ -16,6 +16,7 @@ from modt_desk.experiments.catalogue.estimate import Estimate, Ranking, ratio
 from modt_desk.experiments.judged import Judged
 
 OBJECTS = CLASS_NAMES[1:]
+PRECISIONS = tuple(f"AP {name}" for name in OBJECTS)
 NOTHING = Estimate(None)
 
 
@@ -37,7 +38,7 @@ class Figure:
 
 
 def rankings(judged: Judged) -> Iterator[tuple[str, Ranking]]:
-    """Of each class of objects."""
+    """The ranking of each class of objects."""
     objects = judged.objects
     for c, name in enumerate(OBJECTS, 1):
         counted = (objects["class"] == c) & (objects["role"] == Role.COUNTED) & objects["to_classify"]
@@ -53,7 +54,7 @@ def precisions(judged: Judged, variant: str, at: float | None = None) -> Iterato
     yield Figure(variant, at, "AP mean", Estimate(float(np.mean(values))) if values else NOTHING)
 
 
-def curves(judged: Judged, variant: str) -> Iterator[Figure]:
+def curves(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
     """Precision over recall by class."""
     for name, ranking in rankings(judged):
         for recall, estimate in ranking.precision_at_recalls():
@@ -107,7 +108,7 @@ class TrackLives:
 
     @classmethod
     def of(cls, judged: Judged) -> TrackLives:
-        """Of all tracks."""
+        """Table of all tracks."""
         rows = judged.proposals
         names, unit = np.unique(rows[["drive", "track"]], return_inverse=True)
         frames = np.bincount(unit, minlength=len(names))

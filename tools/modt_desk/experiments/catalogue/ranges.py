@@ -1,16 +1,21 @@
-"""Figs. 12 and 13: beta against the range of interest, real detector."""
+"""Figs. 8, 12 and 13: beta against the range of interest."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
 
 from modt.config import ProfileConfig
+from modt_desk.experiments.catalogue.estimate import ratio
 from modt_desk.experiments.catalogue.experiment import Chart, Experiment, Label, changed
-from modt_desk.experiments.catalogue.figures import Figure, efficiencies
-from modt_desk.experiments.catalogue.ideal_lives import RANGES_M
+from modt_desk.experiments.catalogue.figures import Figure, ObjectLives, efficiencies
+from modt_desk.experiments.catalogue.lives import labels
 from modt_desk.experiments.judged import Judged
 from modt_desk.experiments.replays import NetworkReplay, Replay
 
+RANGES_M = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0)
 GATED, EVERY = "as configured", "every new track classified"
 _UNGATED = {
     "fusion__min_object_probability": 0.0,
@@ -19,21 +24,19 @@ _UNGATED = {
 }
 
 
-def _replays_of(ideal: bool) -> Callable[[ProfileConfig], dict[Label, Replay]]:
-    def replays(config: ProfileConfig) -> dict[Label, Replay]:
-        variants = {GATED: config, EVERY: changed(config, **_UNGATED)}
-        return {
-            (name, range_m): NetworkReplay(made, ideal=ideal, range_m=range_m)
-            for name, made in variants.items()
-            for range_m in RANGES_M
-        }
-
-    return replays
+def _replays(config: ProfileConfig, ideal: bool) -> dict[Label, Replay]:
+    variants = {GATED: config, EVERY: changed(config, **_UNGATED)}
+    return {
+        (name, range_m): NetworkReplay(made, ideal=ideal, range_m=range_m)
+        for name, made in variants.items()
+        for range_m in RANGES_M
+    }
 
 
-def _figures(outcomes: Mapping[Label, Judged]) -> Iterator[Figure]:
-    for (variant, range_m), judged in outcomes.items():
-        yield from efficiencies(judged, variant, range_m)
+def _of_labels(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
+    for range_m in RANGES_M:
+        wanted = ObjectLives.of(judged.within(range_m)).wanted
+        yield Figure(variant, range_m, "beta", ratio(np.ones(len(wanted)), wanted))
 
 
 _CHARTS = (
@@ -45,19 +48,28 @@ _NOTE = (
     "calls as configured; without them every new track is classified, as in the paper, as far as the budget of a "
     "frame goes."
 )
+FIGURE_8 = Experiment(
+    "fig8",
+    "Fig. 8: beta against the range of interest, ideal detector, ideal tracker",
+    labels,
+    _of_labels,
+    (Chart("beta", "range of interest [m]", "beta", ("beta",)),),
+    scans=False,
+    note="An object is classified once, when it first is within the range; it is the inverse of N_go there.",
+)
 FIGURE_12 = Experiment(
     "fig12",
     "Fig. 12: beta against the range of interest, real detector, ideal tracker",
-    _replays_of(True),
-    _figures,
+    partial(_replays, ideal=True),
+    efficiencies,
     _CHARTS,
     note=_NOTE,
 )
 FIGURE_13 = Experiment(
     "fig13",
     "Fig. 13: beta against the range of interest, real detector, real tracker",
-    _replays_of(False),
-    _figures,
+    partial(_replays, ideal=False),
+    efficiencies,
     _CHARTS,
     note=_NOTE,
 )

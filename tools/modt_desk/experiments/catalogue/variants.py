@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from modt.config import ProfileConfig
 from modt_desk.experiments.catalogue.experiment import Experiment, Label, changed
@@ -35,12 +35,11 @@ def _odometries(config: ProfileConfig) -> dict[Label, Replay]:
     return {(name, None): NetworkReplay(config, poses=poses) for poses, name in names.items()}
 
 
-def _figures(outcomes: Mapping[Label, Judged]) -> Iterator[Figure]:
-    for (variant, _), judged in outcomes.items():
-        yield from precisions(judged, variant)
-        yield from (f for f in lives(judged, variant) if f.quantity not in ("objects", "frames"))
-        yield from efficiencies(judged, variant)
-        yield from (f for f in alarms(judged, variant) if f.quantity.endswith("all"))
+def _figures(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
+    yield from precisions(judged, variant, at)
+    yield from (f for f in lives(judged, variant, at) if f.quantity not in ("objects", "frames"))
+    yield from efficiencies(judged, variant, at)
+    yield from (f for f in alarms(judged, variant, at) if f.quantity.endswith("all"))
 
 
 ASSOCIATION = Experiment("association", "Associations", _associations, _figures)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -33,8 +33,8 @@ def parked(centres: Rows) -> Iterator[Rows]:
             yield rows
 
 
-def _figures(outcomes: Mapping[Label, Judged]) -> Iterator[Figure]:
-    cars = list(parked(outcomes["accurate", None].centres))
+def _figures(judged: Judged, variant: str, at: float | None) -> Iterator[Figure]:
+    cars = list(parked(judged.centres))
     for column, name in CENTRES.items():
         square = [float(np.sum((car[column] - car[column].mean(axis=0)) ** 2)) for car in cars]
         jump = [np.hypot(*np.diff(car[column], axis=0).T) for car in cars]
@@ -44,7 +44,7 @@ def _figures(outcomes: Mapping[Label, Judged]) -> Iterator[Figure]:
             name, None, "step from frame to frame [m]", ratio([s.sum() for s in jump], [len(s) for s in jump])
         )
     longest = sorted(cars, key=len, reverse=True)[:MAX_DRAWN]
-    for car in longest if len(np.unique(outcomes["accurate", None].frames["drive"])) == 1 else ():
+    for car in longest if len(np.unique(judged.frames["drive"])) == 1 else ():
         for column, name in list(CENTRES.items())[::2]:
             distance: Float64 = np.hypot(*(car[column] - car["start"]).T)
             for frame, metres in zip(car["frame"].tolist(), distance.tolist(), strict=True):

@@ -8,7 +8,6 @@ from modt_desk.experiments import paper
 from modt_desk.experiments.catalogue.accuracy import DETECTION, TRACKING
 from modt_desk.experiments.catalogue.every import EXPERIMENTS
 from modt_desk.experiments.drives import KITTI
-from modt_desk.experiments.output.tables import number
 from modt_desk.experiments.study import DEFAULT, Row
 
 _BETTER_HIGH = ("AP ", "N_go of objects")
@@ -32,6 +31,11 @@ def shortfalls(rows: Sequence[Row]) -> Iterator[str]:
     if gains:
         yield from ("", "What tracking adds to average precision, in points, the paper's in brackets:", "", *gains)
     yield from ("", *_not_compared(rows))
+
+
+def number(value: float) -> str:
+    """Three digits."""
+    return f"{value:.0f}" if abs(value) >= 100 or value == int(value) else f"{value:.3g}"
 
 
 def _behind(row: Row, value: float, stated: float) -> bool:
