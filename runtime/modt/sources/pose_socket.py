@@ -7,15 +7,13 @@ import socket
 import stat
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
+from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.sources.datagram_queue import DatagramQueue
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.received_poses import ReceivedPoses
-
-FORM = "write recording, none, udp://HOST:PORT, unix:///PATH or ros2:///TOPIC"
 
 
 class PoseSocket(ReceivedPoses):
@@ -42,29 +40,25 @@ class PoseSocket(ReceivedPoses):
                 self._refuse(error)
 
 
-def open_socket(url: str) -> socket.socket:
+def open_socket(address: Address) -> socket.socket:
     """A socket bound to udp://HOST:PORT or unix:///PATH.
 
     Raises:
-        MisuseError: no such address, or it cannot be bound.
+        MisuseError: the address names no socket, or it cannot be bound.
     """
+    host, port, path = address.host, address.port, address.path
     try:
-        parts = urlsplit(url)
-        scheme, host, port, path = parts.scheme, parts.hostname, parts.port, parts.path
-    except ValueError as error:
-        raise MisuseError(url, str(error), FORM) from None
-    try:
-        if scheme == "udp" and host and port and path in ("", "/"):
-            family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-            return _bound(family, address)
-        if scheme == "unix" and not parts.netloc and len(path) > 1:
+        if address.scheme == "udp" and host and port and path in ("", "/"):
+            family, _, _, _, bound = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            return _bound(family, bound)
+        if address.scheme == "unix" and not host and len(path) > 1:
             if _stale(path):
                 Path(path).unlink()
             return _bound(socket.AF_UNIX, path)
     except OSError as error:
         remedy = "give a free port of this machine, or a free path in a writable folder"
-        raise MisuseError(url, f"cannot be bound ({error.strerror or error})", remedy) from None
-    raise MisuseError(url, "is no address of a socket", FORM)
+        raise MisuseError(address.text, f"cannot be bound ({error.strerror or error})", remedy) from None
+    raise MisuseError(address.text, "names no socket", "write udp://HOST:PORT or unix:///PATH")
 
 
 def _bound(family: int, address: Any) -> socket.socket:

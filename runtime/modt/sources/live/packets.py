@@ -8,10 +8,7 @@ from modt.address import Address
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packet_reader import PacketReader, address_of, bound_socket
-from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
-from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.packets.velodyne_models import model_named
 from modt.sources.stream import StreamInfo
 
 VELODYNE_PORT, OUSTER_PORT = 2368, 7502
@@ -25,6 +22,9 @@ def open_velodyne(address: Address, cores: frozenset[int] | None) -> LiveStream:
     HOST is the sensor, whose packets alone are used; PORT of this machine, or of a multicast group, is where it sends
     them.
     """
+    from modt.sources.packets.velodyne import VelodyneDecoder
+    from modt.sources.packets.velodyne_models import model_named
+
     model = address.option("model")
     calibration = address.option("calibration")
     decoder = VelodyneDecoder(
@@ -39,6 +39,8 @@ def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:
     Raises:
         MisuseError: no metadata.
     """
+    from modt.sources.packets.ouster import OusterDecoder
+
     metadata = address.option("metadata")
     if not metadata:
         remedy = "add ?metadata=FILE, what the sensor says at /api/v1/sensor/metadata"
