@@ -7,7 +7,7 @@ import pytest
 
 from modt import assets, profile
 from modt.config import ProfileConfig
-from modt.config.sensor import REFLECTANCE_SCALES
+from modt.config.profile import REFLECTANCE_SCALES
 from modt.sensor_fit.finding import Finding, Recording
 from modt.sensor_fit.fit import FINDERS, cell_m, fit
 from modt.sensor_fit.profile_text import doubts, profile_text

@@ -22,8 +22,8 @@ from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
 from modt.sinks.output import LedgerLines, Sink, close_together
 from modt.sinks.run_directory import RunDirectory
-from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_source import PosedStream
+from modt.sources.stream import PeekedStream
 from modt.types import FrameResult, Proposals
 
 Tick = Callable[[FrameResult], None]

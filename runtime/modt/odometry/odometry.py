@@ -11,8 +11,7 @@ from modt.geometry import inverse, se3
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks, observe
 from modt.odometry.deskew import SweepSkew, skews_alike
-from modt.odometry.landmarks import LandmarkMap
-from modt.odometry.registration import Registration
+from modt.odometry.registration import LandmarkMap, Registration
 from modt.placement import Placement, PlanarMotion
 from modt.types import Float64, Frame, Proposals
 

@@ -8,12 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from modt.config import ProfileConfig, SegmentationConfig
-from modt.geometry.blind_sectors import BlindSectors
-from modt.sensor_fit.beams import BeamPattern, find_beams
-from modt.sensor_fit.body import REACH_M, find_body
+from modt.geometry.field_of_view import BlindSectors
+from modt.sensor_fit.beams import BeamPattern, find_beams, nearest_profile, tangents
 from modt.sensor_fit.finding import Finder, Finding, Recording, apply
-from modt.sensor_fit.height import ground_height_m
-from modt.sensor_fit.likeness import nearest_profile, tangents
+from modt.sensor_fit.mount import BODY_REACH_M, find_body, ground_height_m
 from modt.sensor_fit.reflectance import NONE, SCALES, reflectance_scale
 from modt.types import Float32
 
@@ -90,7 +88,9 @@ def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator
     """Returns of the robot itself, and the range of the others."""
     points = np.concatenate(recording.sweeps)
     range_m = np.hypot(points[:, 0], points[:, 1])
-    height_m = ground_height_m(recording.sweeps, replace(config.sensor, min_range_m=REACH_M), config.segmentation)
+    height_m = ground_height_m(
+        recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M), config.segmentation
+    )
     body = None if height_m is None else find_body(recording.sweeps, height_m)
     own = np.zeros(len(points), np.bool_)
     if body is not None and len(body.sectors_deg):

@@ -12,7 +12,7 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
-from modt.sources.live.packet_reader import PacketReader, address_of, bound_socket
+from modt.sources.live.packets import PacketReader, address_of, bound_socket
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.velodyne import VelodyneDecoder
@@ -98,7 +98,7 @@ def test_closing_ends_a_read(port):
 
 
 def test_a_small_buffer_is_said(port, monkeypatch, caplog):
-    monkeypatch.setattr("modt.sources.live.packet_reader.BUFFER_BYTES", 2**30)
+    monkeypatch.setattr("modt.sources.live.packets.BUFFER_BYTES", 2**30)
     bound_socket("sensor", port).close()
     (record,) = caplog.records
     assert "granted, 1073741824 asked; sysctl -w net.core.rmem_max=1073741824" in record.message

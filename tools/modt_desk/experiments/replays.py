@@ -10,9 +10,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from modt.app import assembly, kernel_choice
-from modt.classification.padding import padded_size
 from modt.classification.pointnet import PointNet
-from modt.classification.scheduler import LinearCost
+from modt.classification.scheduler import LinearCost, padded_size
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.energy.ledger import NullLedger
 from modt.pipeline import Classifier, Pipeline, Segmenter

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from modt.energy.meters.battery import find_batteries
-from modt.energy.meters.hwmon import find_hwmon
 from modt.energy.meters.meter import Candidate, Kind, Meter, Scope
 from modt.energy.meters.pmic import find_pmic
-from modt.energy.meters.powercap import find_powercap
+from modt.energy.meters.sysfs import find_batteries, find_hwmon, find_powercap
 from modt.errors import MisuseError
 
 FINDERS = (find_powercap, find_hwmon, find_batteries)
