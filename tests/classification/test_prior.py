@@ -14,10 +14,10 @@ from modt.classification.box_classifier import (
     MlpBoxClassifier,
     NoBoxClassifier,
     box_features,
+    from_lists,
     from_metadata,
     to_metadata,
 )
-from modt.classification.mlp import from_lists
 from modt.classification.pointnet import PointNet
 from modt.classification.pool import PoolWeights
 from modt.classification.prior import BoxPrior, BoxScores, FrequencyPrior, make_prior

@@ -5,10 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from modt.energy.meters.discovery import Discovery, discover
+from modt.energy.meters.discovery import (
+    Discovery,
+    discover,
+    find_batteries,
+    find_hwmon,
+    find_pmic,
+    find_powercap,
+    rail_power_W,
+)
 from modt.energy.meters.meter import Kind, Measurand, Meter, MeterLostError, Scope, model_meter
-from modt.energy.meters.pmic import find_pmic, rail_power_W
-from modt.energy.meters.sysfs import find_batteries, find_hwmon, find_powercap
 from modt.errors import MisuseError
 
 from .simulated import write_files, write_zone

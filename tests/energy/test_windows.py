@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from modt.config import WindowConfig
 from modt.energy.ledger import Ledger
+from modt.energy.meters.discovery import find_hwmon, find_powercap
 from modt.energy.meters.meter import Conditions, Facts, Kind, MeterLostError, Scope
-from modt.energy.meters.sysfs import find_hwmon, find_powercap
 from modt.energy.windows import SCHEMA, EnergyAccumulator, Windows
 
 from .simulated import SimulatedMachine, write_files

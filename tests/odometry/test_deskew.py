@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from modt.config import RegistrationConfig
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.observations import observe
-from modt.odometry.deskew import SweepSkew, delays, skews_alike
+from modt.odometry.odometry import SweepSkew, delays, skews_alike
 from modt.odometry.registration import Landmarks, Registration
 from modt.placement import Placement, PlanarMotion
 from modt.types import Frame, Proposals

@@ -8,7 +8,6 @@ import numpy as np
 
 from modt.config.segmentation import CarMergeConfig
 from modt.geometry.kernels import GeometryKernels, NumpyGeometryKernels
-from modt.segmentation.box_fitting import best_headings
 from modt.segmentation.clusters import (
     Cells,
     ClusterBounds,
@@ -22,8 +21,7 @@ from modt.segmentation.clusters import (
 )
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import GroundEstimator
-from modt.segmentation.groups import Groups
-from modt.segmentation.reflectance_statistics import reflectance_sums
+from modt.segmentation.groups import Groups, best_headings, reflectance_sums
 from modt.segmentation.strips import ViewBounds, merge_strips, view_bounds
 from modt.types import Bool, Float32, Float64, Int
 

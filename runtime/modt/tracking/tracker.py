@@ -17,7 +17,6 @@ from modt.tracking.fragments import NoReunion, Reunion
 from modt.tracking.kalman import HEADING, SPEED, components_first, standstill_of, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.merging import CarMerging
-from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.splitting import ExpectedSplitting
 from modt.tracking.states import Event, StateMachine
@@ -30,7 +29,11 @@ CREEPING = 0.1
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
     """The association that a configuration names."""
-    return PaperAssociation(config.paper) if config.association == "paper" else KdopAssociation(config.kdop, kernels)
+    if config.association == "paper":
+        from modt.tracking.paper_association import PaperAssociation
+
+        return PaperAssociation(config.paper)
+    return KdopAssociation(config.kdop, kernels)
 
 
 def regroupings_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> tuple[Regrouping, ...]:
