@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import softmax
+
+os.environ["ORT_DISABLE_TELEMETRY"] = "1"  # read at its import; else it writes into ~/.cache and looks up a host
 import onnxruntime as ort
 from onnxruntime.capi import onnxruntime_pybind11_state as ort_errors
-from scipy.special import softmax
 
 from modt import assets
 from modt.classes import N_CLASSES
@@ -49,6 +51,9 @@ _VARINT, _EIGHT_BYTES, _BYTES, _FOUR_BYTES = 0, 1, 2, 5
 
 def read_model(path: Path) -> tuple[bytes, str]:
     """Bytes of a model and their SHA-256, equal to that in its card (the file beside it that ends in .md), if any.
+
+    An ONNX model may name other files to load its numbers from, and may hold loops and functions that stand for more
+    work than its size tells: such a model is refused before ONNX Runtime sees it.
 
     Raises:
         MisuseError: unreadable, too large, not the model of its card, or not a plain ONNX model.
@@ -125,9 +130,6 @@ def _varint(message: memoryview, at: int) -> tuple[int, int]:
         if byte < 0x80:
             return out, at
     raise ValueError("a number without an end")
-
-
-os.environ["ORT_DISABLE_TELEMETRY"] = "1"  # read at its import; else it writes into ~/.cache and looks up a host
 
 
 _MODEL_ERRORS = (

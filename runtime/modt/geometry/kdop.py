@@ -225,6 +225,11 @@ def shift_between(a: Float64, b: Float64) -> Float64:
 def measured(a: Float64, b: Float64, variance: float, before: Float64) -> tuple[Float64, Float64, Float64]:
     """Displacement between k-DOPs with its covariance.
 
+    An end of a k-DOP that comes into view, or is hidden, moves; the other stays. Along each of the four axes the
+    object moved by the mean of both ends where they agree, else by the displacement of the end that moved less. The
+    disagreement of the two ends is a variance of the position along that axis, which lasts: the next k-DOP is
+    compared with one that was already in doubt.
+
     Args:
         a: (8, K) k-DOPs before [m].
         b: (8, K) and after [m].

@@ -20,9 +20,9 @@ from modt.types import Float64, Frame, Proposals
 class SweepSkew:
     """Where and when the proposals of a frame were seen; P rows.
 
-    A proposal is moved as a whole, by the time at which its middle was seen. The remaining error of a body of radius r
-    at distance d: its own rotation, at most r times what the sensor turns in half a sweep, and the delays of its ends,
-    which differ by r / (2 pi d) of a sweep from that of its middle (3 cm for a car 10 m away at 10 m/s).
+    A proposal is moved as a whole, by the time at which its middle was seen. The remaining error of a body of radius
+    r at distance d: its own rotation, at most r times what the sensor turns in half a sweep, and the delays of its
+    ends, which differ by r / (2 pi d) of a sweep from that of its middle (3 cm for a car 10 m away at 10 m/s).
 
     Attributes:
         position: (P, 2) their centroids [m, sensor frame at that time].

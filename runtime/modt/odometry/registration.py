@@ -36,6 +36,8 @@ class Landmarks:
 class LandmarkMap:
     """Mean k-DOPs of stationary tracks, by track id; kept only while no poses are given.
 
+    A landmark lies where it was seen on average, not where it was seen last: the error of one frame is not handed on.
+
     Args:
         config: when a mean is established and how fast it follows.
     """

@@ -17,7 +17,9 @@ from modt.types import NONE, Bool, Float32, Int
 
 
 class StripMerger:
-    """Merges the strips of one car.
+    """Merges the strips in which few beams show a car: a rear and, a metre behind it, a strip of roof.
+
+    From above there is a gap between them; from the sensor, one begins where the other ends.
 
     A car across the negative y axis, the seam at which pseudo-angles begin anew, is not merged.
 
