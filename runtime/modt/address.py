@@ -1,9 +1,10 @@
-"""Addresses of sources and sinks: SCHEME://HOST:PORT/PATH?KEY=VALUE."""
+"""Addresses of sensors, sinks and senders of poses: SCHEME://HOST:PORT/PATH?KEY=VALUE."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 from modt.errors import MisuseError
@@ -32,24 +33,55 @@ class Address:
         return self.options.get(name, default)
 
 
-def parse_address(text: str, options: Mapping[str, frozenset[str]]) -> Address:
-    """An address whose scheme is a key of `options`, with the options allowed to that scheme.
+@dataclass(frozen=True, slots=True)
+class Scheme:
+    """How the addresses of a scheme are opened.
+
+    Attributes:
+        form: of its addresses, for messages and help.
+        opener: of an Address; it imports the modules that it needs, which may need an extra.
+        options: that its addresses may have.
+        extra: of modt, that it needs.
+    """
+
+    form: str
+    opener: Callable[..., Any]
+    options: frozenset[str] = frozenset()
+    extra: str = ""
+
+
+def parse_address(text: str, schemes: Mapping[str, Scheme]) -> Address:
+    """An address of one of these schemes.
 
     Raises:
         MisuseError: another scheme or option, or no valid port.
     """
-    schemes = ", ".join(f"{scheme}://" for scheme in sorted(options))
+    remedy = f"write one of {', '.join(scheme.form for scheme in schemes.values())}"
     try:
         parts = urlsplit(text)
         port = parts.port
         given = dict(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
     except ValueError as error:
-        raise MisuseError(text, f"no address ({error})", f"write one of {schemes}") from None
-    if parts.scheme not in options:
-        raise MisuseError(text, f"scheme {parts.scheme!r} is unknown", f"write one of {schemes}")
-    allowed = options[parts.scheme]
+        raise MisuseError(text, f"no address ({error})", remedy) from None
+    if parts.scheme not in schemes:
+        raise MisuseError(text, f"scheme {parts.scheme!r} is unknown", remedy)
+    allowed = schemes[parts.scheme].options
     unknown = sorted(set(given) - allowed)
     if unknown:
         known = ", ".join(sorted(allowed)) or "none"
         raise MisuseError(text, f"option {unknown[0]!r} is unknown", f"options of {parts.scheme}:// are: {known}")
     return Address(text, parts.scheme, parts.hostname or "", port, parts.path, given)
+
+
+def open_address(text: str, schemes: Mapping[str, Scheme], *arguments: object) -> Any:
+    """What the scheme's opener makes of an address and further arguments.
+
+    Raises:
+        MisuseError: another scheme or option, a missing extra, or what cannot be opened.
+    """
+    address = parse_address(text, schemes)
+    scheme = schemes[address.scheme]
+    try:
+        return scheme.opener(address, *arguments)
+    except ModuleNotFoundError as error:
+        raise MisuseError(text, f"needs {error.name}", f"pip install 'modt[{scheme.extra}]'") from None

@@ -44,7 +44,7 @@ def cubes(sides_m: Float64, label: Int, rng: np.random.Generator) -> Dataset:
 
 def test_training_separates_classes_by_size() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
-    from modt.classification.mlp import logits
+    from modt.classification.box_classifier import logits
     from tools.train.train_box_classifier import cross_validate, train
 
     rng = np.random.default_rng(0)
@@ -69,7 +69,7 @@ def test_training_separates_classes_by_size() -> None:
 
 def test_training_separates_classes_by_reflectance() -> None:
     pytest.importorskip("torch", reason="extra [train] is not installed")
-    from modt.classification.mlp import logits
+    from modt.classification.box_classifier import logits
     from tools.train.train_reflectance_classifier import Features, cross_validate, has_reflectance, on_scale, train
 
     rng = np.random.default_rng(0)

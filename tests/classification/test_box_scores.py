@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modt.classification import box_scores
+from modt.classification import prior
 from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, proposal_features
-from modt.classification.box_scores import BoxScores
+from modt.classification.prior import BoxScores
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import SensorConfig
 from modt.types import Float64, Proposals
@@ -23,7 +23,7 @@ def test_scores_of_a_frame_are_worked_out_once(monkeypatch: pytest.MonkeyPatch) 
         calls.append(len(proposals))
         return proposal_features(proposals, sensor)
 
-    monkeypatch.setattr(box_scores, "proposal_features", counted)
+    monkeypatch.setattr(prior, "proposal_features", counted)
     boxes = MlpBoxClassifier([(rng.normal(size=(N_FEATURES, 4)), rng.normal(size=4))], 0.4)
     scores = BoxScores(boxes, NoReflectanceClassifier(), SENSOR)
     _, first = blobs([10, 30], rng)

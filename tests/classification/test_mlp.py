@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from modt.classification.mlp import from_lists, logits, to_lists
+from modt.classification.box_classifier import from_lists, logits, to_lists
 from modt.types import Float64
 
 RNG = np.random.default_rng(5)

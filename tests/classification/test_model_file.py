@@ -10,9 +10,8 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from modt import assets
-from modt.classification import model_file
-from modt.classification.model_file import read_model
-from modt.classification.pointnet import PointNet
+from modt.classification import pointnet
+from modt.classification.pointnet import PointNet, read_model
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from tests.fuzz.execution import limits
@@ -136,7 +135,7 @@ def test_an_output_of_another_shape_than_promised_is_refused(tmp_path):
 
 
 def test_a_large_file_is_not_read_to_its_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(model_file, "MAX_BYTES", 100)
+    monkeypatch.setattr(pointnet, "MAX_BYTES", 100)
     with pytest.raises(MisuseError, match="larger than"):
         read_model(saved(tmp_path, network()))
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modt.classification.padding import padded_each, padded_size
+from modt.classification.scheduler import padded_each, padded_size
 from modt.config import ClassificationConfig
 
 

@@ -14,8 +14,8 @@ import pytest
 
 from modt import assets
 from modt.classification.box_classifier import NoBoxClassifier
-from modt.classification.padding import padded_size
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet, ort_errors
+from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Proposals

@@ -14,14 +14,13 @@ from modt.classification.box_classifier import (
     MlpBoxClassifier,
     NoBoxClassifier,
     box_features,
+    from_lists,
     from_metadata,
     to_metadata,
 )
-from modt.classification.box_scores import BoxScores
-from modt.classification.mlp import from_lists
 from modt.classification.pointnet import PointNet
 from modt.classification.pool import PoolWeights
-from modt.classification.prior import BoxPrior, FrequencyPrior, make_prior
+from modt.classification.prior import BoxPrior, BoxScores, FrequencyPrior, make_prior
 from modt.classification.reflectance_classifier import NoReflectanceClassifier
 from modt.config import ClassificationConfig, SensorConfig
 from modt.types import Proposals

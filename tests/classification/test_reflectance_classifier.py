@@ -12,12 +12,10 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.classification import box_classifier
-from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, proposal_features
-from modt.classification.box_scores import BoxScores
-from modt.classification.mlp import from_lists, logits
+from modt.classification.box_classifier import N_FEATURES, MlpBoxClassifier, from_lists, logits, proposal_features
 from modt.classification.pointnet import CLASS_FREQUENCY_KEY, PointNet
 from modt.classification.pool import PoolWeights
-from modt.classification.prior import BoxPrior, make_prior
+from modt.classification.prior import BoxPrior, BoxScores, make_prior
 from modt.classification.reflectance_classifier import (
     METADATA_KEY,
     MlpReflectanceClassifier,

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.scheduler import LinearCost, Scheduler
-from modt.classification.warm_up import warm_up
+from modt.classification.scheduler import LinearCost, Scheduler, warm_up
 from modt.config import SchedulerConfig
 from modt.types import NONE, UNLIMITED, Budget, Float32, Float64, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks

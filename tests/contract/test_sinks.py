@@ -6,11 +6,10 @@ import threading
 import pytest
 
 from modt.errors import ModtError
-from modt.sinks.addresses import open_sink
+from modt.schemes import SINKS, open_sink
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
 from modt.sinks.output import LedgerSink, LineFile
-from modt.sinks.schemes import SCHEMES
 from modt.sinks.tracks import frame_line
 from tests.results import CAR, result
 
@@ -117,4 +116,4 @@ def test_nobody_who_reads_and_the_lines_of_the_ledger_hold_nothing_up(kind, tmp_
 
 def test_every_scheme_has_its_contract_tested():
     elsewhere = {"stdout", "ros2"}  # test_frame_lines.py, and beside its sink
-    assert ADDRESSES.keys() | elsewhere == SCHEMES.keys()
+    assert ADDRESSES.keys() | elsewhere == SINKS.keys()

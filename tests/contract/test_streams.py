@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from modt.config import OdometryConfig
-from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
+from modt.sources.stream import PeekedStream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets

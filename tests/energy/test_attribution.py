@@ -18,8 +18,8 @@ from modt.energy.attribution import (
     fit,
     unit_energy_J,
 )
-from modt.energy.conditions import Conditions
-from modt.energy.meters.powercap import find_powercap
+from modt.energy.meters.discovery import find_powercap
+from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Windows
 
 from .simulated import SimulatedMachine

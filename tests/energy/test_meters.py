@@ -5,13 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from modt.energy.meters.battery import find_batteries
-from modt.energy.meters.discovery import Discovery, discover
-from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Kind, Measurand, Meter, MeterLostError, Scope
-from modt.energy.meters.model import model_meter
-from modt.energy.meters.pmic import find_pmic, rail_power_W
-from modt.energy.meters.powercap import find_powercap
+from modt.energy.meters.discovery import (
+    Discovery,
+    discover,
+    find_batteries,
+    find_hwmon,
+    find_pmic,
+    find_powercap,
+    rail_power_W,
+)
+from modt.energy.meters.meter import Kind, Measurand, Meter, MeterLostError, Scope, model_meter
 from modt.errors import MisuseError
 
 from .simulated import write_files, write_zone

@@ -6,11 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import WindowConfig
-from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
-from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Facts, Kind, MeterLostError, Scope
-from modt.energy.meters.powercap import find_powercap
+from modt.energy.meters.discovery import find_hwmon, find_powercap
+from modt.energy.meters.meter import Conditions, Facts, Kind, MeterLostError, Scope
 from modt.energy.windows import SCHEMA, EnergyAccumulator, Windows
 
 from .simulated import SimulatedMachine, write_files

@@ -9,8 +9,7 @@ from modt.config import FragmentConfig
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, transform
 from modt.profile import load
-from modt.tracking.assignment import assign
-from modt.tracking.association import Matches
+from modt.tracking.association import Matches, assign
 from modt.tracking.states import ACCURATE
 from modt.tracking.tracker import Tracker
 from modt.types import NONE

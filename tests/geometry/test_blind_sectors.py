@@ -9,7 +9,7 @@ from modt import profile
 from modt.app import assembly
 from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
-from modt.geometry.blind_sectors import BlindSectors
+from modt.geometry.field_of_view import BlindSectors
 from tests.sensor_fit.recordings import recording, with_mast
 
 

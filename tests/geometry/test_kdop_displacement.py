@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.geometry.kdop import AXES, DIRECTIONS
-from modt.geometry.kdop_displacement import AGREE_M, measured, shape_similarity, shift_between
+from modt.geometry.kdop import AGREE_M, AXES, DIRECTIONS, measured, shape_similarity, shift_between
 
 DISAGREEMENT, DECAY, SOFT_M = 0.3, 0.97, 0.3
 

@@ -4,8 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.geometry.kdop import AXES
-from modt.geometry.kdop_pairs import PairWeights, Shapes, certain_pairs, pair_costs
+from modt.geometry.kdop import AXES, PairWeights, Shapes, certain_pairs, pair_costs
 from tests.geometry.test_kdop_displacement import random_kdops, slow_similarity, square
 
 WEIGHTS = PairWeights(size=1.5, overlap=0.8, height=2.0, points=0.5)

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from modt.config import RegistrationConfig
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.observations import observe
-from modt.odometry.deskew import SweepSkew, delays, skews_alike
-from modt.odometry.landmarks import Landmarks
-from modt.odometry.registration import Registration
+from modt.odometry.odometry import SweepSkew, delays, skews_alike
+from modt.odometry.registration import Landmarks, Registration
 from modt.placement import Placement, PlanarMotion
 from modt.types import Frame, Proposals
 from tests.odometry.odometry_scenes import constant_turn, constant_turn_pose, street

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from modt.config import LandmarkConfig, RegistrationConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
 from modt.observations import observe
-from modt.odometry.landmarks import LandmarkMap, Landmarks
-from modt.odometry.registration import Fit, Registration
+from modt.odometry.registration import Fit, LandmarkMap, Landmarks, Registration
 from tests.odometry.odometry_scenes import constant_turn_pose, static_tracks, street
 from tests.tracking.tracking_scenes import Follower, box, frame_of
 

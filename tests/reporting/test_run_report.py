@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.classification.padding import padded_size
+from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
 from modt.reporting.energy_plots import stage_energy_mJ

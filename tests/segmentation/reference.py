@@ -5,8 +5,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from modt.segmentation.box_fitting import HEADINGS
 from modt.segmentation.grids import SECTORS
+from modt.segmentation.groups import HEADINGS
 
 
 def within_distance(plane, radius):

@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig
 from modt.geometry import upright_boxes
-from modt.segmentation.box_fitting import HEADINGS, best_headings
-from modt.segmentation.groups import Groups
+from modt.segmentation.groups import HEADINGS, Groups, best_headings
 from tests.segmentation import reference
 
 NOISE_M = SegmentationConfig().boxes.noise_m

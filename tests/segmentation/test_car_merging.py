@@ -5,13 +5,12 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.car_merging import StripMerger
+from modt.segmentation.clustering import StripMerger
 from modt.segmentation.clusters import ClusterSizes
+from modt.segmentation.grids import PointColumns
 from modt.segmentation.groups import Groups
-from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
-from modt.segmentation.strips import pairs
-from modt.segmentation.view_bounds import ViewBounds
+from modt.segmentation.strips import ViewBounds, pairs
 from tests.segmentation import reference, scans
 
 BEAM = np.tan(np.deg2rad(SensorConfig().elevation_step_deg))

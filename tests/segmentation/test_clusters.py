@@ -4,10 +4,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.cells import connect, occupied_cells
 from modt.segmentation.clustering import Clusterer
-from modt.segmentation.grids import SqrtRangeGrid
-from modt.segmentation.point_columns import PointColumns
+from modt.segmentation.clusters import connect, occupied_cells
+from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.types import NONE
 from tests.segmentation import reference
 

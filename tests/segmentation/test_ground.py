@@ -4,10 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.segmentation.grids import SECTORS, PolarGrid, pseudo_angle
-from modt.segmentation.ground import GroundEstimator
-from modt.segmentation.point_columns import PointColumns
-from modt.segmentation.sensor_height import HeightEstimator
+from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid, pseudo_angle
+from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from tests.segmentation import reference, scans
 
 HEIGHT_M = 1.73

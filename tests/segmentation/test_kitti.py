@@ -5,8 +5,8 @@ import pytest
 
 from modt import profile
 from modt.geometry import Camera, FieldOfView, inverse, se3, transform
+from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator
-from modt.segmentation.point_columns import PointColumns
 from modt.segmentation.segmenter import Segmenter
 
 pytestmark = pytest.mark.kitti

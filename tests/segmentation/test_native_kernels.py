@@ -18,11 +18,10 @@ from modt.geometry import FieldOfView
 from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.segmentation.clusters import Clusters
-from modt.segmentation.grids import SqrtRangeGrid
+from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY
 from modt.segmentation.native_kernels import NativeKernels
-from modt.segmentation.point_columns import FAR_M, PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.types import NONE, UNRECORDED
 from modt_desk.simulation.synthetic_stream import SyntheticStream

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.reflectance_statistics import (
+from modt.segmentation.groups import (
     BRIGHT,
     DARK,
     has_reflectance,

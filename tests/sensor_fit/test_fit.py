@@ -7,11 +7,9 @@ import pytest
 
 from modt import assets, profile
 from modt.config import ProfileConfig
-from modt.config.sensor import REFLECTANCE_SCALES
-from modt.sensor_fit.finding import Finding, Recording
-from modt.sensor_fit.fit import FINDERS, cell_m, fit
+from modt.config.profile import REFLECTANCE_SCALES
+from modt.sensor_fit.fit import FINDERS, SCALES, Finding, Recording, cell_m, fit
 from modt.sensor_fit.profile_text import doubts, profile_text
-from modt.sensor_fit.reflectance import SCALES
 from modt.sources.recognise import open_stream
 from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording, with_mast, with_scale

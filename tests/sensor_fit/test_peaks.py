@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import find_peaks
 
-from modt.sensor_fit.peaks import prominent_peaks
+from modt.sensor_fit.beams import prominent_peaks
 
 
 @pytest.mark.parametrize("seed", range(8))

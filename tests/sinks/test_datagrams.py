@@ -6,7 +6,7 @@ import socket
 import numpy as np
 import pytest
 
-from modt.sinks.addresses import open_sink
+from modt.schemes import open_sink
 from modt.sinks.datagrams import MAX_BYTES
 from modt.sinks.tracks import frame_line, frame_parts, frame_record
 from tests.results import CAR, result

@@ -13,8 +13,8 @@ import pytest
 pytest.importorskip("foxglove")
 
 from modt.errors import MisuseError
+from modt.schemes import open_sink
 from modt.sinks import foxglove_server
-from modt.sinks.addresses import open_sink
 from modt.sinks.foxglove_server import FoxgloveServer
 from tests.sinks.foxglove_messages import decoded
 from tests.sinks.test_mcap_file import LEDGER, WINDOW, moving

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from modt.sinks.addresses import open_sink
+from modt.schemes import open_sink
 from modt.sinks.background import Background
 from modt.sinks.frame_lines import Descriptor, FrameLines
 from modt.sinks.records import read_records
@@ -55,7 +55,7 @@ def test_what_a_killed_run_left_of_a_line_is_cut_off(tmp_path, whole):
 
 def test_lines_go_to_standard_output():
     script = """
-from modt.sinks.addresses import open_sink
+from modt.schemes import open_sink
 from tests.results import result
 sink = open_sink("-")
 for k in range(3):

@@ -15,7 +15,7 @@ from mcap.reader import NonSeekingReader, make_reader
 from modt.classes import CLASSES, ObjectClass
 from modt.errors import ModtError
 from modt.geometry import rotation_zyx, se3
-from modt.sinks.addresses import open_sink
+from modt.schemes import open_sink
 from modt.sinks.mcap_file import McapFile
 from tests.results import CAR, PEDESTRIAN, result
 from tests.sinks.foxglove_messages import decoded

@@ -9,8 +9,8 @@ from modt.address import parse_address
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.ros2.static_transforms import StaticTransforms
+from modt.schemes import SINKS
 from modt.sinks import ros2_detections, ros2_markers, ros2_transform
-from modt.sinks.schemes import SCHEMES
 from tests.results import CAR, PEDESTRIAN, result
 from tests.ros2 import messages
 from tests.ros2.network import FAR, NEAR, until
@@ -20,7 +20,6 @@ FRAMES = [
     result(3, [5, 4, 7], {0: 1, 1: 12, 2: 1234567}, {1: CAR, 12: PEDESTRIAN}, lost=(99,)),
 ]
 PLACED = se3(rotation_zyx(0.1, -0.2, 2.0), np.array([10.0, -20.0, 0.5]))
-OPTIONS = {"ros2": SCHEMES["ros2"].options}
 
 
 TOPICS = (
@@ -105,9 +104,9 @@ def test_the_pose_of_the_sensor_is_a_transform_from_the_world():
 
 def test_a_frame_is_published_to_whom_has_subscribed(loopback):
     from modt.ros2 import dds
-    from modt.sinks.ros2 import open_sink
+    from modt.sinks.ros2 import open_ros2
 
-    sink = open_sink(parse_address(f"ros2:///robot?domain={NEAR}&frame_id=velodyne&world_frame_id=map", OPTIONS))
+    sink = open_ros2(parse_address(f"ros2:///robot?domain={NEAR}&frame_id=velodyne&world_frame_id=map", SINKS))
     joined = dds.participant(FAR)
     seen = {kind: dds.Subscription(joined, topic, kind, depth=1, reliable=True) for topic, kind in TOPICS}
     until(lambda: all(publication.receivers for publication, _ in sink._topics))
@@ -123,16 +122,16 @@ def test_a_frame_is_published_to_whom_has_subscribed(loopback):
 
 
 def test_without_the_name_of_a_world_tf_is_left_alone(loopback):
-    from modt.sinks.ros2 import open_sink
+    from modt.sinks.ros2 import open_ros2
 
-    sink = open_sink(parse_address(f"ros2:///robot?domain={NEAR}&world_frame_id=", OPTIONS))
+    sink = open_ros2(parse_address(f"ros2:///robot?domain={NEAR}&world_frame_id=", SINKS))
     assert len(sink._topics) == len(TOPICS) - 1
     sink.close()
 
 
 def test_a_domain_that_is_none_is_refused():
     pytest.importorskip("cyclonedds")
-    from modt.sinks.ros2 import open_sink
+    from modt.sinks.ros2 import open_ros2
 
     with pytest.raises(MisuseError, match="domain 'x' is none"):
-        open_sink(parse_address("ros2:///robot?domain=x", OPTIONS))
+        open_ros2(parse_address("ros2:///robot?domain=x", SINKS))

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.errors import ScanError
-from modt.sources.lzf import decompress
+from modt.sources.pcd_file import decompress
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from modt.types import UNRECORDED

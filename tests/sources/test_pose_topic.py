@@ -14,7 +14,8 @@ from tests.ros2.network import FAR, NEAR, until
 pytest.importorskip("cyclonedds")
 from modt.ros2 import dds, odometry
 from modt.ros2.odometry import write_odometry
-from modt.sources.pose_topic import PoseTopic, open_topic
+from modt.schemes import open_poses
+from modt.sources.pose_topic import PoseTopic
 
 
 class Scripted:
@@ -68,7 +69,7 @@ def test_poses_that_go_on_after_a_leap_are_a_restart():
 
 def test_poses_over_loopback(loopback):
     address = f"ros2:///odom?domain={NEAR}&base_to_sensor=0,0,1.5,0,0,0"
-    topic = open_topic(address, OdometryConfig())
+    topic = open_poses(address, OdometryConfig())
     sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
     until(lambda: sent.receivers and topic._subscription.senders)
     sent.write(pose(10.0, 3.0))
@@ -81,4 +82,4 @@ def test_poses_over_loopback(loopback):
 @pytest.mark.parametrize("mount", ["1,2,3", "1,2,3,4,5,x", "nan,0,0,0,0,0", ""])
 def test_a_mount_that_is_no_pose_is_refused(mount):
     with pytest.raises(MisuseError, match=r"x,y,z,roll,pitch,yaw"):
-        open_topic(f"ros2:///odom?base_to_sensor={mount}", OdometryConfig())
+        open_poses(f"ros2:///odom?base_to_sensor={mount}", OdometryConfig())

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from modt.tracking.kalman import SPEED
-from modt.tracking.standstill import standstill_of
+from modt.tracking.kalman import SPEED, standstill_of
 from tests.tracking.tracking_scenes import box, tracks_at
 
 

@@ -10,7 +10,7 @@ import pytest
 from modt.address import parse_address
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
-from modt.sinks.schemes import SCHEMES
+from modt.schemes import SINKS
 from modt.viewer.live_frame import live_cells
 from modt.viewer.live_page import open_view
 from modt.viewer.live_server import MOST_CLIENTS, MOST_CONNECTIONS
@@ -27,7 +27,7 @@ def ledger(frame):
 
 
 def opened(text="view://:0"):
-    return open_view(parse_address(text, {"view": SCHEMES["view"].options}))
+    return open_view(parse_address(text, SINKS))
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ def main() -> None:
     core = host.last_core()
     cores = host.other_cores(core)
     host.pin_to_core(core)
-    from modt.sinks.addresses import open_sink
+    from modt.schemes import open_sink
     from modt.sinks.output import LedgerSink
     from tools.bench.sinks import frame_result
 

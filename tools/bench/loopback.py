@@ -19,8 +19,8 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
+from modt.schemes import open_sensor
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.schemes import open_live
 from tools.options import parser
 
 
@@ -50,7 +50,7 @@ def main() -> None:
     arguments = options.parse_args()
     port = urlsplit(arguments.address).port or 0
     core, *others = sorted(os.sched_getaffinity(0))
-    live = open_live(arguments.address, frozenset({core}))
+    live = open_sensor(arguments.address, frozenset({core}))
     live.start()
     command = [sys.executable, "-m", "tools.send.packets", f"127.0.0.1:{port}", *arguments.sent]
     command += ["--seconds", str(arguments.seconds)]

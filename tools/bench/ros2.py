@@ -47,9 +47,9 @@ def _reading(arguments: argparse.Namespace) -> None:
 
 
 def _receiving(arguments: argparse.Namespace) -> None:
-    from modt.sources.live.schemes import open_live
+    from modt.schemes import open_sensor
 
-    live = open_live(f"ros2:///points?domain={DOMAIN}")
+    live = open_sensor(f"ros2:///points?domain={DOMAIN}")
     live.start()
     command = [sys.executable, "-m", "tools.send.ros2", str(arguments.path), f"--domain={DOMAIN}"]
     with subprocess.Popen([*command, f"--frames={arguments.frames}", f"--rate={arguments.rate}"]) as sender:

@@ -26,7 +26,7 @@ def main() -> None:
     options.add_argument("--period", type=float, default=0.1, metavar="S")
     arguments = options.parse_args()
     host.pin_to_core(host.last_core())
-    from modt.sinks.addresses import open_sink
+    from modt.schemes import open_sink
 
     results = [frame_result(k, arguments.tracks, arguments.points) for k in range(arguments.frames)]
     with receivers() as known:

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from modt import assets
-from modt.config.keys import Key, keys
+from modt.config.profile import Key, keys
 from modt.profile.schema import FILE, schema_text
 from modt.profile.yaml_text import nested, value_text
 from tools.docs.sections import replace_section

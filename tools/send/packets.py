@@ -22,8 +22,8 @@ from pathlib import Path
 
 from modt.cli.options import frames, real
 from modt.errors import ModtError
-from modt.sources.packets.open_capture import SUFFIXES, open_capture
-from modt.sources.recognise import open_stream
+from modt.sources.packets.open_capture import open_capture
+from modt.sources.recognise import CAPTURES, open_stream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 from tools.send.faults import PacketFaults, Timed
@@ -99,7 +99,7 @@ def main() -> None:
 def run(arguments: argparse.Namespace) -> None:
     host, _, port = arguments.address.rpartition(":")
     packets: Iterable[Timed]
-    if arguments.path is not None and arguments.path.suffix in SUFFIXES:
+    if arguments.path is not None and arguments.path.suffix in CAPTURES:
         packets = captured(arguments.path, arguments.metadata, once=arguments.once)
     else:
         packets = made(arguments.path, arguments.model, arguments.calibration, arguments.frames)

@@ -25,7 +25,6 @@ from tools.train.labelled_scans import Scan, object_scans
 from tools.train.synthetic_scans import simulated_scans
 
 RINGS = (5, 10, 15, 20, 30, 50)
-HEIGHTS = (-2.5, -1.3, -0.5, 0.5, 3.0)
 
 
 def figures(scans: Iterable[Scan]) -> dict[str, str]:

@@ -8,8 +8,7 @@ from modt.classification.box_classifier import box_features
 from modt.classification.crops import Crops
 from modt.config.segmentation import BoxConfig
 from modt.geometry import upright_boxes
-from modt.segmentation.box_fitting import HEADINGS, best_headings
-from modt.segmentation.groups import Groups
+from modt.segmentation.groups import HEADINGS, Groups, best_headings
 from modt.types import Float64, Int
 from tools.train.dataset import Dataset, Sensors
 

@@ -14,7 +14,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from modt.config.sensor import REFLECTANCE_SCALES
+from modt.config.profile import REFLECTANCE_SCALES
 from tools.options import parser
 from tools.train.build_crops import add_sources
 

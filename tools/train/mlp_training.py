@@ -1,4 +1,4 @@
-"""Training of the small networks stored in the metadata of a model, modt.classification.mlp."""
+"""Training of the small networks stored in the metadata of a model, modt.classification.box_classifier."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import torch
 from torch import nn
 
 from modt.classes import N_CLASSES
-from modt.classification.mlp import Layers
+from modt.classification.box_classifier import Layers
 from modt.types import Float64, Int
 
 HIDDEN = (32, 32)

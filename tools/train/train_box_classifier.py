@@ -18,7 +18,7 @@ import torch
 from numpy.random import Generator
 
 from modt.classes import CLASS_NAMES, N_CLASSES
-from modt.classification.mlp import Layers, logits
+from modt.classification.box_classifier import Layers, logits
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train.augment import augment, subsample

@@ -18,7 +18,7 @@ import torch
 from scipy.special import softmax
 
 from modt.classes import ObjectClass
-from modt.classification import mlp
+from modt.classification import box_classifier
 from modt.classification.crops import Crops, canonical
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
@@ -60,7 +60,7 @@ def worth(data: Dataset, box: Float64, rows: Int, seed: int) -> Float64:
         seed: of its training.
     """
     layers = train_box_classifier.train(data, rows, BOX_STEPS, seed)
-    posterior = softmax(mlp.logits(layers, box), axis=1)
+    posterior = softmax(box_classifier.logits(layers, box), axis=1)
     like_an_object = np.maximum(1.0 - posterior[:, ObjectClass.BACKGROUND], MIN_WORTH)
     return np.where(data.label == ObjectClass.BACKGROUND, like_an_object, 1.0)
 

@@ -19,8 +19,8 @@ import numpy as np
 import torch
 from scipy.special import softmax
 
-from modt.classification.mlp import Layers, logits
-from modt.config.sensor import REFLECTANCE_SCALES
+from modt.classification.box_classifier import Layers, logits
+from modt.config.profile import REFLECTANCE_SCALES
 from modt.types import Bool, Float64, Int
 from tools.options import make_torch_deterministic, training_parser
 from tools.train import train_box_classifier

@@ -13,15 +13,13 @@ from modt import host
 from modt.app import kernel_choice
 from modt.classification.decision import Decision
 from modt.classification.fusion import EveryFrame, KeyViews, OneView
-from modt.classification.padding import padded_size
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
-from modt.classification.scheduler import LinearCost, Scheduler
-from modt.classification.warm_up import warm_up
+from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
 from modt.config import FusionConfig, ProfileConfig
 from modt.energy.ledger import StageLedger
 from modt.geometry import FieldOfView
-from modt.geometry.blind_sectors import BlindSectors
+from modt.geometry.field_of_view import BlindSectors
 from modt.geometry.kernels import GeometryKernels
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Classifier, Fusion, Pipeline

@@ -14,9 +14,8 @@ from modt import profile
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.sources.pose_socket import PoseSocket, open_socket
+from modt.schemes import POSES, open_poses
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
-from modt.sources.recognise import open_stream
 from modt.sources.stream import Stream, StreamInfo
 
 STREET = "modt_desk.simulation.synthetic_stream"
@@ -64,6 +63,8 @@ def stream(request: Request) -> Stream:
     if request.path is None:
         whole: Stream = import_module(STREET).embedded_street()
     else:
+        from modt.sources.recognise import open_stream
+
         period_s = profile.load(request.profile).sensor.period_s
         whole = open_stream(request.path, period_s, dict(request.capture))
     cut = whole.between(*request.frames)
@@ -92,11 +93,10 @@ def odometry(request: Request, stream: Described, config: OdometryConfig) -> Pos
         return RecordedPoses()
     if request.odometry == NONE:
         return NoPoses()
-    if request.odometry.startswith("ros2:"):
-        from modt.sources.pose_topic import open_topic
-
-        return open_topic(request.odometry, config)
-    return PoseSocket(open_socket(request.odometry), config, request.odometry)
+    if "://" not in request.odometry:
+        remedy = f"write one of {RECORDED}, {NONE}, {', '.join(scheme.form for scheme in POSES.values())}"
+        raise MisuseError(request.odometry, "is no source of poses", remedy)
+    return open_poses(request.odometry, config)
 
 
 def field_of_view(request: Request, stream: Described) -> FieldOfView:

@@ -24,9 +24,8 @@ from modt.app.status import SCHEMA, Counts, loop_report, one_line
 from modt.app.supervisor import Supervisor
 from modt.energy.meters.meter import Kind
 from modt.reporting.summary import Summary
-from modt.sinks.addresses import close_together
 from modt.sinks.job_thread import JobThread
-from modt.sinks.output import LedgerSink
+from modt.sinks.output import LedgerSink, close_together
 from modt.sinks.recording import Recording
 from modt.sinks.run_directory import SUMMARY
 from modt.sinks.service_directory import STATUS, ServiceDirectory

@@ -7,8 +7,8 @@ from urllib.parse import parse_qsl
 
 from modt.app import inputs
 from modt.errors import MisuseError
+from modt.schemes import open_sensor
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.played_reader import PlayedReader
 
 
 def open_source(text: str, cores: frozenset[int] | None) -> LiveStream:
@@ -20,10 +20,9 @@ def open_source(text: str, cores: frozenset[int] | None) -> LiveStream:
         MisuseError: no such sensor or recording.
     """
     if "://" in text:
-        from modt.sources.live.schemes import open_live
+        return open_sensor(text, cores)
+    from modt.sources.live.played_reader import PlayedReader
 
-        live: LiveStream = open_live(text, cores)
-        return live
     path, loop = _recording(text)
     stream = inputs.stream(inputs.Request(path=path))
     return LiveStream(stream.info, PlayedReader(stream, loop=loop), cores=cores)

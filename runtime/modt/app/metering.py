@@ -6,10 +6,8 @@ import time
 from collections.abc import Sequence
 
 from modt.config import EnergyConfig, WindowConfig
-from modt.energy.conditions import Conditions
 from modt.energy.meters.discovery import Discovery, discover
-from modt.energy.meters.meter import Meter
-from modt.energy.meters.model import model_meter
+from modt.energy.meters.meter import Conditions, Meter, model_meter
 from modt.energy.windows import Clocks, Windows
 
 

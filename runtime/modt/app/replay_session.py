@@ -17,13 +17,13 @@ from modt.app.parts import Parts, pipeline_of
 from modt.app.supervisor import Supervisor
 from modt.energy.ledger import Ledger
 from modt.reporting.summary import Summary
-from modt.sinks.addresses import close_together, open_sink
+from modt.schemes import open_sink
 from modt.sinks.kitti import KittiResults
 from modt.sinks.labels import PointLabels
-from modt.sinks.output import LedgerLines, Sink
+from modt.sinks.output import LedgerLines, Sink, close_together
 from modt.sinks.run_directory import RunDirectory
-from modt.sources.peeked_stream import PeekedStream
 from modt.sources.pose_source import PosedStream
+from modt.sources.stream import PeekedStream
 from modt.types import FrameResult, Proposals
 
 Tick = Callable[[FrameResult], None]

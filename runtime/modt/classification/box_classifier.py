@@ -6,17 +6,55 @@ Most background differs from every object in size: walls, canopies, poles.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.classes import N_CLASSES
 from modt.classification.crops import ground_z_m
-from modt.classification.mlp import Layers, from_lists, logits, to_lists
 from modt.classification.pool import PoolWeights
 from modt.config import SensorConfig
 from modt.types import Float64, Int, Proposals
+
+Weights = NDArray[np.floating[Any]]
+Layers = Sequence[tuple[Weights, Weights]]
+"""(in, out) weight and (out,) bias of each layer."""
+
+
+def logits(layers: Layers, features: Float64) -> Float64:
+    """(R, 4) of (R, F) features, worked out in the precision of the layers."""
+    *hidden, (weight, bias) = layers
+    value: Weights = features.astype(weight.dtype)
+    for hidden_weight, hidden_bias in hidden:
+        value = np.tanh(value @ hidden_weight + hidden_bias)
+    output: Float64 = (value @ weight + bias).astype(np.float64)
+    return output
+
+
+def to_lists(layers: Layers) -> list[list[Any]]:
+    """Layers for JSON."""
+    return [[weight.tolist(), bias.tolist()] for weight, bias in layers]
+
+
+def from_lists(lists: Any, n_features: int) -> Layers:
+    """Layers from JSON, in single precision: half the time of double.
+
+    Raises:
+        TypeError, ValueError: not layers, not finite, or not from n_features inputs to the classes.
+    """
+    with np.errstate(over="ignore"):
+        layers = [(np.array(weight, np.float32), np.array(bias, np.float32)) for weight, bias in lists]
+    if not all(np.isfinite(weight).all() and np.isfinite(bias).all() for weight, bias in layers):
+        raise ValueError("weights that are not finite")
+    widths = [n_features, *(len(bias) for _, bias in layers)]
+    if widths[-1] != N_CLASSES or [weight.shape for weight, _ in layers] != [*pairwise(widths)]:
+        raise ValueError(f"layers of {' x '.join(map(str, widths))}, wanted {n_features} to {N_CLASSES}")
+    return layers
+
 
 METADATA_KEY = "box_prior"
 """Key of the box classifier in the metadata of an ONNX model."""

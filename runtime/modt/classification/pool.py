@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from modt.classification.mlp import fraction
 from modt.types import Float64
 
 _MIN_PROBABILITY = 1e-12  # keeps logarithms finite
@@ -87,3 +86,15 @@ def log_pool(
     if weights.reflectance:
         score += weights.reflectance * reflectance
     return score
+
+
+def fraction(content: Mapping[str, Any], key: str) -> float:
+    """Number from 0 to 1 under a key.
+
+    Raises:
+        KeyError, TypeError, ValueError: missing, not a number, or out of range.
+    """
+    value = float(content[key])
+    if not 0.0 <= value <= 1.0:
+        raise ValueError(f"{key} of {value}, wanted 0 to 1")
+    return value

@@ -16,11 +16,10 @@ from typing import Any
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.classification.box_classifier import N_FEATURES
-from modt.classification.mlp import Layers, from_lists, logits, to_lists
+from modt.classification.box_classifier import N_FEATURES, Layers, from_lists, logits, to_lists
 from modt.classification.pool import PoolWeights
 from modt.config import SensorConfig
-from modt.config.sensor import REFLECTANCE_SCALES
+from modt.config.profile import REFLECTANCE_SCALES
 from modt.types import N_REFLECTANCE, Float64
 
 log = logging.getLogger(__name__)

@@ -5,12 +5,39 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.config import CallWorthConfig, CostModelConfig
-from modt.types import NONE, Bool, Budget, Float64, Int, Proposals, Tracks
+from modt.config import CallWorthConfig, ClassificationConfig, CostModelConfig
+from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tracks
+
+
+def padded_size(limits: ClassificationConfig) -> Callable[[Int], int]:
+    """Points that the network processes, padding included, for proposals of (R,) points."""
+    return partial(padded_points, max_points=limits.max_points, batch=limits.batch, min_points=limits.min_points)
+
+
+def padded_points(count: Int, max_points: int, batch: int, min_points: int = 1) -> int:
+    """Points processed by the network, padding included, for R proposals of (R,) count points.
+
+    A call takes a batch of proposals, sorted by size, of max_points each at most, padded to the largest of them and
+    to min_points.
+    """
+    size = sorted(max(min(n, max_points), min_points) for n in count.tolist())  # few: faster than arrays
+    return sum(len(size[k : k + batch]) * size[k : k + batch][-1] for k in range(0, len(size), batch))
+
+
+def padded_each(count: Int, limits: ClassificationConfig) -> Int:
+    """(R,) the same of each proposal."""
+    size = np.maximum(np.minimum(count, limits.max_points), limits.min_points)
+    order = np.argsort(size, kind="stable")
+    last = np.minimum(np.arange(len(size)) // limits.batch * limits.batch + limits.batch, len(size)) - 1
+    size[order] = size[order[last]]
+    return size
+
 
 _POINTS = 100.0  # the unit of points, which conditions the fit
 _DIAGONAL = np.eye(3)
@@ -168,3 +195,42 @@ class Scheduler:
         if budget.calls is not None:
             granted &= np.cumsum(granted) <= budget.calls
         return granted
+
+
+_ROUNDS = 5
+_FEW_POINTS = 8
+_CACHE_BYTES = 4 << 20
+"""Written before each call of the warm-up: between two frames other stages fill the caches."""
+
+
+Classify = Callable[[Float32, Proposals, Int], Float64]
+"""Likelihoods (R, 4) of the proposals of a frame that are named by index."""
+
+
+def warm_up(classify: Classify, cost: LinearCost, max_points: int, batch: int, cpu_ns: Callable[[], int]) -> None:
+    """Classify small and large frames, so that no frame pays for what a first call sets up; the cost model learns."""
+    for n, points in product((1, batch, 2 * batch), (min(_FEW_POINTS, max_points), max_points)):
+        cloud, proposals = _columns(n, points)
+        times_ms = []
+        for _ in range(_ROUNDS):
+            np.ones(_CACHE_BYTES, np.uint8)
+            start_ns = cpu_ns()
+            classify(cloud, proposals, np.arange(n))
+            times_ms.append((cpu_ns() - start_ns) / 1e6)
+        cost.warmed_up(proposals.count, float(np.median(times_ms)))
+
+
+def _columns(n: int, points: int) -> tuple[Float32, Proposals]:
+    """A frame of n columns of so many points, a metre high and ten away, and its proposals."""
+    xyz = np.zeros((n * points, 3), np.float32)
+    xyz[:, 0], xyz[:, 2] = 10.0, np.tile(np.linspace(-1.0, 0.0, points), n)
+    box = np.tile([10.0, 0.0, -0.5, 0.1, 0.1, 1.0, 0.0], (n, 1))
+    return np.pad(xyz, ((0, 0), (0, 1))), Proposals(
+        members=np.arange(len(xyz)),
+        offsets=points * np.arange(n + 1),
+        coordinates=xyz.T.copy(),
+        centroid=box[:, :3],
+        box=box,
+        truncated=np.zeros(n, np.bool_),
+        reflectance=np.zeros((n, 5)),
+    )

@@ -8,10 +8,11 @@ from pathlib import Path
 
 from modt import host
 from modt.profile import DEFAULT
-from modt.sinks.schemes import SCHEMES
+from modt.schemes import SINKS
 
 Parser = argparse.ArgumentParser
 PROFILES = f"sensor, board; later ones win key by key (default: {DEFAULT}, or what the first sweep shows)"
+MODES = ("conventional", "efficient", "accurate")
 CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
 
 
@@ -34,6 +35,11 @@ def add_frames_option(p: Parser, default: tuple[int, int | None] = (0, None)) ->
     p.add_argument("--frames", type=frames, default=default, metavar="A:B", help=which)
 
 
+def add_mode_option(p: Parser) -> None:
+    """Mode."""
+    p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
+
+
 def add_core_option(p: Parser) -> None:
     """Core."""
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
@@ -46,7 +52,7 @@ def add_profile_option(p: argparse._ActionsContainer, meaning: str = PROFILES) -
 
 def add_sink_option(p: Parser) -> None:
     """Sinks."""
-    forms = ", ".join(scheme.form for scheme in SCHEMES.values())
+    forms = ", ".join(scheme.form for scheme in SINKS.values())
     p.add_argument(
         "--sink", action="append", default=[], metavar="ADDRESS", help=f"send tracks to {forms}; repeatable"
     )

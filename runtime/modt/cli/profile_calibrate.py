@@ -41,8 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     from modt import profile
     from modt.app import assembly, inputs, kernel_choice, metering
     from modt.app.chosen_profile import choose
-    from modt.classification.padding import padded_size
     from modt.classification.pointnet import PointNet
+    from modt.classification.scheduler import padded_size
     from modt.config import WindowConfig
     from modt.energy.attribution import FitError
     from modt.energy.ledger import Ledger

@@ -11,8 +11,6 @@ from modt import host
 from modt.cli import options
 from modt.cli.command import INTERRUPTED
 
-MODES = ("conventional", "efficient", "accurate")
-
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
@@ -20,7 +18,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_stream_options(p)
     options.add_fov_option(p)
     p.add_argument("--out", type=Path, metavar="DIR", help="run directory (default: runs/STREAM-MODE)")
-    p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
+    options.add_mode_option(p)
     p.add_argument("--rate", type=rate, dest="rate_hz", metavar="HZ|max", help="frames a second (default: max)")
     motion = p.add_mutually_exclusive_group()
     file = "poses in KITTI odometry's format, instead of the recorded ones"

@@ -12,7 +12,6 @@ from pathlib import Path
 from modt import host
 from modt.cli import options
 from modt.cli.command import INTERRUPTED
-from modt.cli.replay import MODES
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +28,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--view", nargs="?", const="", metavar="HOST:PORT", help=view)
     options.add_profile_option(p)
     options.add_core_option(p)
-    p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
+    options.add_mode_option(p)
     odometry = "poses: recording (those of the source, default), none, udp://HOST:PORT, unix:///PATH, ros2:///TOPIC"
     p.add_argument("--odometry", default="recording", metavar="SOURCE", help=odometry)
     p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
@@ -48,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app.live_source import open_source, recorded_path
     from modt.app.status import one_line
     from modt.app.supervisor import supervisor_of
-    from modt.sinks.addresses import open_sink
+    from modt.schemes import open_sink
 
     supervisor = supervisor_of(os.environ)
     lacking = host.be_punctual()

@@ -9,12 +9,9 @@ from modt.config.classification import (
     FusionConfig,
     SchedulerConfig,
 )
-from modt.config.energy import EnergyConfig, WindowConfig
 from modt.config.odometry import LandmarkConfig, OdometryConfig, RegistrationConfig
-from modt.config.profile import ProfileConfig
+from modt.config.profile import EnergyConfig, LoopConfig, ProfileConfig, RecordingConfig, SensorConfig, WindowConfig
 from modt.config.segmentation import SegmentationConfig
-from modt.config.sensor import SensorConfig
-from modt.config.service import LoopConfig, RecordingConfig
 from modt.config.tracking import (
     BackgroundMapConfig,
     FilterConfig,

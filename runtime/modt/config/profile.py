@@ -1,17 +1,110 @@
-"""The whole profile."""
+"""A profile: sensor, board, live loop and all stages, and the list of its keys."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
 
-from modt.config.base import ValueRangeError
+from modt.config.base import StageConfig, ValueRangeError, choice, mechanism, number, numbers
 from modt.config.classification import ClassificationConfig, DecisionConfig, FusionConfig, SchedulerConfig
-from modt.config.energy import EnergyConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.segmentation import SegmentationConfig
-from modt.config.sensor import SensorConfig
-from modt.config.service import LoopConfig, RecordingConfig
 from modt.config.tracking import TrackingConfig
+
+if TYPE_CHECKING:
+    from modt.geometry.beams import Beams
+
+REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
+"""Sensors whose reflectance a model may have learnt."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorConfig(StageConfig):
+    """Mount, range and resolution of the sensor."""
+
+    height_m: float | None = number(1.73, 0.05, 5.0, "m", "above the ground; null: estimated from the stream")
+    min_range_m: float = number(2.0, 0.0, 20.0, "m", "of the points used; nearer ones are on the robot itself")
+    max_range_m: float = number(80.0, 1.0, 400.0, "m", "of the points used")
+    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "between neighbouring beams that are evenly spaced")
+    elevations_deg: tuple[float, ...] | None = numbers(
+        -90.0, 90.0, 512, "deg", "of all beams, in any order; null: evenly spaced"
+    )
+    azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
+    blind_sectors_deg: tuple[float, ...] | None = numbers(
+        -360.0, 360.0, 64, "deg", "from, to of each, counter-clockwise: onto the robot", pairs=True
+    )
+    blind_range_m: float = number(3.0, 0.1, 20.0, "m", "of returns left out in these sectors, at most")
+    period_s: float = number(0.1, 0.001, 10.0, "s", "between sweeps, of folders without stamps and of max_missed")
+    reflectance: str = choice(
+        "none", ("none", *REFLECTANCE_SCALES), "scale; models use only those they learnt; none: not used"
+    )
+
+    @property
+    def beams(self) -> Beams:
+        """Spacing of the beams."""
+        from modt.geometry.beams import BeamTable, EvenBeams  # NumPy, which commands import after they are pinned
+
+        if self.elevations_deg is None:
+            return EvenBeams(self.elevation_step_deg)
+        return BeamTable(self.elevations_deg)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WindowConfig(StageConfig):
+    """Windows between readings of the meters."""
+
+    min_s: float = number(1.0, 0.001, 1e9, "s", "shortest window; RAPL steps in ms, INA chips and batteries average")
+    suspend_s: float = number(0.2, 0.001, 60.0, "s", "lead of the boot clock that counts as suspension")
+    clock_step_s: float = number(0.5, 0.001, 3600.0, "s", "step of the calendar clock that is marked")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyConfig(StageConfig):
+    """Power of the board where it is not measured, and the coefficients of its calibration.
+
+    The coefficients are those of a fit over windows: energy = idle_W x time + seg_J x segmentations + class_J x
+    classifications + point_J x points classified.
+    """
+
+    board: str = field(default="unknown", metadata={"meaning": "name of the board"})
+    idle_W: float = number(3.0, 0.0, 1000.0, "W", "power while the process waits")
+    busy_W: float = number(7.0, 0.0, 1000.0, "W", "power while it computes on one core")
+    meter: str = field(default="none", metadata={"meaning": "meter of the calibration"})
+    seg_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one segmentation")
+    class_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one classification")
+    point_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one point classified")
+    windows: WindowConfig = mechanism(WindowConfig)
+
+    @property
+    def active_W(self) -> float:
+        """Power of one busy core beyond idle [W], equal to mJ/ms."""
+        return self.busy_W - self.idle_W
+
+    @property
+    def coefficients(self) -> tuple[float, float, float] | None:
+        """seg_J, class_J and point_J of a calibration; None unless all three are set."""
+        if self.seg_J is None or self.class_J is None or self.point_J is None:
+            return None
+        return self.seg_J, self.class_J, self.point_J
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoopConfig(StageConfig):
+    """What the loop keeps to, and what it gives up for it."""
+
+    range_share: float = number(0.6, 0.05, 1.0, "", "of sensor.max_range_m that is kept where the range is reduced")
+    power_W: float | None = number(None, 0.01, 1000.0, "W", "limit, by the meter or the board's model; null: none")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordingConfig(StageConfig):
+    """Records of the live loop."""
+
+    keep: str = choice("all", ("all", "tracks", "ledger", "none"), "which records are written")
+    disk_mb: float = number(
+        2000.0, 1.0, 1e7, "MB", "of the records of this run and earlier ones; the oldest are deleted"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,3 +138,58 @@ class ProfileConfig:
         by_energy = stage.energy_mJ_per_frame
         limits = [stage.cpu_ms_per_frame, None if by_energy is None else by_energy / self.energy.active_W]
         return min((limit for limit in limits if limit is not None), default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One key of a profile.
+
+    Attributes:
+        path: of the key, with dots.
+        default: without a profile.
+        kind: type of its values.
+        facts: low, high, unit, options, number of values and meaning.
+    """
+
+    path: str
+    default: Any
+    kind: str
+    facts: dict[str, Any]
+
+    @property
+    def bounds(self) -> str:
+        """Bounds and unit, or options."""
+        if "options" in self.facts:
+            return ", ".join(self.facts["options"])
+        if "low" not in self.facts:
+            return "text"
+        bounds = f"{self.facts['low']:g} to {self.facts['high']:g} {self.facts.get('unit', '')}".strip()
+        return f"{bounds}, or null" if self.nullable else bounds
+
+    @property
+    def nullable(self) -> bool:
+        """Whether null is a value."""
+        return "None" in self.kind
+
+    @property
+    def whole(self) -> bool:
+        """Whether its numbers are integers."""
+        return self.kind.startswith("int")
+
+
+def keys(config: type[StageConfig] | type[ProfileConfig] = ProfileConfig, prefix: str = "") -> Iterator[Key]:
+    """Every key, in the order of the configuration."""
+    for f in fields(config):
+        kind = f.default_factory
+        if isinstance(kind, type) and issubclass(kind, StageConfig):
+            yield from keys(kind, f"{prefix}{f.name}.")
+        else:
+            yield Key(f"{prefix}{f.name}", f.default, str(f.type), dict(f.metadata))
+
+
+def value_of(config: StageConfig | ProfileConfig, path: str) -> Any:
+    """Value of a key."""
+    value: Any = config
+    for name in path.split("."):
+        value = getattr(value, name)
+    return value

@@ -16,8 +16,7 @@ import numpy as np
 
 from modt.config import EnergyConfig
 from modt.energy.ledger import Line
-from modt.energy.meters.meter import Kind
-from modt.energy.meters.model import model_J, model_name
+from modt.energy.meters.meter import Kind, model_J, model_name
 from modt.types import Float64
 
 _REJECTED_MARKS = frozenset({"suspended", "clock", "lost", "back", "reset", "implausible", "ambiguous"})

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from modt.config import WindowConfig
-from modt.energy.conditions import Conditions
 from modt.energy.ledger import Clock, Line
-from modt.energy.meters.meter import Kind, Measurand, Meter, MeterLostError
+from modt.energy.meters.meter import Conditions, Kind, Measurand, Meter, MeterLostError
 
 SCHEMA = "modt.energy/1"
 

@@ -1,8 +1,18 @@
 """Transforms, boxes, k-DOPs and the field of view."""
 
-from modt.geometry.boxes import corners, transform_boxes, upright_boxes
+from modt.geometry.boxes import (
+    corners,
+    inverse,
+    quaternion_of,
+    rotation_zyx,
+    se3,
+    transform,
+    transform_boxes,
+    upright_boxes,
+    wrap,
+    yaw_of,
+)
 from modt.geometry.field_of_view import Camera, FieldOfView
-from modt.geometry.transforms import inverse, quaternion_of, rotation_zyx, se3, transform, wrap, yaw_of
 
 __all__ = [
     "Camera",

@@ -7,8 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from modt.geometry.boxes import upright_boxes
-from modt.geometry.kdop import kdop_ends, overlapping_pairs
-from modt.geometry.kdop_pairs import PairWeights, Shapes, certain_pairs, pair_costs
+from modt.geometry.kdop import PairWeights, Shapes, certain_pairs, kdop_ends, overlapping_pairs, pair_costs
 from modt.types import Float32, Float64, Int, copy_runs
 
 

@@ -7,8 +7,8 @@ from array import array
 
 import numpy as np
 
-from modt.geometry.kdop_pairs import HALF_ROOT, PAD_M, PairWeights, Shapes
-from modt.native.arrays import FLOAT64, INT64, Signatures, address, at, declare, pointers
+from modt.geometry.kdop import HALF_ROOT, PAD_M, PairWeights, Shapes
+from modt.native.library import FLOAT64, INT64, Signatures, address, at, declare, pointers
 from modt.types import Float32, Float64, Int
 
 _D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p

@@ -10,7 +10,7 @@ from typing import Any
 
 from modt import assets
 from modt.config import ProfileConfig, StageConfig, ValueRangeError
-from modt.config.keys import keys, value_of
+from modt.config.profile import keys, value_of
 from modt.errors import MisuseError
 from modt.profile.yaml_text import MAX_CHARACTERS, Written, nested, read, value_text
 

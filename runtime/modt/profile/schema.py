@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from modt.config.keys import Key, keys
+from modt.config.profile import Key, keys
 from modt.profile.yaml_text import EXTENDS
 
 FILE = "profile.schema.json"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from modt import profile
-from modt.classification.padding import padded_size
+from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, EnergyConfig, ProfileConfig
 from modt.energy.attribution import EnergySums
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA

@@ -1,4 +1,4 @@
-"""Rows grouped by label, and reductions over all groups at once."""
+"""Rows grouped by label, and what is computed of all groups at once: extremes, headings of boxes, reflectance."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import NONE, Bool, Float32, Int
+from modt.types import NONE, Bool, Float32, Float64, Int
 
 T = TypeVar("T", bound=np.generic)
 
@@ -77,3 +77,77 @@ def label_max(values: Float32, labels: Int, n: int) -> Float32:
     most = np.full(n, -np.inf, np.float32)
     np.maximum.at(most, labels, values)
     return most
+
+
+HEADINGS = np.deg2rad(np.arange(0, 90, 5.0))
+"""Candidates [rad]."""
+_AXES = np.append(HEADINGS, HEADINGS + np.pi / 2)
+AXES: Float32 = np.stack([np.cos(_AXES), np.sin(_AXES)]).astype(np.float32)
+"""(2, 2 H) cosines and sines of the headings, then of what lies across them."""
+
+
+def best_headings(x: Float32, y: Float32, groups: Groups, limit: int, noise_m: float) -> Int:
+    """(G,) index of the heading of the rectangle whose sides the points of a group are closest to.
+
+    Closeness, the sum of 1 / distance to the nearest side, finds the legs of the L that a car shows; the least area
+    does not.
+
+    Args:
+        x: (K,) points [m].
+        y: (K,) points [m].
+        groups: groups of the points.
+        limit: points of a group that are used, at a constant stride.
+        noise_m: distance within which a point lies on a side [m].
+    """
+    groups = groups.subsample(limit)
+    across = AXES[0][:, None] * x.take(groups.rows)
+    across += AXES[1][:, None] * y.take(groups.rows)
+    inward = across - groups.broadcast(groups.min(across))
+    np.minimum(inward, groups.broadcast(groups.max(across)) - across, out=inward)
+    nearest = np.minimum(inward[: len(HEADINGS)], inward[len(HEADINGS) :])
+    closeness = 1 / np.maximum(nearest, np.float32(noise_m))
+    best: Int = np.argmax(np.add.reduceat(closeness, groups.offsets[:-1], axis=1, dtype=np.float64), axis=0)
+    return best
+
+
+BRIGHT = 0.8
+"""Exceeded by number plates, lamps and signs only. Models are trained with this value and the next."""
+DARK = 0.005
+"""Below it a return is too weak to be measured."""
+SAMPLE = 1000
+"""Returns, about, by which a sweep is checked for reflectance."""
+
+
+def has_reflectance(reflectance: Float32) -> bool:
+    """Whether a sweep's (N,) reflectances differ; equal values mean that the recording has none."""
+    sample = reflectance[:: max(1, len(reflectance) // SAMPLE)]
+    sample = sample[sample >= 0.0]
+    return len(sample) > 0 and bool(sample.min() != sample.max())
+
+
+def reflectance_sums(points: Float32, index: Int, offsets: Int) -> tuple[Float64, Float32]:
+    """(5, G) number, sum, sum of squares, bright and dark ones of the measured values of each group, (G,) greatest.
+
+    Group i has the (N, 4) points index[offsets[i]:offsets[i + 1]].
+    """
+    reflectance = points[index, 3]
+    starts, measured = offsets[:-1], reflectance >= 0.0
+    greatest: Float32 = np.maximum.reduceat(np.where(measured, reflectance, np.float32(-np.inf)), starts)
+    own = np.where(measured, reflectance, np.float32(0.0))
+    number, bright, dark = (
+        np.add.reduceat(mask.astype(np.float32), starts) for mask in (measured, own > BRIGHT, measured & (own < DARK))
+    )
+    total, squares = (np.add.reduceat(v, starts, dtype=np.float64) for v in (own, own * own))
+    return np.stack([number, total, squares, bright, dark]), greatest
+
+
+def reflectance_statistics(sums: Float64, greatest: Float32) -> Float64:
+    """(G, 5) mean, standard deviation, maximum, share of bright and share of dark returns of each group.
+
+    Returns without a measurement are ignored; a group without any is NaN. Given are the reflectance_sums.
+    """
+    count = np.where(sums[0] > 0, sums[0], np.nan)
+    mean, square, bright, dark = sums[1:] / count
+    deviation = np.sqrt(np.maximum(square - mean * mean, 0.0))
+    maximum = np.where(sums[0] > 0, greatest, np.nan)
+    return np.stack([mean, deviation, maximum, bright, dark], axis=1)

@@ -8,16 +8,21 @@ import numpy as np
 
 from modt.config.segmentation import CarMergeConfig
 from modt.geometry.kernels import GeometryKernels, NumpyGeometryKernels
-from modt.segmentation.box_fitting import best_headings
-from modt.segmentation.cells import Cells, connect, connect_coarse, occupied_cells
-from modt.segmentation.clusters import ClusterBounds, Clusters, Members, cluster_bounds, members_of
-from modt.segmentation.grids import SqrtRangeGrid
+from modt.segmentation.clusters import (
+    Cells,
+    ClusterBounds,
+    Clusters,
+    Members,
+    cluster_bounds,
+    connect,
+    connect_coarse,
+    members_of,
+    occupied_cells,
+)
+from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import GroundEstimator
-from modt.segmentation.groups import Groups
-from modt.segmentation.point_columns import PointColumns
-from modt.segmentation.reflectance_statistics import reflectance_sums
-from modt.segmentation.strips import merge_strips
-from modt.segmentation.view_bounds import ViewBounds, view_bounds
+from modt.segmentation.groups import Groups, best_headings, reflectance_sums
+from modt.segmentation.strips import ViewBounds, merge_strips, view_bounds
 from modt.types import Bool, Float32, Float64, Int
 
 

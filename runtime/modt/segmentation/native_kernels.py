@@ -10,16 +10,12 @@ import numpy as np
 
 from modt.config.segmentation import CarMergeConfig
 from modt.geometry.native_kernels import NativeGeometryKernels
-from modt.native.arrays import BOOL, FLOAT32, FLOAT64, INT32, INT64, Signatures, address, at, declare, pointers
-from modt.segmentation.box_fitting import AXES, HEADINGS
-from modt.segmentation.cells import Cells
-from modt.segmentation.clusters import ClusterBounds, Clusters, Members
-from modt.segmentation.grids import RING_STEP, SECTORS, SqrtRangeGrid
+from modt.native.library import BOOL, FLOAT32, FLOAT64, INT32, INT64, Signatures, address, at, declare, pointers
+from modt.segmentation.clusters import Cells, ClusterBounds, Clusters, Members
+from modt.segmentation.grids import FAR_M, RING_STEP, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import GroundEstimator
-from modt.segmentation.groups import Groups
-from modt.segmentation.point_columns import FAR_M, PointColumns
-from modt.segmentation.reflectance_statistics import BRIGHT, DARK
-from modt.segmentation.view_bounds import DIRECTION, ViewBounds
+from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
+from modt.segmentation.strips import DIRECTION, ViewBounds
 from modt.types import NONE, Bool, Float32, Float64, Int
 
 _F, _I, _L, _P = ctypes.c_float, ctypes.c_int32, ctypes.c_int64, ctypes.c_void_p

@@ -6,14 +6,12 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.box_fitting import HEADINGS
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
-from modt.segmentation.ground import GroundEstimator
+from modt.segmentation.grids import PointColumns
+from modt.segmentation.ground import GroundEstimator, HeightEstimator
+from modt.segmentation.groups import HEADINGS, has_reflectance, reflectance_statistics
 from modt.segmentation.kernels import NUMPY, Kernels
-from modt.segmentation.point_columns import PointColumns
-from modt.segmentation.reflectance_statistics import has_reflectance, reflectance_statistics
-from modt.segmentation.sensor_height import HeightEstimator
 from modt.types import NONE, Bool, Float32, Int, Proposals
 
 

@@ -14,9 +14,30 @@ from typing import Self
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
+from modt import assets, profile
+from modt.config import SensorConfig
 from modt.geometry.beams import Beams, BeamTable, EvenBeams
-from modt.sensor_fit.peaks import prominent_peaks
 from modt.types import Float32, Float64, Int
+
+
+def prominent_peaks(count: Float64) -> tuple[Int, Float64]:
+    """(B,) bins of the local maxima, in the middle of a plateau, and (B,) by how much each stands out.
+
+    The prominence of a peak is its height above the higher of the two valleys that part it from higher ground.
+    """
+    starts = np.flatnonzero(np.diff(count, prepend=np.nan) != 0)
+    ends = np.append(starts[1:], len(count)) - 1
+    height = count[starts]
+    inner = 1 + np.flatnonzero((height[1:-1] > height[:-2]) & (height[1:-1] > height[2:]))
+    valleys = [max(_valley(height[i::-1]), _valley(height[i:])) for i in inner.tolist()]
+    return (starts[inner] + ends[inner]) // 2, height[inner] - np.array(valleys, np.float64)
+
+
+def _valley(height: Float64) -> float:
+    """Lowest value before the first that is higher than the first one."""
+    higher = int(np.argmax(height > height[0]))
+    return float(height[: higher or None].min())
+
 
 BIN = np.deg2rad(0.01)  # of the histogram, tangent
 STEEPEST = 2.75  # tangent: 70 degrees
@@ -174,3 +195,42 @@ def _without_beams(sweeps: Sequence[Float32]) -> BeamPattern:
         spacings.append(np.sqrt(np.prod(CELL_DEG) / np.median(count[count > 0])))
     spacing_deg = float(np.median(spacings))
     return BeamPattern(np.zeros(0), spacing_deg, spacing_deg)
+
+
+MAX_LIKENESS_RATIO = 1.2
+"""Of the spacings of a shipped profile of the same beams."""
+SAMPLE = 20
+"""Points per one that is compared."""
+
+
+def tangents(points: Float32) -> Float32:
+    """(n,) tangents of the elevations of a sample of (N, 4) points; at the sensor itself, level."""
+    some = points[::SAMPLE]
+    range_m = np.hypot(some[:, 0], some[:, 1])
+    return np.asarray(some[:, 2] / np.where(range_m > 0, range_m, np.inf), np.float32)
+
+
+def spacing_ratio(a: SensorConfig, b: SensorConfig, tangent: Float32) -> float:
+    """Median ratio of the spacings of two sensors' beams, the greater by the smaller, at some elevations."""
+    log_ratio = np.log(a.beams.step_rad(tangent) / b.beams.step_rad(tangent))
+    return float(np.exp(np.median(np.abs(log_ratio))))
+
+
+def azimuth_ratio(a: SensorConfig, b: SensorConfig) -> float:
+    """Of the spacings along a beam, the greater by the smaller."""
+    ratio = a.azimuth_step_deg / b.azimuth_step_deg
+    return max(ratio, 1 / ratio)
+
+
+def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
+    """The shipped profile of the same beams, by the height of the mount where several have them."""
+    best = None
+    for path in sorted(assets.folder("profiles").glob("*.yaml")):
+        shipped = profile.resolve(path.stem)
+        if shipped.sensor is None:  # a board
+            continue
+        sensor = shipped.config.sensor
+        if max(spacing_ratio(sensor, found, tangent), azimuth_ratio(sensor, found)) < MAX_LIKENESS_RATIO:
+            away_m = abs((sensor.height_m or 0.0) - (found.height_m or 0.0))
+            best = min(best or (np.inf, ""), (away_m, path.stem))
+    return best[1] if best else None

@@ -2,20 +2,95 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from modt.config import ProfileConfig, SegmentationConfig
-from modt.geometry.blind_sectors import BlindSectors
-from modt.sensor_fit.beams import BeamPattern, find_beams
-from modt.sensor_fit.body import REACH_M, find_body
-from modt.sensor_fit.finding import Finder, Finding, Recording, apply
-from modt.sensor_fit.height import ground_height_m
-from modt.sensor_fit.likeness import nearest_profile, tangents
-from modt.sensor_fit.reflectance import NONE, SCALES, reflectance_scale
+from modt.geometry.field_of_view import BlindSectors
+from modt.sensor_fit.beams import BeamPattern, find_beams, nearest_profile, tangents
+from modt.sensor_fit.mount import BODY_REACH_M, find_body, ground_height_m
 from modt.types import Float32
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Some sweeps of a sensor.
+
+    Attributes:
+        sweeps: (N, 4) points of each [m, sensor frame], without those that lie at the origin.
+        stamps_s: time of each.
+    """
+
+    sweeps: Sequence[Float32]
+    stamps_s: Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A value of a profile's key."""
+
+    stage: str  # of the profile
+    key: str  # of the stage
+    value: Any  # of the key
+    evidence: str  # what was measured, or why nothing could be
+    sure: bool = True  # measured well; else to be checked by the user
+
+
+Finder = Callable[[Recording, ProfileConfig], Iterable[Finding]]
+"""Finds keys in a recording, given the profile that the finders before it have found."""
+
+
+def apply(config: ProfileConfig, findings: Iterable[Finding]) -> ProfileConfig:
+    """The profile with the values found."""
+    for found in findings:
+        stage = replace(getattr(config, found.stage), **{found.key: found.value})
+        config = replace(config, **{found.stage: stage})
+    return config
+
+
+NONE, OTHER = "none", "other"
+"""None recorded; a scale that models do not know."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What a sensor reports in streets.
+
+    Attributes:
+        deciles: of its reflectances, the first to the ninth.
+        max_difference: mean over the deciles.
+        hundredths: whether all of them are, as no other sensor's; else others may have the same scale.
+    """
+
+    deciles: tuple[float, ...]
+    max_difference: float
+    hundredths: bool = False
+
+
+SCALES = {
+    "hdl-64e": Scale((0.0, 0.15, 0.20, 0.24, 0.28, 0.30, 0.32, 0.36, 0.41), 0.12, hundredths=True),
+    "pandar64": Scale((0.004, 0.012, 0.020, 0.027, 0.035, 0.047, 0.063, 0.084, 0.117), 0.025),
+}
+"""Of KITTI's object frames, and of nine scans of PandaSet."""
+
+
+def reflectance_scale(reflectance: Float32) -> tuple[str, str]:
+    """Scale of (N,) reflectances, and what speaks for it."""
+    recorded = reflectance[reflectance >= 0]
+    if len(recorded) < 0.5 * len(reflectance) or not len(recorded) or np.ptp(recorded) == 0:
+        return NONE, "none is recorded"
+    deciles = np.quantile(recorded, np.arange(0.1, 0.95, 0.1))
+    hundredths = np.mean(np.abs(recorded * 100 - np.rint(recorded * 100)) < 0.01) > 0.99
+    of_scale = f"median {deciles[4]:.2f}, 90 % below {deciles[8]:.2f}"
+    for name, scale in SCALES.items():
+        near = np.abs(deciles - scale.deciles).mean() < scale.max_difference
+        if near and (hundredths or not scale.hundredths):
+            return name, f"{'hundredths, ' * scale.hundredths}{of_scale}: as of the {name}"
+    return OTHER, f"{of_scale}: of no scale that models have learnt"
+
 
 MAX_RANGE_M = 100.0
 """Objects farther away have too few returns to be known."""
@@ -90,7 +165,9 @@ def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator
     """Returns of the robot itself, and the range of the others."""
     points = np.concatenate(recording.sweeps)
     range_m = np.hypot(points[:, 0], points[:, 1])
-    height_m = ground_height_m(recording.sweeps, replace(config.sensor, min_range_m=REACH_M), config.segmentation)
+    height_m = ground_height_m(
+        recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M), config.segmentation
+    )
     body = None if height_m is None else find_body(recording.sweeps, height_m)
     own = np.zeros(len(points), np.bool_)
     if body is not None and len(body.sectors_deg):

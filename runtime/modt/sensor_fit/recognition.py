@@ -7,11 +7,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from modt.config import ProfileConfig, SensorConfig
-from modt.sensor_fit.beams import COARSE_ORIGINS_M, find_beams
-from modt.sensor_fit.finding import Recording, apply
-from modt.sensor_fit.fit import find_height, find_reflectance, pattern_findings
-from modt.sensor_fit.likeness import azimuth_ratio, nearest_profile, spacing_ratio, tangents
-from modt.sensor_fit.reflectance import NONE, reflectance_scale
+from modt.sensor_fit.beams import (
+    COARSE_ORIGINS_M,
+    azimuth_ratio,
+    find_beams,
+    nearest_profile,
+    spacing_ratio,
+    tangents,
+)
+from modt.sensor_fit.fit import (
+    NONE,
+    Recording,
+    apply,
+    find_height,
+    find_reflectance,
+    pattern_findings,
+    reflectance_scale,
+)
 from modt.types import Float32
 
 MAX_SPACING_RATIO = 1.35  # of the beams, median over the points, and of the returns along a beam

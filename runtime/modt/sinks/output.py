@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -143,3 +144,12 @@ class LedgerLines:
     def close(self) -> None:
         """Close the ledger."""
         self._lines.close()
+
+
+def close_together(sinks: Iterable[Sink]) -> None:
+    """Close sinks at the same time, so that several that hang delay the end no more than one."""
+    threads = [threading.Thread(target=sink.close) for sink in sinks]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()

@@ -39,7 +39,7 @@ class Ros2Sink:
         self._topics = []
 
 
-def open_sink(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink:
+def open_ros2(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink:
     """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME.
 
     It publishes on PREFIX/detections, PREFIX/markers and /tf. An empty world_frame_id leaves /tf alone, as a robot

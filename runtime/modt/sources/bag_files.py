@@ -162,12 +162,6 @@ def bag_files(path: Path) -> list[BagFile]:
     return [KINDS[_kind(file)](file) for file in sorted(_within(path), key=lambda p: (len(p.name), p.name))]
 
 
-def is_bag(path: Path) -> bool:
-    """Whether a path is a recording: a file, or a folder that `metadata.yaml` joins, or of one file alone."""
-    joined = not path.is_dir() or (path / "metadata.yaml").is_file()
-    return bool(_within(path)) and (joined or sum(p.is_file() for p in path.iterdir()) == 1)
-
-
 def messages_of(files: list[BagFile], topics: set[str]) -> Iterator[BagMessage]:
     """Messages of these topics, file by file."""
     return (message for file in files for message in file.messages(topics))

@@ -19,12 +19,11 @@ from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources import kitti_calibration, oxts
 from modt.sources.pose_file import read_poses, sensor_poses
-from modt.sources.scan_stream import ScanReference, ScanStream
+from modt.sources.scan_stream import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
 from modt.sources.text_file import read_numbers
 from modt.types import Float64
 
-PERIOD_S = 0.1
 MAX_NUMBER_DIGITS = 10
 """Of names that are numbers of frames, not times."""
 NANOSECOND_DIGITS = 19

@@ -5,17 +5,90 @@ from __future__ import annotations
 import errno
 import socket
 import stat
+import struct
+import threading
+from collections import deque
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlsplit
 
+from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.sources.datagram_queue import DatagramQueue
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.received_poses import ReceivedPoses
 
-FORM = "write recording, none, udp://HOST:PORT, unix:///PATH or ros2:///TOPIC"
+_BUFFER_BYTES = 1 << 20
+_READ_AT_ONCE = 4096  # in a flood; the kernel holds about as many
+_EMPTIED_S = 0.01
+_OVERFLOW = getattr(socket, "SO_RXQ_OVFL", 40)  # has Linux count what it dropped; Python does not name it
+_COUNT = struct.Struct("=I")
+
+
+class DatagramQueue:
+    """The newest datagrams since they were last taken, oldest first.
+
+    Of a Unix socket the kernel holds ten datagrams, whatever its buffer: where others can send to one, a thread
+    empties it meanwhile.
+
+    Args:
+        bound: socket, which it owns.
+        capacity: datagrams kept.
+        max_bytes: of a datagram, beyond which it is cut.
+
+    Attributes:
+        overflowed: datagrams that the kernel dropped, where it says so.
+    """
+
+    def __init__(self, bound: socket.socket, capacity: int, max_bytes: int) -> None:
+        bound.setblocking(False)
+        self._socket, self._max_bytes = bound, max_bytes
+        self._kept: deque[bytes] = deque(maxlen=capacity)
+        self._crowded_out = self.overflowed = 0
+        with suppress(OSError):
+            bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER_BYTES)
+        with suppress(OSError):
+            bound.setsockopt(socket.SOL_SOCKET, _OVERFLOW, 1)
+        self._address = bound.getsockname()
+        self._lock, self._ended = threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._keep_empty, name="poses", daemon=True)
+        if bound.family == socket.AF_UNIX and self._address:
+            self._thread.start()
+
+    def take(self) -> tuple[list[bytes], int]:
+        """The newest of what has arrived, and the number of older ones that they crowded out; without waiting."""
+        with self._lock:
+            self._read()
+            taken, crowded_out = list(self._kept), self._crowded_out
+            self._kept.clear()
+            self._crowded_out = 0
+        return taken, crowded_out
+
+    def close(self) -> None:
+        """Close the socket and remove its file."""
+        self._ended.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._socket.close()
+        if isinstance(self._address, str) and self._address:
+            Path(self._address).unlink(missing_ok=True)
+
+    def _keep_empty(self) -> None:
+        while not self._ended.wait(_EMPTIED_S):
+            with self._lock:
+                self._read()
+
+    def _read(self) -> None:
+        for _ in range(_READ_AT_ONCE):
+            try:
+                raw, facts, _, _ = self._socket.recvmsg(self._max_bytes, socket.CMSG_SPACE(_COUNT.size))
+            except OSError:  # nothing to read, or an error caused by the last sender
+                return
+            self._crowded_out += len(self._kept) == self._kept.maxlen
+            self._kept.append(raw)
+            for level, kind, value in facts:
+                if (level, kind) == (socket.SOL_SOCKET, _OVERFLOW):
+                    (self.overflowed,) = _COUNT.unpack(value[: _COUNT.size])
 
 
 class PoseSocket(ReceivedPoses):
@@ -42,29 +115,25 @@ class PoseSocket(ReceivedPoses):
                 self._refuse(error)
 
 
-def open_socket(url: str) -> socket.socket:
+def open_socket(address: Address) -> socket.socket:
     """A socket bound to udp://HOST:PORT or unix:///PATH.
 
     Raises:
-        MisuseError: no such address, or it cannot be bound.
+        MisuseError: the address names no socket, or it cannot be bound.
     """
+    host, port, path = address.host, address.port, address.path
     try:
-        parts = urlsplit(url)
-        scheme, host, port, path = parts.scheme, parts.hostname, parts.port, parts.path
-    except ValueError as error:
-        raise MisuseError(url, str(error), FORM) from None
-    try:
-        if scheme == "udp" and host and port and path in ("", "/"):
-            family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-            return _bound(family, address)
-        if scheme == "unix" and not parts.netloc and len(path) > 1:
+        if address.scheme == "udp" and host and port and path in ("", "/"):
+            family, _, _, _, bound = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            return _bound(family, bound)
+        if address.scheme == "unix" and not host and len(path) > 1:
             if _stale(path):
                 Path(path).unlink()
             return _bound(socket.AF_UNIX, path)
     except OSError as error:
         remedy = "give a free port of this machine, or a free path in a writable folder"
-        raise MisuseError(url, f"cannot be bound ({error.strerror or error})", remedy) from None
-    raise MisuseError(url, "is no address of a socket", FORM)
+        raise MisuseError(address.text, f"cannot be bound ({error.strerror or error})", remedy) from None
+    raise MisuseError(address.text, "names no socket", "write udp://HOST:PORT or unix:///PATH")
 
 
 def _bound(family: int, address: Any) -> socket.socket:

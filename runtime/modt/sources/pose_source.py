@@ -9,7 +9,6 @@ from typing import Any, Self
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.stream import Faults, Stream, StreamInfo
 from modt.types import Frame
 
@@ -64,6 +63,8 @@ class PoseFile(PoseSource):
     has_poses = True
 
     def __init__(self, path: Path, camera: Camera | None, end: int | None) -> None:
+        from modt.sources.pose_file import read_poses, sensor_poses
+
         self.name = str(path)
         poses = read_poses(path)
         self._poses = poses if camera is None else sensor_poses(poses, camera.T_camera_sensor)

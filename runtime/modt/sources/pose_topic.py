@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.address import parse_address
+from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
@@ -17,7 +17,6 @@ from modt.sources.pose_file import pose_defect
 from modt.sources.received_poses import ReceivedPoses
 from modt.types import Float64
 
-OPTIONS = {"ros2": frozenset({"domain", "base_to_sensor"})}
 MOUNT = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
@@ -49,7 +48,7 @@ class PoseTopic(ReceivedPoses):
         return odometry.stamp_s, T
 
 
-def open_topic(text: str, config: OdometryConfig, cores: frozenset[int] | None = None) -> PoseTopic:
+def open_topic(address: Address, config: OdometryConfig, cores: frozenset[int] | None = None) -> PoseTopic:
     """The poses of ros2:///TOPIC?domain=N&base_to_sensor=x,y,z,roll,pitch,yaw [m, rad].
 
     `cores`: where Cyclone's threads run, None: where the caller does.
@@ -58,11 +57,10 @@ def open_topic(text: str, config: OdometryConfig, cores: frozenset[int] | None =
         MisuseError: Cyclone DDS is not installed, or the address names no topic, domain or mount.
         ModtError: the domain cannot be joined.
     """
-    address = parse_address(text, OPTIONS)
     topic = topic_of(address)
-    T_base_sensor = _mount(address.option("base_to_sensor", "0,0,0,0,0,0"), text)
+    T_base_sensor = _mount(address.option("base_to_sensor", "0,0,0,0,0,0"), address.text)
     joined = participant(domain_of(address), cores)
-    return PoseTopic(Subscription(joined, topic, TYPE, depth=config.capacity), config, text, T_base_sensor)
+    return PoseTopic(Subscription(joined, topic, TYPE, depth=config.capacity), config, address.text, T_base_sensor)
 
 
 def _mount(text: str, subject: str) -> Float64:

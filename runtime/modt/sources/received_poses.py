@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import Any
 
 from modt.config import OdometryConfig
+from modt.sources.pose_buffer import PoseSequence
 from modt.sources.pose_datagram import DatagramError
-from modt.sources.pose_sequence import PoseSequence
 from modt.sources.pose_source import PoseSource
 from modt.types import Float64, Frame
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from types import MappingProxyType
 
 from modt.errors import MisuseError
-from modt.sources import kitti
-from modt.sources.bag import open_bag
-from modt.sources.bag_files import is_bag
-from modt.sources.packets.open_capture import CAPTURE_OPTIONS, SUFFIXES, open_capture
 from modt.sources.scan_file import READERS
-from modt.sources.scan_stream import ScanStream
+from modt.sources.scan_stream import PERIOD_S, ScanStream
 from modt.sources.stream import Stream
 
+CAPTURES = frozenset({".pcap", ".cap"})
+"""Suffixes of PCAP files."""
+BAGS = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
+"""Suffixes of the files of ROS 2 recordings."""
 MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
 
@@ -23,9 +23,7 @@ MAX_LISTED = 5
 REMEDY = "give a KITTI drive, a sequence, a folder of .bin, .pcd or .ply scans, a PCAP file or a recording of ROS 2"
 
 
-def open_stream(
-    path: Path, period_s: float = kitti.PERIOD_S, capture: Mapping[str, str] = MappingProxyType({})
-) -> Stream:
+def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, str] = MappingProxyType({})) -> Stream:
     """The stream at a path: packets, a recording of ROS 2, or what `open_scans` opens.
 
     `capture` is what the recording does not tell: options of `open_capture`, or the topic for `open_bag`.
@@ -34,13 +32,17 @@ def open_stream(
         MisuseError: the path does not exist or holds no stream, or an option that does not apply.
         ModtError: a recording that cannot be read.
     """
-    if path.is_file() and path.suffix in SUFFIXES:
-        _only(path, capture, CAPTURE_OPTIONS)
+    if path.is_file() and path.suffix in CAPTURES:
+        from modt.sources.packets.open_capture import open_capture
+
+        _only(path, capture, {"model", "calibration", "metadata"})
         return open_capture(path, capture)
-    if is_bag(path):
-        _only(path, capture, frozenset({"topic"}))
+    if _is_bag(path):
+        from modt.sources.bag import open_bag
+
+        _only(path, capture, {"topic"})
         return open_bag(path, period_s, capture.get("topic"))
-    _only(path, capture, frozenset())
+    _only(path, capture, set())
     return open_scans(path, period_s)
 
 
@@ -51,7 +53,7 @@ def _only(path: Path, capture: Mapping[str, str], known: Collection[str]) -> Non
         raise MisuseError(path, f"{unknown[0]} does not apply", remedy)
 
 
-def open_scans(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
+def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
     """The stream of scan files at a path; period_s is the time between the scans of a folder, which has no stamps.
 
     Raises:
@@ -76,6 +78,8 @@ def open_scans(path: Path, period_s: float = kitti.PERIOD_S) -> ScanStream:
 
 def _stream(path: Path, period_s: float) -> ScanStream | None:
     """The stream in a folder or around it, by the most specific layout; None where there is none."""
+    from modt.sources import kitti
+
     data = path.parts[-2:] == ("velodyne_points", "data")
     scans = path.name == "velodyne" and (path.parent / "calib.txt").is_file() and _has_scans(path)
     layouts: list[tuple[bool, Callable[[Path], ScanStream], Path]] = [
@@ -90,6 +94,13 @@ def _stream(path: Path, period_s: float) -> ScanStream | None:
         folder = partial(kitti.scan_folder, period_s=period_s, suffix=suffix)
         layouts.append((_has_scans(path, suffix), folder, path))
     return next((read(root) for matches, read, root in layouts if matches and path.is_dir()), None)
+
+
+def _is_bag(path: Path) -> bool:
+    """Whether a path is a recording: a file, or a folder that `metadata.yaml` joins, or of one file alone."""
+    files = [p for p in (path.iterdir() if path.is_dir() else [path]) if p.is_file()]
+    joined = len(files) == 1 or (path / "metadata.yaml").is_file()
+    return joined and any(file.name.endswith(BAGS) for file in files)
 
 
 def _is_raw(path: Path) -> bool:

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import ScanError
-from modt.sources.pcd_file import read_pcd
-from modt.sources.ply_file import read_ply
 from modt.types import UNRECORDED, Float32
 
 ROW_BYTES = 16
@@ -43,7 +41,19 @@ def _read_rows(path: Path, raw: bytes) -> Float32:
     return np.frombuffer(raw, np.float32).reshape(-1, 4).copy()
 
 
-READERS = {".bin": _read_rows, ".pcd": read_pcd, ".ply": read_ply}
+def _read_pcd(path: Path, raw: bytes) -> Float32:
+    from modt.sources.pcd_file import read_pcd
+
+    return read_pcd(path, raw)
+
+
+def _read_ply(path: Path, raw: bytes) -> Float32:
+    from modt.sources.ply_file import read_ply
+
+    return read_ply(path, raw)
+
+
+READERS = {".bin": _read_rows, ".pcd": _read_pcd, ".ply": _read_ply}
 
 
 def sanitised(points: Float32, origin: object) -> tuple[Float32, list[str]]:

@@ -13,6 +13,8 @@ from modt.sources.scan_file import read_scan
 from modt.sources.stream import MAX_KEPT_FAULTS, Fault, Faults, StreamInfo
 from modt.types import Float64, Frame
 
+PERIOD_S = 0.1
+"""Time between scans that have no stamps [s]."""
 log = logging.getLogger(__name__)
 
 

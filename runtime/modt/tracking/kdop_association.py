@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import KdopAssociationConfig
-from modt.geometry.kdop import DIRECTIONS
-from modt.geometry.kdop_displacement import measured
-from modt.geometry.kdop_pairs import PairWeights, Shapes
+from modt.geometry.kdop import DIRECTIONS, PairWeights, Shapes, measured
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
-from modt.tracking.assignment import assign
-from modt.tracking.association import Matches
+from modt.tracking.association import Matches, assign
 from modt.tracking.track_table import TrackTable
 from modt.types import Bool, Float64, Int
 

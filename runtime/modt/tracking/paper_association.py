@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import PaperAssociationConfig
-from modt.geometry.overlap import iou_3d
+from modt.geometry.boxes import iou_3d
 from modt.observations import Observations
-from modt.tracking.assignment import assign
-from modt.tracking.association import Matches
+from modt.tracking.association import Matches, assign
 from modt.tracking.track_table import TrackTable
 from modt.types import Bool, Float64, Int
 

@@ -7,21 +7,18 @@ import numpy as np
 from modt.class_sizes import MAX_SIZE_M
 from modt.classes import ObjectClass
 from modt.config import BackgroundMapConfig, TrackingConfig
-from modt.geometry.kdop import DIRECTIONS, widths
-from modt.geometry.kdop_displacement import AGREE_M
+from modt.geometry.kdop import AGREE_M, DIRECTIONS, widths
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks
 from modt.tracking import kalman
 from modt.tracking.association import Association, Matches
 from modt.tracking.background_map import BackgroundMap
 from modt.tracking.fragments import NoReunion, Reunion
-from modt.tracking.kalman import HEADING, SPEED, components_first, tracks_first
+from modt.tracking.kalman import HEADING, SPEED, components_first, standstill_of, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.merging import CarMerging
-from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.splitting import ExpectedSplitting
-from modt.tracking.standstill import standstill_of
 from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
 from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
@@ -32,7 +29,11 @@ CREEPING = 0.1
 
 def association_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Association:
     """The association that a configuration names."""
-    return PaperAssociation(config.paper) if config.association == "paper" else KdopAssociation(config.kdop, kernels)
+    if config.association == "paper":
+        from modt.tracking.paper_association import PaperAssociation
+
+        return PaperAssociation(config.paper)
+    return KdopAssociation(config.kdop, kernels)
 
 
 def regroupings_of(config: TrackingConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> tuple[Regrouping, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.config import ProfileConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.point_columns import PointColumns
+from modt.segmentation.grids import PointColumns
 from modt.segmentation.segmenter import Segmenter
 from modt.types import Float32, Int
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from modt.config import EnergyConfig, WindowConfig
-from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Facts, Kind, Scope
+from modt.energy.meters.meter import Conditions, Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
 from modt.reporting.energy_plots import stage_energy_mJ
 from modt.reporting.page import document_page

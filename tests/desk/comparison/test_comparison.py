@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from modt.config import WindowConfig
-from modt.energy.conditions import Conditions
 from modt.energy.ledger import Ledger
-from modt.energy.meters.model import model_meter
+from modt.energy.meters.meter import Conditions, model_meter
 from modt.energy.windows import Clocks, Windows
 from modt.pipeline import STAGES
 from modt.types import UNLIMITED, Budget, Frame

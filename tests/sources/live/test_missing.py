@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modt.sources.live.missing import MissingSweeps
+from modt.sources.live.ros2 import MissingSweeps
 
 
 def missing(stamps):

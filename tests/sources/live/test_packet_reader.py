@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from modt.sources.live.packet_reader import PacketReader, address_of, bound_socket
-from modt.sources.live.schemes import open_live
+from modt.schemes import open_sensor
+from modt.sources.live.packets import PacketReader, address_of, bound_socket
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.velodyne import VelodyneDecoder
@@ -98,7 +98,7 @@ def test_closing_ends_a_read(port):
 
 
 def test_a_small_buffer_is_said(port, monkeypatch, caplog):
-    monkeypatch.setattr("modt.sources.live.packet_reader.BUFFER_BYTES", 2**30)
+    monkeypatch.setattr("modt.sources.live.packets.BUFFER_BYTES", 2**30)
     bound_socket("sensor", port).close()
     (record,) = caplog.records
     assert "granted, 1073741824 asked; sysctl -w net.core.rmem_max=1073741824" in record.message
@@ -115,7 +115,7 @@ def test_what_cannot_be_bound_or_found_is_refused(port):
 
 def received(address, timed, to):
     """Sweeps taken from a live stream while a sensor sends."""
-    live = open_live(address)
+    live = open_sensor(address)
     live.start()
     sender = threading.Thread(target=send, args=(timed, to))
     sender.start()
@@ -161,7 +161,7 @@ def test_an_ouster_over_loopback_is_that_of_the_file(port, to, kitti_root):
 
 def test_an_ouster_needs_its_metadata():
     with pytest.raises(MisuseError, match=r"metadata; add \?metadata=FILE"):
-        open_live("ouster://127.0.0.1:7502")
+        open_sensor("ouster://127.0.0.1:7502")
 
 
 def test_a_loop_of_a_velodyne_has_no_gap():

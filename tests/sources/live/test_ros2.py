@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
-from modt.sources.live.schemes import open_live
+from modt.schemes import open_sensor
 from tests.ros2 import messages
 from tests.ros2.network import FAR, NEAR, until
 
@@ -91,12 +91,12 @@ def test_after_it_is_closed_nothing_is_read():
 )
 def test_an_address_that_cannot_be_is_refused(address, cause):
     with pytest.raises(MisuseError, match=cause):
-        open_live(address)
+        open_sensor(address)
 
 
 @pytest.fixture
 def live(loopback):
-    stream = open_live(ADDRESS)
+    stream = open_sensor(ADDRESS)
     stream.start()
     yield stream
     stream.close()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from modt.sources.packets.device_clock import DeviceClock
+from modt.sources.packets.packet_decoder import DeviceClock
 
 
 def host_s(clock, device_s, received_s):

@@ -27,13 +27,13 @@ from modt.app.ladder import Ladder
 from modt.app.live_stages import within
 from modt.classification import pointnet
 from modt.config import ProfileConfig
-from modt.config.keys import Key, keys, value_of
-from modt.energy.conditions import Conditions
+from modt.config.profile import Key, keys, value_of
 from modt.energy.ledger import Ledger
+from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
 from modt.reporting.run_report import run_tree
-from modt.segmentation.sensor_height import HeightEstimator
+from modt.segmentation.ground import HeightEstimator
 from modt.sinks.recording import Recording
 from modt.sinks.service_directory import MARK, ServiceDirectory
 from modt.sources.pose_socket import PoseSocket

@@ -2,7 +2,7 @@
 
 from modt import profile
 from modt.config import ProfileConfig
-from modt.config.keys import keys
+from modt.config.profile import keys
 from modt.profile.schema import schema_text
 from tools.docs.profile_keys import CONDITIONS, DOCUMENT, SCHEMA, WHOLE, document, whole
 

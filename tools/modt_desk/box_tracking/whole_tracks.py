@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from modt.geometry import wrap
-from modt.geometry.overlap import iou_3d
+from modt.geometry.boxes import iou_3d
 from modt.types import Bool, Float64, Int
 
 MIN_IOU = 0.25

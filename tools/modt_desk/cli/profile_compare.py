@@ -35,8 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     # NumPy is imported from here on, after the process is pinned.
     from modt.app import inputs, metering
     from modt.app.chosen_profile import choose
-    from modt.energy.conditions import Conditions
-    from modt.energy.meters.meter import Kind
+    from modt.energy.meters.meter import Conditions, Kind
     from modt.reporting.page import document_page, save
     from modt.reporting.quantity import to_json
     from modt_desk.comparison.compare_report import Basis, compare_tree

@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 
 from modt.app import assembly, inputs, metering
-from modt.classification.padding import padded_size
+from modt.classification.scheduler import padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter

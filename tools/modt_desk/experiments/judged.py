@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.classification.padding import padded_each
+from modt.classification.scheduler import padded_each
 from modt.config import ClassificationConfig
 from modt.geometry import FieldOfView, inverse, transform
 from modt.types import NONE, Float64, FrameResult

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from modt.app import assembly, kernel_choice
-from modt.classification.padding import padded_size
-from modt.classification.scheduler import LinearCost
+from modt.classification.scheduler import LinearCost, padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
 from modt.pipeline import Pipeline

@@ -1,16 +1,243 @@
-"""Discovery of the meters of a machine, and the choice of one."""
+"""Discovery of a machine's meters: sysfs, the chip of a Raspberry Pi 5, and the choice of one."""
 
 from __future__ import annotations
 
+import re
+import shutil
+import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
-from modt.energy.meters.battery import find_batteries
-from modt.energy.meters.hwmon import find_hwmon
-from modt.energy.meters.meter import Candidate, Kind, Meter, Scope
-from modt.energy.meters.pmic import find_pmic
-from modt.energy.meters.powercap import find_powercap
+from modt.energy.meters.meter import (
+    Candidate,
+    Facts,
+    Kind,
+    Meter,
+    MeterLostError,
+    Scope,
+    file_meter,
+    number_or_none,
+    probe,
+    read_text,
+    text_or_none,
+)
 from modt.errors import MisuseError
+
+_RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
+
+
+def find_powercap(sys: Path) -> list[Candidate]:
+    """RAPL packages, the platform counter, SCMI; and every zone left out, with the reason.
+
+    Nested zones are left out, since the outer one includes them; so is the memory-mapped duplicate of a package, and
+    all but the top zones of SCMI.
+    """
+    root = sys / "class" / "powercap"
+    zones = sorted(p for p in root.glob("*:*") if p.is_dir())
+    if not zones:
+        cause = "no zone under /sys/class/powercap"
+        remedy = "use bare metal with the intel_rapl_msr or arm_scmi_powercap module; virtual machines have none"
+        return [Candidate("powercap", (), cause, remedy)]
+    packages: list[Meter] = []
+    found: list[Candidate] = []
+    for zone in zones:
+        label = text_or_none(zone / "name") or "unnamed"
+        name = f"powercap {zone.name} ({label})"
+        if zone.name.startswith("intel-rapl-mmio"):
+            found.append(Candidate(name, (), "the same package again", "none needed: its duplicate is used"))
+        elif zone.name.count(":") > 1:
+            found.append(Candidate(name, (), f"counted by {zone.name.rpartition(':')[0]}", "none needed"))
+        elif not (zone / "energy_uj").exists() and (zone / "power_uw").exists():
+            found.append(probe(name, (_scmi(zone, name),), "make its power_uw readable"))
+        elif label == "psys":
+            found.append(probe(name, (_rapl(zone, name, Scope.BOARD),), _RAPL_REMEDY))
+        elif label.startswith("package"):
+            packages.append(_rapl(zone, name, Scope.CPU))
+        else:
+            found.append(Candidate(name, (), "of unknown extent", "none: its scope is not documented"))
+    if packages:
+        found.insert(0, probe("RAPL packages", tuple(packages), _RAPL_REMEDY))
+    return found
+
+
+def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
+    """An energy counter that wraps at the range of its zone."""
+    facts = Facts(
+        name=name,
+        unit="uJ",
+        resolution=61e-6,
+        max_W=1000.0,
+        scope=scope,
+        kind=Kind.MEASURED,
+        wrap_J=1e-6 * (number_or_none(zone / "max_energy_range_uj") or 0.0) or None,
+        privilege="root since Linux 5.10",
+    )
+    return file_meter(facts, zone / "energy_uj")
+
+
+def _scmi(zone: Path, name: str) -> Meter:
+    facts = Facts(name=name, unit="uW", resolution=1e-3, max_W=1000.0, scope=Scope.SOC, kind=Kind.INTEGRATED)
+    return file_meter(facts, zone / "power_uw")
+
+
+_INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
+_INPUT_RAILS = ("VDD_IN", "POM_5V_IN", "VIN_SYS_5V0", "VIN", "5V_IN")
+"""Rails that feed all others on boards known to be wired so."""
+
+
+def find_hwmon(sys: Path) -> list[Candidate]:
+    """AMD sockets, then every rail: rails may feed one another, so none are summed."""
+    folders = sorted((sys / "class" / "hwmon").glob("hwmon*"), key=lambda p: (len(p.name), p.name))
+    sockets: list[Meter] = []
+    rails: list[Meter] = []
+    for folder in folders:
+        chip = text_or_none(folder / "name")
+        if chip == "amd_energy":
+            sockets += _sockets(folder)
+        elif chip in _INA_CHIPS:
+            rails += _rails(folder, chip)
+    found = [probe(rail.facts.name, (rail,), "make the chip's inputs readable") for rail in rails]
+    if sockets:
+        found.insert(0, probe("AMD sockets", tuple(sockets), "run as root, or chmod a+r its energy inputs"))
+    if not found:
+        remedy = "wire an INA219, INA226 or INA3221 into the supply and load its driver"
+        found.append(Candidate("hwmon", (), "no power monitor and no energy counter under /sys/class/hwmon", remedy))
+    return found
+
+
+def _channels(folder: Path, prefix: str) -> list[int]:
+    names = (p.name for p in folder.glob(f"{prefix}[0-9]*_input"))
+    return sorted(int(name[len(prefix) : -len("_input")]) for name in names)
+
+
+def _sockets(folder: Path) -> list[Meter]:
+    """Energy counters of the sockets, without those of the cores; the driver widens them to 64 bits."""
+    sockets = []
+    for n in _channels(folder, "energy"):
+        if (text_or_none(folder / f"energy{n}_label") or "").startswith("Esocket"):
+            facts = Facts(
+                name=f"hwmon amd_energy socket {n}",
+                unit="uJ",
+                resolution=15.3e-6,
+                max_W=1000.0,
+                scope=Scope.CPU,
+                kind=Kind.MEASURED,
+                privilege="root",
+            )
+            sockets.append(file_meter(facts, folder / f"energy{n}_input"))
+    return sockets
+
+
+def _rails(folder: Path, chip: str) -> list[Meter]:
+    """Enabled channels with a current, by their own power where the chip computes it, else by voltage x current.
+
+    The sum channel of an INA3221 is not a rail.
+    """
+    rails = []
+    for n in _channels(folder, "curr"):
+        voltage, current, power = (folder / f"{prefix}{n}_input" for prefix in ("in", "curr", "power"))
+        label = text_or_none(folder / f"in{n}_label") or f"{folder.name} channel {n}"
+        if text_or_none(folder / f"in{n}_enable") == "0" or not voltage.exists() or label.startswith("sum"):
+            continue
+        computed = power.exists()
+        facts = Facts(
+            name=f"hwmon {chip} {label}",
+            unit="uW" if computed else "mV x mA",
+            resolution=5e-3,  # 1 mA at 5 V
+            max_W=500.0,
+            scope=Scope.BOARD if label in _INPUT_RAILS else Scope.SOC if "CPU" in label else Scope.RAIL,
+            kind=Kind.INTEGRATED,
+        )
+        rails.append(file_meter(facts, *((power,) if computed else (voltage, current))))
+    return rails
+
+
+def find_batteries(sys: Path) -> list[Candidate]:
+    """Every battery of the machine itself; those of peripherals (scope Device) are left out."""
+    supplies = sorted((sys / "class" / "power_supply").glob("*"))
+    own = [p for p in supplies if text_or_none(p / "type") == "Battery" and text_or_none(p / "scope") != "Device"]
+    if not own:
+        remedy = "run from a battery with a fuel gauge"
+        return [Candidate("battery", (), "none under /sys/class/power_supply", remedy)]
+    return [probe(f"battery {p.name}", (_battery(p),), "unplug the charger") for p in own]
+
+
+def _battery(folder: Path) -> Meter:
+    """Power drawn from a battery while it discharges."""
+    power = folder / "power_now"
+    computed = power.exists()
+    facts = Facts(
+        name=f"battery {folder.name}",
+        unit="uW" if computed else "uV x uA",
+        resolution=0.01,
+        max_W=2000.0,
+        scope=Scope.ROBOT,
+        kind=Kind.INTEGRATED,
+    )
+    if computed:
+        drawn = file_meter(facts, power)
+    else:
+        drawn = file_meter(facts, folder / "voltage_now", folder / "current_now", scale=1e-12)
+
+    def read() -> float:
+        status = read_text(folder / "status")
+        if status != "Discharging":
+            raise MeterLostError(f"{folder.name} is {status.lower() or 'of unknown status'}, not discharging")
+        return abs(drawn.read())
+
+    return Meter(facts, read)
+
+
+_RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=([0-9.]+)[AV]")
+
+
+_FACTS = Facts(
+    name="Raspberry Pi 5 PMIC",
+    unit="V x A",
+    resolution=0.02,  # from the width of the converter
+    max_W=50.0,
+    scope=Scope.BOARD,
+    kind=Kind.INTEGRATED,
+    privilege="group video",
+)
+
+
+def find_pmic(command: str = "vcgencmd") -> list[Candidate]:
+    """The chip, where the firmware's command is installed.
+
+    Loads on the 5 V rail itself (USB, HATs, the fan) and the loss of the chip are not included. A reading takes a few
+    milliseconds of another process.
+    """
+    path = shutil.which(command)
+    if path is None:
+        return [Candidate(_FACTS.name, (), f"no {command} here", "on a Raspberry Pi 5, install raspi-utils")]
+    meter = Meter(_FACTS, lambda: rail_power_W(_adc_text(path)))
+    return [probe(_FACTS.name, (meter,), "on a Raspberry Pi 5, add the user to group video")]
+
+
+def _adc_text(command: str) -> str:
+    """Currents and voltages of the rails, as the command prints them."""
+    try:
+        done = subprocess.run([command, "pmic_read_adc"], capture_output=True, text=True, timeout=2.0, check=False)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise MeterLostError(f"{command}: {error}") from None
+    if done.returncode:
+        output = (done.stderr or done.stdout).strip().splitlines()
+        raise MeterLostError(f"{command}: {output[0] if output else f'exit status {done.returncode}'}")
+    return done.stdout
+
+
+def rail_power_W(text: str) -> float:
+    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`."""
+    amperes: dict[str, float] = {}
+    volts: dict[str, float] = {}
+    for rail, quantity, value in _RAIL_VALUE.findall(text):
+        (amperes if quantity == "A" else volts)[rail] = float(value)
+    rails = amperes.keys() & volts.keys()
+    if not rails:
+        raise MeterLostError("pmic_read_adc shows no rail with voltage and current (only a Raspberry Pi 5 does)")
+    return sum(amperes[rail] * volts[rail] for rail in sorted(rails))
+
 
 FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Searches of a mount point of sysfs; each returns the candidates of one type of meter."""

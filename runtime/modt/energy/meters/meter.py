@@ -134,3 +134,52 @@ def probe(name: str, meters: tuple[Meter, ...], remedy: str) -> Candidate:
     except MeterLostError as error:
         return Candidate(name, meters, str(error), remedy)
     return Candidate(name, meters)
+
+
+def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns: Callable[[], int]) -> Meter:
+    """A meter that computes the energy of this process by `model_J`.
+
+    Args:
+        idle_W: drawn while this process waits.
+        busy_W: drawn while it computes on one core.
+        wall_ns: monotonic clock.
+        cpu_ns: CPU time of this process.
+    """
+    facts = Facts(
+        name=model_name(idle_W, busy_W),
+        unit="J",
+        resolution=1e-9,
+        max_W=max(idle_W, busy_W) * 1024,
+        scope=Scope.PROCESS,
+        kind=Kind.ESTIMATED,
+    )
+    return Meter(facts, lambda: model_J(idle_W, busy_W, wall_ns(), cpu_ns()))
+
+
+def model_J(idle_W: float, busy_W: float, wall_ns: int, cpu_ns: int) -> float:
+    """E = P_idle T + (P_busy - P_idle) t of wall time T and CPU time t [J]."""
+    return 1e-9 * (idle_W * wall_ns + (busy_W - idle_W) * cpu_ns)
+
+
+def model_name(idle_W: float, busy_W: float) -> str:
+    """Display name of the model of a board."""
+    return f"model {idle_W:g} W idle, {busy_W:g} W busy"
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """Clock policy, frequency and temperature of a core, by the sysfs mounted at a path."""
+
+    core: int = 0
+    sys: Path = Path("/sys")
+
+    def read(self) -> dict[str, str | float | None]:
+        """Governor, frequency [MHz] and temperature [degrees Celsius]; None where not available."""
+        cpufreq = self.sys / "devices" / "system" / "cpu" / f"cpu{self.core}" / "cpufreq"
+        frequency_kHz = number_or_none(cpufreq / "scaling_cur_freq")
+        temperature_mC = number_or_none(self.sys / "class" / "thermal" / "thermal_zone0" / "temp")
+        return {
+            "governor": text_or_none(cpufreq / "scaling_governor"),
+            "frequency_MHz": None if frequency_kHz is None else 1e-3 * frequency_kHz,
+            "temperature_C": None if temperature_mC is None else 1e-3 * temperature_mC,
+        }

@@ -1,18 +1,120 @@
-"""Live sensors that send packets: Velodyne and Ouster."""
+"""Live sensors that send packets, received from a UDP socket: Velodyne and Ouster."""
 
 from __future__ import annotations
 
+import logging
+import socket
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LiveStream
-from modt.sources.live.packet_reader import PacketReader, address_of, bound_socket
-from modt.sources.packets.ouster import OusterDecoder
-from modt.sources.packets.packet_decoder import PacketDecoder
-from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.packets.velodyne_models import model_named
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.packets.packet_decoder import PacketDecoder, refuse
 from modt.sources.stream import StreamInfo
+
+log = logging.getLogger(__name__)
+
+MAX_BYTES = 65_535
+BUFFER_BYTES = 4 * 2**20
+"""Asked of the kernel for packets received: a second of the fastest sensor."""
+PAUSE_S = 0.01
+"""Time without a packet after which a sensor that does not look all round may have ended its sweep."""
+
+
+class PacketReader:
+    """Receives the packets of one sensor and has them decoded.
+
+    Attributes:
+        reception: counts of packets.
+        decoder: of the packets.
+    """
+
+    def __init__(
+        self,
+        bound: socket.socket,
+        decoder: PacketDecoder,
+        source: str | None = None,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        """`source`: address of the sensor, packets of others are refused; None: any. `clock`: s since 1970."""
+        self.reception, self.decoder = Reception(), decoder
+        self._socket, self._source, self._clock = bound, source, clock
+
+    @property
+    def profile(self) -> str | None:
+        """Shipped profile of the sensor; None where there is none, or before its packets have told."""
+        return self.decoder.profile
+
+    def read(self, timeout_s: float) -> Sequence[Sweep]:
+        """Sweeps finished by the packets received until the timeout; returns as soon as there is one."""
+        until_s = time.monotonic() + timeout_s
+        self._socket.settimeout(min(timeout_s, PAUSE_S))
+        while True:
+            try:
+                payload, address = self._socket.recvfrom(MAX_BYTES)
+            except (TimeoutError, BlockingIOError):
+                sweeps = self.decoder.pause(self.reception)
+                if sweeps or time.monotonic() >= until_s:
+                    return sweeps
+                continue
+            self.reception.messages += 1
+            if self._source not in (None, address[0]):
+                refuse(self.reception, self.decoder.name, "from another address than the sensor's")
+            elif sweeps := self.decoder.decode(self._clock(), payload, self.reception):
+                return sweeps
+            if time.monotonic() >= until_s:
+                return []
+
+    def close(self) -> None:
+        """Release the socket."""
+        with suppress(OSError):  # not connected; it wakes a thread that waits in `read` all the same
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+
+
+def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
+    """A socket that receives what is sent to a UDP port of this machine, broadcasts and a multicast group included.
+
+    Raises:
+        MisuseError: the port is taken or not allowed, or the group cannot be joined.
+    """
+    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        made.bind(("", port))
+    except OSError as error:
+        made.close()
+        remedy = "end what else reads this sensor, or give the port that it sends to"
+        raise MisuseError(name, f"port {port} cannot be bound ({error.strerror})", remedy) from None
+    try:
+        if group:
+            made.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + bytes(4))
+    except OSError as error:
+        made.close()
+        remedy = "give an address from 224.0.0.0 on, and a route to it (ip route add 224.0.0.0/4 dev INTERFACE)"
+        raise MisuseError(name, f"group {group} cannot be joined ({error})", remedy) from None
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
+    granted = made.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2  # Linux says twice what it granted
+    if granted < BUFFER_BYTES:
+        remedy = f"sysctl -w net.core.rmem_max={BUFFER_BYTES}"
+        log.warning("%s: receive buffer of %d bytes granted, %d asked; %s", name, granted, BUFFER_BYTES, remedy)
+    return made
+
+
+def address_of(name: str, host: str) -> str | None:
+    """IPv4 address of a host, None for an empty name.
+
+    Raises:
+        MisuseError: it is unknown.
+    """
+    try:
+        return socket.gethostbyname(host) if host else None
+    except OSError as error:
+        raise MisuseError(name, f"host {host} is unknown ({error.strerror})", "give the sensor's address") from None
+
 
 VELODYNE_PORT, OUSTER_PORT = 2368, 7502
 VELODYNE_PERIOD_S = 0.1
@@ -25,6 +127,9 @@ def open_velodyne(address: Address, cores: frozenset[int] | None) -> LiveStream:
     HOST is the sensor, whose packets alone are used; PORT of this machine, or of a multicast group, is where it sends
     them.
     """
+    from modt.sources.packets.velodyne import VelodyneDecoder
+    from modt.sources.packets.velodyne_models import model_named
+
     model = address.option("model")
     calibration = address.option("calibration")
     decoder = VelodyneDecoder(
@@ -39,6 +144,8 @@ def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:
     Raises:
         MisuseError: no metadata.
     """
+    from modt.sources.packets.ouster import OusterDecoder
+
     metadata = address.option("metadata")
     if not metadata:
         remedy = "add ?metadata=FILE, what the sensor says at /api/v1/sensor/metadata"

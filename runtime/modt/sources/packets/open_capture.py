@@ -8,16 +8,9 @@ from pathlib import Path
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.capture import Capture
-from modt.sources.packets.ouster import OusterDecoder
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.packet_stream import PacketStream
-from modt.sources.packets.velodyne import VelodyneDecoder
-from modt.sources.packets.velodyne_models import model_named
 from modt.sources.stream import StreamInfo
-
-SUFFIXES = frozenset({".pcap", ".cap"})
-"""Of PCAP files."""
-CAPTURE_OPTIONS = frozenset({"model", "calibration", "metadata"})
 
 
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
@@ -56,7 +49,12 @@ def _decoder(path: Path, options: Mapping[str, str]) -> tuple[PacketDecoder, str
     beside = path.with_suffix(".json")
     metadata = options.get("metadata", str(beside) if beside.is_file() and "model" not in options else "")
     if metadata:
+        from modt.sources.packets.ouster import OusterDecoder
+
         return OusterDecoder(path.stem, Path(metadata)), "Ouster"
+    from modt.sources.packets.velodyne import VelodyneDecoder
+    from modt.sources.packets.velodyne_models import model_named
+
     model = model_named(options["model"]) if "model" in options else None
     calibration = Path(options["calibration"]) if "calibration" in options else None
     return VelodyneDecoder(path.stem, model, calibration), "Velodyne"

@@ -13,8 +13,7 @@ import numpy as np
 from modt import assets
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.device_clock import DeviceClock
-from modt.sources.packets.packet_decoder import extra, one_line, refuse
+from modt.sources.packets.packet_decoder import DeviceClock, extra, one_line, refuse
 from modt.types import Bool, Float32
 
 MAX_LOST_FRAMES = 20

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,8 +13,7 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.device_clock import DeviceClock
-from modt.sources.packets.packet_decoder import extra, one_line, refuse
+from modt.sources.packets.packet_decoder import DeviceClock, extra, one_line, refuse
 from modt.sources.packets.velodyne_models import (
     IDENTITY_AT,
     STAMP_AT,
@@ -24,9 +24,39 @@ from modt.sources.packets.velodyne_models import (
     recognised,
     signature_of,
 )
-from modt.sources.packets.velodyne_status import CalibrationBytes
 from modt.sources.packets.velodyne_turn import AHEAD, SAME_S, Entry, Turn
 from modt.types import Float32, Float64
+
+CYCLE = 4160
+"""Packets in which all of it is sent."""
+TAIL = slice(-6, None)
+"""Stamp, type and value of a status."""
+
+
+class CalibrationBytes:
+    """Collects the ends of packets until they hold a calibration."""
+
+    def __init__(self, library: Any) -> None:
+        self._library = library
+        self._tails: list[bytes] = []
+
+    def add(self, payload: bytes) -> tuple[str, Any] | None:
+        """Member of velodyne_decoder.Model and calibration of the unit, once they have been received whole."""
+        self._tails.append(payload[TAIL])
+        if len(self._tails) <= CYCLE:
+            return None
+        tails, self._tails = self._tails, []
+        try:
+            status = self._library.hdl64e.read_status_info(tails)
+        except (ValueError, KeyError):  # packets are missing, or they hold no status
+            return None
+        if status["Calibration Time"] is None:
+            return None
+        table = self._library.hdl64e.status_info_to_calib_dict(status)
+        del table["status"]
+        member = f"HDL64E_{status['Model']}"
+        return member, self._library.Calibration.from_string(json.dumps(table))
+
 
 log = logging.getLogger(__name__)
 

@@ -1,33 +1,38 @@
-"""Addresses lead to the sink of their scheme."""
+"""Addresses lead to the opener of their scheme."""
 
 import sys
 import threading
-from importlib.util import find_spec
 
 import pytest
 
+from modt import schemes
+from modt.address import Scheme
+from modt.config import OdometryConfig
 from modt.errors import MisuseError
-from modt.sinks.addresses import close_together, open_sink
-from modt.sinks.schemes import SCHEMES, Scheme
+from modt.schemes import POSES, SENSORS, SINKS, open_poses, open_sensor, open_sink
 
 
-def echo(address):
-    return address
+def parts(address, *arguments):
+    return address.host, address.port, address.path, dict(address.options), *arguments
 
 
-@pytest.fixture
-def scheme(monkeypatch):
-    monkeypatch.setitem(SCHEMES, "echo", Scheme(f"{__name__}:echo", "echo://", frozenset({"a"})))
-
-
-def test_the_opener_of_the_scheme_has_the_address(scheme):
-    address = open_sink("echo://here:7/there?a=b")
-    assert (address.host, address.port, address.path, address.option("a")) == ("here", 7, "/there", "b")
+@pytest.mark.parametrize(
+    ("table", "opened", "arguments"),
+    [
+        (SENSORS, open_sensor, [frozenset({1})]),
+        (SINKS, open_sink, []),
+        (POSES, open_poses, [OdometryConfig()]),
+    ],
+    ids=["sensor", "sink", "poses"],
+)
+def test_the_opener_of_the_scheme_has_the_address_and_what_goes_with_it(table, opened, arguments, monkeypatch):
+    monkeypatch.setitem(table, "echo", Scheme("echo://", parts, frozenset({"a"})))
+    assert opened("echo://here:7/there?a=b", *arguments) == ("here", 7, "/there", {"a": "b"}, *arguments)
 
 
 def test_a_dash_is_standard_output(monkeypatch):
-    monkeypatch.setitem(SCHEMES, "stdout", Scheme(f"{__name__}:echo", "stdout://"))
-    assert open_sink("-").scheme == "stdout"
+    monkeypatch.setitem(SINKS, "stdout", Scheme("stdout://", lambda address: address.scheme))
+    assert open_sink("-") == "stdout"
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch):
@@ -36,6 +41,12 @@ def test_an_extra_that_is_missing_is_named(monkeypatch):
     monkeypatch.delitem(sys.modules, "modt.sinks.scene", raising=False)
     with pytest.raises(MisuseError, match=r"needs foxglove; pip install 'modt\[foxglove\]'"):
         open_sink("foxglove://")
+
+
+@pytest.mark.parametrize("text", ["nothing://here", "2368", "velodyne://here?colour=red"])
+def test_what_is_no_address_of_a_sensor_is_refused(text):
+    with pytest.raises(MisuseError):
+        open_sensor(text)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +87,7 @@ def test_what_is_no_address_of_a_picture_is_one_line(text, part):
 
 def test_a_sink_that_may_wait_is_written_in_the_background(monkeypatch):
     class Plain:
-        def __init__(self, address):
+        def __init__(self):
             self.frames = []
 
         def write(self, result):
@@ -85,28 +96,16 @@ def test_a_sink_that_may_wait_is_written_in_the_background(monkeypatch):
         def close(self):
             pass
 
-    made = []
-    monkeypatch.setitem(globals(), "plain", lambda address: made.append(Plain(address)) or made[0])
-    monkeypatch.setitem(SCHEMES, "plain", Scheme(f"{__name__}:plain", "plain://", depth=2))
+    made = Plain()
+    opener = lambda address: schemes._in_background(address, made, 2)  # noqa: E731
+    monkeypatch.setitem(SINKS, "plain", Scheme("plain://", opener))
     sink = open_sink("plain://")
     sink.write("frame")
     sink.close()
-    assert made[0].frames == [("sink", "frame")]
+    assert made.frames == [("sink", "frame")]
     assert sink.health()["written"] == 1
 
 
-def test_sinks_that_hang_are_closed_together():
-    meeting = threading.Barrier(3, timeout=10.0)
-
-    class Hanging:
-        def close(self):
-            meeting.wait()
-
-    close_together([Hanging(), Hanging(), Hanging()])
-    assert not meeting.broken
-
-
-def test_every_opener_exists():
-    for name, scheme in SCHEMES.items():
-        assert scheme.form.startswith(f"{name}://")
-        assert find_spec(scheme.opener.partition(":")[0])
+def test_forms_begin_with_their_scheme():
+    for table in (SENSORS, SINKS, POSES):
+        assert all(scheme.form.startswith(f"{name}://") for name, scheme in table.items())
