@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modt.cli.main import COMMANDS
+from modt.cli import main, profile
 from tests.cli.commands import environment
 
 MAX_MODULES = 130
@@ -57,6 +57,12 @@ def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, seconds, 
     assert len(modules) <= MAX_MODULES
 
 
-def test_the_desks_commands_are_told_by_their_module():
-    desk = {name for name, module in COMMANDS.items() if module.startswith("modt_desk.")}
-    assert desk == {"view", "evaluate", "export", "simulate", "track"}
+@pytest.mark.parametrize(
+    ("module", "of_the_desk"),
+    [
+        (main, {"view", "evaluate", "export", "simulate", "track"}),
+        (profile, {"report", "compare", "predict", "regimes"}),
+    ],
+)
+def test_the_desks_commands_are_told_by_their_module(module, of_the_desk):
+    assert {name for name, path in module.COMMANDS.items() if path.startswith("modt_desk.")} == of_the_desk

@@ -38,9 +38,9 @@ from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior
 from modt.config import FusionConfig, ProfileConfig
 from modt.pipeline import Fusion
-from modt.reporting import page, svg
 from modt.sources.recognise import open_stream
 from modt.types import Frame
+from modt_desk.reporting import page, svg
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 from tools.study.fusion_replay import Outcome, replay

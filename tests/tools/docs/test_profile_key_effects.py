@@ -32,14 +32,14 @@ from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
-from modt.reporting.run_report import run_tree
 from modt.segmentation.ground import HeightEstimator
 from modt.sinks.recording import Recording
 from modt.sinks.service_directory import MARK, ServiceDirectory
 from modt.sources.pose_socket import PoseSocket
 from modt.types import Frame
+from modt_desk.reporting.run_report import run_tree
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
-from tests.reporting.test_run_report import write_run
+from tests.desk.reporting.test_run_report import write_run
 from tests.results import result
 from tools.docs.profile_keys import condition
 

@@ -73,7 +73,7 @@ def tell(arguments: argparse.Namespace) -> int:
         MisuseError: no run, or no such track.
         ModtError: the file cannot be written.
     """
-    from modt.reporting.page import save
+    from modt_desk.reporting.page import save
     from modt_desk.viewer.recorded_run import RecordedRun
     from modt_desk.viewer.track_page import rows_of, track_page, views
 

@@ -11,14 +11,14 @@ import numpy as np
 from modt.config import EnergyConfig
 from modt.energy.attribution import EnergySums, usable_windows
 from modt.energy.meters.meter import Facts, Kind
-from modt.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt.pipeline import CLASSIFICATION, ODOMETRY, SEGMENTATION, STAGES, TRACKING
 from modt.reporting.histogram import Histogram
-from modt.reporting.quantity import Quantity, estimate, quantity
-from modt.reporting.reconciliation import reconciliation_tree
 from modt.types import Float64
 from modt_desk.comparison import gamma
 from modt_desk.comparison.comparison import COUNTS, ModeRun, Repetition, total
+from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
+from modt_desk.reporting.quantity import Quantity, estimate, quantity
+from modt_desk.reporting.reconciliation import reconciliation_tree
 
 SCHEMA = "modt.compare/3"
 _COUNTING = "Energy is assumed power times CPU time: the reconciliation tests counts and unit costs, not the physics."

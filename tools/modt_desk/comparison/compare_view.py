@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from modt.energy.meters.meter import Kind
-from modt.reporting import energy_plots, svg
-from modt.reporting.document import Document, Table
-from modt.reporting.page import Plot
 from modt_desk.comparison.prediction_report import against_table
+from modt_desk.reporting import energy_plots, svg
+from modt_desk.reporting.document import Document, Table
+from modt_desk.reporting.page import Plot
 
 
 def compare_document(tree: dict[str, Any]) -> Document:

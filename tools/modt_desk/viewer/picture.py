@@ -18,11 +18,10 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from modt.geometry import corners
-from modt.reporting.page import LIGHT
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64
 from modt.viewer import look
-from modt.viewer.look import REACH_M
+from modt.viewer.look import LIGHT, REACH_M
 from modt.viewer.point_cells import SIDE, Cells
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.extent import RINGS_M, reach_m

@@ -26,10 +26,10 @@ def run(arguments: argparse.Namespace) -> int:
     """
     import numpy as np
 
-    from modt.reporting.page import document_page, save
-    from modt.reporting.quantity import to_json
-    from modt.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
     from modt.sinks.records import records_of
+    from modt_desk.reporting.page import document_page, save
+    from modt_desk.reporting.quantity import to_json
+    from modt_desk.reporting.run_report import lateness_plots, run_document, run_plots, run_tree
 
     path = arguments.run_directory
     if path.is_file():

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from modt.energy.savings import Reconciliation
 from modt.pipeline import CLASSIFICATION, FUSION, ODOMETRY, SCHEDULING, SEGMENTATION, STAGES, TRACKING
-from modt.reporting.quantity import estimate
+from modt_desk.energy.savings import Reconciliation
+from modt_desk.reporting.quantity import estimate
 
 SEG, CLASS = STAGES.index(SEGMENTATION), STAGES.index(CLASSIFICATION)
 TRACK = [STAGES.index(ODOMETRY), STAGES.index(TRACKING)]

@@ -9,8 +9,8 @@ from html import escape
 
 import numpy as np
 
-from modt.reporting.quantity import format_number
 from modt.types import Float64
+from modt_desk.reporting.quantity import format_number
 
 WIDTH, HEIGHT = 520, 230
 LEFT, RIGHT, TOP, BOTTOM = 58, 14, 12, 44

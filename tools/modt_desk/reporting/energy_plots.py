@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from modt.energy.equations import EnergyModel
 from modt.energy.meters.meter import Kind
-from modt.reporting import svg
-from modt.reporting.document import Table
-from modt.reporting.page import Plot
-from modt.reporting.quantity import Quantity
 from modt.types import Float64
+from modt_desk.energy.equations import EnergyModel
+from modt_desk.reporting import svg
+from modt_desk.reporting.document import Table
+from modt_desk.reporting.page import Plot
+from modt_desk.reporting.quantity import Quantity
 
 _MAX_LIFE = 1000.0
 """Upper end of the N_go axis of the curve of Equation 3 [frames]."""

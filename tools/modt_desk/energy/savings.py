@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from modt.energy.equations import EnergyModel
+from modt_desk.energy.equations import EnergyModel
 
 
 @dataclass(frozen=True, slots=True)

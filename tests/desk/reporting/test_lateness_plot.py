@@ -3,8 +3,8 @@ import json
 import pytest
 
 from modt.app.timing import Timing
-from modt.reporting.run_report import lateness_plots
 from modt.sinks.run_directory import SUMMARY
+from modt_desk.reporting.run_report import lateness_plots
 
 
 def test_how_many_are_as_late_or_later(tmp_path):

@@ -18,21 +18,21 @@ from modt.config import ClassificationConfig, EnergyConfig, ProfileConfig
 from modt.energy.attribution import EnergySums
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.meters.meter import Kind
-from modt.energy.nonnegative import nonnegative_fit
-from modt.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, STAGES
-from modt.reporting import energy_plots, svg
-from modt.reporting.document import Cell, Document, Table
-from modt.reporting.page import Plot
-from modt.reporting.quantity import Quantity, estimate, quantity
-from modt.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
-from modt.reporting.run_sums import COLUMNS, FrameSums
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
 from modt.types import Float64
+from modt_desk.energy.nonnegative import nonnegative_fit
+from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
+from modt_desk.reporting import energy_plots, svg
+from modt_desk.reporting.document import Cell, Document, Table
+from modt_desk.reporting.page import Plot
+from modt_desk.reporting.quantity import Quantity, estimate, quantity
+from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK, reconciliation_tree
+from modt_desk.reporting.run_sums import COLUMNS, FrameSums
 
 SCHEMA = "modt.report/2"
 _CONVENTIONAL = "conventional"

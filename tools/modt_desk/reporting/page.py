@@ -6,24 +6,11 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
-from modt.reporting.document import Cell, Document, Table
-from modt.reporting.quantity import LEGEND
 from modt.sinks.output import writing
+from modt.viewer.look import COLOURS, THEME
+from modt_desk.reporting.document import Cell, Document, Table
+from modt_desk.reporting.quantity import LEGEND
 
-COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a", "#3a97a6")
-LIGHT = {"ink": "#1c2430", "soft": "#5d6876", "line": "#d8dde4", "paper": "#ffffff", "panel": "#f6f8fa"}
-DARK = {"ink": "#e4e8ee", "soft": "#9aa6b5", "line": "#38424f", "paper": "#151a21", "panel": "#1d242d"}
-
-
-def _variables(theme: dict[str, str]) -> str:
-    return ":root{" + ";".join(f"--{name}:{colour}" for name, colour in theme.items()) + "}"
-
-
-THEME = f"""
-{_variables(LIGHT)}
-@media (prefers-color-scheme:dark){{{_variables(DARK)}}}
-"""
-"""Colours of pages, for light and dark screens."""
 _STYLE = """
 *{box-sizing:border-box}
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);margin:0 auto;

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from modt.classes import CLASS_NAMES, ObjectClass
-from modt.energy.savings import Counts
 from modt.pipeline import CLASSIFICATION, STAGES
-from modt.reporting.frame_series import FrameSeries
 from modt.reporting.histogram import Histogram
 from modt.types import Int
+from modt_desk.energy.savings import Counts
+from modt_desk.reporting.frame_series import FrameSeries
 
 _BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
 COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")

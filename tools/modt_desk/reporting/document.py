@@ -1,4 +1,4 @@
-"""A report as results, tables and notes, for a terminal; modt.reporting.page shows the same as HTML."""
+"""A report as results, tables and notes, for a terminal; modt_desk.reporting.page shows the same as HTML."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from modt.reporting.quantity import LEGEND, Quantity
+from modt_desk.reporting.quantity import LEGEND, Quantity
 
 Cell = str | Quantity
 

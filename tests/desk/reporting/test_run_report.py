@@ -10,11 +10,11 @@ from modt import profile
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
-from modt.reporting.energy_plots import stage_energy_mJ
-from modt.reporting.page import document_page
-from modt.reporting.quantity import to_json
-from modt.reporting.run_report import run_document, run_plots, run_tree
-from modt.reporting.run_sums import FrameSums
+from modt_desk.reporting.energy_plots import stage_energy_mJ
+from modt_desk.reporting.page import document_page
+from modt_desk.reporting.quantity import to_json
+from modt_desk.reporting.run_report import run_document, run_plots, run_tree
+from modt_desk.reporting.run_sums import FrameSums
 
 
 def run_text(tree):
