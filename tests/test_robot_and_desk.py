@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from modt.cli import main, profile
+from modt.cli import main, profile, profiles
 from tests.cli.commands import environment
 
 MAX_MODULES = 130
@@ -61,6 +61,7 @@ def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, seconds, 
     ("module", "of_the_desk"),
     [
         (main, {"view", "evaluate", "export", "simulate", "track"}),
+        (profiles, {"fit"}),
         (profile, {"report", "compare", "predict", "regimes"}),
     ],
 )

@@ -1,17 +1,16 @@
-"""A profile from a recording: the finders in their order."""
+"""Values of a profile's keys, as sweeps of the sensor show them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from modt.config import ProfileConfig, SegmentationConfig
-from modt.geometry.field_of_view import BlindSectors
-from modt.sensor_fit.beams import BeamPattern, find_beams, nearest_profile, tangents
-from modt.sensor_fit.mount import BODY_REACH_M, find_body, ground_height_m
+from modt.sensor_fit.beams import BeamPattern, nearest_profile, tangents
+from modt.sensor_fit.mount import ground_height_m
 from modt.types import Float32
 
 
@@ -37,10 +36,6 @@ class Finding:
     value: Any  # of the key
     evidence: str  # what was measured, or why nothing could be
     sure: bool = True  # measured well; else to be checked by the user
-
-
-Finder = Callable[[Recording, ProfileConfig], Iterable[Finding]]
-"""Finds keys in a recording, given the profile that the finders before it have found."""
 
 
 def apply(config: ProfileConfig, findings: Iterable[Finding]) -> ProfileConfig:
@@ -92,9 +87,6 @@ def reflectance_scale(reflectance: Float32) -> tuple[str, str]:
     return OTHER, f"{of_scale}: of no scale that models have learnt"
 
 
-MAX_RANGE_M = 100.0
-"""Objects farther away have too few returns to be known."""
-MAX_MIN_RANGE_M = 2.0
 HEIGHTS_M = (0.05, 5.0)
 MAX_SPACING_DEG = 10.0
 """What a profile can state."""
@@ -102,35 +94,11 @@ EVEN_DEG, EVEN_SHARE = 0.05, 0.05
 """Deviation from even spacing of beams that a table is not worth: the greater of the two, and of the spacing."""
 SURE_CONTRAST = 0.985
 """Least share of the points in the peaks of beams that are told apart without a doubt."""
-EMPTY_SECTOR_DEG = 10.0
-"""Least sector without a return that is mentioned."""
 
 
 def cell_m(spacing_deg: float, azimuth_step_deg: float) -> float:
     """Side of a cell at 10 m: the root of the mean spacing of the returns, as cells grow as the root of range."""
     return max(SegmentationConfig().cell_m, round(0.18 * float(np.sqrt(np.sqrt(spacing_deg * azimuth_step_deg))), 3))
-
-
-def find_period(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
-    """Time between sweeps."""
-    steps = np.diff(recording.stamps_s)
-    if not len(steps) or np.median(steps) <= 0:
-        yield Finding("sensor", "period_s", config.sensor.period_s, "assumed: one sweep", sure=False)
-    elif np.ptp(steps) < 1e-6:
-        said = "time stamps are exactly even: perhaps made up, as those of a folder of scans"
-        yield Finding("sensor", "period_s", round(float(steps[0]), 4), said, sure=False)
-    else:
-        said = f"median of {len(steps)} steps, {steps.min():.3f} to {steps.max():.3f} s"
-        yield Finding("sensor", "period_s", round(float(np.median(steps)), 4), said)
-
-
-def find_pattern(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
-    """Beams, their spacing, and the size of a cell."""
-    pattern = find_beams(recording.sweeps)
-    if pattern is None:
-        yield Finding("sensor", "elevation_step_deg", config.sensor.elevation_step_deg, "too few points", sure=False)
-        return
-    yield from pattern_findings(pattern)
 
 
 def pattern_findings(pattern: BeamPattern) -> Iterator[Finding]:
@@ -161,40 +129,6 @@ def _beam_findings(pattern: BeamPattern) -> Iterator[Finding]:
     yield Finding("sensor", "azimuth_step_deg", step_deg, "most frequent step along a beam")
 
 
-def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
-    """Returns of the robot itself, and the range of the others."""
-    points = np.concatenate(recording.sweeps)
-    range_m = np.hypot(points[:, 0], points[:, 1])
-    height_m = ground_height_m(
-        recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M), config.segmentation
-    )
-    body = None if height_m is None else find_body(recording.sweeps, height_m)
-    own = np.zeros(len(points), np.bool_)
-    if body is not None and len(body.sectors_deg):
-        bounds = tuple(np.round(body.sectors_deg, 1).ravel().tolist())
-        said = "returns that move with the sensor; a wall along the way would look like that too"
-        yield Finding("sensor", "blind_sectors_deg", bounds, said, sure=False)
-        yield Finding("sensor", "blind_range_m", round(body.range_m, 2), "farthest of these")
-        own = BlindSectors(bounds, body.range_m).contain(points)
-    nearest = min(MAX_MIN_RANGE_M, float(np.floor(10 * np.quantile(range_m[~own], 0.001))) / 10)
-    said = f"of 0.1 % of the returns, at most {MAX_MIN_RANGE_M:g}"
-    if body is None:
-        said += "; whether they are on the robot is not known: the recording stands still or is too short"
-    yield Finding("sensor", "min_range_m", nearest, said, sure=body is not None)
-    farthest = float(10 * np.ceil(np.quantile(range_m, 0.999) / 10))
-    said = f"of 99.9 % of the returns, at most {MAX_RANGE_M:g}"
-    yield Finding("sensor", "max_range_m", min(MAX_RANGE_M, farthest), f"{said}{empty_sectors(points)}")
-
-
-def empty_sectors(points: Float32) -> str:
-    """The sectors without a return, in words; empty where there are none."""
-    azimuth_deg = np.sort(np.rad2deg(np.arctan2(points[:, 1], points[:, 0])))
-    gap = np.diff(np.append(azimuth_deg, azimuth_deg[0] + 360))
-    wide = np.flatnonzero(gap > EMPTY_SECTOR_DEG)
-    words = [f"{azimuth_deg[k]:.0f} to {(azimuth_deg[k] + gap[k] + 180) % 360 - 180:.0f}" for k in wide]
-    return f"; no returns at all from {' and from '.join(words)} deg" if words else ""
-
-
 def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Height of the sensor above the ground."""
     height_m = ground_height_m(recording.sweeps, config.sensor, config.segmentation)
@@ -214,17 +148,3 @@ def find_reflectance(recording: Recording, config: ProfileConfig) -> Iterator[Fi
     if known and not known.hundredths and nearest_profile(config.sensor, tangents(points)) != scale:
         known, said = None, f"{said}, but these are other beams: not used"
     yield Finding("sensor", "reflectance", scale if known else NONE, said)
-
-
-FINDERS: tuple[Finder, ...] = (find_period, find_pattern, find_body_and_range, find_height, find_reflectance)
-"""Each knows what those before it have found."""
-
-
-def fit(recording: Recording, finders: Sequence[Finder] = FINDERS) -> tuple[ProfileConfig, list[Finding]]:
-    """Profile of a recording's sensor, and the findings that it is made of."""
-    config, findings = ProfileConfig(), list[Finding]()
-    for finder in finders:
-        found = list(finder(recording, config))
-        config = apply(config, found)
-        findings += found
-    return config, findings

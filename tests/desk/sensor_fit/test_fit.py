@@ -8,9 +8,10 @@ import pytest
 from modt import assets, profile
 from modt.config import ProfileConfig
 from modt.config.profile import REFLECTANCE_SCALES
-from modt.sensor_fit.fit import FINDERS, SCALES, Finding, Recording, cell_m, fit
-from modt.sensor_fit.profile_text import doubts, profile_text
+from modt.sensor_fit.findings import SCALES, Finding, Recording, cell_m
 from modt.sources.recognise import open_stream
+from modt_desk.sensor_fit.fit import FINDERS, fit
+from modt_desk.sensor_fit.profile_text import doubts, profile_text
 from modt_desk.simulation.sensors import sensor
 from tests.sensor_fit.recordings import recording, with_mast, with_scale
 

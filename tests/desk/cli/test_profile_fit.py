@@ -5,8 +5,7 @@ import yaml
 
 from modt import profile
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-
-from .commands import modt
+from tests.cli.commands import modt
 
 
 @pytest.fixture(scope="module", name="scans")
