@@ -61,7 +61,7 @@ def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, seconds, 
     ("module", "of_the_desk"),
     [
         (main, {"view", "evaluate", "export", "simulate", "track"}),
-        (profiles, {"fit"}),
+        (profiles, {"fit", "schema"}),
         (profile, {"report", "compare", "predict", "regimes"}),
     ],
 )

@@ -8,7 +8,7 @@ from importlib import import_module
 COMMANDS = {
     "fit": "modt_desk.cli.profile_fit",
     "show": "modt.cli.profile_show",
-    "schema": "modt.cli.profile_schema",
+    "schema": "modt_desk.cli.profile_schema",
 }
 """Module of each command."""
 

@@ -8,7 +8,7 @@ import yaml
 
 from modt import assets, profile
 from modt.errors import MisuseError
-from modt.profile.schema import FILE, schema_text
+from modt_desk.cli.profile_schema import FILE, schema_text
 
 SCHEMA = json.loads(schema_text())
 SHIPPED = sorted(assets.folder("profiles").glob("*.yaml"))

@@ -1,7 +1,8 @@
-"""JSON Schema of a profile, for editors, from the metadata of the configuration."""
+"""`modt profile schema`: the JSON Schema of a profile, from the metadata of the configuration."""
 
 from __future__ import annotations
 
+import argparse
 import json
 from typing import Any
 
@@ -10,6 +11,18 @@ from modt.profile.yaml_text import EXTENDS
 
 FILE = "profile.schema.json"
 """Its name in profiles/."""
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command."""
+    p = commands.add_parser("schema", help="print the JSON Schema of a profile, for editors")
+    p.set_defaults(run=run)
+
+
+def run(_arguments: argparse.Namespace) -> int:
+    """Print it."""
+    print(schema_text(), end="")
+    return 0
 
 
 def schema_text() -> str:
