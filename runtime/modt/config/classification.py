@@ -70,7 +70,7 @@ class DecisionConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FusionConfig(StageConfig):
-    """Independent views and final classes (section V-C, Figs. 10 and 11), found by tools/study/sweep_fusion.py.
+    """Independent views and final classes (section V-C, Figs. 10 and 11), found by sweeps: docs/log/fusion-sweep.md.
 
     first_view_*: mode efficient; object_threshold, review_point_ratio, review_extra_points: both modes; the other
     thresholds, start_frame, *_change and review_*: mode accurate.
