@@ -38,7 +38,6 @@ _STATE_COLOURS = {
     "lost_classified": COLOURS[3],
     "lost_unclassified": COLOURS[6],
 }
-STATES = tuple(_STATE_COLOURS)
 
 
 def classes() -> list[Entry]:
@@ -49,12 +48,6 @@ def classes() -> list[Entry]:
 def states(names: Iterable[str]) -> list[Entry]:
     """Of states: waiting ones grey, final ones green, those in doubt orange, lost ones violet or ochre."""
     return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
-
-
-def truth() -> dict[str, Entry]:
-    """Of what became of labelled objects, and of tracks that are said to be what they are not."""
-    colours = {"found": COLOURS[7], "missed": "#d6177f", "not judged": _GREY, "false": "#e07b00"}
-    return {name: {"name": name, "colour": colour} for name, colour in colours.items()}
 
 
 def stages(names: Sequence[str] = STAGES) -> list[Entry]:

@@ -21,7 +21,8 @@ from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA, recorded_pose
 from modt.types import Float64, Int
-from modt.viewer.track_rows import frame_rows, planar, track_table
+from modt.viewer.track_rows import planar
+from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
 COUNTS: dict[str, Callable[[Any], Any]] = {
     "frame": int,
