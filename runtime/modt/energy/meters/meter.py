@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -16,6 +16,11 @@ class Kind(StrEnum):
     INTEGRATED = "integrated"  # power samples integrated over time
     ESTIMATED = "estimated"  # computed from assumptions
     UNAVAILABLE = "unavailable"
+
+
+def worst(kinds: Iterable[Kind]) -> Kind:
+    """The least reliable kind, which is that of a sum."""
+    return max(kinds, key=list(Kind).index)
 
 
 class Measurand(StrEnum):
@@ -31,6 +36,7 @@ class Scope(StrEnum):
     PROCESS = "this process, by a model"
     CPU = "CPU packages"
     SOC = "system on chip"
+    MODULE = "the module, without what its carrier board feeds"
     BOARD = "whole board"
     ROBOT = "everything on the battery"
     RAIL = "one rail, of unknown extent"
@@ -47,7 +53,7 @@ class Facts:
     name: str
     unit: str  # of the device's own readings
     resolution: float  # smallest step of a reading [J or W]
-    max_W: float  # upper bound of plausible power
+    max_W: float  # range: more power than it can show
     scope: Scope  # consumers covered
     kind: Kind  # reliability of the energy derived from it
     wrap_J: float | None = None  # range of an energy counter; None where it never wraps, or the range is unknown
@@ -57,6 +63,11 @@ class Facts:
     def measurand(self) -> Measurand:
         """Power where it is integrated, else energy."""
         return Measurand.POWER if self.kind is Kind.INTEGRATED else Measurand.ENERGY
+
+    @property
+    def must_draw(self) -> bool:
+        """Whether its consumers draw power whenever this program runs."""
+        return self.scope not in (Scope.PROCESS, Scope.RAIL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +97,7 @@ def read_number(path: Path) -> float:
     text = read_text(path)
     try:
         return float(int(text))
-    except ValueError:
+    except (ValueError, OverflowError):
         raise MeterLostError(f"{path}: {text!r} is not a number") from None
 
 
