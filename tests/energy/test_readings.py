@@ -53,8 +53,9 @@ def test_every_state_and_event_has_a_row() -> None:
         ([1380.0, 1680.0, 1690.0], [(None, "implausible"), (300.0, ""), (10.0, "")]),
         ([1082.0, 1085.0, 1088.0], [(None, "implausible"), (3.0, ""), (3.0, "")]),
         ([9000.0, 30_000.0, 1200.0], [(None, "implausible"), (None, "implausible"), (None, "back")]),
+        ([-40.0, RANGE_J + 1, 1200.0], [(None, "lost"), (None, "lost"), (None, "back")]),
     ],
-    ids="steady zero jump stuck lost none reset busier idle garbage".split(),
+    ids=["steady", "zero", "jump", "stuck", "lost", "none", "reset", "busier", "idle", "garbage", "out of range"],
 )
 def test_faults_of_a_counter(readings: list[float | None], found: list[tuple[float | None, str]]) -> None:
     assert judged(facts(), KNOWN + readings)[2:] == found
@@ -72,7 +73,7 @@ def test_faults_of_a_counter(readings: list[float | None], found: list[tuple[flo
         ([6.0, 6.0, 30.0, 31.0], [(6.0, ""), (None, "implausible"), (30.5, "")]),
         ([6.0, 6.0, 1e300, 1e300], [(6.0, ""), (None, "implausible"), (None, "implausible")]),
     ],
-    ids="steady spike zero drop reversed first busier beyond".split(),
+    ids=["steady", "spike", "zero", "drop", "reversed", "first", "busier", "beyond"],
 )
 def test_faults_of_a_power_sensor(readings: list[float | None], found: list[tuple[float | None, str]]) -> None:
     assert judged(RAIL, readings) == found
@@ -102,8 +103,8 @@ def test_a_counter_is_ambiguous_over_an_interval_in_which_it_may_go_round() -> N
 def counted(random: np.random.Generator, energy_J: np.ndarray) -> Iterator[float | None]:
     """What a counter shows at each time, by the true energy of each interval before it.
 
-    A fault is one that can be told: a value, alone among five, that no machine of several times the power reaches, a counter that
-    stands still (and has, or has not, counted meanwhile), is gone, or begins anew far from its range.
+    A fault is one that can be told: a value, alone among five, that no machine of several times the power reaches, a
+    counter that stands still (and has, or has not, counted meanwhile), is gone, or begins anew far from its range.
     """
     most_J = 5 * float(energy_J.max())
     value_J, held_J, left, stalled, rest = float(random.uniform(0, RANGE_J)), None, 0, False, 0
@@ -122,7 +123,7 @@ def counted(random: np.random.Generator, energy_J: np.ndarray) -> Iterator[float
             stalled = bool(held_J is not None and random.random() < 0.5)
             yield held_J
         else:
-            value_J = 0.0 if fault == "reset" and most_J < value_J < RANGE_J - most_J else value_J
+            value_J = 0.0 if fault == "reset" and rest < 0 and most_J < value_J < RANGE_J - most_J else value_J
             yield floor(value_J)
         rest -= 1
 

@@ -19,11 +19,14 @@ def machine(tmp_path: Path) -> SimulatedMachine:
     return SimulatedMachine(tmp_path)
 
 
+def fresh(machine: SimulatedMachine) -> Windows:
+    meters = find_powercap(machine.sys)[0].meters
+    return Windows(meters, machine.clocks, Conditions(0, machine.sys), WindowConfig())
+
+
 def windows_of(machine: SimulatedMachine) -> Windows:
     """Windows over the machine's counter, after the first one, which compares with nothing."""
-    windows = Windows(
-        find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys), WindowConfig()
-    )
+    windows = fresh(machine)
     machine.wait(0.1)
     assert windows.close()["marks"] == ["first"]
     return windows
@@ -165,8 +168,7 @@ def test_without_a_meter_energy_is_unavailable(machine: SimulatedMachine) -> Non
 @given(st.lists(st.tuples(st.floats(0, 0.6), st.floats(0, 0.6), st.integers(0, 4)), max_size=8))
 def test_parts_of_every_window_sum_to_it(tmp_path_factory: Any, frames: list[tuple[float, float, int]]) -> None:
     machine = SimulatedMachine(tmp_path_factory.mktemp("sys"))
-    meters, ledger = find_powercap(machine.sys)[0].meters, machine.ledger()
-    windows = Windows(meters, machine.clocks, Conditions(0, machine.sys), WindowConfig())
+    ledger, windows = machine.ledger(), fresh(machine)
     start, lines = machine.now_ns, []
     for index, (busy, idle, items) in enumerate(frames):
         ledger.run("tracking", machine.work, busy, busy, items)
@@ -185,10 +187,7 @@ def test_parts_of_every_window_sum_to_it(tmp_path_factory: Any, frames: list[tup
 
 def test_the_first_window_of_a_counter_is_short(machine: SimulatedMachine) -> None:
     """It takes a measured power to judge a reading by; a power sample needs none."""
-    ledger = machine.ledger()
-    windows = Windows(
-        find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys), WindowConfig()
-    )
+    ledger, windows = machine.ledger(), fresh(machine)
     machine.wait(0.1)
     line = windows.add(ledger.close_frame(0))
     assert line is not None

@@ -1,8 +1,8 @@
 """The one rule that turns readings of a meter into joules, for counters and power samples alike.
 
-An interval is measured when the readings at both its ends are confirmed; any other interval is marked with its cause.
+An interval is measured when the readings at both its ends are confirmed; any other one is marked with its cause.
 A reading is confirmed by the power that it implies: near what the meter has shown, counted from the last confirmed
-reading, or near what the doubtful reading before it implied. Only that makes a doubtful reading a base of differences.
+reading, or near what the doubtful reading before it implied. Only so does a doubtful reading become a base.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 
 from modt.energy.meters.meter import Facts, Kind, Measurand
 
@@ -22,7 +23,7 @@ TICK_S = 0.01
 class Event(Enum):
     """Relation of a reading to those before."""
 
-    FITS = "continues the confirmed reading"
+    FITS = "continues the confirmed reading, or one before a standstill"
     AGREES = "continues the doubtful reading"
     STRAYS = "continues neither"
     LOST = "there is none"
@@ -49,6 +50,7 @@ class History:
     base: float | None = None  # last confirmed reading
     base_s: float = 0.0  # time since
     doubtful: float | None = None  # last reading, while it is doubted
+    doubtful_s: float = 0.0  # time for which it had stood still before
     doubtful_W: float | None = None  # power that it implies
     low_W: float = math.inf  # lowest and highest power measured
     high_W: float = -math.inf
@@ -74,34 +76,38 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     """The history after a reading, the energy of the interval up to it [J], None where not measured, and its mark.
 
     Marks: "wrap" (measured; a counter passed its range); without energy "first" (nothing to compare with), "lost"
-    (unreadable), "back" (the reading before was lost or doubtful), "implausible" (unlike what the meter has shown),
-    "reset" (counter decreased), "negative" (power below zero), "stuck" (nothing is drawn), "ambiguous" (long enough for
-    a full range of the counter).
+    (unreadable or out of range), "back" (the reading before was lost or doubtful), "implausible" (unlike what the
+    meter has shown), "reset" (counter decreased), "negative" (power below zero), "stuck" (nothing is drawn),
+    "ambiguous" (long enough for a full range of the counter).
     """
-    base_s, event = before.base_s + seconds, Event.STRAYS
-    if reading is None or not math.isfinite(reading):
-        state, _ = TABLE[before.state, Event.LOST]
-        return replace(before, state=state, base_s=base_s, doubtful=None, doubtful_W=None), None, "lost"
+    base_s, event, agrees = before.base_s + seconds, Event.STRAYS, False
+    unsettled = partial(History, base=before.base, base_s=base_s, low_W=before.low_W, high_W=before.high_W)
+    counts = facts.measurand is Measurand.ENERGY
+    if reading is None or not math.isfinite(reading) or (counts and not 0 <= reading <= (facts.wrap_J or reading)):
+        return unsettled(TABLE[before.state, Event.LOST][0]), None, "lost"
     if facts.kind is Kind.ESTIMATED:  # a formula
         return History(CONFIRMED, reading), None if before.base is None else reading - before.base, ""
-    step, agrees = _step(facts, before, before.base, reading, base_s), False
-    if step.near(before.low_W, before.high_W):
-        event = Event.FITS
+    step = from_base = _step(facts, before, before.base, reading, base_s)
+    if before.doubtful is not None:
+        step = _step(facts, before, before.doubtful, reading, before.doubtful_s + seconds)
+    if step.fault != "stuck" and from_base.near(before.low_W, before.high_W):
+        step, event = from_base, Event.FITS
     elif before.doubtful is not None:
-        step, watts = _step(facts, before, before.doubtful, reading, seconds), before.doubtful_W
+        watts = before.doubtful_W
         agrees = watts is not None and not step.mark and step.near(watts, watts)
-        event = Event.AGREES if agrees or step.near(before.low_W, before.high_W) else event
+        if agrees or step.near(before.low_W, before.high_W):
+            event = Event.FITS if before.doubtful_s else Event.AGREES
     state, measured = TABLE[before.state, event]
     if state is DOUBTED:
         mark = step.fault or ("first" if before.base is None else "implausible")
-        doubtful = None if mark == "stuck" else reading  # of an older time
-        return replace(before, state=state, base_s=base_s, doubtful=doubtful, doubtful_W=step.watts), None, mark
+        age_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
+        return unsettled(state, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts), None, mark
     after = History(state, reading, low_W=before.low_W, high_W=before.high_W)
     if not measured:
         return after, None, "back"
     shown = [watts for watts in (step.watts, before.doubtful_W if agrees else None) if watts is not None]
     after = replace(after, low_W=min([before.low_W, *shown]), high_W=max([before.high_W, *shown]))
-    if facts.measurand is Measurand.ENERGY:
+    if counts:
         return after, max(step.joules, 0.0), step.mark
     start = before.base if event is Event.FITS else before.doubtful
     return after, 0.5 * seconds * (max(start or 0.0, 0.0) + max(reading, 0.0)), ""

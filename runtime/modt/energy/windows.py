@@ -26,7 +26,7 @@ class Clocks:
 
 
 PRIMING_S = 0.05
-"""Length of the first window of a counter [s]: it has no energy, since nothing is known of the counter's power yet."""
+"""Length of the first window of a counter [s], which has no energy: there is no power yet to judge it by."""
 
 
 class EnergyAccumulator:
