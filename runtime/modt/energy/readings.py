@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import partial
 
 from modt.energy.meters.meter import Facts, Kind, Measurand
 
@@ -80,59 +79,55 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     meter has shown), "reset" (counter decreased), "negative" (power below zero), "stuck" (nothing is drawn),
     "ambiguous" (long enough for a full range of the counter).
     """
-    base_s, event, agrees = before.base_s + seconds, Event.STRAYS, False
-    unsettled = partial(History, base=before.base, base_s=base_s, low_W=before.low_W, high_W=before.high_W)
-    counts = facts.measurand is Measurand.ENERGY
+    shown, counts = (before.low_W, before.high_W), facts.measurand is Measurand.ENERGY
+    unsettled = replace(before, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None)
     if reading is None or not math.isfinite(reading) or (counts and not 0 <= reading <= (facts.wrap_J or reading)):
-        return unsettled(TABLE[before.state, Event.LOST][0]), None, "lost"
+        return replace(unsettled, state=TABLE[before.state, Event.LOST][0]), None, "lost"
     if facts.kind is Kind.ESTIMATED:  # a formula
         return History(CONFIRMED, reading), None if before.base is None else reading - before.base, ""
-    step = from_base = _step(facts, before, before.base, reading, base_s)
+    step = from_base = _step(facts, before, before.base, reading, unsettled.base_s)
+    event, near_W = Event.STRAYS, before.doubtful_W
     if before.doubtful is not None:
         step = _step(facts, before, before.doubtful, reading, before.doubtful_s + seconds)
-    if step.fault != "stuck" and from_base.near(before.low_W, before.high_W):
-        step, event = from_base, Event.FITS
-    elif before.doubtful is not None:
-        watts = before.doubtful_W
-        agrees = watts is not None and not step.mark and step.near(watts, watts)
-        if agrees or step.near(before.low_W, before.high_W):
-            event = Event.FITS if before.doubtful_s else Event.AGREES
+    agrees = near_W is not None and not step.mark and step.near(near_W, near_W)
+    if step.fault != "stuck" and from_base.near(*shown):
+        step, event, agrees = from_base, Event.FITS, False
+    elif before.doubtful is not None and (agrees or step.near(*shown)):
+        event = Event.FITS if before.doubtful_s else Event.AGREES
     state, measured = TABLE[before.state, event]
     if state is DOUBTED:
         mark = step.fault or ("first" if before.base is None else "implausible")
         age_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
-        return unsettled(state, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts), None, mark
-    after = History(state, reading, low_W=before.low_W, high_W=before.high_W)
+        return replace(unsettled, state=state, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts), None, mark
+    levels = [W for W in (step.watts, near_W if agrees else None) if W is not None] if measured else []
+    after = History(state, reading, low_W=min(shown[0], *levels, math.inf), high_W=max(shown[1], *levels, -math.inf))
     if not measured:
         return after, None, "back"
-    shown = [watts for watts in (step.watts, before.doubtful_W if agrees else None) if watts is not None]
-    after = replace(after, low_W=min([before.low_W, *shown]), high_W=max([before.high_W, *shown]))
-    if counts:
-        return after, max(step.joules, 0.0), step.mark
     start = before.base if event is Event.FITS else before.doubtful
-    return after, 0.5 * seconds * (max(start or 0.0, 0.0) + max(reading, 0.0)), ""
+    joules = step.joules if counts else 0.5 * seconds * (max(start or 0.0, 0.0) + reading)
+    return after, max(joules, 0.0), step.mark
 
 
 def _step(facts: Facts, before: History, start: float | None, end: float, seconds: float) -> _Step:
-    if facts.measurand is Measurand.POWER:
-        fault = "stuck" if end <= 0 and facts.must_draw else "implausible" if end > facts.max_W else ""
-        fault = "negative" if end < -facts.resolution else fault
-        return _Step(0.0, None if fault else end, end - facts.resolution, end + facts.resolution, fault)
-    if start is None:
+    """Change from a counter's reading to another; a power sample is judged by itself, as the joules of a second."""
+    counts, fault, mark, tick_s = facts.measurand is Measurand.ENERGY, "", "", TICK_S
+    if not counts:
+        start, seconds, tick_s = 0.0, 1.0, 0.0
+    elif start is None:
         return _Step(0.0, None, 0.0, 0.0, "first")
-    joules, wrap_J, mark, fault = end - start, facts.wrap_J or math.inf, "", ""
-    if joules < 0 and facts.wrap_J is not None:
+    joules, wrap_J = end - start, facts.wrap_J or math.inf
+    if joules < 0 and facts.wrap_J:
         joules, mark = joules + wrap_J, "wrap"
-    least_W = (joules - facts.resolution) / (seconds + TICK_S)
-    most_W = (joules + facts.resolution) / (seconds - TICK_S) if seconds > TICK_S else math.inf
+    least_W = (joules - facts.resolution) / (seconds + tick_s)
+    most_W = (joules + facts.resolution) / (seconds - tick_s) if seconds > tick_s else math.inf
     # A wrap beyond what was shown may as well be a reset.
-    if joules < 0 or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
-        fault = "reset"
+    if joules < -facts.resolution or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
+        fault = "reset" if counts else "negative"
     elif seconds * min(facts.max_W, SURGE * before.high_W if before.base is not None else math.inf) >= wrap_J:
         fault = "ambiguous"
-    elif joules == 0 and seconds > 10 * TICK_S and facts.must_draw:
+    elif joules <= 0 and seconds > 10 * tick_s and facts.must_draw:
         fault = "stuck"
     elif least_W > facts.max_W:
         fault = "implausible"
-    watts = joules / seconds if seconds > 2 * TICK_S and not fault and not mark else None
+    watts = joules / seconds if seconds > 2 * tick_s and not fault and not mark else None
     return _Step(joules, watts, least_W, most_W, fault, mark)

@@ -35,6 +35,7 @@ class Scope(StrEnum):
 
     PROCESS = "this process, by a model"
     CPU = "CPU packages"
+    CPU_RAIL = "the rail of the CPU, with what shares it"
     SOC = "system on chip"
     MODULE = "the module, without what its carrier board feeds"
     BOARD = "whole board"
@@ -46,7 +47,7 @@ class MeterLostError(Exception):
     """The meter cannot be read now."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Facts:
     """Static properties of a meter."""
 
@@ -156,14 +157,8 @@ def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns
         wall_ns: monotonic clock.
         cpu_ns: CPU time of this process.
     """
-    facts = Facts(
-        name=model_name(idle_W, busy_W),
-        unit="J",
-        resolution=1e-9,
-        max_W=max(idle_W, busy_W) * 1024,
-        scope=Scope.PROCESS,
-        kind=Kind.ESTIMATED,
-    )
+    most_W = max(idle_W, busy_W) * 1024
+    facts = Facts(model_name(idle_W, busy_W), "J", 1e-9, most_W, Scope.PROCESS, Kind.ESTIMATED)
     return Meter(facts, lambda: model_J(idle_W, busy_W, wall_ns(), cpu_ns()))
 
 
