@@ -79,10 +79,16 @@ class FitError(Exception):
     """The windows do not determine the coefficients; the message names the load to vary."""
 
 
+def usable(line: Line) -> bool:
+    """Whether a window has a reading that can be true, and no mark that forbids its use."""
+    energy_J = line["energy_J"]
+    known = energy_J is not None and _HARMLESS_MARKS.issuperset(line.get("marks", ()))
+    return known and 0.0 <= energy_J <= _MAX_W * IDLE.count(line)
+
+
 def usable_windows(lines: Iterable[Line]) -> list[Line]:
-    """Windows with a reading that can be, and without a mark that forbids its use."""
-    known = (line for line in lines if line["energy_J"] is not None and _HARMLESS_MARKS.issuperset(line["marks"]))
-    return [line for line in known if 0.0 <= line["energy_J"] <= _MAX_W * IDLE.count(line)]
+    """The windows that are usable."""
+    return [line for line in lines if usable(line)]
 
 
 def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 1000) -> Fit:
@@ -212,7 +218,7 @@ class EnergySums:
         """Add a line of modt.energy; one that is not usable is counted as dropped."""
         self.conditions = window["conditions"]
         self.marks.update(window["marks"])
-        if not usable_windows([window]):
+        if not usable(window):
             self.dropped += 1
             self.marks.update(() if window["energy_J"] is None or window["marks"] else {"implausible"})
         elif window["frames"][2]:

@@ -207,7 +207,7 @@ def _battery(folder: Path) -> Meter:
     return Meter(facts, read)
 
 
-_RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=(\S*)[AV]\s")
+_RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=(\S*)[AV](?!\S)")
 _STEP_W = 0.02  # from the width of the converter
 _FACTS = Facts("Raspberry Pi 5 PMIC", "V x A", _STEP_W, 50.0, Scope.MODULE, Kind.INTEGRATED, privilege="group video")
 
