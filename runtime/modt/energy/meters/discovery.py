@@ -8,8 +8,8 @@ import subprocess
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from modt.energy.meters.boards import Board, board_of
 from modt.energy.meters.meter import (
     Candidate,
     Facts,
@@ -24,6 +24,9 @@ from modt.energy.meters.meter import (
     text_or_none,
 )
 from modt.errors import MisuseError
+
+if TYPE_CHECKING:
+    from modt.energy.meters.boards import Board
 
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
 _SAME_J = 1e-3
@@ -111,7 +114,8 @@ def find_hwmon(sys: Path) -> list[Candidate]:
             found_here = _rails(folder, chip)
             rails |= {f"{label} of {folder.name}" if label in rails else label: m for label, m in found_here.items()}
     found = _counters("AMD sockets", sockets, "run as root, or chmod a+r its energy inputs")
-    found += _rails_of_board(text_or_none(sys / "firmware/devicetree/base/model") or "", rails)
+    if rails:
+        found += _rails_of_board(text_or_none(sys / "firmware/devicetree/base/model") or "", rails)
     if not found:
         remedy = "wire an INA219, INA226 or INA3221 into the supply and load its driver"
         found.append(Candidate("hwmon", (), "no power monitor and no energy counter under /sys/class/hwmon", remedy))
@@ -120,6 +124,8 @@ def find_hwmon(sys: Path) -> list[Candidate]:
 
 def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
     """Each rail by itself; the module of a known board is the one that feeds the others, or the sum of several."""
+    from modt.energy.meters.boards import board_of  # for those that have rails
+
     remedy, board = "make the chip's inputs readable", board_of(model, rails)
     found = [] if board is None else [_module(board, rails, remedy)]
     for label, meter in rails.items():
