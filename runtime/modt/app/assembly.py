@@ -92,7 +92,7 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
     if budget.mean_ms is None or price_ms <= budget.mean_ms:
         return
     price = f"{budget.mean_ms:.2g} ms of CPU a frame, but a classification takes {price_ms:.2g} ms on this machine"
-    often = "none is made" if not budget.mean_ms else f"one frame in {price_ms / budget.mean_ms:.0f} has one"
+    often = f"one is made every {price_ms / budget.mean_ms:.3g} frames" if budget.mean_ms else "none is made"
     remedy = f"cpu_ms_per_frame to {price_ms:.2g} or energy_mJ_per_frame to {price_ms * profile.energy.active_W:.2g}"
     log.warning("scheduler: the budget is %s: %s; for one in each raise %s", price, often, remedy)
 
