@@ -48,7 +48,9 @@ def test_a_budget_below_the_price_of_a_call_is_warned_of(mode, scheduler, warned
     monkeypatch.setattr(assembly, "time", clock)
     with caplog.at_level(logging.WARNING):
         pipeline(mode, **scheduler)
-    assert ("the budget is" in caplog.text and "one is made every" in caplog.text and "raise" in caplog.text) is warned
+    assert (
+        "the budget is" in caplog.text and "one is made every" in caplog.text and "raise" in caplog.text
+    ) is warned
     assert len(caplog.records) == warned
 
 

@@ -275,6 +275,12 @@ def test_a_module_that_draws_less_than_its_rails_is_refused(tmp_path: Path) -> N
         found.choose("VDD_IN")
 
 
+def test_a_module_is_usable_while_a_rail_that_it_feeds_cannot_be_read(tmp_path: Path) -> None:
+    board(tmp_path, NX)
+    (tmp_path / "class" / "hwmon" / "hwmon0" / "curr3_input").write_text("none")
+    assert watts_of(look(tmp_path), "VDD_IN") == pytest.approx(5.0)
+
+
 def test_two_chips_with_one_label_are_two_rails(tmp_path: Path) -> None:
     for n in (0, 1):
         folder = tmp_path / "class" / "hwmon" / f"hwmon{n}"

@@ -140,9 +140,12 @@ def _module(board: Board, rails: dict[str, Meter], remedy: str) -> Candidate:
     summed = f"{board.name} module ({' + '.join(board.whole)})"
     module = probe(summed if len(whole) > 1 else whole[0].facts.name, whole, remedy)
     parts = [rails[label] for label in board.parts if label in rails]
-    if module.usable and sum(m.read() for m in parts) > _PART_SHARE * sum(m.read() for m in whole):
-        return replace(module, why_not="less than the rails that it feeds", remedy="check shunts and labels")
-    return module
+    try:
+        beyond = sum(m.read() for m in parts) > _PART_SHARE * sum(m.read() for m in whole)
+    except MeterLostError:
+        return module
+    cause = "less than the rails that it feeds"
+    return replace(module, why_not=cause, remedy="check shunts and labels") if beyond else module
 
 
 def _scoped(meter: Meter, scope: Scope) -> Meter:

@@ -99,7 +99,7 @@ def read_number(path: Path) -> float:
     try:
         return float(int(text))
     except (ValueError, OverflowError):
-        raise MeterLostError(f"{path}: {text!r} is not a number") from None
+        raise MeterLostError(f"{path}: {text[:40]!r} is not a number") from None
 
 
 def text_or_none(path: Path) -> str | None:
