@@ -249,6 +249,7 @@ class Budget:
 
     calls: int | None = None  # proposals classified
     cpu_ms: float | None = None  # CPU time by the cost model [ms]
+    mean_ms: float | None = None  # CPU time on average; what is not spent is carried over, for a second at most [ms]
 
 
 UNLIMITED = Budget()

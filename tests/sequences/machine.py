@@ -20,7 +20,8 @@ from tests.sequences.world import SENSORS, World, broken
 
 SEED = st.integers(0, 9)
 GAPS_S = st.sampled_from([0.0, 5e-324, 1e-9, 0.01, 0.1, 0.5, 0.95, 60.0, 3600.0]) | st.floats(0.0, 3600.0)
-BUDGETS = st.builds(Budget, st.sampled_from([None, 0, 1, 3, 16]), st.sampled_from([None, 0.0, 1e-6, 0.02, 0.3, 5.0]))
+LIMITS_MS = st.sampled_from([None, 0.0, 1e-6, 0.02, 0.3, 5.0])
+BUDGETS = st.builds(Budget, st.sampled_from([None, 0, 1, 3, 16]), LIMITS_MS, LIMITS_MS)
 
 
 class Sequences(RuleBasedStateMachine):

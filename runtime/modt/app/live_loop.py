@@ -164,7 +164,7 @@ class LiveLoop:
         step = self.ladder.step
         left_ms = max(1e3 * (deadline_s - self._clock()) - self.rest.ms, 0.0)
         budget = budget_at(step, self._stages.budget, left_ms, received.frame.index)
-        self.budget_ms = left_ms if budget.cpu_ms is None else budget.cpu_ms
+        self.budget_ms = min(ms for ms in (left_ms, budget.cpu_ms, budget.mean_ms) if ms is not None)
         result = self._stages.step(received.frame, budget, reduced=step >= Step.REDUCED)
         for named in self._sinks:
             try:

@@ -46,8 +46,8 @@ class SchedulerConfig(StageConfig):
     """Budget of classification per frame; none: unlimited."""
 
     calls_per_frame: int | None = number(16, 0, 10000, "", "proposals classified")
-    cpu_ms_per_frame: float | None = number(None, 0.0, 10000.0, "ms", "CPU time by the cost model")
-    energy_mJ_per_frame: float | None = number(None, 0.0, 100000.0, "mJ", "above idle during that time")
+    cpu_ms_per_frame: float | None = number(None, 0.0, 10000.0, "ms", "CPU time, on average over a second")
+    energy_mJ_per_frame: float | None = number(None, 0.0, 100000.0, "mJ", "above idle, on average over a second")
     worth: CallWorthConfig = mechanism(CallWorthConfig)
     cost: CostModelConfig = mechanism(CostModelConfig)
 

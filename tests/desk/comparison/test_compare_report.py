@@ -75,6 +75,9 @@ def mode_run(name, metered):
     board = Board()
     ledger = Ledger(lambda: board.now_ns, lambda: board.cpu_ns)
     windows = Windows([board], board.clocks(), Conditions(), WindowConfig(min_s=0.1)) if metered else None
+    for _ in range(2 if windows else 0):  # its power is known
+        board.work(100)
+        windows.close()
     steps = Steps(board, ledger, EVERY[name])
     return ModeRun(steps, ledger, lambda index: UNLIMITED, windows)
 

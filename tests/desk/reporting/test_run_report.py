@@ -215,6 +215,36 @@ def test_rejected_windows_are_dropped_and_counted(run):
     assert "marked: lost" in run_text(tree)
 
 
+@pytest.mark.parametrize("energy_J", [-0.4, 1e300, 7e4, float("nan"), float("inf")])
+def test_windows_that_cannot_be_are_dropped_and_said(run, energy_J):
+    lines = [ledger_line(k, 1) for k in range(5)]
+    with (run / "ledger.jsonl").open("a") as out:
+        out.write(json.dumps(window(9, lines, energy_J)) + "\n")
+    tree = run_tree(run)
+    assert (tree["dropped_windows"], tree["marks"]) == (1, ["implausible"])
+    assert tree["gross_J"].value == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_run_is_as_reliable_as_its_least_reliable_window(run, order):
+    kept = [window(k, [ledger_line(k, 1)], 0.3, kind) for k, kind in enumerate(["measured", "estimated"][::order])]
+    ledger = (run / "ledger.jsonl").read_text().splitlines()
+    frames = [line for line in ledger if "modt.ledger" in line]
+    (run / "ledger.jsonl").write_text("\n".join([*frames, *map(json.dumps, kept)]) + "\n")
+    tree = run_tree(run)
+    assert tree["gross_J"].kind.value == "estimated"
+    assert "assumed power" in tree["test"]
+
+
+def test_what_is_not_measured_is_not_called_so(tmp_path):
+    """Energy above idling rests on the idle power of the profile, and without a meter all does."""
+    tree = run_tree(write_run(tmp_path / "metered"))
+    assert (tree["gross_J"].kind.value, tree["net_J"].kind.value) == ("measured", "estimated")
+    estimated = run_tree(write_run(tmp_path / "run", windows=False))
+    said = [run_text(estimated).replace("No mark: measured", ""), *(note for _, _, note in run_plots(estimated))]
+    assert not [line for text in said for line in text.splitlines() if "measured" in line and "E1 is" not in line]
+
+
 def test_the_baseline_saves_nothing(tmp_path):
     tree = run_tree(write_run(tmp_path / "run", mode="conventional"))
     assert tree["saved"]["gamma_of_this_run"].value == pytest.approx(1.0)

@@ -99,7 +99,7 @@ class Reconciliation:
 
     def explain(self, measured: float) -> tuple[GammaTerm, ...]:
         """The terms, and the remainder up to the measured ratio."""
-        remainder = GammaTerm("not explained (measured - reconciled)", measured - self.model.gamma, measured)
+        remainder = GammaTerm("not explained (observed - reconciled)", measured - self.model.gamma, measured)
         return (*self.terms, remainder)
 
 

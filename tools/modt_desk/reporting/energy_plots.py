@@ -23,11 +23,11 @@ def stage_energy_mJ(series: dict[str, Any]) -> dict[str, Float64]:
     return {stage: watts * np.array(series["cpu_ms"][stage], float) for stage, watts in series["stage_W"].items()}
 
 
-def basis(net_J: Quantity) -> str:
+def basis(gross_J: Quantity) -> str:
     """Origin of the energy that the plots show."""
-    if net_J.kind is Kind.ESTIMATED:
+    if gross_J.kind is Kind.ESTIMATED:
         return "estimated from CPU time, without idling"
-    return f"{net_J.kind}, its split over stages and frames estimated; without idling and what is unattributed"
+    return f"{gross_J.kind}, its split over stages and frames estimated; without idling and what is unattributed"
 
 
 def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64, note: str) -> Plot:
@@ -49,7 +49,7 @@ def life_histogram(title: str, lives: dict[str, list[int]]) -> Plot:
     life = np.array(lives["values"], float)
     edges = np.linspace(0.5, max(life.max(initial=1.0), 1.0) + 0.5, 31)
     heights = np.histogram(life, edges, weights=np.array(lives["counts"], float))[0]
-    return (title, svg.bars(edges, heights, "frames seen", "tracks"), "measured")
+    return (title, svg.bars(edges, heights, "frames seen", "tracks"), "counted")
 
 
 def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quantity]], note: str) -> Plot:

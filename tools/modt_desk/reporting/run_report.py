@@ -114,7 +114,7 @@ def _energy(sums: EnergySums, idle_W: float) -> dict[str, Any]:
     return {
         "meter": {"name": sums.meter, "kind": sums.kind.value, "windows": sums.count},
         "gross_J": quantity(gross_J / frames, "J", sums.kind, bounds),
-        "net_J": quantity((gross_J - idle_W * seconds) / frames, "J", sums.kind),
+        "net_J": estimate((gross_J - idle_W * seconds) / frames, "J"),
         "power_W": quantity(gross_J / seconds if seconds else None, "W", sums.kind),
         "parts_J": {name: estimate(part_J / frames, "J") for name, part_J in sums.parts_J.items()},
     }
@@ -245,7 +245,7 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
     series, saved = tree["series"], tree["saved"]
     each = np.array(series["frames"], float)
     frames = np.cumsum(each) - each
-    parts_mJ, basis = energy_plots.stage_energy_mJ(series), energy_plots.basis(tree["net_J"])
+    parts_mJ, basis = energy_plots.stage_energy_mJ(series), energy_plots.basis(tree["gross_J"])
     baseline, run_mJ = "E1, tracking-by-detection (computed)", np.sum([*parts_mJ.values()], axis=0)
     further_ms = np.array(series["e1_cpu_ms"]) - np.sum([*series["cpu_ms"].values()], axis=0)  # of classification
     energy_mJ = {baseline: run_mJ + series["stage_W"][CLASSIFICATION] * further_ms, "E2, this run": run_mJ}
@@ -258,7 +258,7 @@ def run_plots(tree: dict[str, Any]) -> list[Plot]:
         energy_plots.cumulative_energy(energy_mJ, each, f"E2: {basis}; E1: estimated", dashed=baseline),
         energy_plots.gamma_curve(saved["a"], saved["proposals"], point, "dot: this run"),
         energy_plots.life_histogram("Life of tracks", series["lives"]),
-        ("Use of the budget", svg.lines(budget, "frame", "proposals"), "measured"),
+        ("Use of the budget", svg.lines(budget, "frame", "proposals"), "counted"),
     ]
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from modt import profile
 from modt.config import ProfileConfig
+from modt.energy.attribution import usable
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
@@ -137,7 +138,7 @@ def _costs(ledger: Path) -> dict[int, dict[str, Any]]:
         costs[line["frame"]] = {"cpu_ms": {name: s["cpu_ns"] / 1e6 for name, s in line["stages"].items()}}
     for window in read_records(ledger, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}):
         first, last, n = window["frames"]
-        if n and window["energy_J"] is not None:
+        if n and usable(window):
             energy = {"energy_mJ": 1e3 * window["energy_J"] / n, "kind": window["kind"]}
             for frame in range(first, last + 1):
                 if frame in costs:

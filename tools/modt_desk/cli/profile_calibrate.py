@@ -11,7 +11,7 @@ from modt.cli import options
 from modt.errors import ModtError
 
 if TYPE_CHECKING:
-    from modt.energy.window_fit_calibration import Calibration
+    from modt_desk.comparison.window_fit_calibration import Calibration
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -46,9 +46,9 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.config import WindowConfig
     from modt.energy.attribution import FitError
     from modt.energy.ledger import Ledger
-    from modt.energy.window_fit_calibration import Workload
     from modt.geometry import FieldOfView
     from modt.sinks.output import writing
+    from modt_desk.comparison.window_fit_calibration import Workload
 
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)
