@@ -17,6 +17,7 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.received_poses import ReceivedPoses
+from modt.types import Float64
 
 _BUFFER_BYTES = 1 << 20
 _READ_AT_ONCE = 4096  # in a flood; the kernel holds about as many
@@ -102,17 +103,16 @@ class PoseSocket(ReceivedPoses):
         """Close the socket and remove its file."""
         self._queue.close()
 
-    def _drain(self, now_s: float) -> None:
-        """Read what has arrived, the newest `capacity` datagrams: a flood must not delay the frame."""
+    def _take(self) -> list[bytes]:
+        """The newest `capacity` datagrams: a flood must not delay the frame."""
         taken, crowded_out = self._queue.take()
         self.received, self.overflowed = self.received + len(taken) + crowded_out, self._queue.overflowed
         if crowded_out:
             self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"), crowded_out)
-        for raw in taken:
-            try:
-                self._keep(*read_datagram(raw), now_s)
-            except DatagramError as error:
-                self._refuse(error)
+        return taken
+
+    def _read(self, message: bytes) -> tuple[float, Float64]:
+        return read_datagram(message)
 
 
 def open_socket(address: Address) -> socket.socket:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -29,7 +30,7 @@ class ReceivedPoses(PoseSource):
 
     has_poses = True  # though frames may lack one
     REASONS = (
-        *("malformed", "non_finite", "crowded_out", "stale", "ahead"),
+        *("malformed", "non_finite", "unit", "crowded_out", "stale", "ahead", "failed"),
         *("repeated", "out_of_order", "early", "leap"),  # doubts of PoseBuffer
     )
     """Reasons of a refusal; each has a counter."""
@@ -47,8 +48,12 @@ class ReceivedPoses(PoseSource):
 
     def place(self, frame: Frame) -> Frame:
         """The frame with T_world_sensor at its stamp, None where the poses received are too old."""
-        self._drain(frame.stamp_s)
-        T = self._poses.believed.at(frame.stamp_s)
+        try:
+            for message in self._take():
+                self._add(message, frame.stamp_s)
+            T = self._poses.believed.at(frame.stamp_s)
+        except Exception as error:  # poses are optional: the run goes on without
+            T = self._failed(error)
         self.posed, self.unposed = self.posed + (T is not None), self.unposed + (T is None)
         return replace(frame, T_world_sensor=T, restarts=self.restarts)
 
@@ -65,9 +70,27 @@ class ReceivedPoses(PoseSource):
             "frames_unposed": self.unposed,
         }
 
-    def _drain(self, now_s: float) -> None:
-        """Keep what has arrived."""
+    def _take(self) -> Sequence[Any]:
+        """The messages that have arrived, without waiting."""
         raise NotImplementedError
+
+    def _read(self, message: Any) -> tuple[float, Float64]:
+        """Stamp [s] and (4, 4) T_world_sensor of a message; raises DatagramError."""
+        raise NotImplementedError
+
+    def _add(self, message: Any, now_s: float) -> None:
+        try:
+            self._keep(*self._read(message), now_s)
+        except DatagramError as error:
+            self._refuse(error)
+        except Exception as error:
+            self._failed(error)
+
+    def _failed(self, error: Exception) -> None:
+        """Go on without the poses before, which may be the cause."""
+        self._poses.clear()
+        remedy = "frames have no pose until it works; check the sender and its network, or report this line"
+        self._refuse(DatagramError("failed", f"{type(error).__name__}: {error}; {remedy}"))
 
     def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
         cause = f"stamp {stamp_s:.3f} s when the frame's is {now_s:.3f} s"
