@@ -87,6 +87,19 @@ def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after):
     assert len(ids[7] & ids[10]) >= 0.8 * len(whole[7] & whole[10])
 
 
+@pytest.mark.parametrize("posed", [False, True])
+def test_a_clock_that_steps_costs_no_track(posed):
+    steady, stepping = stages_of(), stages_of()
+    pose = np.eye(4) if posed else None
+    for given in frames():
+        frame = dataclasses.replace(given, T_world_sensor=pose, steady_s=given.stamp_s)
+        expected = steady.step(frame, UNLIMITED, reduced=False)
+        step_s = 3600.0 * (frame.index >= 6) - 7200.0 * (frame.index >= 12)
+        result = stepping.step(dataclasses.replace(frame, stamp_s=frame.stamp_s + step_s), UNLIMITED, reduced=False)
+        assert result.tracks.id.tolist() == expected.tracks.id.tolist()
+        np.testing.assert_array_equal(result.tracks.x, expected.tracks.x)
+
+
 def test_renewed_stages_begin_without_tracks_and_never_give_an_id_twice():
     stages = stages_of()
     before = [stages.step(frame, UNLIMITED, reduced=False) for frame in frames()[:5]]

@@ -17,7 +17,6 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.received_poses import ReceivedPoses
-from modt.types import Float64
 
 _BUFFER_BYTES = 1 << 20
 _READ_AT_ONCE = 4096  # in a flood; the kernel holds about as many
@@ -111,8 +110,7 @@ class PoseSocket(ReceivedPoses):
             self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"), crowded_out)
         return taken
 
-    def _read(self, message: bytes) -> tuple[float, Float64]:
-        return read_datagram(message)
+    _read = staticmethod(read_datagram)
 
 
 def open_socket(address: Address) -> socket.socket:

@@ -32,7 +32,7 @@ class PoseTopic(ReceivedPoses):
         self.received += len(taken)
         return taken
 
-    def _read(self, message: Message) -> tuple[float, Float64]:
+    def _read(self, message: Message, /) -> tuple[float, Float64]:
         try:
             odometry = read_odometry(message.data)
         except MessageError as error:

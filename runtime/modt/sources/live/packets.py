@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -21,6 +22,10 @@ log = logging.getLogger(__name__)
 MAX_BYTES = 65_535
 BUFFER_BYTES = 4 * 2**20
 """Asked of the kernel for packets received: a second of the fastest sensor."""
+LATE_S = 1.0
+"""Time that a packet has waited to be read, from which it is part of a sweep that is too old."""
+TIMESTAMP, TIMESPEC = 35, struct.Struct("@ll")
+"""SO_TIMESTAMPNS, which Python does not name: Linux states when it received a packet [s, ns]."""
 PAUSE_S = 0.01
 """Time without a packet after which a sensor that does not look all round may have ended its sweep."""
 
@@ -55,16 +60,21 @@ class PacketReader:
         self._socket.settimeout(min(timeout_s, PAUSE_S))
         while True:
             try:
-                payload, address = self._socket.recvfrom(MAX_BYTES)
+                payload, facts, _, address = self._socket.recvmsg(MAX_BYTES, socket.CMSG_SPACE(TIMESPEC.size))
             except (TimeoutError, BlockingIOError):
                 sweeps = self.decoder.pause(self.reception)
                 if sweeps or time.monotonic() >= until_s:
                     return sweeps
                 continue
             self.reception.messages += 1
+            now_s = self._clock()
+            received_s = next((s + 1e-9 * ns for _, _, raw in facts for s, ns in [TIMESPEC.unpack(raw)]), now_s)
             if self._source not in (None, address[0]):
                 refuse(self.reception, self.decoder.name, "from another address than the sensor's")
-            elif sweeps := self.decoder.decode(self._clock(), payload, self.reception):
+            elif now_s - received_s > LATE_S:
+                reason = "late: this process was stopped, or has too little CPU time, or the clock was set"
+                refuse(self.reception, self.decoder.name, reason)
+            elif sweeps := self.decoder.decode(received_s, payload, self.reception):
                 return sweeps
             if time.monotonic() >= until_s:
                 return []
@@ -83,6 +93,8 @@ def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
         MisuseError: the port is taken or not allowed, or the group cannot be joined.
     """
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with suppress(OSError):  # without it, packets are as of when they are read
+        made.setsockopt(socket.SOL_SOCKET, TIMESTAMP, 1)
     try:
         made.bind(("", port))
     except OSError as error:
