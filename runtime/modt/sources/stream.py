@@ -41,12 +41,12 @@ class Fault:
 
 MAX_STAMP_S = 1e11
 """Three thousand years: a stamp beyond it is no time in seconds."""
-UNITS = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
 
 
 def unit_of(ratio: float) -> str:
-    """Unit of a time that is so many times another one in seconds; empty where it is none of UNITS."""
-    return next((name for factor, name in UNITS.items() if abs(ratio / factor - 1.0) < 0.02), "")
+    """Unit of a time that is so many times another one in seconds; empty where it is none."""
+    units = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+    return next((name for factor, name in units.items() if abs(ratio / factor - 1.0) < 0.02), "")
 
 
 MAX_KEPT_FAULTS = 20

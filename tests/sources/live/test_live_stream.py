@@ -109,7 +109,7 @@ def test_a_failure_of_the_receiving_thread_costs_a_message(live, caplog):
         reader.give(batch)
     assert taken(stream).frame.stamp_s == 1.0
     assert stream.health()["refused_messages"] == {"failed (RuntimeError)": 2, "failed (AttributeError)": 1}
-    assert caplog.text.count("a message is left out; later ones are only counted") == 2
+    assert caplog.text.count("a message is left out") == 2
 
 
 def test_a_source_that_is_broken_reaches_the_loop(live):
@@ -272,4 +272,4 @@ def test_stamps_in_another_unit_are_said_to_be(factor, unit, caplog):
     driven = Driven()
     for k in range(20):
         driven.sweep(0.1, factor * 0.1 * k)
-    assert f"they seem to be in {unit}; have its driver write seconds" in caplog.text
+    assert f"are they in {unit}? have its driver write s" in caplog.text

@@ -28,7 +28,7 @@ STEP_S = 1.0
 DOUBT_S = 0.5
 """Time for which doubtful stamps are refused; if they keep coming, a clock was set, and they are followed."""
 JITTER_S = 0.1
-"""Change of the least delay between stamp and arrival, beyond which the stamps have stepped."""
+"""Change of the least delay from stamp to arrival, beyond which the stamps have stepped."""
 LATE_S = 1.0
 """Time after its arrival from which a sweep is no longer of use."""
 
@@ -156,9 +156,7 @@ class LiveStream:
                 return
             except Exception as error:
                 if self.reader.reception.refuse(f"failed ({type(error).__name__})"):
-                    log.exception(
-                        "%s: a message is left out; later ones are only counted; report this", self.info.name
-                    )
+                    log.exception("%s: a message is left out: report this; later ones are counted", self.info.name)
 
     def _put(self, sweep: Sweep) -> None:
         try:  # here, off the loop's thread
@@ -184,11 +182,8 @@ class LiveStream:
         used = arrival.usable and not doubt
         if flaws:
             self._fault(index, "; ".join(flaws), skipped=not used)
-        if not used:
-            return None
-        return Received(
-            Frame(index, sweep.stamp_s, sweep.points, turn_s=sweep.turn_s, steady_s=self._steady_s), arrived_s
-        )
+        frame = Frame(index, sweep.stamp_s, sweep.points, turn_s=sweep.turn_s, steady_s=self._steady_s)
+        return Received(frame, arrived_s) if used else None
 
     def _doubt(self, stamp_s: float, arrived_s: float) -> str:
         """Why a sweep is refused, empty if not: steady time passes as stamps do, or as arrivals where those step."""
@@ -196,7 +191,7 @@ class LiveStream:
             return f"taken {age_s:.1f} s after it came: this process was stopped, or has too little CPU time"
         if not abs(stamp_s) < MAX_STAMP_S:
             return f"stamp {stamp_s:g} is no time in seconds; have its driver write seconds"
-        before_s, passed_s = self._delay.offset_s, stamp_s
+        before_s, passed_s, waited_s = self._delay.offset_s, stamp_s, stamp_s
         if self._taken is not None:
             passed_s, waited_s = stamp_s - self._taken[0], arrived_s - self._taken[1]
             ahead_s = passed_s - waited_s
@@ -208,15 +203,12 @@ class LiveStream:
                     return f"stamped {what}, which arrived {waited_s:.3f} s ago{late}"
                 self.time_steps += 1
                 unit = unit_of(passed_s / waited_s)
-                why = f"they seem to be in {unit}; have its driver write seconds" if unit else "a clock was set"
+                why = f"are they in {unit}? have its driver write s" if unit else "a clock was set, or they come late"
                 what = f"stamps have stepped by {ahead_s:+.3f} s against their arrival"
                 log.warning("%s: %s: %s; they are followed", self.info.name, what, why)
         self._delay.unwrapped(stamp_s, arrived_s)
-        if self._taken is not None and (
-            self._doubted_s is not None or abs(self._delay.offset_s - before_s) > JITTER_S
-        ):
-            passed_s = waited_s
-        self._steady_s += passed_s
+        stepped = self._doubted_s is not None or abs(self._delay.offset_s - before_s) > JITTER_S
+        self._steady_s += waited_s if stepped else passed_s
         self._taken, self._doubted_s = (stamp_s, arrived_s), None
         return ""
 

@@ -8,6 +8,7 @@ import struct
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from modt.address import Address
@@ -171,15 +172,6 @@ def _stream(
 ) -> LiveStream:
     source = address_of(address.text, address.host)
     reader = PacketReader(bound_socket(address.text, port, address.option("group")), decoder, source)
-    info = StreamInfo(
-        name=address.text,
-        layout=f"{address.scheme} packets",
-        sequence=0,
-        n_frames=None,
-        period_s=period_s,
-        camera=None,
-        has_poses=False,
-        profile=decoder.profile,
-        elevations_deg=decoder.elevations_deg,
-    )
+    info = StreamInfo(address.text, f"{address.scheme} packets", 0, None, period_s, None, has_poses=False)
+    info = replace(info, profile=decoder.profile, elevations_deg=decoder.elevations_deg)
     return LiveStream(info, reader, cores=cores)

@@ -28,10 +28,8 @@ from modt.sources.packets.velodyne_models import (
 from modt.sources.packets.velodyne_turn import AHEAD, SAME_S, Entry, Turn
 from modt.types import Float32, Float64
 
-CYCLE = 4160
-"""Packets in which all of it is sent."""
-TAIL = slice(-6, None)
-"""Stamp, type and value of a status."""
+CYCLE, TAIL = 4160, slice(-6, None)
+"""Packets in which all of it is sent; stamp, type and value of a status."""
 
 
 class CalibrationBytes:
@@ -71,8 +69,6 @@ LEAST_TURN = 1000
 """A head that falls back by more has begun another turn [0.01 deg]; by less, it stands still."""
 SILENCE_S = 1.0
 """Packets missing for longer are those of a sensor that was off."""
-
-
 RETURN = 7
 """Column of the library's table: which return of a firing."""
 NO_TURN = Turn(0.0, None)
@@ -106,8 +102,7 @@ class VelodyneDecoder:
     def _forget(self) -> None:
         self._clock = DeviceClock(HOUR_S)
         self._last: Entry | None = None
-        self._turn: Turn = NO_TURN
-        self._ending: Turn = NO_TURN
+        self._turn = self._ending = NO_TURN
         self._holes: Float64 | None = None
         self._interval_s, self._longest_s = 0.0, LONGEST_TURN_S
         self._heard_s = -math.inf
@@ -176,11 +171,8 @@ class VelodyneDecoder:
         if calibration is None and model.calibration is not None:
             calibration = self._library.get_bundled_calibration(model.calibration)
             self._own = CalibrationBytes(self._library)
-            log.warning(
-                "%s: beams as of another %s until it has sent its own; better give them by calibration=",
-                self.name,
-                model.name,
-            )
+            remedy = "until it has sent its own; better give them by calibration="
+            log.warning("%s: beams as of another %s %s", self.name, model.name, remedy)
         self._decoder, self._first = self._scan_decoder(model.member, calibration), None
         return [s for r, p in first for s in self._packet(r, p, signature_of(p), reception)]
 
@@ -222,9 +214,8 @@ class VelodyneDecoder:
         if len(self._others) < RECOGNISED_BY:
             return []
         log.warning("%s: packets are of another model, and those of the one before have ended", self.name)
-        others = self._others
+        self._first = self._others
         self._forget()
-        self._first = others
         return self._begin(reception)
 
     def _follow(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
