@@ -26,10 +26,13 @@ class LiveSequences(RuleBasedStateMachine):
     @initialize(
         source=st.sampled_from(["velodyne", "velodyne", "ros2"] if ROS else ["velodyne"]),
         odometry=st.sampled_from(["datagrams", "topic"] if ROS else ["datagrams"]),
+        others=st.sampled_from([0, 0, 20]),
     )
-    def begin(self, source, odometry) -> None:
+    def begin(self, source, odometry, others) -> None:
         self.world = LiveWorld(source, odometry)
         self._cpu_s, self._messages = cpu_s(), 0
+        for payload in turn("hdl-64e")[: others if source == "velodyne" else 0]:
+            self.world.packet(self.world.stamped(payload))
 
     def check(self) -> None:
         world = self.world
@@ -90,13 +93,14 @@ class LiveSequences(RuleBasedStateMachine):
     @rule(
         seed=SEED,
         scale_s=st.sampled_from([0.0, 1e-6, 0.001, 0.05, 0.3, 3.0, 3600.0]),
+        ahead=st.sampled_from([0.0, 0.5]),
         n=st.sampled_from([1, 30, 1000]),
     )
-    def valid_packets_of_any_time(self, seed, scale_s, n) -> None:
+    def valid_packets_of_any_time(self, seed, scale_s, ahead, n) -> None:
         rng, world = np.random.default_rng(seed), self.world
         payloads = turn(world.model)
         for _ in range(n):
-            world.packet(world.stamped(payloads[rng.integers(len(payloads))], scale_s * rng.uniform(-1, 0.5)))
+            world.packet(world.stamped(payloads[rng.integers(len(payloads))], scale_s * rng.uniform(-1, ahead)))
         world.take()
         self.check()
 

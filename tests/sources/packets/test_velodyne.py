@@ -352,6 +352,7 @@ def test_another_model_is_adopted_once_the_one_before_is_silent(caplog):
     decoder = VelodyneDecoder("sensor")
     sweeps, reception = decoded(decoder, [*other, *later])
     assert decoder.profile == "vlp-16"
+    assert decoder._own is None  # no calibration of the other is looked for
     assert len(sweeps) >= 17
     assert reception.refused["of another model than the packets before"] == 20
     assert "packets are of another model, and those of the one before have ended" in caplog.text

@@ -104,8 +104,7 @@ class VelodyneDecoder:
         self._last: Entry | None = None
         self._turn = self._ending = NO_TURN
         self._holes: Float64 | None = None
-        self._interval_s, self._longest_s = 0.0, LONGEST_TURN_S
-        self._heard_s = -math.inf
+        self._interval_s, self._longest_s, self._heard_s = 0.0, LONGEST_TURN_S, -math.inf
         self._others: list[tuple[float, bytes]] = []  # packets of another model since this one was heard
 
     def again(self) -> Self:
@@ -167,7 +166,7 @@ class VelodyneDecoder:
         self._identity = None if model.signature.identity is None else bytes([model.signature.identity])
         self._reach, self._packet_s = model.reach, model.interval_us * 1e-6
         self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # of two returns
-        calibration = self._calibration
+        calibration, self._own = self._calibration, None
         if calibration is None and model.calibration is not None:
             calibration = self._library.get_bundled_calibration(model.calibration)
             self._own = CalibrationBytes(self._library)
