@@ -30,7 +30,7 @@ DOUBT_S = 0.5
 JITTER_S = 0.1
 """Change of the least delay from stamp to arrival, beyond which the stamps have stepped."""
 LATE_S = 1.0
-"""Time after its arrival from which a sweep is no longer of use."""
+"""Time after its arrival from which a sweep, or a packet of it, is no longer of use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +157,7 @@ class LiveStream:
             except Exception as error:
                 if self.reader.reception.refuse(f"failed ({type(error).__name__})"):
                     log.exception("%s: a message is left out: report this; later ones are counted", self.info.name)
+                time.sleep(0.001)  # where each read fails, others need the CPU
 
     def _put(self, sweep: Sweep) -> None:
         try:  # here, off the loop's thread

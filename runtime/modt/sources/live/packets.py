@@ -13,7 +13,7 @@ from pathlib import Path
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sources.live.live_stream import LiveStream
+from modt.sources.live.live_stream import LATE_S, LiveStream
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import PacketDecoder, refuse
 from modt.sources.stream import StreamInfo
@@ -23,8 +23,6 @@ log = logging.getLogger(__name__)
 MAX_BYTES = 65_535
 BUFFER_BYTES = 4 * 2**20
 """Asked of the kernel for packets received: a second of the fastest sensor."""
-LATE_S = 1.0
-"""Time that a packet has waited to be read, from which it is part of a sweep that is too old."""
 TIMESTAMP, TIMESPEC = 35, struct.Struct("@ll")
 """SO_TIMESTAMPNS, which Python does not name: Linux states when it received a packet [s, ns]."""
 PAUSE_S = 0.01
