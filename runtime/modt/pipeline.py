@@ -121,7 +121,7 @@ class Pipeline:
         run = self.ledger.run
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
-        tracked = run(TRACKING, self.tracker.follow, frame.stamp_s, proposals, located)
+        tracked = run(TRACKING, self.tracker.follow, frame.time_s, proposals, located)
         tracks, proposals = tracked.tracks, tracked.proposals
         asks = run(FUSION, self.fusion.asks, tracks, proposals, tracked.wants_class)
         chosen = run(SCHEDULING, self.scheduler.select, tracks, proposals, asks, budget)

@@ -44,6 +44,7 @@ class Frame:
         turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
             ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
             stamp, compensated or by a sensor that does not turn.
+        steady_s: the time by a clock that nobody sets, where the one of the stamps may be [s]; None: the stamp.
     """
 
     index: int
@@ -52,6 +53,12 @@ class Frame:
     T_world_sensor: Float64 | None = None
     restarts: int = 0
     turn_s: float = 0.0
+    steady_s: float | None = None
+
+    @property
+    def time_s(self) -> float:
+        """Time by which durations are measured [s]."""
+        return self.stamp_s if self.steady_s is None else self.steady_s
 
 
 @dataclass(frozen=True, slots=True)

@@ -102,7 +102,7 @@ class Sequences(RuleBasedStateMachine):
     def another_sensor(self, sensor: int) -> None:
         self.world.sensor = sensor
 
-    @rule(x_m=st.floats(-2e5, 2e5), y_m=st.sampled_from([0.0, 5.0, 1e5]), yaw=st.floats(-4, 4))
+    @rule(x_m=st.floats(-2e5, 2e5), y_m=st.sampled_from([0.0, 5.0, 1e5, 5.4e6, -8e7]), yaw=st.floats(-4, 4))
     def teleport(self, x_m: float, y_m: float, yaw: float) -> None:
         self.world.move(x_m, y_m, yaw)
 

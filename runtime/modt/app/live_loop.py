@@ -135,7 +135,7 @@ class LiveLoop:
             self._supervisor.alive()
             if self._clock() - self._reported_s >= REPORT_S:
                 self._reported_s = self._clock()
-                self._report()
+                self._spare("status", self._report)
 
     def _sweep(self, received: Received) -> None:
         self._shed_last = self.ladder.step is Step.DROPPED and not self._shed_last
@@ -167,13 +167,17 @@ class LiveLoop:
         self.budget_ms = min(ms for ms in (left_ms, budget.cpu_ms, budget.mean_ms) if ms is not None)
         result = self._stages.step(received.frame, budget, reduced=step >= Step.REDUCED)
         for named in self._sinks:
-            try:
-                self._stages.run_sink(SINK, named.sink, result)
-            except Exception as error:
-                self.failures.note(error, named.name)
+            self._spare(named.name, self._stages.run_sink, SINK, named.sink, result)
         line = self._stages.close_frame(result.frame.index)
         self.rest.add(line)
-        self._observe(result, line)
+        self._spare("records", self._observe, result, line)
+
+    def _spare(self, where: str, call: Callable[..., None], *arguments: Any) -> None:
+        """Call what a frame can do without."""
+        try:
+            call(*arguments)
+        except Exception as error:
+            self.failures.note(error, where)
 
     def power(self, watts: float) -> None:
         """Tell the ladder of a window of the meters."""

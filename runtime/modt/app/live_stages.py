@@ -48,7 +48,7 @@ class LiveStages:
     def __init__(self, request: inputs.Request, stream: LiveSource) -> None:
         self._request, self._stream = request, stream
         self._ledger = Ledger()
-        self._seen = False  # the sensor
+        self._seen = self._unlike = False  # the sensor; sweeps of another size
         self.misfits, self._watch = 0, SensorWatch()
         self.looking: Thread | None = None
         self._found: list[ChosenProfile] = []  # by the thread that looks again
@@ -68,7 +68,7 @@ class LiveStages:
 
     def step(self, frame: Frame, budget: Budget, *, reduced: bool) -> FrameResult:
         """One frame; reduced: without what is far."""
-        unlike = self._watch.unlike(frame.points)
+        self._unlike |= self._watch.unlike(frame.points)
         if not self._seen:
             self._seen = True
             chosen = self._chosen(frame)
@@ -76,7 +76,8 @@ class LiveStages:
                 self.parts = replace(self.parts, chosen=chosen)
             else:
                 self._exchange(self._made(chosen))
-        elif unlike:  # it takes longer than a frame
+        elif self._unlike and not (self.looking and self.looking.is_alive()):  # it takes longer than a frame
+            self._unlike = False
             self.looking = Thread(target=self._look_again, args=(frame,), name="recognition", daemon=True)
             self.looking.start()
         elif self._found:

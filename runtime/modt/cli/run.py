@@ -41,6 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
+    from modt.app.containment import OncePerSecond
     from modt.app.inputs import Request
     from modt.app.live_loop import NamedSink
     from modt.app.live_session import LiveSession
@@ -61,6 +62,8 @@ def run(arguments: argparse.Namespace) -> int:
         request = replace(Request.of(arguments), path=recorded_path(arguments.source))
         out, metrics = arguments.out, arguments.metrics
         session = LiveSession(request, source, sinks, out, metrics, pinned, cores, command, lacking)
+    for handler in logging.getLogger().handlers:
+        handler.addFilter(OncePerSecond())
     status = session.run(supervisor)
     print(
         f"modt: {status['counts']['frames']} frames; {one_line(status)}; records in {arguments.out}", file=sys.stderr

@@ -39,6 +39,16 @@ class Fault:
     skipped: bool  # the whole scan is skipped
 
 
+MAX_STAMP_S = 1e11
+"""Three thousand years: a stamp beyond it is no time in seconds."""
+
+
+def unit_of(ratio: float) -> str:
+    """Unit of a time that is so many times another one in seconds; empty where it is none."""
+    units = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+    return next((name for factor, name in units.items() if abs(ratio / factor - 1.0) < 0.02), "")
+
+
 MAX_KEPT_FAULTS = 20
 """Faults kept; later ones are only counted."""
 
