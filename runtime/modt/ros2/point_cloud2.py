@@ -148,7 +148,9 @@ def _fields(cdr: CdrReader) -> dict[str, _Field]:
 def _points(table: _Table) -> Float32:
     xyz = [table.fields[name] for name in "xyz" if name in table.fields]
     if len(xyz) < 3 or any(NUMBERS[field.datatype][0] != "f" for field in xyz):
-        raise MessageError("fields", f"no x, y, z of floating point among {', '.join(table.fields) or 'none'}")
+        kinds = ": they are " + ", ".join(str(np.dtype(NUMBERS[f.datatype])) for f in xyz) if len(xyz) == 3 else ""
+        there = ", ".join(table.fields) or "none"
+        raise MessageError("fields", f"no x, y, z of floating point among {there}{kinds}")
     reflectance = table.first(REFLECTANCES)
     points = np.empty((table.shape[0] * table.shape[1], 4), np.float32)
     rows = points.reshape(*table.shape, 4)
