@@ -1,5 +1,7 @@
 """Stamps that lie, and clocks that are set."""
 
+import itertools
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -74,4 +76,4 @@ def test_arrivals_that_stand_still_do_not_end_the_recording():
 @given(st.lists(st.tuples(st.floats(-1e10, 1e10), st.floats(-1e10, 1e10)), max_size=50))
 def test_corrected_stamps_never_fall_by_more_than_rounding(messages):
     _, corrected, _ = believed(*zip(*messages, strict=True)) if messages else ([], [], None)
-    assert all(b >= a - 1e-3 for a, b in zip(corrected, corrected[1:], strict=False))
+    assert all(b >= a - 1e-3 for a, b in itertools.pairwise(corrected))

@@ -5,6 +5,7 @@ Every reader raises a MisuseError where there are no scans, or a file is invalid
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,6 +19,7 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources import kitti_calibration, oxts
+from modt.sources.file_names import files_in, times_ns
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_stream import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
@@ -26,8 +28,6 @@ from modt.types import Float64
 
 MAX_NUMBER_DIGITS = 10
 """Of names that are numbers of frames, not times."""
-NANOSECOND_DIGITS = 19
-"""Of names that are times since 1970 [ns]."""
 MAX_SWEEP_PERIODS = 2
 """Longer sweeps are taken for wrong time stamps."""
 NO_SWEEP_TIMES = "sweeps are not deskewed"
@@ -107,24 +107,23 @@ def odometry_sequence(sequence: Path) -> ScanStream:
 
 
 def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") -> ScanStream:
-    """A folder of scans, ordered by name, period_s apart or at the nanoseconds that are their names."""
+    """A folder of scans in the order of their names, at the times that these are, or period_s apart."""
     indices, files = _scans(folder, suffix)
-    if all(f.stem.isdigit() and len(f.stem) == NANOSECOND_DIGITS for f in files):
-        apart, began = "stamped by their names", int(files[0].stem)
-        stamps = {i: (int(f.stem) - began) / 1e9 for i, f in zip(indices, files, strict=True)}
-    else:
-        apart, stamps = f"{period_s} s apart", {i: i * period_s for i in indices}
+    times = times_ns([f.stem for f in files])
+    apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
+    stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(indices)}
     notes = Notes([f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"])
     return _stream(folder.name, "folder of scans", folder, None, {}, stamps, notes, period_s=period_s, suffix=suffix)
 
 
 def _scans(data: Path, suffix: str = ".bin") -> tuple[list[int], list[Path]]:
-    """Indices and files of the scans of a folder, ordered by name."""
-    files = sorted(data.glob(f"*{suffix}"))
+    """Indices and files of the scans of a folder in their order."""
+    files = files_in(data, suffix)
     if not files:
         raise MisuseError(data, f"no {suffix} scans", "give a folder of scans")
-    numbered = all(f.stem.isdigit() and len(f.stem) <= MAX_NUMBER_DIGITS for f in files)
-    return [int(f.stem) for f in files] if numbered else list(range(len(files))), files
+    numbers = [int(f.stem) for f in files if re.fullmatch(f"[0-9]{{1,{MAX_NUMBER_DIGITS}}}", f.stem)]
+    numbered = len(set(numbers)) == len(files) and times_ns([f.stem for f in files]) is None
+    return numbers if numbered else list(range(len(files))), files
 
 
 def _stream(
@@ -142,9 +141,10 @@ def _stream(
     suffix: str = ".bin",
 ) -> ScanStream:
     indices, files = _scans(data, suffix)
-    gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
-    if gaps:
-        notes.of_stream.append(f"{len(gaps)} frames are missing (the first is {gaps[0]})")
+    missing = indices[-1] - indices[0] + 1 - len(indices)
+    if missing:
+        first = next(a + 1 for a, b in pairwise(indices) if b > a + 1)
+        notes.of_stream.append(f"{missing} frames are missing (the first is {first})")
     if poses:
         lost = [i for i in indices if i not in poses]
         if lost:
@@ -179,7 +179,7 @@ def _filled(poses: Poses, indices: list[int]) -> Poses:
 
 
 def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
-    records = sorted((drive / "oxts" / "data").glob("*.txt"))
+    records = [r for r in files_in(drive / "oxts" / "data", ".txt") if re.fullmatch("[0-9]+", r.stem)]
     calib = drive.parent / "calib_imu_to_velo.txt"
     if not records or not calib.is_file():
         notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")

@@ -116,7 +116,7 @@ def _is_odometry(path: Path) -> bool:
 
 
 def _has_scans(path: Path, suffix: str = ".bin") -> bool:
-    return path.is_dir() and next(path.glob(f"*{suffix}"), None) is not None
+    return path.is_dir() and any(f.is_file() and not f.name.startswith(".") for f in path.glob(f"*{suffix}"))
 
 
 def _nearby(path: Path) -> list[Path]:

@@ -1,0 +1,55 @@
+"""Order and times of files by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+
+_SINCE_1970 = re.compile(r"(?<![0-9])([1-9][0-9]{9})([._-]?)([0-9]*)")
+_CALENDAR = re.compile(
+    r"(?<![0-9])([0-9]{4})[-_.]?([0-9]{2})[-_.]?([0-9]{2})[T _-]?"  # date
+    r"([0-9]{2})[-:_.]?([0-9]{2})[-:_.]?([0-9]{2})([.,_-]?)([0-9]*)"
+)
+_SECONDS = re.compile(r"([0-9]{1,9})(\.)([0-9]+)")
+
+
+def files_in(folder: Path, suffix: str) -> list[Path]:
+    """Regular files of a folder that end in a suffix, in the order of the times or else of the numbers in their names."""
+    files = [f for f in folder.glob(f"*{suffix}") if f.is_file() and not f.name.startswith(".")]
+    files.sort(key=lambda f: [int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", f.stem))])
+    times = times_ns([f.stem for f in files])
+    return files if times is None else [f for _, f in sorted(zip(times, files, strict=True))]
+
+
+def times_ns(names: Sequence[str]) -> list[int] | None:
+    """Times in names [ns]; None where one has none, or two have the same.
+
+    A time is a date and time of day, or seconds with or without a fraction, since 1970 or, alone, since any moment.
+    """
+    found = [_time(name) for name in names]
+    if not found or None in found:
+        return None
+    known = [time for time in found if time is not None]
+    longest = max(len(fraction) for _, _, fraction in known)
+    uneven = any(len(fraction) < longest for _, _, fraction in known)
+    counted = uneven and (longest > 7 or known[0][1] != ".")  # without leading zeros; else without trailing ones
+    wide = longest if counted else 0
+    times = [second * 10**9 + int(f.rjust(wide, "0").ljust(9, "0")) for second, _, f in known]
+    return times if len(set(times)) == len(times) else None
+
+
+def _time(name: str) -> tuple[int, str, str] | None:
+    """Second, separator and digits of the fraction of a second."""
+    match = _SINCE_1970.search(name)
+    if match and (match[2] or len(match[3]) in (0, 3, 6, 9)):
+        return int(match[1]), match[2], match[3][:9]
+    if match := _CALENDAR.search(name):
+        try:
+            second = datetime(*map(int, match.groups()[:6]), tzinfo=UTC)
+        except ValueError:
+            return None
+        return int(second.timestamp()), match[7], match[8][:9]
+    match = _SECONDS.fullmatch(name)
+    return None if match is None else (int(match[1]), match[2], match[3][:9])
