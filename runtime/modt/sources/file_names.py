@@ -16,7 +16,7 @@ _SECONDS = re.compile(r"([0-9]{1,9})(\.)([0-9]+)")
 
 
 def files_in(folder: Path, suffix: str) -> list[Path]:
-    """Regular files of a folder that end in a suffix, in the order of the times or else of the numbers in their names."""
+    """Regular files with a suffix in a folder, in the order of the times in their names, else of the numbers."""
     files = [f for f in folder.glob(f"*{suffix}") if f.is_file() and not f.name.startswith(".")]
     files.sort(key=lambda f: [int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", f.stem))])
     times = times_ns([f.stem for f in files])

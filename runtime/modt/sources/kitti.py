@@ -13,6 +13,7 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,8 +32,10 @@ MAX_NUMBER_DIGITS = 10
 MAX_SWEEP_PERIODS = 2
 """Longer sweeps are taken for wrong time stamps."""
 NO_SWEEP_TIMES = "sweeps are not deskewed"
+NO_CAMERA = "no camera, no --fov camera"
 NO_POSES = "no odometry, ego-motion is estimated from the proposals"
 
+T = TypeVar("T")
 Poses = dict[int, Float64]
 """T_world_sensor by frame."""
 
@@ -48,7 +51,8 @@ class Notes:
 def raw_drive(drive: Path) -> ScanStream:
     """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder."""
     notes = Notes()
-    camera = _camera(kitti_calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
+    calib = drive.parent / "calib_cam_to_cam.txt"
+    camera = _optional(kitti_calibration.camera_of_raw, calib, notes.of_stream, NO_CAMERA)
     poses = _poses_of_raw(drive, notes)
     data = drive / "velodyne_points" / "data"
     frames, _ = _scans(data)
@@ -65,16 +69,15 @@ def tracking_sequence(scans: Path) -> ScanStream:
     root, number = scans.parent.parent, scans.name
     notes = Notes()
     calib = root / "calib" / f"{number}.txt"
-    camera = _camera(kitti_calibration.camera_of_sequence, calib, notes)
+    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, NO_CAMERA)
     records = root / "oxts" / f"{number}.txt"
     poses: Poses = {}
     if not records.is_file():
         notes.of_poses.append(f"{records} is missing: {NO_POSES}")
-    elif not calib.is_file():
-        notes.of_poses.append(f"{calib} is missing, and its Tr_imu_velo: {NO_POSES}")
     else:
-        T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
-        poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
+        T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, notes.of_poses, NO_POSES)
+        if T_imu_sensor is not None:
+            poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
     name, turns = f"tracking {number}", dict.fromkeys(_scans(scans)[0], PERIOD_S)
     return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turns=turns)
 
@@ -86,12 +89,14 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     """
     notes = Notes()
     calib = sequence / "calib.txt"
-    camera = _camera(kitti_calibration.camera_of_sequence, calib, notes)
+    cost = f"{NO_CAMERA}; get Tr from data_odometry_calib.zip"
+    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, cost)
     places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
     found = next((p for p in places if p.is_file()), None)
     poses: Poses = {}
     if found is None or camera is None:
-        notes.of_poses.append(f"{places[0] if found is None else calib} is missing: {NO_POSES}")
+        lacking = f"{places[0]} is missing" if found is None else f"{found} needs the Tr of {calib}"
+        notes.of_poses.append(f"{lacking}: {NO_POSES}")
     else:
         poses = dict(enumerate(sensor_poses(read_poses(found), camera.T_camera_sensor)))
     times = sequence / "times.txt"
@@ -180,11 +185,12 @@ def _filled(poses: Poses, indices: list[int]) -> Poses:
 
 def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
     records = [r for r in files_in(drive / "oxts" / "data", ".txt") if re.fullmatch("[0-9]+", r.stem)]
-    calib = drive.parent / "calib_imu_to_velo.txt"
-    if not records or not calib.is_file():
-        notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")
+    if not records:
+        notes.of_poses.append(f"{drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
-    T_imu_sensor = kitti_calibration.T_imu_sensor_of_raw(drive.parent)
+    T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_raw, drive.parent, notes.of_poses, NO_POSES)
+    if T_imu_sensor is None:
+        return {}
     T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1, : len(oxts.FIELDS)] for r in records]))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
@@ -254,8 +260,10 @@ def _time_ns(line: str) -> int | None:
         return None
 
 
-def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera | None:
-    if not calib.is_file():
-        notes.of_stream.append(f"{calib} is missing: no camera, no --fov camera")
+def _optional(read: Callable[[Path], T], path: Path, notes: list[str], cost: str) -> T | None:
+    """A calibration; None where its file or a row of it is missing, which is noted with its cost."""
+    try:
+        return read(path)
+    except kitti_calibration.MissingError as error:
+        notes.append(f"{error.subject}: {error.cause}: {cost}")
         return None
-    return read(calib)
