@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 
 _SINCE_1970 = re.compile(r"(?<![0-9])([1-9][0-9]{9})([._-]?)([0-9]*)")
@@ -47,9 +47,9 @@ def _time(name: str) -> tuple[int, str, str] | None:
         return int(match[1]), match[2], match[3][:9]
     if match := _CALENDAR.search(name):
         try:
-            second = datetime(*map(int, match.groups()[:6]), tzinfo=UTC)
+            second = datetime.strptime("".join(match.groups()[:6]) + "+0000", "%Y%m%d%H%M%S%z").timestamp()
         except ValueError:
             return None
-        return int(second.timestamp()), match[7], match[8][:9]
+        return int(second), match[7], match[8][:9]
     match = _SECONDS.fullmatch(name)
     return None if match is None else (int(match[1]), match[2], match[3][:9])

@@ -71,7 +71,7 @@ class PacketStream:
         return type(self)(info, self.capture, self.decoder, first, first if nothing else end)
 
     def _sweeps(self, reception: Reception) -> Iterator[tuple[float, Sweep]]:
-        """Arrival of each sweep [s], and the sweep; after them, what was refused and where the file is broken are faults."""
+        """Arrival [s] and sweep of each turn; then faults for what was refused and where the file is broken."""
         decoder, index, arrived_s = self.decoder.again(), 0, 0.0
         for datagram in self.capture:
             reception.messages += 1
@@ -88,6 +88,5 @@ class PacketStream:
             self._fault(index, self.capture.flaw, skipped=False)
 
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
-        self.faults.report(
-            Fault(index, str(self.capture.path), cause, skipped), f"{self.capture.path}: sweep {index}"
-        )
+        subject = str(self.capture.path)
+        self.faults.report(Fault(index, subject, cause, skipped), f"{subject}: sweep {index}")
