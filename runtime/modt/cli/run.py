@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         out, metrics = arguments.out, arguments.metrics
         session = LiveSession(request, source, sinks, out, metrics, pinned, cores, command, lacking)
     status = session.run(supervisor)
-    print(
-        f"modt: {status['counts']['frames']} frames; {one_line(status)}; records in {arguments.out}", file=sys.stderr
-    )
+    counts, recording = status["counts"], status["recording"]
+    records = f"records in {out}" if recording["parts"] else f"nothing is recorded: {recording['failing']}"
+    print(f"modt: {counts['frames']} frames; {one_line(status)}; {records}", file=sys.stderr)
     return INTERRUPTED if session.stop.signal == "SIGINT" else 0
