@@ -294,9 +294,10 @@ def test_between_reads_only_its_part(tmp_path):
         (lambda root: root / "nowhere", "no such file"),
         (lambda root: root, "no stream"),
         (lambda root: (root / "a.bin").write_bytes(b"") or root / "a.bin", "no stream"),
+        (lambda root: (root / "a.bag").write_bytes(b"#ROSBAG V2.0\n") and root / "a.bag", "ROS 1; convert it"),
         (lambda root: layouts.raw_drive(root).parent.parent, "several streams.*drive_9999"),
     ],
-    ids=["missing", "empty", "a file", "a root"],
+    ids=["missing", "empty", "a file", "ROS 1", "a root"],
 )
 def test_a_path_without_a_stream_is_refused(tmp_path, make, cause):
     with pytest.raises(MisuseError, match=cause):

@@ -61,6 +61,8 @@ def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
     """
     if not path.exists():
         raise MisuseError(path, "no such file or directory", REMEDY)
+    if path.suffix == ".bag":
+        raise MisuseError(path, "is a recording of ROS 1", "convert it: pip install rosbags, then rosbags-convert")
     path = path.resolve()
     stream = _stream(path, period_s)
     if stream is not None:
