@@ -163,7 +163,7 @@ def closed(chance: Chance, whole: bytes, at: int, part: bytes, known: bytes) -> 
     sizes = struct.pack("<Q", 0) + text(b"zstd") + struct.pack("<QQ", len(part), len(part))
     entry = record(INDEX, struct.pack("<QQQQ", 0, 2**40, place, len(part)) + offsets + sizes)
     end = record(END, bytes(4))
-    footer = record(FOOTER, struct.pack("<QQI", summary_at, 0, 0))
+    footer = record(FOOTER, struct.pack("<QQI", chance.choice((summary_at, summary_at, 8, at, 0, 2**62)), 0, 0))
     return whole + end + known + statistics + entry * chance.choice((1, 1, 500)) + footer + MAGIC
 
 

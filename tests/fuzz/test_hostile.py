@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import struct
+import tracemalloc
 from pathlib import Path
 
 import pytest
@@ -78,3 +80,20 @@ def test_views_and_triggers_are_refused_by_their_name(schema: int, tmp_path: Pat
 def test_what_unpacks_to_too_much_is_refused_with_the_limit(maker: str, tmp_path: Path) -> None:
     with limits(), pytest.raises(ModtError, match=r"unpacks to more than 64 times its size and 16 MiB"):
         open_stream(made(tmp_path, maker, 0))
+
+
+def test_an_index_that_begins_at_a_bomb_unpacks_nothing(tmp_path: Path) -> None:
+    import zstandard
+
+    packed = zstandard.compress(bytes(2**28))
+    body = struct.pack("<QQQI", 0, 0, 2**28, 0) + hostile.text(b"zstd") + struct.pack("<Q", len(packed)) + packed
+    footer = hostile.record(hostile.FOOTER, struct.pack("<QQI", 8, 0, 0))
+    path = tmp_path / "a.mcap"
+    path.write_bytes(hostile.MAGIC + hostile.record(hostile.CHUNK, body) + footer + hostile.MAGIC)
+    tracemalloc.start()
+    try:
+        with pytest.raises(ModtError, match="unpacks to more than 64 times its size and 16 MiB"):
+            open_stream(path)
+        assert tracemalloc.get_traced_memory()[1] < 2**26
+    finally:
+        tracemalloc.stop()

@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from modt.errors import ModtError
 from modt.sinks.output import replace_file
 
 COUNTERS = re.compile(
@@ -41,7 +42,7 @@ def metrics_text(status: Mapping[str, Any]) -> str:
 
 def write_metrics(path: Path, status: Mapping[str, Any]) -> None:
     """Replace a file by the metrics of a status; one that cannot be written is left as it is."""
-    with suppress(OSError):
+    with suppress(ModtError):
         replace_file(path, metrics_text(status))
 
 

@@ -44,8 +44,7 @@ class RunDirectory:
 
     def describe(self, text: str) -> None:
         """Write run.yaml, the configuration of the run."""
-        with writing(self.path / RUN):
-            replace_file(self.path / RUN, text)
+        replace_file(self.path / RUN, text)
 
     def tracks(self) -> LineFile[FrameResult]:
         """A new tracks.jsonl."""
@@ -57,5 +56,4 @@ class RunDirectory:
 
     def summarise(self, summary: dict[str, Any]) -> None:
         """Write summary.json."""
-        with writing(self.path / SUMMARY):
-            replace_file(self.path / SUMMARY, json.dumps(summary, indent=2) + "\n")
+        replace_file(self.path / SUMMARY, json.dumps(summary, indent=2) + "\n")

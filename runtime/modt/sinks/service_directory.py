@@ -74,8 +74,7 @@ class ServiceDirectory:
         Raises:
             ModtError: it cannot be written.
         """
-        with writing(self.path / name):
-            replace_file(self.path / name, text, lasting=lasting)
+        replace_file(self.path / name, text, lasting=lasting)
 
     def sync(self) -> None:
         """Have the names of the present part and its files outlast a power cut.

@@ -68,7 +68,9 @@ def _base(message: BagMessage) -> str:
 
 
 PEEKED = 50
-"""Messages of a topic read before the first frame, until one can be used."""
+"""Messages of a topic read before the first frame, until some can be used."""
+COMPARED = 4
+"""First sweeps whose stamps are compared."""
 
 
 class BagStream:
@@ -172,7 +174,7 @@ def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream
         for name, found in file.topics().items():
             topics[name] = BagTopic(found.type, found.count + (topics[name].count if name in topics else 0))
     chosen = _choose(path, topics, topic)
-    began = list(islice(_clouds(path, files, chosen), 4))
+    began = _first_clouds(path, files, chosen)
     stamps = [(_stamp_s(cloud, message), message.recorded_s) for cloud, message in began]
     first = next((a for a, b in combinations(stamps, 2) if not StampCheck(a).doubt(*b)), stamps[0])
     steps_s = (b[0] - a[0] for a, b in pairwise(stamps) if b[0] > a[0] and not StampCheck(a).doubt(*b))
@@ -209,28 +211,29 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
     return clouds[0]
 
 
-def _clouds(path: Path, files: list[BagFile], topic: str) -> Iterator[tuple[PointCloud, BagMessage]]:
-    """The usable ones among the first messages.
+def _first_clouds(path: Path, files: list[BagFile], topic: str) -> list[tuple[PointCloud, BagMessage]]:
+    """The first usable sweeps, at least one.
 
     Raises:
-        ModtError: there are none; with the cause of the first one.
+        ModtError: there are none.
     """
-    refused, usable = "no message", False
+    clouds: list[tuple[PointCloud, BagMessage]] = []
+    refused = "no message"
     try:
         for message in islice(messages_of(files, {topic}), PEEKED):
             try:
-                cloud = read_cloud(message.data)
+                clouds.append((read_cloud(message.data), message))
             except MessageError as error:
-                refused = refused if usable else str(error)
-                continue
-            usable = True
-            yield cloud, message
+                refused = str(error)
+            if len(clouds) == COMPARED:
+                break
     except ModtError:
-        if not usable:
+        if not clouds:
             raise
-    if not usable:
+    if not clouds:
         remedy = "record sensor_msgs/PointCloud2 in CDR, with x, y, z [m] as float32"
         raise ModtError(path, f"no usable sweep at the begin of {topic} ({refused})", remedy)
+    return clouds
 
 
 def _stamp_s(cloud: PointCloud, message: BagMessage) -> float:

@@ -29,6 +29,8 @@ MAX_RECORD_BYTES = 2**28
 """Largest record of an MCAP file and largest unpacked message; a chunk has a few megabytes."""
 ALLOWANCE_BYTES, MOST_TIMES = 16 * 2**20, 64
 """A file unpacks to as many bytes, and as many times its size, at most."""
+FOOTER_BYTES = 37
+"""Last record of a closed MCAP file, and what follows it."""
 STEPS = 10_000
 """Instructions of a database between two looks at their number, which may be that of the bytes unpacked."""
 
@@ -252,31 +254,44 @@ def _kind(path: Path) -> str:
     return Path(path.name.removesuffix(ZSTD)).suffix
 
 
+def _from(file: BinaryIO, at: int) -> Iterator[Any]:
+    """Records of an MCAP file from a place on; chunks as they are."""
+    from mcap.stream_reader import StreamReader
+
+    file.seek(at)
+    records = StreamReader(file, skip_magic=at > 0, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES).records
+    return iter(records)
+
+
 def _summary(file: BinaryIO) -> Any:
     """Index and counts of an MCAP file; None where the recording was not closed."""
-    from mcap.reader import SeekingReader
+    from mcap.records import Channel, ChunkIndex, Schema, Statistics
+    from mcap.summary import Summary
 
+    summary = Summary()
     with suppress(Exception):
-        summary = SeekingReader(file, record_size_limit=MAX_RECORD_BYTES).get_summary()
-        if summary is not None and summary.statistics is not None:
-            return summary
-    return None
+        start = next(_from(file, file.seek(-FOOTER_BYTES, os.SEEK_END))).summary_start
+        for record in _from(file, start) if start else ():
+            if isinstance(record, Schema):
+                summary.schemas[record.id] = record
+            elif isinstance(record, Channel):
+                summary.channels[record.id] = record
+            elif isinstance(record, ChunkIndex):
+                summary.chunk_indexes.append(record)
+            elif isinstance(record, Statistics):
+                summary.statistics = record
+    return None if summary.statistics is None else summary
 
 
 def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iterator[tuple[int, Any]]:
     """Chunks with messages of these topics by the time of their begin [ns]; without an index all records, and 0."""
-    from mcap.stream_reader import StreamReader
-
     chunks = () if summary is None else summary.chunk_indexes
     for index in sorted(chunks, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
         held = {summary.channels[number].topic for number in index.message_index_offsets}
         if topics is None or not held or held & set(topics):
-            file.seek(index.chunk_start_offset)
-            reader = StreamReader(file, skip_magic=True, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES)
-            yield index.message_start_time, next(iter(reader.records))
+            yield index.message_start_time, next(_from(file, index.chunk_start_offset))
     if not chunks:
-        file.seek(0)
-        yield from ((0, r) for r in StreamReader(file, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES).records)
+        yield from ((0, record) for record in _from(file, 0))
 
 
 def _unpacked(compression: str, data: bytes, most: int) -> bytes:
