@@ -124,6 +124,12 @@ def test_what_reaches_beyond_the_file_is_refused_before_it_runs(model, said, tmp
         read_model(path)
 
 
+def test_an_attribute_of_another_name_may_have_the_number_of_the_type_of_text(tmp_path):
+    for attributes in ({"axis": 8}, {"group": 8}, {"to": TensorProto.DOUBLE}, {"auto_pad": "SAME_UPPER"}):
+        path = saved(tmp_path, with_node("Cast", **attributes)())
+        assert read_model(path)[0] == path.read_bytes()
+
+
 def large(*nodes: onnx.NodeProto, **numbers: list[int]) -> onnx.ModelProto:
     """A small file that makes large tensors."""
     model = network()

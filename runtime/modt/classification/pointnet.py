@@ -47,10 +47,10 @@ _REFUSED = {
     _ATTRIBUTE: {6: "a graph within a node", 9: "text", 11: "a graph within a node"},
     _TENSOR: {6: "text", 13: "numbers in another file"},
 }
-_TEXT = {(_TENSOR, 2, 8), (_ATTRIBUTE, 1, b"value_string"), (_ATTRIBUTE, 3, 8)}
-"""Fields that make a tensor of text, of which few bytes stand for much memory: its type, a constant, a cast."""
 _SIZES = {(_TENSOR, 1), (_SPARSE, 3)}
 """Fields with the dimensions of a tensor."""
+_STRING = 8
+"""Type of tensors of text, of which few bytes stand for much memory."""
 _VARINT, _EIGHT_BYTES, _BYTES, _FOUR_BYTES = 0, 1, 2, 5
 
 
@@ -89,17 +89,20 @@ def _flaws(raw: memoryview) -> Iterator[str]:
     waiting = [(_MODEL, raw)]
     while waiting:
         kind, message = waiting.pop()
-        numbers = 1
+        numbers, last = 1, dict[int, memoryview | int | None]()
         for number, value in _fields(message):
+            last[number] = value & 0xFFFFFFFF if isinstance(value, int) else value
             if number in _REFUSED.get(kind, {}):
                 yield _REFUSED[kind][number]
-            if (kind, number, value) in _TEXT:
-                yield "text"
             if (kind, number) in _SIZES and value is not None:
                 numbers *= value if isinstance(value, int) else math.prod(_varints(value))
             inner = _PARTS[kind].get(number)
             if inner is not None and isinstance(value, memoryview):
                 waiting.append((inner, value))
+        name = last.get(1) if kind == _ATTRIBUTE else None
+        made = last.get(2) if kind == _TENSOR else last.get(3) if name == b"to" else None
+        if made == _STRING or name == b"value_string":
+            yield "text"
         if numbers > 2 * len(raw):
             yield "a tensor of more numbers than the file holds"
 
