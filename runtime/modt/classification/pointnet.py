@@ -99,7 +99,8 @@ def _flaws(raw: memoryview) -> Iterator[str]:
             inner = _PARTS[kind].get(number)
             if inner is not None and isinstance(value, memoryview):
                 waiting.append((inner, value))
-        name = last.get(1) if kind == _ATTRIBUTE else None
+        label = last.get(1)
+        name = bytes(label) if kind == _ATTRIBUTE and isinstance(label, memoryview) else b""
         made = last.get(2) if kind == _TENSOR else last.get(3) if name == b"to" else None
         if made == _STRING or name == b"value_string":
             yield "text"
