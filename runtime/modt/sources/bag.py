@@ -202,7 +202,7 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
             raise MisuseError(path, f"no point clouds in {asked}", f"topics of sensor_msgs/PointCloud2: {there}")
         return asked
     if not clouds:
-        there = ", ".join(sorted({topic.type for topic in topics.values()})) or "nothing"
+        there = ", ".join(sorted({topic.type for topic in topics.values() if topic.count})) or "nothing"
         raise MisuseError(path, "no sensor_msgs/PointCloud2", f"record the driver's point clouds; it holds {there}")
     if len(clouds) > 1:
         raise MisuseError(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 
 _SINCE_1970 = re.compile(r"(?<![0-9])([1-9][0-9]{9})([._-]?)([0-9]*)")
 _CALENDAR = re.compile(
-    r"(?<![0-9])([0-9]{4})[-_.]?([0-9]{2})[-_.]?([0-9]{2})[T _-]?"  # date
+    r"(?<![0-9])(19[7-9][0-9]|20[0-9]{2})[-_.]?([0-9]{2})[-_.]?([0-9]{2})[T _-]?"  # date
     r"([0-9]{2})[-:_.]?([0-9]{2})[-:_.]?([0-9]{2})([.,_-]?)([0-9]*)"
 )
 _SECONDS = re.compile(r"([0-9]{1,9})(\.)([0-9]+)")
@@ -40,16 +41,19 @@ def times_ns(names: Sequence[str]) -> list[int] | None:
     return times if len(set(times)) == len(times) else None
 
 
+def time_ns(text: str) -> int | None:
+    """Time in a text [ns], None where there is none."""
+    found = _time(text.strip())
+    return None if found is None else found[0] * 10**9 + int(found[2].ljust(9, "0"))
+
+
 def _time(name: str) -> tuple[int, str, str] | None:
     """Second, separator and digits of the fraction of a second."""
-    match = _SINCE_1970.search(name)
-    if match and (match[2] or len(match[3]) in (0, 3, 6, 9)):
-        return int(match[1]), match[2], match[3][:9]
     if match := _CALENDAR.search(name):
-        try:
+        with suppress(ValueError):
             second = datetime.strptime("".join(match.groups()[:6]) + "+0000", "%Y%m%d%H%M%S%z").timestamp()
-        except ValueError:
-            return None
-        return int(second), match[7], match[8][:9]
-    match = _SECONDS.fullmatch(name)
+            return int(second), match[7], match[8][:9]
+    match = _SINCE_1970.search(name)
+    if match is None or not (match[2] or len(match[3]) in (0, 3, 6, 9)):
+        match = _SECONDS.fullmatch(name)
     return None if match is None else (int(match[1]), match[2], match[3][:9])

@@ -9,7 +9,6 @@ import re
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
@@ -20,7 +19,7 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources import kitti_calibration, oxts
-from modt.sources.file_names import files_in, times_ns
+from modt.sources.file_names import files_in, time_ns, times_ns
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_stream import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
@@ -235,7 +234,7 @@ def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_o
         notes.of_stream.append(f"{path} is missing: {cost}")
         return {}
     lines = path.read_text(encoding="utf-8", errors="replace").rstrip().split("\n")
-    times = {i: time for i, time in enumerate(map(_time_ns, lines)) if time is not None}
+    times = {i: time for i, time in enumerate(map(time_ns, lines)) if time is not None}
     if not times:
         notes.of_stream.append(f"{path} is no list of time stamps: {cost}")
         return {}
@@ -248,16 +247,6 @@ def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_o
         lacking = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
         notes.of_stream.append(f"{lacking}: {cost_of_few or cost}")
     return times
-
-
-def _time_ns(line: str) -> int | None:
-    """A time in KITTI's format [ns], None if invalid."""
-    second, _, fraction = line.partition(".")
-    try:
-        whole = int(datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp())
-        return whole * 10**9 + int(fraction[:9].ljust(9, "0"))
-    except ValueError:
-        return None
 
 
 def _optional(read: Callable[[Path], T], path: Path, notes: list[str], cost: str) -> T | None:
