@@ -2,6 +2,7 @@
 
 import threading
 
+from modt.errors import ModtError
 from modt.sinks.job_thread import JobThread
 
 
@@ -39,3 +40,16 @@ def test_a_job_that_fails_does_not_end_the_thread(caplog):
     assert background.close(5.0)
     assert done == [1]
     assert len(caplog.records) == 1
+
+
+def test_a_failure_with_a_remedy_is_one_line_and_any_other_a_traceback(caplog):
+    def fail(error):
+        raise error
+
+    for error in (ModtError("disk", "full", "free it"), ValueError("x")):
+        background = JobThread()
+        background.submit(lambda error=error: fail(error))
+        assert background.close(5.0)
+    known, unknown = caplog.records
+    assert (known.getMessage(), known.exc_info) == ("writer: disk: full; free it; later ones are only counted", None)
+    assert unknown.exc_info

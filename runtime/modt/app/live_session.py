@@ -202,7 +202,8 @@ class LiveSession:
         summary = self._summary.result() | {"run": run, "status": status, "lateness": lateness}
         self._writer.submit(self.recording.finish)
         self._writer.submit(lambda: self._write(status))
-        self._writer.submit(lambda: self.directory.write(SUMMARY, json.dumps(summary, indent=2) + "\n"))
+        text = json.dumps(summary, indent=2) + "\n"
+        self._writer.submit(lambda: self.directory.write(SUMMARY, text) if self.recording.parts else None)
         self._writer.close()
 
 

@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
     for handler in logging.getLogger().handlers:
         handler.addFilter(OncePerSecond())
     status = session.run(supervisor)
-    print(
-        f"modt: {status['counts']['frames']} frames; {one_line(status)}; records in {arguments.out}", file=sys.stderr
-    )
+    counts, recording = status["counts"], status["recording"]
+    records = f"records in {out}" if recording["parts"] else f"nothing is recorded: {recording['failing']}"
+    print(f"modt: {counts['frames']} frames; {one_line(status)}; {records}", file=sys.stderr)
     return INTERRUPTED if session.stop.signal == "SIGINT" else 0

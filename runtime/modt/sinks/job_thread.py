@@ -7,6 +7,8 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
+from modt.errors import ModtError
+
 log = logging.getLogger(__name__)
 
 CAPACITY = 128
@@ -60,6 +62,6 @@ class JobThread:
             except Exception as error:
                 if not self._failed:
                     self._failed = True
-                    log.error(
-                        "writer: %s: %s; later ones are only counted", type(error).__name__, error, exc_info=error
-                    )
+                    known = isinstance(error, ModtError)
+                    what = f"{error}" if known else f"{type(error).__name__}: {error}"
+                    log.error("writer: %s; later ones are only counted", what, exc_info=None if known else error)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from modt.errors import MisuseError
-from modt.sinks.output import LineFile, writing
+from modt.sinks.output import LineFile, replace_file, writing
 from modt.sinks.records import line
 from modt.sinks.tracks import frame_line
 from modt.types import FrameResult
@@ -44,7 +44,7 @@ class RunDirectory:
 
     def describe(self, text: str) -> None:
         """Write run.yaml, the configuration of the run."""
-        self._write(RUN, text)
+        replace_file(self.path / RUN, text)
 
     def tracks(self) -> LineFile[FrameResult]:
         """A new tracks.jsonl."""
@@ -56,11 +56,4 @@ class RunDirectory:
 
     def summarise(self, summary: dict[str, Any]) -> None:
         """Write summary.json."""
-        self._write(SUMMARY, json.dumps(summary, indent=2) + "\n")
-
-    def _write(self, name: str, text: str) -> None:
-        """Write a file atomically."""
-        path, partial = self.path / name, self.path / f".{name}.part"
-        with writing(path):
-            partial.write_text(text, encoding="utf-8")
-            partial.replace(path)
+        replace_file(self.path / SUMMARY, json.dumps(summary, indent=2) + "\n")

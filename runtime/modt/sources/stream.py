@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import chain
@@ -9,6 +10,8 @@ from typing import Protocol, Self
 
 from modt.geometry import Camera
 from modt.types import Frame
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +72,12 @@ class Faults:
         if kept:
             self.first.append(fault)
         return kept
+
+    def report(self, fault: Fault, place: str) -> None:
+        """Count a fault, and log it where it is kept; `place` is its subject for the log."""
+        if self.add(fault):
+            more = "; later faults are only counted" if self.count == MAX_KEPT_FAULTS else ""
+            log.warning("%s: %s%s%s", place, fault.cause, "; frame skipped" if fault.skipped else "", more)
 
 
 class Stream(Protocol):
