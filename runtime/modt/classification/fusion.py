@@ -32,8 +32,8 @@ BOX_FORGETTING, BOX_WEIGHT = 0.5, 0.75
 """Weight of the boxes so far at a further one, and of their mean."""
 MISMATCH_PROBABILITY = 0.05
 """That a proposal is not the object of its track: the posterior is then the prior of its box."""
-SURPRISE, GREAT_SURPRISE = 1.0, 2.0
-"""Change of the log-odds of an object by the box that is worth another view: of an uncertain track, of a certain."""
+SURPRISE = 2.3
+"""Change of the log-odds of an object by the box, since the last view, that is worth another one."""
 MORE_POINTS, MORE_POINTS_BY = 1.25, 5
 """Clearly more points than at the last view: by this ratio, and so many beyond random variation."""
 REVIEW_FRAMES = 10
@@ -70,13 +70,12 @@ class Certainty:
     posterior under equal class frequencies.
 
     Args:
-        config: frequencies, and the threshold of objects.
-        background_threshold: that of background.
+        config: frequencies and thresholds.
     """
 
-    def __init__(self, config: FusionConfig, background_threshold: float) -> None:
+    def __init__(self, config: FusionConfig) -> None:
         self._log_frequency = log_frequency_of(config)
-        self._object, self._background = config.object_threshold, background_threshold
+        self._object, self._background = config.object_threshold, config.background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
         """(R,) of posteriors (R, 4)."""
@@ -107,12 +106,11 @@ class FusedTracks:
     Args:
         config: frequencies, conditions of a view, thresholds of certainty.
         prior: of a proposal before its view; the class frequency by default.
-        background_threshold: at which background is certain.
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior | None, background_threshold: float) -> None:
+    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         self.config, self.prior = config, prior or FrequencyPrior(config.prior)
-        self.certain = Certainty(config, background_threshold)
+        self.certain = Certainty(config)
         self._log_frequency = log_frequency_of(config)
 
     def observe(self, tracks: Tracks, proposals: Proposals) -> None:
@@ -163,9 +161,6 @@ class FirstViews(FusedTracks):
     again once it shows clearly more points.
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
-        super().__init__(config, prior, config.first_view_background_threshold)
-
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
@@ -177,23 +172,18 @@ class FirstViews(FusedTracks):
 class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is certain, and where something changes (Table II).
 
-    A track is classified as soon as its box may be an object's; again while it is uncertain, where its box says
-    something else by now or it shows clearly more points; once certain, where the box says quite another thing and,
-    of an object, at growing intervals.
+    A track is classified as soon as its box may be an object's; again where its box says something else by now, where
+    it is uncertain and shows clearly more points and, of a certain object, at growing intervals.
     """
-
-    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
-        super().__init__(config, prior, config.background_threshold)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
         self.observe(tracks, proposals)
-        change = np.abs(_log_odds(tracks.prior) - tracks.key_log_odds)
         first = wants_class & self.prior.may_be_object(tracks.prior, self.config.min_object_probability)
         object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
         due = object_ & (tracks.age >= 2 * tracks.key_age + REVIEW_FRAMES)
-        uncertain = (change > SURPRISE) | _shows_more(tracks, proposals)
-        further = np.where(self.certain(tracks.posterior), (change > GREAT_SURPRISE) | due, uncertain)
+        further = np.where(self.certain(tracks.posterior), due, _shows_more(tracks, proposals))
+        further |= np.abs(_log_odds(tracks.prior) - tracks.key_log_odds) > SURPRISE
         asks: Bool = (tracks.proposal != NONE) & np.where(tracks.viewed, further, first)
         return asks
 
