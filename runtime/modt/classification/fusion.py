@@ -172,14 +172,15 @@ class FirstViews(FusedTracks):
 class FurtherViews(FusedTracks):
     """Mode accurate: views are fused until the class is certain, and where something changes (Table II).
 
-    A track is classified as soon as its box may be an object's; again where its box says something else by now, where
-    it is uncertain and shows clearly more points and, of a certain object, at growing intervals.
+    A track, a remembered place too, is classified as soon as its box may be an object's; again where its box says
+    something else by now, where it is uncertain and shows clearly more points and, of a certain object, at growing
+    intervals.
     """
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
         self.observe(tracks, proposals)
-        first = wants_class & self.prior.may_be_object(tracks.prior, self.config.min_object_probability)
+        first = self.prior.may_be_object(tracks.prior, self.config.min_object_probability)
         object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
         due = object_ & (tracks.age >= 2 * tracks.key_age + REVIEW_FRAMES)
         further = np.where(self.certain(tracks.posterior), due, _shows_more(tracks, proposals))

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.types import Float64
+from modt.classes import N_CLASSES
+from modt.types import Float64, Int
 
 YOUNG_S = 0.5, 1.5
 """Ages [s] that part tracks which stay where they are."""
@@ -44,8 +45,8 @@ Halved, since box and motion are not independent, and within 1.5; by `python -m 
 """
 
 
-def log_likelihood(moved_m: Float64, observed_s: Float64, length_m: Float64) -> Float64:
-    """(R, 4) log P(motion | class) over that of background.
+def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int, Int]:
+    """(R,) band of the length and (R,) cell of the motion: its displacement, or the age of what is still.
 
     Args:
         moved_m: (R,) displacement within about the last two seconds [m].
@@ -54,7 +55,12 @@ def log_likelihood(moved_m: Float64, observed_s: Float64, length_m: Float64) -> 
     """
     still = np.searchsorted(YOUNG_S, observed_s, side="right")
     gone = np.searchsorted(MOVED_M, moved_m, side="right") + len(YOUNG_S)
-    cell = np.where(moved_m < MOVED_M[0], still, gone)
-    out = np.zeros((len(moved_m), 4))
-    out[:, 1:] = LOG_LIKELIHOOD_RATIO[np.searchsorted(LENGTH_M, length_m, side="right"), :, cell]
+    return np.searchsorted(LENGTH_M, length_m, side="right"), np.where(moved_m < MOVED_M[0], still, gone)
+
+
+def log_likelihood(moved_m: Float64, observed_s: Float64, length_m: Float64) -> Float64:
+    """(R, 4) log P(motion | class) over that of background; arguments as of `cells`."""
+    length, cell = cells(moved_m, observed_s, length_m)
+    out = np.zeros((len(cell), N_CLASSES))
+    out[:, 1:] = LOG_LIKELIHOOD_RATIO[length, :, cell]
     return out

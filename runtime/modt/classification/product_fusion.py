@@ -22,8 +22,8 @@ class AnyView:
 
     def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
         """Multiply the view into the posterior; (R,) True."""
-        tracks.evidence[rows] += np.log(normalise(likelihood)) - self._log_frequency
-        tracks.posterior[rows] = from_log_weights(self._log_frequency + tracks.evidence[rows])
+        posterior = from_log_weights(tracks.evidence[rows] + np.log(normalise(likelihood)))
+        tracks.posterior[rows], tracks.evidence[rows] = posterior, np.log(posterior) - self._log_frequency
         tracks.views[rows] += 1
         tracks.key_points[rows] = proposals.count[tracks.proposal[rows]]
         return np.ones(len(rows), np.bool_)
