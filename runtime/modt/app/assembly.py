@@ -11,8 +11,9 @@ import numpy as np
 
 from modt import host
 from modt.app import kernel_choice
+from modt.classification import product_fusion
 from modt.classification.decision import Decision
-from modt.classification.fusion import EveryFrame, KeyViews, OneView
+from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
@@ -52,10 +53,18 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
     return Budget(profile.scheduler.calls_per_frame, mean_ms=profile.classification_ms)
 
 
+def _first_views(config: FusionConfig, prior: Prior) -> Fusion:
+    return (product_fusion.AnyView if config.rule == "product" else FirstViews)(config, prior)
+
+
+def _further_views(config: FusionConfig, prior: Prior) -> Fusion:
+    return (product_fusion.KeyViews if config.rule == "product" else FurtherViews)(config, prior)
+
+
 MODES = {
     "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, OneView, _profile_budget),
-    "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
+    "efficient": Mode(EFFICIENT, _first_views, _profile_budget),
+    "accurate": Mode(ACCURATE, _further_views, _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 
