@@ -75,10 +75,10 @@ def test_the_way_in_names_the_steps_in_order():
         "Segmenter.segment",
         "Odometry.locate",
         "Tracker.follow",
-        "KeyViews.asks",
+        "FurtherViews.asks",
         "Scheduler.select",
         "PointNet.classify",
-        "KeyViews.fuse",
+        "FurtherViews.fuse",
         "Tracker.conclude",
     ]
     places = [text.index(step) for step in steps]

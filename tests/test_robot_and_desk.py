@@ -62,7 +62,7 @@ def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, seconds, 
     [
         (main, {"view", "evaluate", "export", "simulate", "track"}),
         (profiles, {"fit", "schema"}),
-        (profile, {"report", "compare", "predict", "regimes"}),
+        (profile, {"calibrate", "report", "compare", "predict", "regimes"}),
     ],
 )
 def test_the_desks_commands_are_told_by_their_module(module, of_the_desk):

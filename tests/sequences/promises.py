@@ -141,7 +141,7 @@ class Run:
 
     def _posteriors(self, result: FrameResult) -> None:
         tracks, frequency = result.tracks, self.pipeline.decision.frequency
-        for column in (tracks.prior, tracks.posterior, tracks.key_prior, tracks.key_posterior, frequency[None]):
+        for column in (tracks.prior, tracks.posterior, frequency[None]):
             assert (column >= 0).all()
             np.testing.assert_allclose(column.sum(axis=1), 1.0, rtol=0, atol=1e-9)
 
