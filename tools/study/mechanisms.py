@@ -74,8 +74,7 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
     "new rest position": ("of what stopped", values(_FILTER, stopped_mps=0.01)),
     "rest position follows": ("the track", values(_FILTER, rest_gain=0.0)),
     "mean of views": ("not their product", values("fusion", rule="product")),
-    "probable objects": ("first of several views", values("fusion", min_object_probability=0.0)),
-    "probable objects, efficient": ("only view", values("fusion", first_view_min_object_probability=0.0)),
+    "probable objects": ("are classified", values("fusion", min_object_probability=0.0)),
     "hysteresis": ("of the class that is said", values("decision", hysteresis=1.0)),
     "worth": (
         "order of calls; off: longest waiting first",

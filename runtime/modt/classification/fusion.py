@@ -33,7 +33,7 @@ BOX_FORGETTING, BOX_WEIGHT = 0.5, 0.75
 MISMATCH_PROBABILITY = 0.05
 """That a proposal is not the object of its track: the posterior is then the prior of its box."""
 SURPRISE = 2.3
-"""Change of the log-odds of an object by the box, since the last view, that is worth another one."""
+"""Change of the log-odds of an object by box and motion, since the last view, that is worth another one."""
 MORE_POINTS, MORE_POINTS_BY = 1.25, 5
 """Clearly more points than at the last view: by this ratio, and so many beyond random variation."""
 REVIEW_FRAMES = 10
@@ -139,7 +139,7 @@ class FusedTracks:
         tracks.weight[rows] = total
         tracks.views[rows] += 1
         tracks.key_points[rows], tracks.key_age[rows] = count, tracks.age[rows]
-        tracks.key_log_odds[rows] = _log_odds(prior)
+        tracks.key_log_odds[rows] = _log_odds(_expected(tracks)[rows])
         self._conclude(tracks, rows)
         return self.certain(tracks.posterior[rows])
 
@@ -165,7 +165,7 @@ class FirstViews(FusedTracks):
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
         asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= self.config.first_view_min_hits)
-        asks &= self.prior.may_be_object(tracks.prior, self.config.first_view_min_object_probability)
+        asks &= self.prior.may_be_object(_expected(tracks), self.config.min_object_probability)
         return asks & (~tracks.viewed | _shows_more(tracks, proposals))
 
 
@@ -180,13 +180,19 @@ class FurtherViews(FusedTracks):
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first view or one that may change their class."""
         self.observe(tracks, proposals)
-        first = self.prior.may_be_object(tracks.prior, self.config.min_object_probability)
+        expected = _expected(tracks)
+        first = self.prior.may_be_object(expected, self.config.min_object_probability)
         object_ = tracks.posterior[:, ObjectClass.BACKGROUND] < 0.5
         due = object_ & (tracks.age >= 2 * tracks.key_age + REVIEW_FRAMES)
         further = np.where(self.certain(tracks.posterior), due, _shows_more(tracks, proposals))
-        further |= np.abs(_log_odds(tracks.prior) - tracks.key_log_odds) > SURPRISE
+        further |= np.abs(_log_odds(expected) - tracks.key_log_odds) > SURPRISE
         asks: Bool = (tracks.proposal != NONE) & np.where(tracks.viewed, further, first)
         return asks
+
+
+def _expected(tracks: Tracks) -> Float64:
+    """(M, 4) P(class | box, motion)."""
+    return normalise(tracks.prior * np.exp(tracks.witness))
 
 
 def _log(probability: Float64) -> Float64:

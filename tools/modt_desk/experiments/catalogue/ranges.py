@@ -19,7 +19,6 @@ RANGES_M = (10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0)
 GATED, EVERY = "as configured", "every new track classified"
 _UNGATED = {
     "fusion__min_object_probability": 0.0,
-    "fusion__first_view_min_object_probability": 0.0,
     "tracking__background_map__capacity": 0,
 }
 
