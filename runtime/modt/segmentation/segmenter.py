@@ -37,7 +37,7 @@ class Segmenter:
         self.height_estimator = HeightEstimator(sensor, config)
         self.ground = GroundEstimator(sensor, config)
         self.clusterer = Clusterer(sensor, config, kernels)
-        self.ends = ViewEnds(sensor, config.max_height_m)
+        self.ends = ViewEnds(sensor, config.person_splitting.max_top_m)
 
     def facts(self) -> dict[str, str]:
         """Which kernels it runs on."""

@@ -12,7 +12,7 @@ _STEPS, _NEAR_M = 0.75, 0.1
 
 
 class ViewEnds:
-    """Tells which sides of proposals are cut; no point is higher than `max_height_m` above the ground."""
+    """Tells which sides of proposals are cut, above as far away as the highest beam is below `max_height_m`."""
 
     def __init__(self, sensor: SensorConfig, max_height_m: float) -> None:
         sectors = np.deg2rad(sensor.blind_sectors_deg or ())
@@ -33,7 +33,7 @@ class ViewEnds:
     def cut(self, coordinates: Float32, offsets: Int, box: Float64) -> Int:
         """(P,) flags of Cut, of proposals that own (3, K) points by (P + 1,) offsets, in (P, 7) boxes."""
         cut, nearest_m = np.zeros(len(box), np.int64), np.hypot(*box[:, :2].T) - np.hypot(*box[:, 3:5].T) / 2
-        near = (nearest_m < self._reach_m).nonzero()[0]  # farther away the beams pass beyond what is segmented
+        near = (nearest_m < self._reach_m).nonzero()[0]  # farther away the beams pass beyond people
         if not len(near):
             return cut
         runs = zip(offsets[near].tolist(), offsets[near + 1].tolist(), strict=True)
