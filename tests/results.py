@@ -15,7 +15,7 @@ def proposals(counts: list[int], boxes: np.ndarray | None = None) -> Proposals:
     offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
     made = np.tile([10.0, 0, -1, 4, 2, 1.5, 0], (p, 1)) + np.arange(p)[:, None] * [0, 3.0, 0, 0, 0, 0, 0]
     box = made if boxes is None else boxes
-    none, nowhere = np.zeros(p, np.bool_), np.zeros((3, offsets[-1]), np.float32)
+    none, nowhere = np.zeros(p, np.int64), np.zeros((3, offsets[-1]), np.float32)
     return Proposals(np.arange(offsets[-1]), offsets, nowhere, box[:, :3].copy(), box, none)
 
 

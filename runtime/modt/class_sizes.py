@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.classes import CLASSES, ObjectClass
-from modt.types import Bool, Float32, Float64
+from modt.classes import CLASSES, PERSON_M, ObjectClass
+from modt.types import Bool, Cut, Float32, Float64, FrameResult
 
 MAX_SIZE_M: Float64 = np.array([(spec.max_length_m, spec.max_width_m) for spec in CLASSES.values()])
 """(4, 2) greatest length and width of each class."""
@@ -37,3 +37,12 @@ class PersonSize:
         fits: Bool = (extent_m > self.min_extent_m) & (extent_m < self.max_extent_m)
         fits &= (top_m > self.min_top_m) & (top_m < self.max_top_m) & (top_m - bottom_m > self.min_height_m)
         return fits
+
+
+def unknown_near(result: FrameResult) -> Bool:
+    """(M,) tracks in view, background as far as is known, that may be people: cut above, below a third of one."""
+    own, box = result.tracks.proposal, result.proposals.box
+    may_be = (result.proposals.cut & Cut.TOP > 0) & (box[:, 5] < PERSON_M / 3) & (box[:, 3] < MAX_PERSON_M)
+    unknown: Bool = np.append(may_be, False)[own]  # the last is that of NONE
+    unknown &= result.tracks.object_class == ObjectClass.BACKGROUND
+    return unknown

@@ -54,6 +54,7 @@ CLASSES: dict[ObjectClass, ClassSpec] = {
 
 CLASS_NAMES = tuple(c.name.lower() for c in CLASSES)
 N_CLASSES = len(CLASSES)
+PERSON_M = 1.7  # height of a person
 OBJECTS = tuple(CLASSES)[1:]
 """Every class but background."""
 

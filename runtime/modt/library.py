@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from modt import profile
 from modt.app import assembly
+from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
@@ -34,6 +35,7 @@ class TrackedObjects:
         posterior: (n, 4) probability of each class.
         final: (n,) the class is final.
         visible: (n,) matched with a proposal of this frame.
+        unknown_near: (n,) background as far as is known, but too near for the sensor to show whether it is a person.
         box_sensor: (n, 7) x, y, z of the centre, length, width, height [m], yaw [rad] in the sensor frame; NaN if not
             visible.
         box_world: (n, 7) last box in the world.
@@ -49,6 +51,7 @@ class TrackedObjects:
     posterior: Float64
     final: Bool
     visible: Bool
+    unknown_near: Bool
     box_sensor: Float64
     box_world: Float64
     position: Float64
@@ -171,6 +174,7 @@ class Pipeline:
             posterior=tracks.posterior,
             final=tracks.final,
             visible=visible,
+            unknown_near=unknown_near(result),
             box_sensor=box,
             box_world=tracks.box,
             position=tracks.x[:, :2],

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
+from enum import IntFlag
 from functools import cache
 from operator import attrgetter
 from typing import Any, Self
@@ -61,6 +62,15 @@ class Frame:
         return self.stamp_s if self.steady_s is None else self.steady_s
 
 
+class Cut(IntFlag):
+    """Sides of a proposal that end where the view of the sensor ends: what lies beyond them is not known."""
+
+    TOP = 1  # at the highest beam
+    BOTTOM = 2  # at the lowest beam
+    SIDE = 4  # at the edge of the field of view or of a blind sector
+    NEAR = 8  # at the nearest range used
+
+
 @dataclass(frozen=True, slots=True)
 class Proposals:
     """The segments of one frame that could be objects.
@@ -74,7 +84,7 @@ class Proposals:
     coordinates: Float32  # (3, K) x, y and z of the members [m, sensor frame], gathered once
     centroid: Float64  # (P, 3) mean of each proposal's points [m, sensor frame]
     box: Float64  # (P, 7) minimum box: x, y, z of its centre, l, w, h [m], yaw [rad], sensor frame, l >= w
-    truncated: Bool  # (P,) cut by the edge of the field of view
+    cut: Int  # (P,) flags of Cut
     ground_z_m: Float64 | None = None  # (P,) z of the ground beneath each [m, sensor frame], None where not known
     reflectance: Float64 | None = None  # (P, 5)
 
@@ -109,7 +119,7 @@ class Proposals:
             coordinates=coordinates,
             centroid=self.centroid.take(source, axis=0),
             box=self.box.take(source, axis=0),
-            truncated=self.truncated[source],
+            cut=self.cut[source],
             ground_z_m=None if self.ground_z_m is None else self.ground_z_m.take(source),
             reflectance=None if self.reflectance is None else self.reflectance.take(source, axis=0),
         )
@@ -128,7 +138,7 @@ class Proposals:
             coordinates=np.zeros((3, 0), np.float32),
             centroid=np.zeros((0, 3)),
             box=np.zeros((0, 7)),
-            truncated=np.zeros(0, np.bool_),
+            cut=np.zeros(0, np.int64),
         )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from modt.app import checks
-from modt.config import ClassificationConfig, ProfileConfig, RecordingConfig
+from modt.config import ClassificationConfig, ProfileConfig, RecordingConfig, SensorConfig
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, Scope
 from modt.errors import MisuseError
@@ -124,3 +124,20 @@ def test_a_sensor_that_cannot_be_opened_fails_with_the_remedy():
         raise MisuseError("udp://x", "port taken", "give a free port")
 
     assert checks.sensor(refuse) == [checks.Finding("fail", "sensor", "udp://x: port taken", "give a free port")]
+
+
+@pytest.mark.parametrize(
+    ("sensor", "level", "said"),
+    [
+        ({"height_m": 0.3, "elevation_span_deg": (-15.0, 15.0)}, "warn", "from 1.1 m on"),
+        ({"height_m": 0.5, "elevation_span_deg": (-7.0, 52.0)}, "ok", "from 0.5 m on"),
+        ({"height_m": 0.5, "elevations_deg": (-25.0, 0.0, 25.0)}, "ok", "from 0.7 m on"),
+        ({"height_m": 0.3}, "ok", "not known"),
+        ({"height_m": None, "elevation_span_deg": (-15.0, 15.0)}, "ok", "not known"),
+        ({"height_m": 5.0, "elevation_span_deg": (-5.0, 15.0)}, "ok", "not known"),
+    ],
+)
+def test_how_much_is_seen_of_people_near_the_sensor_is_said(sensor, level, said):
+    found = checks.near(SensorConfig(**sensor))
+    assert found.level == level
+    assert said in str(found)

@@ -18,7 +18,7 @@ def blobs(counts: list[int], rng: np.random.Generator) -> tuple[Float32, Proposa
     members = np.sort(rng.choice(2 * total, total, replace=False))
     points[members, :3] = xyz
     box = np.c_[centre, np.full((n, 3), 1.5), np.zeros(n)].reshape(n, 7)
-    none = np.zeros(n, np.bool_)
+    none = np.zeros(n, np.int64)
     offsets = np.append(0, np.cumsum(counts)).astype(np.int64)
     return points, Proposals(members, offsets, points[members, :3].T, centre, box, none)
 

@@ -129,7 +129,9 @@ def test_points_are_repeated_to_a_least_number(shipped: PointNet, monkeypatch: p
     paper, sizes = network(shipped.path, max_points=400, min_points=400, batch=1), []
     expected = network(shipped.path, max_points=400).classify(points, proposals, np.arange(3))
     infer = PointNet.infer
-    monkeypatch.setattr(PointNet, "infer", lambda self, batch: (sizes.append(batch.shape[:2]), infer(self, batch))[1])
+    monkeypatch.setattr(
+        PointNet, "infer", lambda self, batch, *_: (sizes.append(batch.shape[:2]), infer(self, batch))[1]
+    )
     np.testing.assert_allclose(paper.classify(points, proposals, np.arange(3)), expected, atol=1e-5)
     assert sizes == [(1, 400)] * 3
     assert padded_size(paper.config)(proposals.count) == 1200

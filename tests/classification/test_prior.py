@@ -116,6 +116,7 @@ def test_malformed_metadata_is_rejected(entry: str) -> None:
 def test_box_classifier_round_trips_through_metadata() -> None:
     features = RNG.normal(size=(6, N_FEATURES))
     loaded = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
-    np.testing.assert_array_equal(loaded.log_probability(features), BOXES.log_probability(features))
+    whole = np.zeros(6, np.int64)
+    np.testing.assert_array_equal(loaded.log_probability(features, whole), BOXES.log_probability(features, whole))
     assert loaded.weights == WEIGHTS
-    assert not from_metadata({}).log_probability(features).any()
+    assert not from_metadata({}).log_probability(features, whole).any()

@@ -25,7 +25,7 @@ from modt.classification.reflectance_classifier import (
 )
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
-from modt.types import N_REFLECTANCE, Proposals
+from modt.types import N_REFLECTANCE, Cut, Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)
@@ -196,3 +196,32 @@ def test_shipped_model_separates_number_plates_from_leaves() -> None:
     )
     assert car[ObjectClass.CAR] > 0.9
     assert bush[ObjectClass.CAR] < 0.3
+
+
+def test_what_the_view_cuts_is_judged_by_the_network_beside_the_model(tmp_path: Path) -> None:
+    onnx = pytest.importorskip("onnx", reason="extra [train] is not installed")
+    points, blob = blobs([10, 30, 60], np.random.default_rng(0))
+    box = blob.box.copy()
+    box[:, 2], box[:, 5] = -1.0, 0.5  # lower than a person
+    proposals = dataclasses.replace(blob, box=box, cut=np.array([Cut.TOP, 0, Cut.TOP]))
+    whole = dataclasses.replace(proposals, cut=np.zeros(3, np.int64))
+    metadata = {box_classifier.METADATA_KEY: box_classifier.to_metadata(BOX_LAYERS, PoolWeights(0.8, 0.2))}
+    model = _with_metadata(tmp_path / "net.onnx", metadata)
+    alone = PointNet(model, SensorConfig()).classify(points, proposals, np.arange(3))
+    np.testing.assert_array_equal(PointNet(model, SensorConfig()).classify(points, whole, np.arange(3)), alone)
+
+    beside = onnx.load(tmp_path / "net.onnx")
+    last = next(i for i in beside.graph.initializer if i.name == "bias5")
+    last.CopyFrom(onnx.numpy_helper.from_array(np.float32([0.0, 0.0, 30.0, 0.0]), "bias5"))  # all are people
+    bounds = [(np.zeros((box_classifier.N_BOUND_FEATURES, 4)), np.zeros(4))]
+    text = {box_classifier.BOUNDS_KEY: json.dumps(box_classifier.to_lists(bounds))}
+    onnx.helper.set_model_props(beside, text)
+    (tmp_path / "net-near.onnx").write_bytes(beside.SerializeToString())
+    found = PointNet(model, SensorConfig()).classify(points, proposals, np.array([2, 1, 0]))
+    assert (found[[0, 2], ObjectClass.PEDESTRIAN] > 0.99).all()
+    np.testing.assert_array_equal(found[1], alone[1])
+    np.testing.assert_array_equal(PointNet(model, SensorConfig()).classify(points, whole, np.arange(3)), alone)
+    onnx.helper.set_model_props(beside, {box_classifier.BOUNDS_KEY: "[]"})
+    (tmp_path / "net-near.onnx").write_bytes(beside.SerializeToString())
+    with pytest.raises(MisuseError, match="malformed box"):
+        PointNet(model, SensorConfig())

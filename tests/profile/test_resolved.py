@@ -108,4 +108,5 @@ def test_what_is_shown_is_a_profile_and_says_who_set_each_key():
     assert "elevation_step_deg: 1.45 # os1-32" in lines
     assert "board: Raspberry Pi 5 # raspberry-pi-5" in lines
     assert "period_s: 0.1 # default" in lines
+    assert shown.endswith("# a third of a person's height is in view from 0.7 m on\n")
     assert "min_range_m: 2.0 # hdl-64e" in profile.resolve("raspberry-pi-5").shown()

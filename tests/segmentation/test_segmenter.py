@@ -6,7 +6,7 @@ import pytest
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
 from modt.segmentation.segmenter import Segmenter
-from modt.types import NONE
+from modt.types import NONE, Cut
 from tests.segmentation import reference, scans
 
 CAR = (4.2, 1.8, 0.2, 1.8)
@@ -45,7 +45,7 @@ def test_one_object_is_one_proposal():
     assert len(proposals) == 1
     assert set(on[proposals.members]) == {1}
     assert proposals.centroid[0] == pytest.approx(points[proposals.members, :3].mean(axis=0), abs=1e-4)
-    assert not proposals.truncated[0]
+    assert not proposals.cut[0]
 
 
 @pytest.mark.parametrize("fov", [None, AHEAD], ids=["all round", "ahead"])
@@ -139,14 +139,14 @@ def test_objects_that_reach_into_the_field_of_view_are_whole():
 def test_an_object_cut_by_the_margin_is_truncated():
     points, _ = scans.scan([(16.0, 20.0, 3.0, 7.0, 0.0, 1.0)], step_deg=0.25)
     proposals = segmenter(AHEAD).segment(points)
-    assert proposals.truncated.tolist() == [True]
+    assert proposals.cut.tolist() == [Cut.SIDE]
 
 
 def test_the_same_sweep_gives_the_same_bytes():
     points, _ = scans.scan([(12.0, 3.0, *CAR), (8.0, -4.0, *PERSON)])
     stage = segmenter()
     one, other = stage.segment(points), stage.segment(points.copy())
-    for name in ("members", "offsets", "centroid", "box", "truncated"):
+    for name in ("members", "offsets", "centroid", "box", "cut"):
         assert getattr(one, name).tobytes() == getattr(other, name).tobytes()
 
 

@@ -8,12 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from modt.class_sizes import unknown_near
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.json_columns import decode, join_columns, probabilities, rounded_to_3
 from modt.sinks.output import LineFile
 from modt.sinks.records import BROKEN, line, read_records
-from modt.sinks.tracks import SCHEMA, frame_line, frame_record, recorded_pose
-from tests.results import CAR, result
+from modt.sinks.tracks import SCHEMA, UNKNOWN_NEAR, frame_line, frame_record, recorded_pose
+from modt.types import Cut
+from tests.results import CAR, PEDESTRIAN, result
 
 
 def test_a_record_has_the_documented_fields():
@@ -31,6 +33,7 @@ def test_a_record_has_the_documented_fields():
         "witness": [0.0] * 4,
         "viewed": False,
         "final": False,
+        "uncertain": None,
         "proposal": 0,
         "points": 0,
         "age": 0,
@@ -41,6 +44,23 @@ def test_a_record_has_the_documented_fields():
     assert unsure["class"] == "background"
     assert unsure["posterior"] == [0.25] * 4
     assert (lost["proposal"], lost["box"], lost["state"]) == (None, None, "lost")
+
+
+@pytest.mark.parametrize(
+    ("size", "cut", "posteriors", "said"),
+    [
+        ((0.5, 0.4, 0.5), Cut.TOP, {}, UNKNOWN_NEAR),
+        ((0.5, 0.4, 0.5), Cut.BOTTOM, {}, None),
+        ((0.5, 0.4, 0.6), Cut.TOP, {}, None),  # more than a third of a person is in view
+        ((1.2, 0.4, 0.5), Cut.TOP, {}, None),  # longer than a person
+        ((0.5, 0.4, 0.5), Cut.TOP, {11: PEDESTRIAN}, None),
+    ],
+)
+def test_what_may_be_a_person_too_near_to_be_known_is_said_to_be_uncertain(size, cut, posteriors, said):
+    r = result(3, [7, 5], {0: 11}, posteriors, lost=(9,))
+    r.proposals.box[0, 3:6], r.proposals.cut[0] = size, cut
+    assert [track["uncertain"] for track in frame_record(r)["tracks"]] == [said, None]
+    assert unknown_near(r).tolist() == [said is not None, False]
 
 
 def test_the_pose_of_the_sensor_is_recorded_and_read_back():
@@ -99,6 +119,7 @@ def results(draw):
     for column, elements in ((t.x, NUMBERS), (r.proposals.box, NUMBERS), (t.posterior, LIKELIHOODS)):
         column[:] = draw(arrays(np.float64, column.shape, elements=elements))
     t.final[:] = draw(arrays(np.bool_, len(t)))
+    r.proposals.cut[:] = draw(arrays(np.int64, tracked, elements=st.sampled_from([0, Cut.TOP])))
     return r
 
 

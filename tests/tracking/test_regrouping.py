@@ -36,7 +36,7 @@ def scenes(draw):
     frame, proposals = frame_of([box(6 * k + 5, k, yaw=0.3 * k) for k in range(n)], points=draw_counts(draw, n))
     proposals = dataclasses.replace(
         proposals,
-        truncated=np.arange(n) % 3 == 0,
+        cut=np.arange(n) % 3,
         reflectance=np.arange(5.0 * n).reshape(n, 5),
         ground_z_m=-1.0 - np.arange(n),
     )
@@ -104,7 +104,7 @@ def test_what_did_not_change_keeps_its_columns(scene):
     same = np.setdiff1d(np.arange(n), scene.grouping.changed)
     np.testing.assert_array_equal(after.box[same], before.box[source[same]])
     np.testing.assert_array_equal(after.centroid[same], before.centroid[source[same]])
-    np.testing.assert_array_equal(after.truncated, before.truncated[source])
+    np.testing.assert_array_equal(after.cut, before.cut[source])
     np.testing.assert_array_equal(after.reflectance, before.reflectance[source])
     np.testing.assert_array_equal(after.ground_z_m, before.ground_z_m[source])
     for column in dataclasses.fields(observations):

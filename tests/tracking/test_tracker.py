@@ -1,10 +1,13 @@
 """The tracker: births, prediction, updates, rest and deaths."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from modt.classes import ObjectClass
 from modt.config import TrackingConfig
 from modt.config.tracking import FilterConfig
 from modt.geometry.kdop import DIRECTIONS
@@ -12,7 +15,7 @@ from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.paper_association import PaperAssociation
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, UndefinedTransitionError
 from modt.tracking.tracker import association_of, regroupings_of
-from modt.types import NONE, Proposals
+from modt.types import NONE, Cut, Proposals
 from tests.tracking.tracking_scenes import EYE, Follower, box, frame_of
 
 ASSOCIATIONS = ["kdop", "paper"]
@@ -216,3 +219,25 @@ def test_new_tracks_begin_with_the_uncertainty_of_the_configuration():
     tracker = Follower(TrackingConfig(filter=config))
     tracks = tracker.follow(*frame_of([box(10, 0)], 0, EYE))
     np.testing.assert_allclose(np.diag(tracks.P[0]), [0.49, 0.49, np.pi**2, 81.0])
+
+
+@pytest.mark.parametrize(
+    ("object_class", "cut", "height_m"),
+    [
+        (ObjectClass.PEDESTRIAN, Cut.TOP, 1.6),
+        (ObjectClass.PEDESTRIAN, Cut.BOTTOM, 0.6),  # what is seen whole above is no higher than that
+        (ObjectClass.CAR, Cut.TOP, 0.6),
+    ],
+)
+def test_a_person_of_whom_only_legs_are_left_is_as_high_as_before(object_class, cut, height_m):
+    tracker = Follower()
+    run_frames = [frame_of([box(2 - 0.1 * i, 0, 0.5, 0.4, 1.6, z=0.6)], i, EYE) for i in range(6)]
+    for frame, proposals in run_frames:
+        tracker.follow(frame, proposals)
+        tracker.classify(object_class)
+    for i in (6, 7):
+        frame, proposals = frame_of([box(1.4, 0, 0.5, 0.4, 0.6, z=0.1)], i, EYE)
+        tracks = tracker.follow(frame, replace(proposals, cut=np.array([cut])))
+        assert len(tracks) == 1
+        for of in (tracks.box[0], tracker.proposals.box[0]):
+            assert (of[5], of[2] - of[5] / 2) == (pytest.approx(height_m), pytest.approx(-0.2))

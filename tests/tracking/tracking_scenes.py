@@ -77,7 +77,7 @@ def frame_of(boxes, index=0, T_world_sensor=None, points=60, seed=0, period_s=0.
     offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     points = np.concatenate([xyz, np.zeros((len(xyz), 1))], axis=1).astype(np.float32)
     frame = Frame(index, index * period_s, points, T_world_sensor)
-    flags = np.zeros(len(boxes), np.bool_)
+    flags = np.zeros(len(boxes), np.int64)
     centroid = np.array([c.mean(axis=0) for c in clouds]).reshape(-1, 3)
     return frame, Proposals(np.arange(len(xyz)), offsets, points[:, :3].T.copy(), centroid, boxes, flags)
 
@@ -109,7 +109,7 @@ def joined(proposals, groups):
         coordinates=proposals.coordinates[:, np.concatenate(rows)],
         centroid=np.array([p.mean(axis=0) for p in xyz]),
         box=np.array(boxes),
-        truncated=np.zeros(len(rows), np.bool_),
+        cut=np.zeros(len(rows), np.int64),
         reflectance=None if proposals.reflectance is None else proposals.reflectance[[g[0] for g in groups]],
     )
 

@@ -64,7 +64,7 @@ def frame_result(index: int, n_tracks: int, n_points: int) -> FrameResult:
     tracks.id[:] = tracks.proposal[:] = np.arange(n_tracks)
     tracks.object_class[::3] = 1
     tracks.x[:], tracks.box[:] = rng.normal(0.0, 5.0, (n_tracks, 4)), box
-    cut = np.zeros(n_tracks, np.bool_)
+    cut = np.zeros(n_tracks, np.int64)
     proposals = Proposals(members, offsets, points[members, :3].T.copy(), box[:, :3], box, cut)
     return FrameResult(Frame(index, 0.1 * index, points), np.eye(4), proposals, tracks, ("tracked",), 0)
 

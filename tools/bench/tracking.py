@@ -53,7 +53,7 @@ def frames(n: int, count: int, alive: float, seed: int = 0) -> list[tuple[Frame,
         x, y = c * local[..., 0] - s * local[..., 1], s * local[..., 0] + c * local[..., 1]
         xyz = np.stack([x, y, local[..., 2]], axis=-1) + boxes[:, None, :3]
         points = np.concatenate([xyz.reshape(-1, 3), np.zeros((n * POINTS, 1))], axis=1).astype(np.float32)
-        flags = np.zeros(n, np.bool_)
+        flags = np.zeros(n, np.int64)
         members, offsets, coordinates = np.arange(n * POINTS), np.arange(n + 1) * POINTS, points[:, :3].T.copy()
         proposals = Proposals(members, offsets, coordinates, xyz.mean(axis=1), boxes, flags)
         out.append((Frame(i, 0.1 * i, points, T), proposals))

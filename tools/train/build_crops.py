@@ -36,7 +36,6 @@ from tools.train.labelled_scans import (
     folder_scans,
     object_scans,
     pandaset_scans,
-    raw_scans,
     semantic_scans,
     thinned,
 )
@@ -174,10 +173,9 @@ class CropWriter:
 
 
 def kitti(root: Path) -> Iterator[Scan]:
-    """Labelled scans of KITTI except those of the test drive."""
+    """Labelled scans of KITTI's object frames; none is of a test drive."""
     for folder in ("training", "training_more"):
         yield from object_scans(root / "object" / folder)
-    yield from raw_scans(root / "raw" / "2011_09_26" / "2011_09_26_drive_0001_sync")
 
 
 def add_labelled(writer: CropWriter, scan: Scan) -> None:

@@ -20,13 +20,14 @@ from tools.train.build_crops import add_sources
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
 WORLDS, PASTES = 240, 120
+NEAR_WORLDS, NEAR_STEPS = {1: 3000, 2: 550}, 4000
+"""Seed and number of the worlds near the sensor: to train on, and for the card; steps."""
 KITTI_DATA = (
-    "106 + 2 and 53 more object frames, drive 0001 (5 scans) and 4 odometry scans of KITTI (A. Geiger et al., IJRR "
-    "2013; SemanticKITTI labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 "
-    "sweeps of Argoverse 2 (B. Wilson et al., 2021) and 9 scans of PandaSet (Hesai and Scale AI, CC BY 4.0), as our "
-    "segmentation cuts them up, KITTI's objects pasted into "
-    "other scans and moved to other ranges, and the synthetic world, part of it with objects placed by KITTI's label "
-    "files; nothing of drive 0005"
+    "106 + 2 and 53 more object frames and 4 odometry scans of KITTI (A. Geiger et al., IJRR 2013; SemanticKITTI "
+    "labels, J. Behley et al., ICCV 2019), the former thinned to 32 and to 16 beams too, 3 sweeps of Argoverse 2 (B. "
+    "Wilson et al., 2021) and 9 scans of PandaSet (Hesai and Scale AI, CC BY 4.0), as our segmentation cuts them up, "
+    "KITTI's objects pasted into other scans and moved to other ranges, and the synthetic world, part of it with "
+    "objects placed by KITTI's label files; nothing of drives 0001 and 0005"
 )
 SYNTHETIC_DATA = (
     "the synthetic world alone, by every simulated sensor: no recordings; the reflectance of its materials is "
@@ -41,12 +42,15 @@ def run(name: str, *arguments: str | Path | int) -> None:
     subprocess.run(command, check=True)
 
 
-def build(folder: Path, crops: list[Path], out: Path, options: list[str], data: str, licence: str) -> None:
-    """Train and export a model with its card.
+def build(
+    folder: Path, crops: list[Path], near: list[Path], out: Path, options: list[str], data: str, licence: str
+) -> None:
+    """Train and export a model and the network beside it for what the view cuts, with their cards.
 
     Args:
         folder: for the trained weights.
         crops: data sets.
+        near: two data sets of build_near_crops, one to train on and one for the card.
         out: the model.
         options: of train_pointnet.
         data: description of the data, for the card.
@@ -57,6 +61,9 @@ def build(folder: Path, crops: list[Path], out: Path, options: list[str], data: 
     for sensor in REFLECTANCE_SCALES:
         run("train_reflectance_classifier", folder, *crops, "--sensor", sensor)
     run("export_pointnet", folder, out, "--data", data, "--licence", licence)
+    options = ["--steps", str(NEAR_STEPS), "--licence", licence]
+    beside = out.with_stem(f"{out.stem}-near")
+    run("train_near", out, beside, *options, "--near", near[0], "--held", near[1], "--crops", *crops)
 
 
 def main() -> None:
@@ -67,6 +74,9 @@ def main() -> None:
     args = options.parse_args()
     args.work.mkdir(parents=True, exist_ok=True)
     free, placed, real, own = (args.work / f"{name}.npz" for name in ("synthetic", "placed", "kitti", "scans"))
+    near = [args.work / f"near-{seed}.npz" for seed in NEAR_WORLDS]
+    for path, (seed, worlds) in zip(near, NEAR_WORLDS.items(), strict=True):
+        run("build_near_crops", path, "--worlds", worlds, "--seed", seed)
     steps = ["--steps", str(args.steps)]
     if args.kitti:
         run("build_crops", real, "--kitti", args.kitti, "--paste", PASTES)
@@ -79,12 +89,20 @@ def main() -> None:
         crops, data = [own, real, placed] if args.kitti else [own, free], f"scans of {args.scans.name}; "
         licence = KITTI_LICENCE if args.kitti else "that of the scans"
         data += KITTI_DATA if args.kitti else SYNTHETIC_DATA
-        build(args.work / "scans", crops, args.work / "pointnet-scans.onnx", steps, data, licence)
+        build(args.work / "scans", crops, near, args.work / "pointnet-scans.onnx", steps, data, licence)
         return
     licence = "Apache-2.0: free for any use"
-    build(args.work / "synthetic", [free], MODELS / "pointnet-synthetic.onnx", steps, SYNTHETIC_DATA, licence)
+    build(args.work / "synthetic", [free], near, MODELS / "pointnet-synthetic.onnx", steps, SYNTHETIC_DATA, licence)
     if args.kitti:
-        build(args.work / "kitti", [real, placed], MODELS / "pointnet-kitti.onnx", steps, KITTI_DATA, KITTI_LICENCE)
+        build(
+            args.work / "kitti",
+            [real, placed],
+            near,
+            MODELS / "pointnet-kitti.onnx",
+            steps,
+            KITTI_DATA,
+            KITTI_LICENCE,
+        )
 
 
 if __name__ == "__main__":

@@ -48,6 +48,12 @@ class Sensors:
         """(R,) solid angle of a point [sr]."""
         return np.deg2rad(self.azimuth_deg) * np.deg2rad(self.elevation_deg)
 
+    def followed_by(self, other: Sensors) -> Sensors:
+        """These, then others."""
+        return Sensors(
+            *(np.concatenate(pair) for pair in zip(vars(self).values(), vars(other).values(), strict=True))
+        )
+
     def take(self, rows: Int) -> Sensors:
         """Those of rows."""
         return Sensors(self.ground_z_m[rows], self.azimuth_deg[rows], self.elevation_deg[rows])

@@ -43,6 +43,7 @@ def train_mlp(batch: Callable[[], Batch], sample: Float64, steps: int, rate: flo
         decay: weight decay.
     """
     mean, scale = sample.mean(axis=0), sample.std(axis=0)
+    scale = np.where(scale > 0, scale, 1.0)  # of a feature that never varies
     linear = [nn.Linear(a, b) for a, b in pairwise((sample.shape[1], *HIDDEN, N_CLASSES))]
     net = nn.Sequential(*[part for layer in linear for part in (layer, nn.Tanh())][:-1])
     optimiser = torch.optim.AdamW(net.parameters(), weight_decay=decay)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from modt import host
-from modt.config import ClassificationConfig, ProfileConfig
+from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Kind
 from modt.errors import ModtError
@@ -99,6 +99,15 @@ def model(config: ClassificationConfig, load: Callable[[], dict[str, str]]) -> F
     except ModtError as error:
         return Finding(FAIL, "model", f"{error.subject}: {error.cause}", error.remedy)
     return Finding(OK, "model", f"{config.model}, SHA-256 {facts['sha256'][:12]} as on its card")
+
+
+def near(sensor: SensorConfig) -> Finding:
+    """From which distance on enough of a person is in view; from 0.7 m on, people are expected to be recognised."""
+    seen_m = sensor.person_seen_from_m
+    if seen_m is None:
+        return Finding(OK, "near", "how much is seen of people is not known", "set height_m, elevation_span_deg")
+    what = f"a third of a person is in view from {seen_m:.1f} m on; nearer ones may be 'unknown, near'"
+    return Finding(OK if seen_m <= 0.7 else WARN, "near", what, "beams that spread wider show more")
 
 
 def disk(out: Path, config: ProfileConfig, free_bytes: Callable[[Path], int] | None = None) -> Finding:

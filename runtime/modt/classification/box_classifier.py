@@ -18,7 +18,7 @@ from modt.classes import N_CLASSES
 from modt.classification.crops import ground_z_m
 from modt.classification.pool import PoolWeights
 from modt.config import SensorConfig
-from modt.types import Float64, Int, Proposals
+from modt.types import Bool, Cut, Float64, Int, Proposals
 
 Weights = NDArray[np.floating[Any]]
 Layers = Sequence[tuple[Weights, Weights]]
@@ -56,9 +56,11 @@ def from_lists(lists: Any, n_features: int) -> Layers:
     return layers
 
 
-METADATA_KEY = "box_prior"
-"""Key of the box classifier in the metadata of an ONNX model."""
-N_FEATURES = 7
+METADATA_KEY, BOUNDS_KEY = "box_prior", "box_bounds"
+"""Keys of the box classifiers: in the metadata of an ONNX model, and of that beside it for what the view cuts."""
+N_FEATURES, N_BOUND_FEATURES = 7, 7 + len(Cut)
+PERSON_TOP_M, LEGS_M = 2.0, 0.4
+"""Heights above ground [m]: a box cut above below the first, or below above the second, may be of a person."""
 # Definition of the features: fixed when a model is trained.
 _MAX_COUNT = 1000
 _LENGTH_OFFSET_M = 0.05  # keeps the logarithm of a length finite
@@ -69,21 +71,25 @@ class NoBoxClassifier:
 
     weights = PoolWeights()
 
-    def log_probability(self, features: Float64) -> Float64:
+    def log_probability(self, features: Float64, cut: Int) -> Float64:
         """(R, 4) zeros."""
         return np.zeros((len(features), N_CLASSES))
 
 
 @dataclass(frozen=True, slots=True)
 class MlpBoxClassifier:
-    """Multilayer perceptron of 1,444 weights."""
+    """Multilayer perceptron of 1,444 weights, and one for boxes whose sizes are bounds."""
 
     layers: Layers
     weights: PoolWeights  # in the pool with the network, without reflectance
+    bounds: Layers | None = None
 
-    def log_probability(self, features: Float64) -> Float64:
-        """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features`."""
-        return logits(self.layers, features)
+    def log_probability(self, features: Float64, cut: Int) -> Float64:
+        """(R, 4) log P(class | box) up to a constant, of (R, 7) `box_features` and (R,) flags of Cut."""
+        out = logits(self.layers, features)
+        if self.bounds is not None and len(rows := is_bound(features, cut).nonzero()[0]):
+            out[rows] = logits(self.bounds, bound_features(features[rows], cut[rows]))
+        return out
 
 
 BoxClassifier = NoBoxClassifier | MlpBoxClassifier
@@ -119,6 +125,18 @@ def box_features(count: Int, box: Float64, ground_z_m: Float64, beam_sr: Float64
     return features.T
 
 
+def is_bound(features: Float64, cut: Int) -> Bool:
+    """(R,) boxes of (R, 7) features that are cut where a person may go on: at least so high, not so high."""
+    is_bound: Bool = ((cut & Cut.TOP) > 0) & (features[:, -1] < PERSON_TOP_M)
+    is_bound |= ((cut & Cut.BOTTOM) > 0) & (features[:, -2] > LEGS_M)
+    return is_bound
+
+
+def bound_features(features: Float64, cut: Int) -> Float64:
+    """(R, 11) features of bounds: (R, 7) of boxes, and the flags (R,) of Cut one by one."""
+    return np.column_stack([features, *((cut & side) > 0 for side in Cut)])
+
+
 def proposal_features(proposals: Proposals, sensor: SensorConfig) -> Float64:
     """(P, 7) box features of the proposals."""
     beam_sr = beam_solid_angle_sr(sensor, proposals.box)
@@ -130,8 +148,8 @@ def to_metadata(layers: Layers, weights: PoolWeights) -> str:
     return json.dumps({"weights": weights.as_dict(), "layers": to_lists(layers)})
 
 
-def from_metadata(metadata: Mapping[str, str]) -> BoxClassifier:
-    """Box classifier of a model; NoBoxClassifier where its metadata has none.
+def from_metadata(metadata: Mapping[str, str], beside: Mapping[str, str] | None = None) -> BoxClassifier:
+    """Box classifier of a model, and of bounds of the one beside it; NoBoxClassifier where its metadata has none.
 
     Raises:
         KeyError, TypeError, ValueError: malformed entry.
@@ -140,4 +158,7 @@ def from_metadata(metadata: Mapping[str, str]) -> BoxClassifier:
     if text is None:
         return NoBoxClassifier()
     content = json.loads(text)
-    return MlpBoxClassifier(from_lists(content["layers"], N_FEATURES), PoolWeights.from_dict(content["weights"]))
+    bounds = from_lists(json.loads(beside[BOUNDS_KEY]), N_BOUND_FEATURES) if beside else None
+    return MlpBoxClassifier(
+        from_lists(content["layers"], N_FEATURES), PoolWeights.from_dict(content["weights"]), bounds
+    )

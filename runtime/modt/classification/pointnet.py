@@ -175,6 +175,8 @@ CLASS_FREQUENCY_KEY = "class_frequency"
 class PointNet:
     """P(class | points, box, reflectance): log-linear pool of the network and the classifiers in its metadata.
 
+    What the view cuts where a person may go on is judged by the network beside it, NAME-near.onnx, if there is one.
+
     The cost of a proposal follows its number of points: crops of similar size share a batch, so that padding is
     small, and a batch is small enough for its features to stay in the cache.
 
@@ -203,7 +205,10 @@ class PointNet:
         metadata: dict[str, str] = self._session.get_modelmeta().custom_metadata_map
         pooled = metadata if config.likelihood == "pooled" else {}
         try:
-            boxes = box_classifier.from_metadata(pooled)
+            near = self.path.with_stem(f"{self.path.stem}-near")  # what the view cuts is judged by it
+            self._near = _session(near, read_model(near)[0]) if pooled and near.is_file() else None
+            beside = self._near.get_modelmeta().custom_metadata_map if self._near else None
+            boxes = box_classifier.from_metadata(pooled, beside)
             self.box_scores = BoxScores(boxes, reflectance_classifier.from_metadata(pooled, sensor), sensor)
             self.class_frequency = _class_frequency(metadata)
             objects = self.class_frequency or (1 / N_CLASSES,) * (N_CLASSES - 1)
@@ -225,9 +230,11 @@ class PointNet:
         crops = canonical(crops, ground_z_m(proposals, which, self._sensor))
         out = np.empty((len(crops), N_CLASSES))
         by_size = crops.count.argsort(kind="stable")
-        for first in range(0, len(crops), self.config.batch):
-            rows = by_size[first : first + self.config.batch]
-            out[rows] = self.infer(crops.padded(rows, self.config.min_points))
+        near = self.box_scores.bound(proposals)[which[by_size]] if self._near else np.zeros(len(crops), np.bool_)
+        for session, own in ((self._session, by_size[~near]), (self._near, by_size[near])):
+            for first in range(0, len(own), self.config.batch):
+                rows = own[first : first + self.config.batch]
+                out[rows] = self.infer(crops.padded(rows, self.config.min_points), session)
         return self._pooled(out, proposals, which)
 
     def _pooled(self, network: Float64, proposals: Proposals, which: Int) -> Float64:
@@ -257,9 +264,9 @@ class PointNet:
         if shape != (batch, N_CLASSES):
             raise MisuseError(self.path, f"an output of shape {shape}", REMEDY)
 
-    def infer(self, batch: Float32) -> Float32:
-        """(b, 4) network output of a (b, n, 3) canonical batch."""
-        (output,) = self._session.run(None, {self._input: batch})
+    def infer(self, batch: Float32, session: ort.InferenceSession | None = None) -> Float32:
+        """(b, 4) output of a (b, n, 3) canonical batch, of the network or of that beside it."""
+        (output,) = (session or self._session).run(None, {self._input: batch})
         probability: Float32 = output
         return probability
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import softmax
 
 from modt.classes import N_CLASSES, ObjectClass
-from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, proposal_features
+from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, is_bound, proposal_features
 from modt.classification.pool import PoolWeights
 from modt.classification.reflectance_classifier import NoReflectanceClassifier, ReflectanceClassifier
 from modt.config import SensorConfig
@@ -48,10 +48,16 @@ class BoxScores:
         """(2, P, 4) log P(class | box) and log P(reflectance | class, box) of each proposal, up to constants."""
         if proposals is not self._proposals:
             features = proposal_features(proposals, self._sensor)
-            boxes = self.boxes.log_probability(features)
+            boxes = self.boxes.log_probability(features, proposals.cut)
             reflectance = self.reflectance.log_likelihood(features, proposals.reflectance)
             self._proposals, self._scores = proposals, np.stack([boxes, reflectance])
+            self._bound = is_bound(features, proposals.cut)
         return self._scores
+
+    def bound(self, proposals: Proposals) -> Bool:
+        """(P,) proposals that the view cuts where a person may go on."""
+        self.of(proposals)
+        return self._bound
 
 
 class Prior(Protocol):

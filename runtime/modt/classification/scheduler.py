@@ -255,6 +255,6 @@ def _columns(n: int, points: int) -> tuple[Float32, Proposals]:
         coordinates=xyz.T.copy(),
         centroid=box[:, :3],
         box=box,
-        truncated=np.zeros(n, np.bool_),
+        cut=np.zeros(n, np.int64),
         reflectance=np.zeros((n, 5)),
     )

@@ -40,6 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
         checks.meters(metering.discovery(config.energy)),
         checks.kernels(lambda: kernel_choice.choose(config.segmentation.kernels).name),
         checks.model(limits, lambda: PointNet(limits, config.sensor).facts()),
+        checks.near(config.sensor),
         checks.disk(arguments.out, config),
         checks.clock(),
     ]

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
+from modt.classes import PERSON_M
 from modt.config.base import StageConfig, ValueRangeError, choice, mechanism, number, numbers
 from modt.config.classification import ClassificationConfig, DecisionConfig, FusionConfig, SchedulerConfig
 from modt.config.odometry import OdometryConfig
@@ -32,6 +34,9 @@ class SensorConfig(StageConfig):
     elevations_deg: tuple[float, ...] | None = numbers(
         -90.0, 90.0, 512, "deg", "of all beams, in any order; null: evenly spaced"
     )
+    elevation_span_deg: tuple[float, ...] | None = numbers(
+        -90.0, 90.0, 2, "deg", "lowest, highest beam; null: unknown"
+    )
     azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
     blind_sectors_deg: tuple[float, ...] | None = numbers(
         -360.0, 360.0, 64, "deg", "from, to of each, counter-clockwise: onto the robot", pairs=True
@@ -41,6 +46,21 @@ class SensorConfig(StageConfig):
     reflectance: str = choice(
         "none", ("none", *REFLECTANCE_SCALES), "scale; models use only those they learnt; none: not used"
     )
+
+    @property
+    def span_deg(self) -> tuple[float, float] | None:
+        """Elevations of the lowest and the highest beam; None where they are not known."""
+        beams = self.elevations_deg or self.elevation_span_deg
+        return None if beams is None else (min(beams), max(beams))
+
+    @property
+    def person_seen_from_m(self) -> float | None:
+        """Distance from which a third of a person is in view [m]; None where mount or beams are not known."""
+        if self.height_m is None or self.span_deg is None:
+            return None
+        h, (low, high) = self.height_m, (math.tan(math.radians(deg)) for deg in self.span_deg)
+        seen = ((d / 10, min(h + d / 10 * high, PERSON_M) - max(h + d / 10 * low, 0.0)) for d in range(1, 201))
+        return next((d for d, seen_m in seen if seen_m >= PERSON_M / 3), None)
 
     @property
     def beams(self) -> Beams:

@@ -66,10 +66,12 @@ class Resolved:
         return _configured(self.layers, base)
 
     def shown(self) -> str:
-        """The configuration as YAML, itself a profile, with who set it behind each value."""
+        """The configuration as YAML, itself a profile, with who set it behind each value, and what is seen near."""
         set_by = {path: layer.name for layer in (*self.assumed, *self.layers) for path in layer.settings}
         rows = ((key.path, value_of(self.config, key.path)) for key in keys())
-        return nested((path, f"{value_text(value)} # {set_by.get(path, 'default')}") for path, value in rows)
+        text = nested((path, f"{value_text(value)} # {set_by.get(path, 'default')}") for path, value in rows)
+        near_m = self.config.sensor.person_seen_from_m
+        return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
 
 
 def load(names: Names = None) -> ProfileConfig:

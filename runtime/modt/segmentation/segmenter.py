@@ -12,7 +12,8 @@ from modt.segmentation.grids import PointColumns
 from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, has_reflectance, reflectance_statistics
 from modt.segmentation.kernels import NUMPY, Kernels
-from modt.types import NONE, Bool, Float32, Int, Proposals
+from modt.segmentation.view_ends import ViewEnds
+from modt.types import NONE, Bool, Cut, Float32, Int, Proposals
 
 
 class Segmenter:
@@ -36,6 +37,7 @@ class Segmenter:
         self.height_estimator = HeightEstimator(sensor, config)
         self.ground = GroundEstimator(sensor, config)
         self.clusterer = Clusterer(sensor, config, kernels)
+        self.ends = ViewEnds(sensor, config.person_splitting.max_top_m)
 
     def facts(self) -> dict[str, str]:
         """Which kernels it runs on."""
@@ -76,9 +78,10 @@ class Segmenter:
         members = kernels.members_of(clusters, index)
         offsets, own = members.offsets, members.columns[:3]
         mean = kernels.group_sums(members.columns, offsets) / (offsets[1:] - offsets[:-1])
-        truncated, statistics = np.zeros(clusters.n, np.bool_), None
+        box = kernels.upright_boxes(own, offsets, HEADINGS[heading])
+        cut, statistics = self.ends.cut(own, offsets, box), None
         if depth is not None:
-            truncated = by_cell.min(depth[by_cell.rows]) < self.truncated_m
+            cut |= Cut.SIDE * (by_cell.min(depth[by_cell.rows]) < self.truncated_m)
         if self.sensor.reflectance != "none" and has_reflectance(sweep[:, 3]):
             statistics = reflectance_statistics(*kernels.reflectance_sums(sweep, members.index, offsets))
         return Proposals(
@@ -86,8 +89,8 @@ class Segmenter:
             offsets=offsets,
             coordinates=own,
             centroid=np.ascontiguousarray(mean[:3].T),
-            box=kernels.upright_boxes(own, offsets, HEADINGS[heading]),
-            truncated=truncated,
+            box=box,
+            cut=cut,
             ground_z_m=mean[3],
             reflectance=statistics,
         )

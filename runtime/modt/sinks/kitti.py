@@ -10,7 +10,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
 from modt.sinks.output import Health, LineFile, writing
-from modt.types import NONE, Float64, FrameResult, Int
+from modt.types import NONE, Cut, Float64, FrameResult, Int
 
 KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
 
@@ -47,7 +47,7 @@ class KittiResults:
         if not len(rows):
             return
         boxes = result.proposals.box[tracks.proposal[rows]]
-        truncated = result.proposals.truncated[tracks.proposal[rows]].astype(np.int64)
+        truncated = (result.proposals.cut[tracks.proposal[rows]] & Cut.SIDE > 0).astype(np.int64)
         T = self._camera.T_camera_sensor
         bottom = transform(T, boxes[:, :3] - np.array([0, 0, 0.5]) * boxes[:, 5:6])
         ahead = np.stack([np.cos(boxes[:, 6]), np.sin(boxes[:, 6]), np.zeros(len(boxes))], axis=1) @ T[:3, :3].T

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES
 from modt.sinks import json_columns as text
 from modt.sinks.records import line
@@ -19,6 +20,7 @@ from modt.types import NONE, Float64, FrameResult, Int
 
 SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
+UNKNOWN_NEAR = "unknown, near"  # may be a person, too near for the sensor to show enough of it
 WORLD_KEYS = ("x", "y", "heading", "speed_mps")
 
 
@@ -36,6 +38,7 @@ def frame_record(result: FrameResult) -> dict[str, Any]:
         "witness": np.round(tracks.witness, 3).tolist(),
         "viewed": tracks.viewed.tolist(),
         "final": tracks.final.tolist(),
+        "uncertain": [UNKNOWN_NEAR if near else None for near in unknown_near(result).tolist()],
         "proposal": [None if proposal == NONE else proposal for proposal in tracks.proposal.tolist()],
         "points": tracks.points.tolist(),
         "age": tracks.age.tolist(),
@@ -78,6 +81,7 @@ def recorded_pose(record: dict[str, Any]) -> Float64:
 
 
 CLASSES = text.encode_table([json.dumps(name) for name in CLASS_NAMES])
+UNCERTAIN = text.encode_table(["null", json.dumps(UNKNOWN_NEAR)])
 BOOLEANS = text.encode_table(["false", "true"])
 NULL = text.encode("null")[0]
 
@@ -124,6 +128,7 @@ def _encoded(result: FrameResult) -> str:
         "witness": _lists(text.rounded_to_3(tracks.witness)),
         "viewed": BOOLEANS[tracks.viewed.astype(np.int64)],
         "final": BOOLEANS[tracks.final.astype(np.int64)],
+        "uncertain": UNCERTAIN[unknown_near(result).astype(np.int64)],
         "proposal": proposal,
         "points": points,
         "age": age,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.class_sizes import MAX_SIZE_M
+from modt.class_sizes import IS_PERSON, MAX_SIZE_M
 from modt.classes import ObjectClass
 from modt.config import BackgroundMapConfig, TrackingConfig
 from modt.geometry.kdop import AGREE_M, DIRECTIONS, widths
@@ -22,7 +22,7 @@ from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.splitting import ExpectedSplitting
 from modt.tracking.states import Event, StateMachine
 from modt.tracking.track_table import TrackTable
-from modt.types import NONE, Bool, Float64, Int, Proposals, TrackedFrame, Tracks
+from modt.types import NONE, Bool, Cut, Float64, Int, Proposals, TrackedFrame, Tracks
 
 CREEPING = 0.1
 """Of the period: shorter steps are those of a clock that stands."""
@@ -131,8 +131,10 @@ class Tracker:
         frame = Associated(proposals, located.observations, matches)
         for regrouping in self.regroupings:
             frame = regrouping.regroup(self._tracks, frame, located.placement)
+        known = self._tracks.box.take(frame.matches.rows, axis=0)
         self._update(frame.matches, frame.observations)
         observe_motion(self._tracks, frame.matches.rows, dt_s)
+        self._keep_top(frame, known)
         self._observe_rest(frame.matches.rows)
         self._coast(frame.matches.rows)
         self._withdraw()
@@ -213,6 +215,14 @@ class Tracker:
         off = t.mean_kdop.take(rows, axis=0) - about
         weight = np.minimum(1.0 - 1.0 / t.hits[rows], self.config.mean_kdop_decay)[:, None]
         t.mean_kdop[rows] = about + (np.abs(off) < AGREE_M) * weight * off
+
+    def _keep_top(self, frame: Associated, known: Float64) -> None:
+        """A person cut above is as high as in (R, 7) the boxes known before the frame: writes track and proposal."""
+        t, rows, own = self._tracks, frame.matches.rows, frame.matches.proposals
+        hidden_m = (known[:, 2] + known[:, 5] / 2) - (t.box[rows, 2] + t.box[rows, 5] / 2)
+        kept = IS_PERSON[t.last_class[rows]] & (frame.proposals.cut[own] & Cut.TOP > 0) & (hidden_m > 0)
+        for boxes, index in ((t.box, rows[kept]), (frame.proposals.box, own[kept])):
+            boxes[index, 2:6:3] += np.outer(hidden_m[kept], (0.5, 1.0))  # z of the middle, and height
 
     def _record(self, rows: Int, proposals: Int, observations: Observations, position: Float64) -> Float64:
         """Record what is observed of tracks (R,) at positions (R, 2); returns (R, 8) their k-DOPs about these [m]."""

@@ -75,7 +75,7 @@ def replay(
         result = pipeline.step(frame, assembly.MODES[mode].budget(config))
         columns = [column for _, column in result.tracks.columns()]
         proposals = result.proposals
-        columns += [proposals.members, proposals.box, proposals.truncated, pipeline.decision.frequency]
+        columns += [proposals.members, proposals.box, proposals.cut, pipeline.decision.frequency]
         for column in columns:
             digest.update(column.tobytes())
         digest.update(json.dumps(ledger.close_frame(frame.index)["stages"]).encode())
@@ -328,7 +328,7 @@ def others(key: Key) -> Iterator[Any]:
     elif "length" in facts and value is None:
         yield (0.2,) * facts["length"]
     elif "most" in facts:
-        yield tuple(np.linspace(-15.0, 15.0, 8).tolist())
+        yield tuple(np.linspace(-15.0, 15.0, 8)[: facts["most"]].tolist())
     elif key.kind == "str":
         yield "pointnet-synthetic" if key.path == "classification.model" else "another"
     else:

@@ -23,13 +23,18 @@ def test_one_command_trains_on_scans_of_ones_own(tmp_path: Path, monkeypatch: py
     scans = simulated_scans(["street", "crossing"], [3, 4], [0.0], camera=False, sensors=["vlp-16"])
     write_folder(tmp_path / "mine", scans)
     monkeypatch.setattr(build_models, "WORLDS", 4)
+    monkeypatch.setattr(build_models, "NEAR_WORLDS", {1: 12, 2: 12})
+    monkeypatch.setattr(build_models, "NEAR_STEPS", 10)
     options = ["--scans", str(tmp_path / "mine"), "--profile", "vlp-16", "--steps", "10"]
     monkeypatch.setattr(sys, "argv", ["build_models", str(tmp_path), *options])
     build_models.main()
     path = tmp_path / "pointnet-scans.onnx"
     PointNet(ClassificationConfig(model=str(path)), SensorConfig())  # checks the hash on the card
-    assert "| vlp-16 |" in path.with_suffix(".md").read_text(encoding="utf-8")
+    card = path.with_suffix(".md").read_text(encoding="utf-8")
+    assert "| vlp-16 |" in card
     metadata = ort.InferenceSession(path).get_modelmeta().custom_metadata_map
+    beside = ort.InferenceSession(tmp_path / "pointnet-scans-near.onnx").get_modelmeta().custom_metadata_map
+    assert len(json.loads(beside["box_bounds"])) == 3
     frequency = json.loads(metadata["class_frequency"])
     assert np.sum(frequency) == pytest.approx(1.0, abs=1e-3)
     assert frequency[0] > 0.7

@@ -60,4 +60,4 @@ def _table(rows: list[dict[str, float]], keys: tuple[str, ...]) -> Float64:
 def _proposals(n: int) -> Proposals:
     none = np.zeros(0, np.int64)
     offsets, coordinates = np.zeros(n + 1, np.int64), np.zeros((3, 0), np.float32)
-    return Proposals(none, offsets, coordinates, np.zeros((n, 3)), np.zeros((n, 7)), np.zeros(n, np.bool_))
+    return Proposals(none, offsets, coordinates, np.zeros((n, 3)), np.zeros((n, 7)), np.zeros(n, np.int64))

@@ -41,8 +41,8 @@ def yard(rng: np.random.Generator, seconds: float, height_m: float) -> World:
             builder.scenery(scenery.shrub(rng, rng.uniform(0.4, 1.2)), x, y, turn)
         else:
             builder.scenery(pallets(rng) if make < 5 else scenery.bin_(rng), x, y, turn)
-    _enclose(builder, half, rng.uniform(2.0, 6.0))
-    return builder.world(_floor(rng, half, Material.ASPHALT, 0.01), ego, height_m, sway_rad=0.006)
+    enclose(builder, half, rng.uniform(2.0, 6.0))
+    return builder.world(floor(rng, half, Material.ASPHALT, 0.01), ego, height_m, sway_rad=0.006)
 
 
 def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
@@ -59,10 +59,10 @@ def hall(rng: np.random.Generator, seconds: float, height_m: float) -> World:
         x, y = rng.uniform(-half[0], half[0]), rng.uniform(-half[1], half[1])
         turn = rng.choice([0, np.pi / 2]) + rng.normal(0, 0.1)
         builder.scenery((table, chair, shelf, pallets)[rng.choice(4)](rng), x, y, turn)
-    _enclose(builder, half, ceiling)
+    enclose(builder, half, ceiling)
     roof = box((0, 0, ceiling + 0.1), (2 * half[0], 2 * half[1], 0.2), Material.WALL)
     builder.scenery(roof, 0.0, 0.0, 0.0)
-    return builder.world(_floor(rng, half, Material.FLOOR, 0.002), ego, height_m, sway_rad=0.003)
+    return builder.world(floor(rng, half, Material.FLOOR, 0.002), ego, height_m, sway_rad=0.003)
 
 
 def pallets(rng: np.random.Generator) -> Solids:
@@ -128,7 +128,7 @@ def _walkers(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:
         builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)))
 
 
-def _enclose(builder: SceneBuilder, half: tuple[float, float], height: float) -> None:
+def enclose(builder: SceneBuilder, half: tuple[float, float], height: float) -> None:
     for long, across, turn in ((half[0], half[1], 0.0), (half[1], half[0], np.pi / 2)):
         for side in (-1, 1):
             wall = box((0.0, 0.0, height / 2), (2 * long + 0.6, 0.3, height), Material.WALL)
@@ -136,7 +136,7 @@ def _enclose(builder: SceneBuilder, half: tuple[float, float], height: float) ->
             builder.scenery(wall, x, y, turn)
 
 
-def _floor(rng: np.random.Generator, half: tuple[float, float], material: int, roughness_m: float) -> Terrain:
+def floor(rng: np.random.Generator, half: tuple[float, float], material: int, roughness_m: float) -> Terrain:
     shape = (int(2 * (half[0] + 5) / CELL_M), int(2 * (half[1] + 5) / CELL_M))
     height = rng.standard_normal(shape, np.float32) * np.float32(roughness_m)
     return Terrain(np.array([-half[0] - 5, -half[1] - 5]), CELL_M, height, np.full(shape, material, np.uint8))

@@ -1,0 +1,84 @@
+"""Sides at which proposals end because the view ends."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.config import SensorConfig
+from modt.geometry import upright_boxes
+from modt.segmentation.view_ends import ViewEnds
+from modt.types import Cut
+
+SENSOR = SensorConfig(
+    height_m=0.3, min_range_m=0.2, elevation_step_deg=2.0, elevation_span_deg=(-15.0, 15.0), azimuth_step_deg=0.2
+)
+
+
+def person(distance_m, sensor=SENSOR, height_m=1.75):
+    """(3, K) returns of an upright board as high as a person, 0.4 m wide, from all beams that meet it."""
+    elevation, azimuth = np.meshgrid(
+        np.deg2rad(np.arange(-15, 16, 2)), np.arctan(np.linspace(-0.2, 0.2, 9) / distance_m)
+    )
+    z = distance_m * np.tan(elevation) / np.cos(azimuth)
+    shown = (z > -sensor.height_m) & (z < height_m - sensor.height_m)
+    y = distance_m * np.tan(azimuth)
+    return np.stack([np.full(shown.sum(), distance_m), y[shown], z[shown]]).astype(np.float32)
+
+
+def flags(*parts, sensor=SENSOR):
+    points, offsets = np.concatenate(parts, axis=1), np.cumsum([0, *(part.shape[1] for part in parts)])
+    box = upright_boxes(points, offsets, np.zeros(len(parts)))
+    return [Cut(flag) for flag in ViewEnds(sensor, 2.6).cut(points, offsets, box).tolist()]
+
+
+def test_a_person_near_a_low_sensor_is_cut_above_and_one_farther_away_is_whole():
+    assert flags(person(1.0), person(3.0), person(8.0)) == [Cut.TOP | Cut.BOTTOM, Cut.TOP, Cut(0)]
+
+
+def test_without_known_beams_nothing_is_cut_above_or_below():
+    assert flags(person(1.0), sensor=SensorConfig(min_range_m=0.2)) == [Cut(0)]
+
+
+def test_a_table_of_beams_says_where_they_end():
+    table = SensorConfig(min_range_m=0.2, elevations_deg=tuple(range(-15, 16, 2)))
+    assert flags(person(1.0), person(8.0), sensor=table) == [Cut.TOP | Cut.BOTTOM, Cut(0)]
+
+
+def test_what_reaches_the_nearest_range_is_cut_there():
+    near = SensorConfig(min_range_m=0.95)
+    assert flags(person(1.0), person(3.0), sensor=near) == [Cut.NEAR, Cut(0)]
+
+
+@pytest.mark.parametrize(
+    ("sector", "cut"), [((6.0, 90.0), Cut.SIDE), ((-90.0, -6.0), Cut.SIDE), ((30.0, 90.0), Cut(0))]
+)
+def test_what_reaches_a_blind_sector_is_cut_at_its_side(sector, cut):
+    seen = person(1.0)[:, np.abs(np.rad2deg(np.arctan(person(1.0)[1]))) < 5.8]
+    blind = SensorConfig(min_range_m=0.2, azimuth_step_deg=0.2, blind_sectors_deg=sector, blind_range_m=3.0)
+    assert flags(seen, 10.0 * seen, sensor=blind) == [cut, Cut(0)]  # the other is farther than it is blind
+
+
+@given(st.lists(st.integers(1, 6), min_size=1, max_size=5), st.integers(0, 2**32 - 1), st.floats(-180, 90))
+def test_flags_are_those_of_a_loop_over_points(counts, seed, bound_deg):
+    sensor = SensorConfig(
+        min_range_m=0.5,
+        elevation_step_deg=2.0,
+        elevation_span_deg=(-15.0, 15.0),
+        azimuth_step_deg=1.0,
+        blind_sectors_deg=(bound_deg, bound_deg + 60.0),
+    )
+    xyz = np.random.default_rng(seed).normal(0, 1.0, (3, sum(counts))).astype(np.float32)
+    parts = np.split(xyz, np.cumsum(counts)[:-1], axis=1)
+    steepest = np.tan(np.deg2rad(15.0)) - 0.75 * np.deg2rad(2.0)
+    expected = []
+    for part in parts:
+        flag = Cut(0)
+        for x, y, z in part.T.tolist():
+            range_m = np.hypot(x, y)
+            flag |= Cut.NEAR * int(range_m < 0.6) | Cut.TOP * int(z / range_m > steepest)
+            flag |= Cut.BOTTOM * int(z / range_m < -steepest)
+            off_deg = (np.rad2deg(np.arctan2(y, x)) - bound_deg - np.array([0.0, 60.0]) + 180.0) % 360.0 - 180.0
+            flag |= Cut.SIDE * int((np.abs(off_deg) < 2.0).any() and range_m < sensor.blind_range_m)
+        expected.append(flag)
+    assert flags(*parts, sensor=sensor) == expected

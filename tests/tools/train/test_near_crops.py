@@ -1,0 +1,97 @@
+"""Crops of people and things near a low sensor."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.classes import ObjectClass
+from modt.classification.crops import Crops
+from modt.types import Cut
+from tests.tools.train.datasets import data_of
+from tools.train import build_near_crops
+from tools.train.dataset import Sensors, load
+from tools.train.near_batches import NearSource, varied
+from tools.train.near_cut import MIN_POINTS, cut_flags, cut_near
+from tools.train.near_scans import HEIGHT_M, near_scans
+
+
+def boards(n: int, height_m: float = 1.8) -> tuple[Crops, Sensors]:
+    """Upright boards 0.5 m wide, 10 m away from a sensor 1.73 m above the ground."""
+    y, z = np.meshgrid(np.linspace(-0.25, 0.25, 8), np.linspace(-1.4, height_m - 1.73, 60))
+    one = np.stack([np.full(y.size, 10.0), y.ravel(), z.ravel()], axis=1)
+    crops = Crops(np.tile(one, (n, 1)).astype(np.float32), np.arange(n + 1) * len(one))
+    ground, step = np.full(n, -1.73), np.full(n, 0.4)
+    return crops, Sensors(ground, step, step)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_crops_cut_near_lie_between_the_beams_and_keep_their_places_above_the_ground(seed: int) -> None:
+    crops, sensors = boards(20)
+    cut, near, rows, flags = cut_near(crops, sensors, np.random.default_rng(seed))
+    assert len(cut) == len(rows) == len(flags)
+    assert (cut.count >= MIN_POINTS).all()
+    assert (flags > 0).all()
+    mount_m = np.repeat(-near.ground_z_m, cut.count)
+    assert ((near.ground_z_m <= -HEIGHT_M[0]) & (near.ground_z_m >= -HEIGHT_M[1])).all()
+    above_m = cut.xyz[:, 2] + mount_m
+    assert (above_m > 0.32).all()
+    assert (above_m < 1.81).all()
+    top_m = np.maximum.reduceat(above_m, cut.offsets[:-1])
+    assert ((flags & Cut.TOP) > 0)[top_m < 1.79].all()
+
+
+def test_near_crops_are_built_with_their_labels_and_flags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "near.npz"
+    monkeypatch.setattr(sys, "argv", ["build_near_crops", str(path), "--worlds", "12"])
+    build_near_crops.main()
+    data = load(path)
+    assert data.provenance[0]["near"] == 12
+    assert len(data.sensor_names) == 11
+    people = (data.label == ObjectClass.PEDESTRIAN) & data.trainable
+    assert people.sum() > 10
+    flags = cut_flags(data)
+    assert 0.2 < ((flags & Cut.TOP) > 0)[people].mean() < 0.95
+    of_unknown_beams = data.sensor == data.sensor_names.index("hdl-64e")
+    assert not (flags[of_unknown_beams] & (Cut.TOP | Cut.BOTTOM)).any()
+
+
+def test_each_scan_is_seen_from_a_low_mount_of_its_own() -> None:
+    scans = list(near_scans(range(4), ["vlp-16", "mid-360"]))
+    heights = [scan.profile.sensor.height_m for scan in scans]
+    assert [scan.sensor for scan in scans] == ["vlp-16", "mid-360"] * 2
+    assert len(set(heights)) == 4
+    assert all(h is not None and HEIGHT_M[0] <= h <= HEIGHT_M[1] for h in heights)
+    for scan, height_m in zip(scans, heights, strict=True):
+        below = scan.points[np.hypot(*scan.points[:, :2].T) < 3.0, 2].min()
+        assert height_m is not None
+        assert below == pytest.approx(-height_m, abs=0.15) or scan.sensor == "mid-360"
+
+
+def test_a_batch_holds_simulated_crops_and_crops_of_the_streets_cut_near() -> None:
+    crops, sensors = boards(8)
+    label = np.arange(8) % 4
+    data = data_of(crops, label, sensors=sensors)
+    batch = NearSource(data, data).draw(np.random.default_rng(1))
+    n = len(batch.crops)
+    assert n == len(batch.label) == len(batch.cut) == len(batch.sensors.ground_z_m)
+    from_streets = batch.sensors.ground_z_m > -1.5
+    assert 20 < from_streets.sum() < n
+    assert ((batch.cut[from_streets] & ~Cut.SIDE) > 0).all()
+    assert not (batch.cut[~from_streets] & ~Cut.SIDE).any()  # of an HDL-64E it is not known where the beams end
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_varied_crops_lie_where_they_did_and_those_flagged_are_narrower(seed: int) -> None:
+    crops, _ = boards(10)
+    out, cut = varied(crops, np.random.default_rng(seed))
+    assert len(out) == len(cut) == 10
+    widths = [np.ptp(out.xyz[a:b, 1]) for a, b in zip(out.offsets, out.offsets[1:], strict=False)]
+    assert np.abs(out.xyz - [10.0, 0.0, 0.0]).max(axis=0)[:2].max() < 0.4
+    assert all(width < 0.56 for width in widths)
+    assert set(np.unique(cut)) <= {0, int(Cut.SIDE)}

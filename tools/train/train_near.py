@@ -1,0 +1,241 @@
+"""Train the network beside a model that judges what the view of a low sensor cuts (extra [train]).
+
+    python -m tools.train.train_near MODEL.onnx NAME-near.onnx --near NEAR.npz --held NEAR.npz --crops CROPS.npz...
+                         --licence TEXT [--steps N] [--seed S]
+
+It begins with the weights of the model, and learns near crops by their labels: those of build_near_crops, and those
+of the streets cut near. A classifier of boxes whose sizes are bounds goes into its metadata. Logits are adjusted for
+the shares of the classes in a batch, so posteriors hold for FREQUENCY. The card is scored on --held, on which nothing
+is trained.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import onnx
+import torch
+from onnx import helper, numpy_helper
+from scipy.special import log_softmax, softmax
+from torch import Tensor, nn
+
+from modt.classes import CLASS_NAMES, N_CLASSES, ObjectClass
+from modt.classification import box_classifier
+from modt.classification.box_classifier import Layers, MlpBoxClassifier, bound_features
+from modt.classification.pointnet import CLASS_FREQUENCY_KEY
+from modt.classification.pool import log_pool
+from modt.types import Bool, Cut, Float64, Int
+from tools.options import make_torch_deterministic, parser
+from tools.train.augment import subsample
+from tools.train.box_features import crop_features
+from tools.train.dataset import Dataset, load
+from tools.train.export_pointnet import N_SHARED, graph
+from tools.train.mlp_training import Batch, train_mlp
+from tools.train.near_batches import SHARE, NearSource, distance_m
+from tools.train.near_cut import cut_flags
+from tools.train.network import MaxPooledLinear
+from tools.train.train_pointnet import POINTS, tensors
+from tools.train.weights import Layer
+
+FREQUENCY = np.array([0.86, 0.03, 0.1, 0.01])
+"""Of the classes among proposals near a small robot."""
+RATE = 5e-4
+"""Greatest learning rate."""
+BOUND_CROPS, BOUND_STEPS = 60_000, 3000
+"""Crops that the classifier of bounds is trained on, and steps."""
+SMOOTHING = 0.01
+"""Of the labels: probability spread evenly over the classes."""
+EVERY = 100
+"""Steps whose mean loss is printed."""
+RANGES_M = ((0.5, 1.0), (1.0, 1.5), (1.5, 3.0), (3.0, 7.0))
+"""Rows of the card's table."""
+
+
+class Student(nn.Module):
+    """The exported network, its normalisation folded in."""
+
+    def __init__(self, layers: list[Layer]) -> None:
+        super().__init__()
+        self.weight = nn.ParameterList(torch.from_numpy(w.T.astype(np.float32)) for w, _ in layers)
+        self.bias = nn.ParameterList(torch.from_numpy(b.astype(np.float32)) for _, b in layers)
+
+    def forward(self, xyz: Tensor, count: Tensor) -> Tensor:
+        """(R, 4) logits of R crops: (K, 3) concatenated points, (R,) points of each crop."""
+        h = xyz
+        for i, (weight, bias) in enumerate(zip(self.weight, self.bias, strict=True)):
+            product = MaxPooledLinear.apply(h, weight, count) if i == N_SHARED - 1 else h @ weight.T
+            h = product + bias
+            h = torch.relu(h) if i < len(self.weight) - 1 else h
+        return h
+
+    def layers(self) -> list[Layer]:
+        """(in, out) weight and (out,) bias of each layer."""
+        pairs = zip(self.weight, self.bias, strict=True)
+        return [(w.detach().numpy().T.copy(), b.detach().numpy().copy()) for w, b in pairs]
+
+
+def layers_of(model: onnx.ModelProto) -> list[Layer]:
+    """(in, out) weight and (out,) bias of each layer of an exported network."""
+    array = {i.name: numpy_helper.to_array(i) for i in model.graph.initializer}
+    weights = [array[f"weight{i}"] for i in range(len(array) // 2)]
+    return [(w.T if i < N_SHARED else w, array[f"bias{i}"].ravel()) for i, w in enumerate(weights)]
+
+
+def train(first: list[Layer], source: NearSource, steps: int, seed: int) -> tuple[Student, float]:
+    """The network after training from its first layers on, and its loss at the end."""
+    torch.manual_seed(seed)
+    rng, net = np.random.default_rng(seed), Student(first)
+    optimiser = torch.optim.AdamW(net.parameters(), weight_decay=1e-3)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, RATE, total_steps=steps, pct_start=max(0.1, 2 / steps))
+    shift = torch.from_numpy(np.log(SHARE / FREQUENCY).astype(np.float32))
+    losses: list[float] = []
+    for step in range(steps):
+        near = source.draw(rng)
+        score = net(*tensors(subsample(near.crops, POINTS, rng), near.sensors))
+        loss = nn.functional.cross_entropy(score + shift, torch.from_numpy(near.label), label_smoothing=SMOOTHING)
+        optimiser.zero_grad()
+        loss.backward()
+        optimiser.step()
+        schedule.step()
+        losses = [*losses[1 - EVERY :], loss.item()]
+        if (step + 1) % EVERY == 0:
+            print(step + 1, round(float(np.mean(losses)), 4), flush=True)
+    return net.eval(), round(float(np.mean(losses)), 4)
+
+
+def train_bounds(source: NearSource, seed: int) -> Layers:
+    """The classifier of boxes that are cut, whose posteriors hold for FREQUENCY."""
+    torch.manual_seed(seed)
+    rng = np.random.default_rng(seed)
+    features, labels, n = [], [], 0
+    while n < BOUND_CROPS:
+        near = source.draw(rng)
+        found = crop_features(near.crops, near.sensors)
+        rows = np.flatnonzero(box_classifier.is_bound(found, near.cut))
+        features.append(bound_features(found[rows], near.cut[rows]))
+        labels.append(near.label[rows])
+        n += len(rows)
+    feature, label = np.concatenate(features), np.concatenate(labels)
+
+    def batch() -> Batch:
+        chosen = rng.integers(0, len(label), 512)
+        return Batch(feature[chosen], label[chosen])
+
+    *hidden, (weight, bias) = train_mlp(batch, feature, BOUND_STEPS, rate=1e-2, decay=1e-3)
+    share = np.bincount(label, minlength=N_CLASSES).clip(1) / len(label)
+    return [*hidden, (weight, bias + np.log(FREQUENCY / share))]
+
+
+@dataclass(frozen=True)
+class Judges:
+    """A network and the box classifiers beside it.
+
+    Attributes:
+        network: PointNet.
+        boxes: both box classifiers, and the weights of the pool.
+        log_frequency: (4,) that both assume.
+    """
+
+    network: Student
+    boxes: MlpBoxClassifier
+    log_frequency: Float64
+
+    @torch.no_grad()
+    def posteriors(self, data: Dataset, rows: Int) -> tuple[Float64, Float64, Float64]:
+        """(R, 4) of rows of a data set by the network, by the boxes, and by the pool of both."""
+        rng, flags = np.random.default_rng(0), cut_flags(data)
+        network, boxes = [], []
+        for part in np.array_split(rows, max(1, len(rows) // 500)):
+            crops, sensors = data.take(part), data.sensors.take(part)
+            network.append(self.network(*tensors(subsample(crops, POINTS, rng), sensors)).double().numpy())
+            boxes.append(self.boxes.log_probability(crop_features(crops, sensors), flags[part]))
+        by_network, by_box = softmax(np.concatenate(network), axis=1), log_softmax(np.concatenate(boxes), axis=1)
+        none = np.zeros_like(by_box)
+        pool = softmax(log_pool(by_network, by_box, none, self.log_frequency, self.boxes.weights), axis=1)
+        return by_network, np.exp(by_box), pool
+
+
+def score(probability: Float64, person: Bool) -> str:
+    """Recall and precision of people at a posterior of one half [%], of (R, 4) and (R,) who is one."""
+    called = probability[:, ObjectClass.PEDESTRIAN] > 0.5
+    return f"{100 * called[person].mean():.0f} / {100 * person[called].mean() if called.any() else 0:.0f}"
+
+
+def table(before: Judges, now: Judges, held: Dataset) -> list[str]:
+    """Markdown of the people found near, by their distance."""
+    rows = np.flatnonzero(held.trainable)
+    cut, distance, person = cut_flags(held)[rows], distance_m(held.crops)[rows], held.label[rows] == 2
+    former, answers = before.posteriors(held, rows)[0], now.posteriors(held, rows)
+    lines = ["| distance, cut above or below | people | network before | network | box | pool |", "|" + "---|" * 6]
+    for low, high in RANGES_M:
+        for word, is_cut in (("cut", True), ("not cut", False)):
+            own = (distance > low) & (distance <= high) & ((cut & (Cut.TOP | Cut.BOTTOM) > 0) == is_cut)
+            if person[own].any():
+                cells = [score(p[own], person[own]) for p in (former, *answers)]
+                lines.append(f"| {low} to {high} m, {word} | {person[own].sum()} | {' | '.join(cells)} |")
+    return lines
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("model", type=Path)
+    options.add_argument("out", type=Path)
+    options.add_argument("--near", type=Path, required=True, help="crops of build_near_crops")
+    options.add_argument("--held", type=Path, required=True, help="others, for the card")
+    options.add_argument("--crops", type=Path, nargs="+", required=True, help="of the streets")
+    options.add_argument("--licence", required=True)
+    options.add_argument("--steps", type=int, default=4000, help="of the network (default: %(default)s)")
+    options.add_argument("--seed", type=int, default=1)
+    args = options.parse_args()
+    make_torch_deterministic()
+    started = time.process_time()
+    model = onnx.load(str(args.model))
+    metadata = {entry.key: entry.value for entry in model.metadata_props}
+    streets, near, held = load(*args.crops), load(args.near), load(args.held)
+    source, first = NearSource(near, streets), layers_of(model)
+    bounds = train_bounds(source, args.seed)
+    net, loss = train(first, source, args.steps, args.seed)
+    network = graph(net.layers())
+    helper.set_model_props(network, {box_classifier.BOUNDS_KEY: json.dumps(box_classifier.to_lists(bounds))})
+    raw = network.SerializeToString(deterministic=True)
+    args.out.write_bytes(raw)
+
+    classifier = box_classifier.from_metadata(metadata)
+    assert isinstance(classifier, MlpBoxClassifier)
+    classifier = replace(classifier, bounds=bounds)
+    log_frequency = np.log(json.loads(metadata[CLASS_FREQUENCY_KEY]))
+    before, now = (Judges(judge, classifier, log_frequency) for judge in (Student(first), net))
+    tally = [np.bincount(d.label[d.trainable], minlength=N_CLASSES).tolist() for d in (near, streets)]
+    card = [
+        f"# {args.out.stem}",
+        "",
+        f"The network beside {args.model.stem} for what the view of the sensor cuts where a person may go on",
+        "(docs/classification.md), ONNX, float32; in its metadata the classifier of such boxes.",
+        "",
+        f"- sha256: {hashlib.sha256(raw).hexdigest()}",
+        f"- licence: {args.licence}",
+        f"- training: tools.train.train_near from {args.model.stem} on, seed {args.seed}, {args.steps} steps, torch",
+        f"  {torch.__version__}, {time.process_time() - started:.0f} s on one core; loss at the end {loss}",
+        f"- crops by class ({', '.join(CLASS_NAMES)}): {tally[0]} simulated near low sensors, sha256",
+        f"  {near.sha256[0]};",
+        f"  cut near, of those of the streets that show enough: {tally[1]}, sha256",
+        f"  {', '.join(streets.sha256)}",
+        f"- class frequency near the sensor: {', '.join(f'{100 * f:.0f} %' for f in FREQUENCY)}",
+        "",
+        f"People of {held.provenance[0]['near']} simulated sweeps that nothing was trained on, a proposal at a time:",
+        f"share with a posterior above one half, and precision of these [%]. Before: {args.model.stem}.",
+        "",
+        *table(before, now, held),
+        "",
+    ]
+    args.out.with_suffix(".md").write_text("\n".join(card), encoding="utf-8")
+    print("\n".join(card))
+
+
+if __name__ == "__main__":
+    main()
