@@ -78,14 +78,21 @@ class SceneBuilder:
         bicycle = vehicles.bicycle(self.rng)
         self._person(kinds.CYCLIST, size, path, height, bicycle, 2 * np.pi * speed_mps / 4.5)
 
-    def world(self, terrain: Terrain, ego: Path, height_m: float, sway_rad: float = 0.003) -> World:
+    def world(
+        self,
+        terrain: Terrain,
+        ego: Path,
+        height_m: float,
+        sway_rad: float = 0.003,
+        ego_m: tuple[float, float] = EGO_M,
+    ) -> World:
         """The world of the bodies that collide neither with the ego vehicle nor with one another.
 
         Of two that collide, moving bodies take precedence over bodies at rest, earlier ones over later ones.
         """
         order = sorted(range(len(self.bodies)), key=lambda i: self.bodies[i].path.at_rest)
         paths = [ego, *(self.bodies[i].path for i in order)]
-        footprint = np.array([EGO_M, *(self.bodies[i].size[:2] for i in order)])
+        footprint = np.array([ego_m, *(self.bodies[i].size[:2] for i in order)])
         kept = without_collisions(paths, footprint, self.seconds)[1:]
         remaining = sorted(i for i, k in zip(order, kept, strict=True) if k)
         number = {old: new for new, old in enumerate(remaining)}

@@ -48,7 +48,8 @@ class Terrain:
         sensor = caster.sensor
         distance = np.full(sensor.shape, np.inf, np.float32)
         surface = np.zeros(sensor.shape, np.uint8)
-        low = np.flatnonzero(caster.tangent[:, 0] < STEEPEST)
+        tilt = np.hypot(*T_world_sensor[2, :2]) / max(T_world_sensor[2, 2], 1e-9)  # infinite upside down
+        low = np.flatnonzero(caster.tangent[:, 0] < (STEEPEST if tilt < STEEPEST else STEEPEST + tilt))
         if not len(low):
             return distance, surface
         rows = slice(int(low[0]), int(low[-1]) + 1)
