@@ -44,6 +44,7 @@ class Frame:
         turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
             ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
             stamp, compensated or by a sensor that does not turn.
+        R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
     """
 
     index: int
@@ -52,6 +53,7 @@ class Frame:
     T_world_sensor: Float64 | None = None
     restarts: int = 0
     turn_s: float = 0.0
+    R_level_sensor: Float64 | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,7 +260,7 @@ UNLIMITED = Budget()
 class FrameResult:
     """What is known after a frame."""
 
-    frame: Frame
+    frame: Frame  # level, as are the frame of the sensor in all that follows and its pose
     T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp, as the odometry placed it
     proposals: Proposals
     tracks: Tracks  # a copy of those alive after the frame

@@ -23,9 +23,11 @@ from modt.classes import ObjectClass
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
-from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, transform_boxes
+from modt.geometry import FieldOfView, inverse, transform_boxes
+from modt.placement import Mount
 from modt.profile import load
-from modt.types import Float32, Float64, Frame, FrameResult
+from modt.sensor_fit.recognition import recognise
+from modt.types import Frame, FrameResult
 from modt_desk.evaluation.evaluation import DriveRows, collect
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.rows import Outcome as Found
@@ -48,52 +50,26 @@ PLACES = ("yard", "corridor", "hall", "crowd", "ramp")
 
 
 @dataclass(frozen=True, slots=True)
-class Mount:
-    """Height of a sensor [m], its roll and its pitch [deg]."""
-
-    height_m: float
-    roll_deg: float = 0.0
-    pitch_deg: float = 0.0
-
-    @property
-    def T_level_sensor(self) -> Float64:
-        """(4, 4) from the sensor to the frame at its place that is level."""
-        return se3(rotation_zyx(*np.deg2rad([self.roll_deg, self.pitch_deg, 0.0])), np.zeros(3))
-
-    def level(self, frame: Frame) -> Frame:
-        """The frame as a level sensor has it."""
-        pose = None if frame.T_world_sensor is None else frame.T_world_sensor @ inverse(self.T_level_sensor)
-        return replace(frame, points=turned(self.T_level_sensor, frame.points), T_world_sensor=pose)
-
-
-def turned(T: Float64, points: Float32) -> Float32:
-    """(N, 4) points after a rotation."""
-    out = points.copy()
-    out[:, :3] = points[:, :3] @ T[:3, :3].T.astype(np.float32)
-    return out
-
-
-@dataclass(frozen=True, slots=True)
 class Drive:
-    """Frames of a mount and their truth, boxes in the level frame."""
+    """Frames of a mount and their truth."""
 
     stream: SyntheticStream
     mount: Mount
     frames: Sequence[tuple[Frame, Truth]]
 
     @classmethod
-    def simulated(cls, scene: str, sensor: str, seconds: float, seed: int, mount: Mount) -> Drive:
-        """A drive through a scene."""
-        angles = mount.roll_deg, mount.pitch_deg
-        stream = SyntheticStream(scene, sensor, seconds, seed, height_m=mount.height_m, mount_deg=angles)
-        return cls(stream, mount, list(stream.sweeps()))
+    def simulated(
+        cls, scene: str, sensor: str, seconds: float, seed: int, height_m: float, angles_deg: tuple[float, float]
+    ) -> Drive:
+        """A drive through a scene with a sensor at a height, rolled and pitched."""
+        stream = SyntheticStream(scene, sensor, seconds, seed, height_m=height_m, mount_deg=angles_deg)
+        return cls(stream, Mount.of(*angles_deg), list(stream.sweeps()))
 
     def truth(self, frame: Frame, truth: Truth) -> FrameTruth:
         """Labels of a frame, boxes in the level frame."""
-        assert frame.T_world_sensor is not None
-        world = self.stream.simulator.world
-        T_level_world = self.mount.T_level_sensor @ inverse(frame.T_world_sensor)
-        boxes = transform_boxes(T_level_world, world.boxes(frame.stamp_s)[truth.bodies])
+        pose = self.mount.level(frame).T_world_sensor
+        assert pose is not None
+        boxes = transform_boxes(inverse(pose), self.stream.simulator.world.boxes(frame.stamp_s)[truth.bodies])
         return FrameTruth.of(TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], boxes)
 
 
@@ -109,6 +85,7 @@ def run(drive: Drive, mode_name: str, config: ProfileConfig, *, levelled: bool =
     """What became of a drive in a mode of the method."""
     mount, mode, longer = drive.mount, assembly.MODES[mode_name], 0
     given = [mount.level(frame) if levelled else frame for frame, _ in drive.frames]
+    config = recognise(given[0].points, config).mounted(config)
     pipeline, budget = assembly.pipeline(mode, config, FieldOfView(), NullLedger()), mode.budget(config)
 
     def judged() -> Iterator[JudgedFrame]:
@@ -116,8 +93,7 @@ def run(drive: Drive, mode_name: str, config: ProfileConfig, *, levelled: bool =
         for (frame, truth), sweep in zip(drive.frames, given, strict=True):
             result = pipeline.step(sweep, budget)
             longer += _long(result, truth)
-            level = turned(mount.T_level_sensor, frame.points)
-            yield replace(JudgedFrame.of_result(result, drive.truth(frame, truth)), points=level)
+            yield replace(JudgedFrame.of_result(result, drive.truth(frame, truth)), points=mount.turn(frame.points))
 
     return Outcome(collect(judged(), CUBOID_RULES), longer)
 
@@ -181,12 +157,11 @@ def main() -> None:
     bands = [f"people {low:g}-{high:g}" for low, high in BANDS_M]
     columns = ["sensor", "scene", "height", "roll, pitch", *bands, "people", "cars", "long"]
     print(f"| {' | '.join(columns)} |\n|{'---|' * len(columns)}")
-    for sensor, scene, height_m, (roll, pitch) in product(args.sensors, args.scenes, args.heights, args.mounts):
-        mount = Mount(height_m, roll, pitch)
-        drives = (Drive.simulated(scene, sensor, args.seconds, seed, mount) for seed in range(*args.seeds))
+    for sensor, scene, height_m, angles in product(args.sensors, args.scenes, args.heights, args.mounts):
+        drives = (Drive.simulated(scene, sensor, args.seconds, seed, height_m, angles) for seed in range(*args.seeds))
         config = of_mount(sensor, height_m)
         outcomes = [run(drive, args.mode, config, levelled=args.levelled) for drive in drives]
-        print(row(f"{sensor} | {scene} | {height_m:g} | {roll:g}, {pitch:g}", outcomes), flush=True)
+        print(row(f"{sensor} | {scene} | {height_m:g} | {angles[0]:g}, {angles[1]:g}", outcomes), flush=True)
 
 
 if __name__ == "__main__":

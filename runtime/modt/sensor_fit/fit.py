@@ -10,8 +10,10 @@ import numpy as np
 
 from modt.config import ProfileConfig, SegmentationConfig
 from modt.geometry.field_of_view import BlindSectors
+from modt.placement import Mount
 from modt.sensor_fit.beams import BeamPattern, find_beams, nearest_profile, tangents
 from modt.sensor_fit.mount import BODY_REACH_M, find_body, ground_height_m
+from modt.sensor_fit.tilt import find_floor
 from modt.types import Float32
 
 
@@ -104,6 +106,8 @@ SURE_CONTRAST = 0.985
 """Least share of the points in the peaks of beams that are told apart without a doubt."""
 EMPTY_SECTOR_DEG = 10.0
 """Least sector without a return that is mentioned."""
+MOST_FLOORS, LEVEL_DEG = 10, 1.0
+"""Sweeps whose floor is fitted, and tilt of a sensor that counts as level."""
 
 
 def cell_m(spacing_deg: float, azimuth_step_deg: float) -> float:
@@ -161,8 +165,28 @@ def _beam_findings(pattern: BeamPattern) -> Iterator[Finding]:
     yield Finding("sensor", "azimuth_step_deg", step_deg, "most frequent step along a beam")
 
 
+def find_mount(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
+    """Roll and pitch of the sensor, the median of sweeps."""
+    floors = [floor for points in recording.sweeps[:MOST_FLOORS] if (floor := find_floor(points)) is not None]
+    if not floors:
+        yield Finding("sensor", "roll_deg", None, "no floor in sight: by the first sweep that shows one", sure=False)
+        return
+    angles = np.median([floor.roll_pitch_deg for floor in floors], axis=0)
+    tilt_deg = float(np.median([floor.tilt_deg for floor in floors]))
+    said = f"by the floor in {len(floors)} sweeps: the sensor is tilted by {tilt_deg:.1f} deg"
+    for key, angle in zip(("roll_deg", "pitch_deg"), angles.tolist(), strict=True):
+        yield Finding("sensor", key, round(angle, 1) if tilt_deg > LEVEL_DEG else 0.0, said)
+
+
+def _level(recording: Recording, config: ProfileConfig) -> Recording:
+    """The recording of a level sensor."""
+    mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
+    return replace(recording, sweeps=[mount.turn(points) for points in recording.sweeps])
+
+
 def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Returns of the robot itself, and the range of the others."""
+    recording = _level(recording, config)
     points = np.concatenate(recording.sweeps)
     range_m = np.hypot(points[:, 0], points[:, 1])
     height_m = ground_height_m(
@@ -197,7 +221,7 @@ def empty_sectors(points: Float32) -> str:
 
 def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Height of the sensor above the ground."""
-    height_m = ground_height_m(recording.sweeps, config.sensor, config.segmentation)
+    height_m = ground_height_m(_level(recording, config).sweeps, config.sensor, config.segmentation)
     if height_m is None or not HEIGHTS_M[0] <= height_m <= HEIGHTS_M[1]:
         yield Finding("sensor", "height_m", None, "no flat ground in sight: estimated as it comes", sure=False)
     else:
@@ -216,7 +240,10 @@ def find_reflectance(recording: Recording, config: ProfileConfig) -> Iterator[Fi
     yield Finding("sensor", "reflectance", scale if known else NONE, said)
 
 
-FINDERS: tuple[Finder, ...] = (find_period, find_pattern, find_body_and_range, find_height, find_reflectance)
+FINDERS: tuple[Finder, ...] = (
+    *(find_period, find_pattern, find_mount),
+    *(find_body_and_range, find_height, find_reflectance),
+)
 """Each knows what those before it have found."""
 
 
