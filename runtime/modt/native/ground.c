@@ -175,7 +175,10 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
         median_across(g->sectors, 1, row, ray);
         median_across(g->sectors, g->flank_sectors, ray, ray + g->sectors);
         for (i32 k = 0; k < g->sectors; k++)
-            row[k] = (ray[k] - ray[g->sectors + k] > g->flank_m) & !(kind[k] & RAMP) ? ray[g->sectors + k] : ray[k];
+        {
+            float beside = ray[g->sectors + k];
+            row[k] = (kind[k] & RAMP ? ray[k] < beside : ray[k] - beside > g->flank_m) ? beside : ray[k];
+        }
     }
     float low = bounds[0], high = bounds[1], near = bounds[2], far = bounds[3];
     i64 count = 0;

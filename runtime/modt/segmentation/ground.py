@@ -82,7 +82,8 @@ class GroundEstimator:
         known = np.where(is_ground, lowest, np.float32(-sensor_height_m))
         surface = _median_across(self._interpolate(known, is_ground))
         beside = _median_across(surface, self.config.flank_sectors)
-        np.copyto(surface, beside, where=(surface - beside > np.float32(self.config.flank_m)) & ~is_ramp)
+        flank = surface - beside > np.float32(self.config.flank_m)
+        np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))  # what stands on a ramp hides it
         height: Float32 = points.z - surface.ravel().take(cell)
         return height
 

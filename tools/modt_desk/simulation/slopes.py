@@ -16,6 +16,8 @@ from modt_desk.simulation.world import World
 HALF_M = (40.0, 30.0)
 KERB_M, DOCK_M = 0.12, 1.1
 ROUGHNESS_M = 0.005
+STEEPEST = 0.4
+"""Tangent of the rays that may meet a slope."""
 
 
 def ramp(rng: np.random.Generator, seconds: float, height_m: float, slope_deg: float | None = None) -> World:
@@ -64,4 +66,4 @@ def _grid() -> tuple[Float32, Float32]:
 def _terrain(rng: np.random.Generator, height: Float32) -> Terrain:
     rough = height + rng.standard_normal(height.shape, np.float32) * np.float32(ROUGHNESS_M)
     material = np.full(height.shape, Material.ASPHALT, np.uint8)
-    return Terrain(-np.array(HALF_M), CELL_M, rough.astype(np.float32), material)
+    return Terrain(-np.array(HALF_M), CELL_M, rough.astype(np.float32), material, STEEPEST)
