@@ -76,6 +76,19 @@ def test_heights_of_people_on_a_ramp_are_above_the_ramp():
     assert np.allclose(height[on], points[on, 2] + 0.8 - 5 * slope, atol=0.25)
 
 
+def test_the_ground_behind_a_person_on_a_ramp_is_that_beside_them():
+    slope, direction = 0.268, scans.rays(np.deg2rad(np.linspace(-22.5, 22.5, 64)), step_deg=0.35)
+    hit = scans.floor_ranges(direction, lambda x, y: -0.5 + slope * np.clip(x - 4, 0, 10))
+    person = scans.box_ranges(direction, (10.75, -0.3, -0.5 + 6.75 * slope), (11.25, 0.3, -0.5 + 7 * slope + 1.7))
+    nearest = np.minimum(hit, person)
+    points = (direction * nearest[:, None])[np.isfinite(nearest)].astype(np.float32)
+    on = (person < hit)[np.isfinite(nearest)]
+    height = ground(height_m=0.5, min_range_m=0.4).height_above(PointColumns.from_array(points), 0.5)
+    error = height[on] - (points[on, 2] + 0.5 - 6.75 * slope)
+    assert on.sum() > 50
+    assert np.abs(np.median(error)) < 0.15
+
+
 def test_a_kerb_is_ground_and_a_wall_is_not():
     points, on = scans.scan([(20.0, 8.0, 50.0, 4.0, 0.0, 0.12), (20.0, 12.0, 50.0, 1.0, 0.0, 2.0)], step_deg=0.5)
     height = ground().height_above(PointColumns.from_array(points), HEIGHT_M)

@@ -189,9 +189,7 @@ def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator
     recording = _level(recording, config)
     points = np.concatenate(recording.sweeps)
     range_m = np.hypot(points[:, 0], points[:, 1])
-    height_m = ground_height_m(
-        recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M), config.segmentation
-    )
+    height_m = ground_height_m(recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M))
     body = None if height_m is None else find_body(recording.sweeps, height_m)
     own = np.zeros(len(points), np.bool_)
     if body is not None and len(body.sectors_deg):
@@ -221,7 +219,7 @@ def empty_sectors(points: Float32) -> str:
 
 def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Height of the sensor above the ground."""
-    height_m = ground_height_m(_level(recording, config).sweeps, config.sensor, config.segmentation)
+    height_m = ground_height_m(_level(recording, config).sweeps, config.sensor)
     if height_m is None or not HEIGHTS_M[0] <= height_m <= HEIGHTS_M[1]:
         yield Finding("sensor", "height_m", None, "no flat ground in sight: estimated as it comes", sure=False)
     else:
