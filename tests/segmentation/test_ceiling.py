@@ -9,7 +9,7 @@ from modt.config import SegmentationConfig
 from modt.config.segmentation import CeilingConfig
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.segmentation.ceiling import below_ceiling_m
+from modt.segmentation.ground import below_ceiling_m
 from modt.segmentation.segmenter import Segmenter
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 

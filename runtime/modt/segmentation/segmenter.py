@@ -6,11 +6,10 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
-from modt.segmentation.ceiling import below_ceiling_m
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns
-from modt.segmentation.ground import GroundEstimator, HeightEstimator
+from modt.segmentation.ground import GroundEstimator, HeightEstimator, below_ceiling_m
 from modt.segmentation.groups import HEADINGS, has_reflectance, reflectance_statistics
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.types import NONE, Bool, Float32, Int, Proposals
