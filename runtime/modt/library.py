@@ -36,14 +36,14 @@ class TrackedObjects:
         final: (n,) the class is final.
         visible: (n,) matched with a proposal of this frame.
         unknown_near: (n,) background as far as is known, but too near for the sensor to show whether it is a person.
-        box_sensor: (n, 7) x, y, z of the centre, length, width, height [m], yaw [rad] in the sensor frame; NaN if not
-            visible.
+        box_sensor: (n, 7) x, y, z of the centre, length, width, height [m], yaw [rad] in the sensor frame, for a
+            tilted sensor the level frame at its place; NaN if not visible.
         box_world: (n, 7) last box in the world.
         position: (n, 2) filtered x, y [m, world].
         heading_rad, speed_mps: (n,) of the motion in the world.
         points: (n,) of the last proposal.
         age, missed: (n,) frames since birth, and since the last proposal.
-        T_world_sensor: (4, 4) pose of the sensor at the stamp of the frame: as given, or as registered.
+        T_world_sensor: (4, 4) pose of that frame at the stamp: as given, or as registered.
     """
 
     id: Int
@@ -114,14 +114,16 @@ class Pipeline:
         self._budget = chosen.budget(config)
 
     def _recognise(self, points: Float32) -> None:
-        """Warn of a profile that the first sweep does not fit; replace it if it was not asked for."""
+        """Warn of what the first sweep shows of sensor and mount; level it, and replace a profile not asked for."""
         found, asked = recognise(points, self.config), self._asked
-        if found.differences:
-            free = asked is not None and asked.sensor is None
-            name = (asked.sensor or profile.DEFAULT) if asked else "given"
-            log.warning("%s", found.warning(name, replaced=free))
-            if asked and free:
-                self._use(asked.over(found.fitted))
+        free = asked is not None and asked.sensor is None
+        name = (asked.sensor or profile.DEFAULT) if asked else "given"
+        for line in found.warnings(name, replaced=free):
+            log.warning("%s", line)
+        if asked and free and found.differences:
+            self._use(asked.over(found.fitted))
+        elif found.tilt_deg is not None:
+            self._use(found.mounted(self.config))
 
     @classmethod
     def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:

@@ -11,6 +11,7 @@ import numpy as np
 from modt.classification.scheduler import Scheduler
 from modt.energy.ledger import StageLedger
 from modt.observations import Located, StaticTracks
+from modt.placement import LEVEL, Mount
 from modt.types import (
     UNLIMITED,
     Bool,
@@ -115,10 +116,11 @@ class Pipeline:
     classifier: Classifier
     decision: Decision
     ledger: StageLedger
+    mount: Mount = LEVEL
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:
         """One frame, within a budget of classifications (Figs. 2 and 5)."""
-        run = self.ledger.run
+        run, frame = self.ledger.run, self.mount.level(frame)
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
         tracked = run(TRACKING, self.tracker.follow, frame.time_s, proposals, located)

@@ -1,13 +1,59 @@
-"""The placement of a sweep in the world: the pose at its stamp, and the motion of the sensor during it."""
+"""The placement of a sweep: mount of the sensor, its pose at the stamp, and its motion during the sweep."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modt.geometry import yaw_of
-from modt.types import Float64
+from modt.geometry import Camera, inverse, rotation_zyx, se3, yaw_of
+from modt.types import Float32, Float64, Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """How the sensor is turned on its robot.
+
+    Attributes:
+        R_level_sensor: (3, 3) from the sensor to the level frame at its place and heading; None if it is level.
+    """
+
+    R_level_sensor: Float64 | None = None
+
+    @classmethod
+    def of(cls, roll_deg: float | None, pitch_deg: float | None) -> Mount:
+        """A mount by its angles, None for 0."""
+        roll, pitch = np.deg2rad([roll_deg or 0.0, pitch_deg or 0.0]).tolist()
+        return cls(rotation_zyx(roll, pitch, 0.0) if roll or pitch else None)
+
+    def turn(self, points: Float32) -> Float32:
+        """(N, 4) points, or wider, as a level sensor has them."""
+        if self.R_level_sensor is None:
+            return points
+        out = points.copy()
+        x, y, z = points.T[:3]
+        for k, (a, b, c) in enumerate(self.R_level_sensor.astype(np.float32)):
+            out[:, k] = a * x + b * y + c * z
+        return out
+
+    def level(self, frame: Frame) -> Frame:
+        """The frame of a level sensor; the head of one that hangs upside down turns the other way."""
+        R, T = self.R_level_sensor, frame.T_world_sensor
+        if R is None:
+            return frame
+        pose = None if T is None else T @ inverse(se3(R, np.zeros(3)))
+        turn_s = frame.turn_s if R[2, 2] > 0 else -frame.turn_s
+        return replace(frame, points=self.turn(frame.points), T_world_sensor=pose, turn_s=turn_s, R_level_sensor=R)
+
+    def camera(self, camera: Camera) -> Camera:
+        """A camera beside the sensor, for level points."""
+        if self.R_level_sensor is None:
+            return camera
+        T = inverse(se3(self.R_level_sensor, np.zeros(3)))
+        return replace(camera, P_image_sensor=camera.P_image_sensor @ T, T_camera_sensor=camera.T_camera_sensor @ T)
+
+
+LEVEL = Mount()
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,7 @@ class Frame:
             ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
             stamp, compensated or by a sensor that does not turn.
         steady_s: the time by a clock that nobody sets, where the one of the stamps may be [s]; None: the stamp.
+        R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
     """
 
     index: int
@@ -55,6 +56,7 @@ class Frame:
     restarts: int = 0
     turn_s: float = 0.0
     steady_s: float | None = None
+    R_level_sensor: Float64 | None = None
 
     @property
     def time_s(self) -> float:
@@ -282,7 +284,7 @@ UNLIMITED = Budget()
 class FrameResult:
     """What is known after a frame."""
 
-    frame: Frame
+    frame: Frame  # level, as are the frame of the sensor in all that follows and its pose
     T_world_sensor: Float64  # (4, 4) pose of the sensor at the stamp, as the odometry placed it
     proposals: Proposals
     tracks: Tracks  # a copy of those alive after the frame

@@ -130,6 +130,17 @@ def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
     stages.step(frames()[9], stages.budget, reduced=False)
 
 
+def test_a_reload_keeps_the_tilt_that_the_first_sweep_showed():
+    tilted = SyntheticStream("yard", "vlp-16", 0.2, 3, mount_deg=(0.0, 12.0))
+    stages = stages_of()
+    results = [stages.step(frame, UNLIMITED, reduced=False) for frame in tilted]
+    pitch_deg = stages.parts.config.sensor.pitch_deg
+    assert pitch_deg == pytest.approx(12.5, abs=1.0)
+    assert results[0].frame.R_level_sensor is not None
+    stages.reload()
+    assert stages.parts.config.sensor.pitch_deg == pitch_deg
+
+
 def test_without_a_profile_the_first_sweep_decides(caplog):
     stages = stages_of(profile=None)
     stages.step(frames()[0], UNLIMITED, reduced=False)

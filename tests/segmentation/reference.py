@@ -37,27 +37,29 @@ def flood_fill(cells, beam_m, config):
 
 
 def trace(lowest, stands, range_m, height_m, config):
-    """(rings, SECTORS) ground cells, ray by ray and ring by ring."""
+    """(rings, SECTORS) ground cells, and cells on and beside a ramp, ring by ring and ray by ray."""
     c = config.ground
-    max_slope, max_bend, start_bend = (
-        np.tan(np.deg2rad(v)) for v in (config.max_slope_deg, c.max_bend_deg, c.start_bend_deg)
-    )
-    found = np.zeros(lowest.shape, bool)
-    for ray in range(SECTORS):
-        height, at, slope, bend = -height_m, 0.0, 0.0, start_bend
-        for ring in range(len(range_m)):
-            here = lowest[ring, ray]
-            if not np.isfinite(here):
-                continue
-            gap = range_m[ring] - at
-            reach = min(gap, c.max_gap_m)
-            off = here - height - slope * reach
-            above = c.noise_m if stands[ring, ray] else reach * bend + c.noise_m
-            if -gap * bend - c.noise_m < off < above:
-                found[ring, ray] = True
-                slope = float(np.clip(slope + c.slope_gain * ((here - height) / gap - slope), -max_slope, max_slope))
-                height, at, bend = here, range_m[ring], max_bend
-    return found
+    max_slope, ramp_slope = (np.tan(np.deg2rad(v * config.max_slope_deg)) for v in (1.0, c.ramp_share))
+    ground, steep, ramp = np.zeros((3, *lowest.shape), bool)
+    last = [(-height_m, 0.0, 0.0)] * SECTORS
+    for ring in range(len(range_m)):
+        for ray in range(SECTORS):
+            here, (height, at, slope) = lowest[ring, ray], last[ray]
+            if np.isfinite(here):
+                gap = range_m[ring] - at
+                reach = min(gap, c.max_gap_m)
+                off = here - height - slope * reach
+                near = c.max_gap_m if ring and ramp[ring - 1, ray] else c.near_m
+                bound = 0.0 if stands[ring, ray] else min(gap, near) * max_slope
+                if -gap * max_slope - c.noise_m < off < bound + c.noise_m:
+                    ground[ring, ray] = True
+                    slope = slope + c.slope_gain * ((here - height) / gap - slope)
+                    slope = float(np.clip(slope, -max_slope, max_slope))
+                    last[ray] = here, range_m[ring], slope
+            steep[ring, ray] = abs(slope) > ramp_slope
+        for ray in range(SECTORS):
+            ramp[ring, ray] = steep[ring, [(ray + k * c.flank_sectors) % SECTORS for k in (-1, 0, 1)]].any()
+    return ground, ramp
 
 
 def closeness(x, y, noise_m):

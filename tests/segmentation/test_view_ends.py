@@ -1,5 +1,7 @@
 """Sides at which proposals end because the view ends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,6 +9,7 @@ from hypothesis import strategies as st
 
 from modt.config import SensorConfig
 from modt.geometry import upright_boxes
+from modt.placement import Mount
 from modt.segmentation.view_ends import ViewEnds
 from modt.types import Cut
 
@@ -82,3 +85,14 @@ def test_flags_are_those_of_a_loop_over_points(counts, seed, bound_deg):
             flag |= Cut.SIDE * int((np.abs(off_deg) < 2.0).any() and range_m < sensor.blind_range_m)
         expected.append(flag)
     assert flags(*parts, sensor=sensor) == expected
+
+
+@pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(0.0, 12.0), (-10.0, 4.0), (180.0, 0.0)])
+def test_the_view_of_a_tilted_sensor_ends_where_its_own_beams_do(roll_deg, pitch_deg):
+    tilted = replace(SENSOR, roll_deg=roll_deg, pitch_deg=pitch_deg)
+    mount = Mount.of(roll_deg, pitch_deg)
+    parts = [mount.turn(np.ascontiguousarray(person(distance_m).T)).T for distance_m in (1.0, 8.0)]
+    upright = person(1.6)  # whose feet the lowest beam shows, and not the head
+    above = mount.turn(np.ascontiguousarray(upright[:, upright[2] > 0].T)).T
+    cut_above = Cut.TOP if roll_deg < 90 else Cut.BOTTOM
+    assert flags(*parts, above, sensor=tilted) == [Cut.TOP | Cut.BOTTOM, Cut(0), cut_above]

@@ -25,6 +25,7 @@ from modt.geometry.kernels import GeometryKernels
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Classifier, Fusion, Pipeline
 from modt.pipeline import Segmenter as SegmenterStage
+from modt.placement import Mount
 from modt.segmentation.kernels import Kernels
 from modt.segmentation.segmenter import Segmenter
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, StateMachine
@@ -146,4 +147,5 @@ def stages(
         classifier=classifier,
         decision=Decision(profile.decision, with_background(fusion.prior)),
         ledger=ledger,
+        mount=Mount.of(profile.sensor.roll_deg, profile.sensor.pitch_deg),
     )

@@ -38,7 +38,8 @@ def choose(asked_for: profile.Names, first: Frame | None, info: StreamInfo) -> C
     """The profile of a stream by its first frame; what differs is warned of.
 
     What is found takes the place of the default profile, and of that which the source has named, never of one of a
-    sensor that was asked for; beams that the source knows are better than found ones.
+    sensor that was asked for, but for a tilt of the mount that it leaves open; beams that the source knows are better
+    than found ones.
 
     Raises:
         MisuseError: a profile that cannot be used.
@@ -47,10 +48,10 @@ def choose(asked_for: profile.Names, first: Frame | None, info: StreamInfo) -> C
     base = info.profile or profile.DEFAULT
     config = asked.config if asked.sensor else _with_beams(asked.over(profile.load(base)), info)
     recognition = Recognition((), None, config) if first is None else recognise(first.points, config)
-    if recognition.differences:
-        log.warning("%s", recognition.warning(asked.sensor or base, replaced=asked.sensor is None))
+    for line in recognition.warnings(asked.sensor or base, replaced=asked.sensor is None):
+        log.warning("%s", line)
     if asked.sensor:
-        return ChosenProfile(config, asked.sensor, asked.used(""), recognition)
+        return ChosenProfile(recognition.mounted(config), asked.sensor, asked.used(""), recognition)
     sensor = FOUND if recognition.differences else base
     config = _with_beams(asked.over(recognition.fitted), info)
     return ChosenProfile(config, sensor, asked.used(sensor), recognition)

@@ -14,6 +14,7 @@ from modt import profile
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
+from modt.placement import LEVEL, Mount
 from modt.schemes import POSES, open_poses
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.stream import Stream, StreamInfo
@@ -99,8 +100,8 @@ def odometry(request: Request, stream: Described, config: OdometryConfig) -> Pos
     return open_poses(request.odometry, config)
 
 
-def field_of_view(request: Request, stream: Described) -> FieldOfView:
-    """The part of space to look at.
+def field_of_view(request: Request, stream: Described, mount: Mount = LEVEL) -> FieldOfView:
+    """The part of space to look at, for the level points of a mount.
 
     Raises:
         MisuseError: the camera's is asked for and the stream has none.
@@ -110,4 +111,4 @@ def field_of_view(request: Request, stream: Described) -> FieldOfView:
     if stream.info.camera is None:
         missing = next((n for n in stream.info.notes if "camera" in n), "it has no calibration")
         raise MisuseError(stream.info.name, missing, "restore the calibration, or use --fov full")
-    return FieldOfView.of_camera(stream.info.camera)
+    return FieldOfView.of_camera(mount.camera(stream.info.camera))

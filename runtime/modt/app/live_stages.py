@@ -117,7 +117,8 @@ class LiveStages:
         Raises:
             ModtError: it is not valid; nothing has changed.
         """
-        self._exchange(self._made(self._chosen(None)))
+        chosen, seen = self._chosen(None), self.parts.chosen.recognition
+        self._exchange(self._made(replace(chosen, config=seen.mounted(chosen.config), recognition=seen)))
         self._seen = bool(self._request.profile)  # else the next sweep says what differs
 
     def _look_again(self, frame: Frame) -> None:

@@ -12,6 +12,7 @@ from modt.classes import CLASS_NAMES
 from modt.config import ProfileConfig
 from modt.energy.ledger import StageLedger
 from modt.pipeline import Pipeline
+from modt.placement import Mount
 from modt.sources.pose_source import PoseSource
 from modt.sources.stream import StreamInfo
 from modt.types import Budget
@@ -85,5 +86,6 @@ def pipeline_of(
     request: inputs.Request, stream: inputs.Described, config: ProfileConfig, ledger: StageLedger
 ) -> Pipeline:
     """The stages of a profile."""
-    fov = inputs.field_of_view(request, stream)
+    mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
+    fov = inputs.field_of_view(request, stream, mount)
     return assembly.pipeline(assembly.MODES[request.mode], config, fov, ledger)

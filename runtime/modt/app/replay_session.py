@@ -101,7 +101,8 @@ class Session:
 
     def _sinks(self) -> list[Sink]:
         info, path = self.stream.info, self.directory.path
-        kitti = KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", info.camera)
+        camera = None if info.camera is None else self.parts.pipeline.mount.camera(info.camera)
+        kitti = KittiResults(path / "kitti" / f"{info.sequence:04d}.txt", camera)
         labels: list[Sink] = [PointLabels(path / "labels")] if self.request.labels else []
         return [self.directory.tracks(), kitti, *labels]
 

@@ -28,6 +28,14 @@ class SensorConfig(StageConfig):
     """Mount, range and resolution of the sensor."""
 
     height_m: float | None = number(1.73, 0.05, 5.0, "m", "above the ground; null: estimated from the stream")
+    roll_deg: float | None = number(
+        None,
+        -180.0,
+        180.0,
+        "deg",
+        "of the mount, left side up; null: by the first sweep, where it is tilted by 2 or more",
+    )
+    pitch_deg: float | None = number(None, -90.0, 90.0, "deg", "of the mount, nose down; null: likewise")
     min_range_m: float = number(2.0, 0.0, 20.0, "m", "of the points used; nearer ones are on the robot itself")
     max_range_m: float = number(80.0, 1.0, 400.0, "m", "of the points used")
     elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "between neighbouring beams that are evenly spaced")

@@ -30,16 +30,29 @@ class GroundConfig(StageConfig):
     """Ground as piece-wise planes (section III-A), traced outwards along each ray of a polar grid."""
 
     noise_m: float = number(0.1, 0.0, 1.0, "m", "residual of a lowest return on the plane of its ray")
-    max_bend_deg: float = number(4.0, 0.0, 45.0, "deg", "change of slope between two ground cells of a ray")
-    start_bend_deg: float = number(
-        6.0, 0.0, 45.0, "deg", "tilt of the sensor on the ground beneath it, to the first cell"
+    near_m: float = number(
+        1.5, 0.0, 20.0, "m", "of a rise by max_slope_deg, at most, from one ground cell of a ray to the next"
     )
+    ramp_share: float = number(0.3, 0.0, 1.0, "", "of max_slope_deg: running slope of a ray that is on a ramp")
     slope_gain: float = number(0.2, 0.01, 1.0, "", "weight of the newest slope in the running slope of a ray")
-    max_gap_m: float = number(6.0, 0.1, 100.0, "m", "between ground cells, beyond which tolerance stops growing")
+    max_gap_m: float = number(6.0, 0.1, 100.0, "m", "the same on and beside a ramp; reach of the running slope")
     flat_m: float = number(0.1, 0.0, 1.0, "m", "height range of the returns of a flat cell ...")
     flat_slope: float = number(0.2, 0.0, 2.0, "", "... and what it grows by with the width of the cell")
     flank_sectors: int = number(3, 1, 60, "", "to the left and right of a ray, whose median bounds its surface")
     flank_m: float = number(0.25, 0.0, 100.0, "m", "above that median, from where on a surface is a vehicle's side")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CeilingConfig(StageConfig):
+    """The ceiling of a room below max_height_m, of which nothing becomes a proposal."""
+
+    above_m: float = number(1.95, 0.5, 10.0, "m", "above ground of the returns of which a ceiling has its share")
+    lowest_m: float = number(2.15, 0.5, 10.0, "m", "above ground of the lowest ceiling")
+    bin_m: float = number(0.05, 0.01, 0.5, "m", "of the histogram of heights, two of which hold a ceiling")
+    min_returns: int = number(50, 1, 10000, "", "above above_m in a room")
+    min_share: float = number(0.5, 0.0, 1.0, "", "of these returns that are on the ceiling")
+    edge_share: float = number(0.05, 0.0, 1.0, "", "of its returns, from which the bin below belongs to it too")
+    clearance_m: float = number(0.05, 0.0, 1.0, "m", "below a ceiling up to where objects reach")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -114,7 +127,7 @@ class BoxConfig(StageConfig):
 class SegmentationConfig(StageConfig):
     """Ground, clusters and the sizes of what can be an object (section III-A)."""
 
-    max_slope_deg: float = number(12.0, 0.5, 45.0, "deg", "of the ground")
+    max_slope_deg: float = number(16.0, 0.5, 45.0, "deg", "steepest ground, up or down; what rises more stands on it")
     clearance_m: float = number(0.25, 0.02, 1.0, "m", "lowest point of an object above ground")
     max_height_m: float = number(2.6, 0.3, 20.0, "m", "highest point of an object above ground")
     cell_m: float = number(0.105, 0.01, 2.0, "m", "side of a cell at 10 m; grows as the square root of range")
@@ -126,6 +139,7 @@ class SegmentationConfig(StageConfig):
     )
     sensor_height: SensorHeightConfig = mechanism(SensorHeightConfig)
     ground: GroundConfig = mechanism(GroundConfig)
+    ceiling: CeilingConfig = mechanism(CeilingConfig)
     clusters: ClusterConfig = mechanism(ClusterConfig)
     person_splitting: PersonSplitConfig = mechanism(PersonSplitConfig)
     car_merging: CarMergeConfig = mechanism(CarMergeConfig)

@@ -4,13 +4,13 @@
 typedef struct {
     i32 rings, sectors, sector_bits, flank_sectors;
     float far_m, ring_scale, sector_scale;
-    float min_sqrt_range, max_slope, max_bend, start_bend, slope_gain, noise_m, max_gap_m, flank_m;
+    float min_sqrt_range, max_slope, ramp_slope, near_m, slope_gain, noise_m, max_gap_m, flank_m;
 } Ground;
 
 /* Scratch of the caller: rings * sectors each, then one a point. */
 typedef struct {
     float *lowest, *surface, *other;
-    uint8_t *stands, *is_ground;
+    uint8_t *stands, *kind;
     float *z, *sqrt_range;
     i32 *cell;
 } Scratch;
@@ -68,32 +68,41 @@ static void find_stands(const Ground *g, const float *flat_m, const float *highe
             s->stands[k] = highest[k] > s->lowest[k] + flat_m[ring];
 }
 
-/* GroundEstimator.trace; `ray` holds height, range, slope and bend of the last ground cell of each ray */
+enum { GROUND = 1, STEEP = 2, RAMP = 4 }; /* of a cell: is ground, its ray rises or falls, so does one beside it */
+
+/* GroundEstimator.trace; `ray` holds height, range and slope of the last ground cell of each ray, and how far
+ * from it the ground may rise by max_slope */
 static void trace(const Ground *g, float height_m, const float *range_m, Scratch *s, float *ray)
 {
     i32 sectors = g->sectors;
-    float *height = ray, *at = ray + sectors, *slope = ray + 2 * sectors, *bend = ray + 3 * sectors;
+    float *height = ray, *at = ray + sectors, *slope = ray + 2 * sectors, *bend_m = ray + 3 * sectors;
+    i32 mask = sectors - 1;
     for (i32 k = 0; k < sectors; k++) {
         height[k] = -height_m;
         at[k] = slope[k] = 0.0f;
-        bend[k] = g->start_bend;
+        bend_m[k] = g->near_m;
     }
     for (i32 ring = 0; ring < g->rings; ring++) {
         const float *lowest = s->lowest + ring * sectors;
         const uint8_t *stands = s->stands + ring * sectors;
-        uint8_t *is_ground = s->is_ground + ring * sectors;
+        uint8_t *kind = s->kind + ring * sectors;
         for (i32 k = 0; k < sectors; k++) {
             float gap = range_m[ring] - at[k], reach = least(gap, g->max_gap_m);
             float rise = lowest[k] - height[k], off = rise - slope[k] * reach;
             float flat = stands[k] ? 0.0f : 1.0f;
-            int found = (off < reach * bend[k] * flat + g->noise_m) & (off > -(gap * bend[k] + g->noise_m));
+            float bound = least(gap, bend_m[k]) * g->max_slope * flat + g->noise_m;
+            int found = (off < bound) & (off > -(gap * g->max_slope + g->noise_m));
             float newest = slope[k] + g->slope_gain * (rise / gap - slope[k]);
             newest = least(most(newest, -g->max_slope), g->max_slope);
-            is_ground[k] = (uint8_t)found;
             height[k] = found ? lowest[k] : height[k];
             at[k] = found ? range_m[ring] : at[k];
             slope[k] = found ? newest : slope[k];
-            bend[k] = found ? g->max_bend : bend[k];
+            kind[k] = (uint8_t)(found | (magnitude(slope[k]) > g->ramp_slope) << 1);
+        }
+        for (i32 k = 0; k < sectors; k++) {
+            i32 steep = kind[k] | kind[(k - g->flank_sectors) & mask] | kind[(k + g->flank_sectors) & mask];
+            kind[k] |= (uint8_t)((steep & STEEP) << 1);
+            bend_m[k] = steep & STEEP ? g->max_gap_m : g->near_m;
         }
     }
 }
@@ -110,16 +119,16 @@ static void interpolate(const Ground *g, float height_m, const float *range_m, S
     for (i32 ring = 0; ring < g->rings; ring++)
         for (i32 k = 0; k < sectors; k++) {
             i32 i = ring * sectors + k;
-            low[i] = value[k] = s->is_ground[i] ? s->lowest[i] : value[k];
-            near[i] = at[k] = s->is_ground[i] ? range_m[ring] : at[k];
+            low[i] = value[k] = (s->kind[i] & GROUND) ? s->lowest[i] : value[k];
+            near[i] = at[k] = (s->kind[i] & GROUND) ? range_m[ring] : at[k];
         }
     for (i32 k = 0; k < sectors; k++)
         at[k] = -1.0f; /* nothing beyond */
     for (i32 ring = g->rings - 1; ring >= 0; ring--)
         for (i32 k = 0; k < sectors; k++) {
             i32 i = ring * sectors + k, first = ring == 0;
-            value[k] = s->is_ground[i] || first ? low[i] : value[k];
-            at[k] = s->is_ground[i] || first ? range_m[ring] : at[k];
+            value[k] = (s->kind[i] & GROUND) || first ? low[i] : value[k];
+            at[k] = (s->kind[i] & GROUND) || first ? range_m[ring] : at[k];
             float high = at[k] < 0.0f ? low[i] : value[k], far = at[k] < 0.0f ? near[i] : at[k];
             float share = (range_m[ring] - near[i]) / most(far - near[i], 1e-3f);
             s->surface[i] = low[i] + (high - low[i]) * share;
@@ -162,10 +171,14 @@ EXPORT i64 modt_above_ground(const Ground *g, const float *range_m, const float 
     interpolate(g, height_m, range_m, s, ray);
     for (i32 ring = 0; ring < g->rings; ring++) {
         float *row = s->surface + ring * g->sectors;
+        const uint8_t *kind = s->kind + ring * g->sectors;
         median_across(g->sectors, 1, row, ray);
         median_across(g->sectors, g->flank_sectors, ray, ray + g->sectors);
         for (i32 k = 0; k < g->sectors; k++)
-            row[k] = ray[k] - ray[g->sectors + k] > g->flank_m ? ray[g->sectors + k] : ray[k];
+        {
+            float beside = ray[g->sectors + k];
+            row[k] = (kind[k] & RAMP ? ray[k] < beside : ray[k] - beside > g->flank_m) ? beside : ray[k];
+        }
     }
     float low = bounds[0], high = bounds[1], near = bounds[2], far = bounds[3];
     i64 count = 0;

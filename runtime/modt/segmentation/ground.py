@@ -1,10 +1,11 @@
-"""Ground as piece-wise planes (section III-A): one height a polar cell, traced outwards along each ray."""
+"""Ground as piece-wise planes (section III-A), one height a polar cell, traced outwards; and the ceiling above it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
+from modt.config.segmentation import CeilingConfig
 from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid
 from modt.segmentation.groups import label_max, label_min
 from modt.types import Bool, Float32, Int
@@ -55,9 +56,9 @@ class HeightEstimator:
 class GroundEstimator:
     """Height of each point above the ground below it.
 
-    The lowest return of a cell is ground if it continues the ground of its ray within a bounded change of slope, and
-    where something stands in the cell without any: the lowest return may then be a flank. Ground that begins again
-    farther away may lie lower by that slope all the way, since nothing else does. Cells without ground are
+    The lowest return of a cell is ground if it continues the ground of its ray. It may rise by `max_slope_deg` over a
+    short way, on and beside a ramp over a longer one, and not at all where something stands in the cell, since it may
+    be a flank. It may lie lower by `max_slope_deg` all the way, since nothing else does. Cells without ground are
     interpolated along the ray.
 
     Args:
@@ -71,18 +72,19 @@ class GroundEstimator:
         flat_m = self.config.flat_m + self.config.flat_slope * self.grid.ring_width_m
         self.flat_m: Float32 = flat_m[:, None].astype(np.float32)
         self.min_sqrt_range = np.float32(np.sqrt(sensor.min_range_m))
-        self.max_slope = float(np.tan(np.deg2rad(config.max_slope_deg)))
-        self.max_bend = float(np.tan(np.deg2rad(self.config.max_bend_deg)))
+        steepest_rad = np.deg2rad(config.max_slope_deg)
+        self.max_slope, self.ramp_slope = np.tan([steepest_rad, self.config.ramp_share * steepest_rad]).tolist()
 
     def height_above(self, points: PointColumns, sensor_height_m: float) -> Float32:
         """(N,) height of each point above the ground [m]."""
         cell = self.grid.cell(points)
         lowest = self._lowest(points, cell, sensor_height_m)
-        is_ground = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
+        is_ground, is_ramp = self.trace(lowest, self._stands(points, cell, lowest), sensor_height_m)
         known = np.where(is_ground, lowest, np.float32(-sensor_height_m))
         surface = _median_across(self._interpolate(known, is_ground))
         beside = _median_across(surface, self.config.flank_sectors)
-        np.copyto(surface, beside, where=surface - beside > np.float32(self.config.flank_m))
+        flank = surface - beside > np.float32(self.config.flank_m)
+        np.copyto(surface, beside, where=np.where(is_ramp, surface < beside, flank))  # what stands on a ramp hides it
         height: Float32 = points.z - surface.ravel().take(cell)
         return height
 
@@ -103,34 +105,35 @@ class GroundEstimator:
         stands.ravel()[cell[points.z > flat.ravel().take(cell)]] = True
         return stands
 
-    def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> Bool:
-        """(rings, SECTORS) ground cells.
+    def trace(self, lowest: Float32, stands: Bool, sensor_height_m: float) -> tuple[Bool, Bool]:
+        """(rings, SECTORS) ground cells, and cells on and beside a ramp, where no surface is a vehicle's side.
 
         All rays advance together, ring by ring, from the foot of the sensor.
         """
         c = self.config
-        max_slope, max_bend, gain, noise, max_gap = (
-            np.float32(v) for v in (self.max_slope, self.max_bend, c.slope_gain, c.noise_m, c.max_gap_m)
-        )
-        start_bend = np.float32(np.tan(np.deg2rad(c.start_bend_deg)))
-        last = np.zeros((4, SECTORS), np.float32)  # ground cell of each ray
-        height, at, slope, bend = last
-        height[:], bend[:] = -sensor_height_m, start_bend
-        step = np.zeros_like(last)
-        step[3] = max_bend
-        flat, is_ground = ~stands, np.zeros(lowest.shape, np.bool_)
-        for ring in np.flatnonzero(np.isfinite(lowest).any(axis=1)).tolist():
-            here, range_m = lowest[ring], self.grid.range_m[ring]
+        max_slope, ramp = np.float32(self.max_slope), np.float32(self.ramp_slope)
+        gain, noise, max_gap, near = (np.float32(v) for v in (c.slope_gain, c.noise_m, c.max_gap_m, c.near_m))
+        last = np.zeros((3, SECTORS), np.float32)  # ground cell of each ray
+        height, at, slope = last
+        height[:] = -sensor_height_m
+        step, bend_m = np.zeros_like(last), np.full(SECTORS, near)
+        flat = ~stands
+        is_ground, is_ramp = np.zeros((2, *lowest.shape), np.bool_)
+        for ring, (here, range_m) in enumerate(zip(lowest, self.grid.range_m, strict=True)):
             gap = range_m - at
             reach = np.minimum(gap, max_gap)
             rise = here - height
             off = rise - slope * reach
-            found = np.less(off, reach * bend * flat[ring] + noise, out=is_ground[ring])
-            found &= off > -(gap * bend + noise)
+            bound = np.minimum(gap, bend_m) * max_slope * flat[ring] + noise
+            found = np.less(off, bound, out=is_ground[ring])
+            found &= off > -(gap * max_slope + noise)
             step[0], step[1] = here, range_m
             step[2] = np.minimum(np.maximum(slope + gain * (rise / gap - slope), -max_slope), max_slope)
             np.copyto(last, step, where=found)
-        return is_ground
+            on = np.abs(slope) > ramp
+            is_ramp[ring] = on | np.roll(on, c.flank_sectors) | np.roll(on, -c.flank_sectors)
+            bend_m = np.where(is_ramp[ring], max_gap, near)
+        return is_ground, is_ramp
 
     def _interpolate(self, ground: Float32, is_ground: Bool) -> Float32:
         """(rings, SECTORS) surface: linear between the ground cells of a ray, level beyond the last one."""
@@ -155,3 +158,23 @@ def _median_across(surface: Float32, step: int = 1) -> Float32:
     low, high = np.minimum(left, surface), np.maximum(left, surface)
     median: Float32 = np.maximum(low, np.minimum(high, right))
     return median
+
+
+def below_ceiling_m(height: Float32, config: CeilingConfig) -> float | None:
+    """Height [m] up to which objects reach under a ceiling, by (K,) heights of returns above ground; None outdoors.
+
+    Most of the returns above people's heads are at one height there; on walls, trees and houses they spread.
+    """
+    upper = height[height > np.float32(config.above_m)]
+    if len(upper) < config.min_returns:
+        return None
+    count = np.bincount(
+        ((upper - np.float32(config.above_m)) / np.float32(config.bin_m)).astype(np.int64), minlength=2
+    )
+    pair = count[:-1] + count[1:]
+    pair[: round((config.lowest_m - config.above_m) / config.bin_m)] = 0  # doors
+    first = int(pair.argmax())
+    if pair[first] < config.min_share * len(upper):
+        return None
+    begins = first - 1 if first and count[first - 1] > config.edge_share * pair[first] else first
+    return config.above_m + config.bin_m * begins - config.clearance_m

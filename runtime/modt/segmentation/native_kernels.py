@@ -38,8 +38,8 @@ class _Ground(ctypes.Structure):
 
     _fields_ = (
         *((name, _I) for name in ("rings", "sectors", "sector_bits", "flank_sectors")),
-        *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope", "max_bend")),
-        *((name, _F) for name in ("start_bend", "slope_gain", "noise_m", "max_gap_m", "flank_m")),
+        *((name, _F) for name in ("far_m", "ring_scale", "sector_scale", "min_sqrt_range", "max_slope")),
+        *((name, _F) for name in ("ramp_slope", "near_m", "slope_gain", "noise_m", "max_gap_m", "flank_m")),
     )
 
 
@@ -55,8 +55,8 @@ class _GroundBuffers:
 
     def __init__(self, ground: GroundEstimator) -> None:
         grid, c = ground.grid, ground.config
-        start_bend, scales = np.tan(np.deg2rad(c.start_bend_deg)), (FAR_M, 1 / RING_STEP, SECTORS / 4)
-        slopes = ground.min_sqrt_range, ground.max_slope, ground.max_bend, start_bend
+        scales = FAR_M, 1 / RING_STEP, SECTORS / 4
+        slopes = ground.min_sqrt_range, ground.max_slope, ground.ramp_slope
         self.constants = _Ground(
             grid.rings,
             SECTORS,
@@ -64,6 +64,7 @@ class _GroundBuffers:
             c.flank_sectors,
             *scales,
             *slopes,
+            c.near_m,
             c.slope_gain,
             c.noise_m,
             c.max_gap_m,

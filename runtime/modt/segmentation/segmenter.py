@@ -9,7 +9,7 @@ from modt.geometry import FieldOfView
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns
-from modt.segmentation.ground import GroundEstimator, HeightEstimator
+from modt.segmentation.ground import GroundEstimator, HeightEstimator, below_ceiling_m
 from modt.segmentation.groups import HEADINGS, has_reflectance, reflectance_statistics
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.view_ends import ViewEnds
@@ -58,11 +58,18 @@ class Segmenter:
         return self.height_estimator.height_m(points) if known is None else known
 
     def above_ground(self, points: Float32) -> tuple[Int, PointColumns, Float32]:
-        """(K,) rows of the points within range and between `clearance_m` and `max_height_m` above ground.
+        """(K,) rows of the points within range, and `clearance_m` to `max_height_m` or the ceiling above ground.
 
         With them come those points and their (K,) heights above ground [m].
         """
-        return self.kernels.above_ground(self.ground, points, self.sensor_height_m(points), self.bounds)
+        rows, above, height = self.kernels.above_ground(
+            self.ground, points, self.sensor_height_m(points), self.bounds
+        )
+        limit_m = below_ceiling_m(height, self.config.ceiling)
+        if limit_m is None:
+            return rows, above, height
+        kept = np.flatnonzero(height < np.float32(limit_m))
+        return rows.take(kept), above.take(kept), height.take(kept)
 
     def _proposals(self, clusters: Clusters, index: Int, sweep: Float32) -> Proposals:
         """The clusters in view with their boxes, given (K,) the row of each point in the (N, 4) sweep."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from modt.config import SensorConfig
+from modt.placement import Mount
 from modt.types import Cut, Float32, Float64, Int
 
 _STEPS, _NEAR_M = 0.75, 0.1
@@ -15,6 +16,10 @@ class ViewEnds:
     """Tells which sides of proposals are cut, above as far away as the highest beam is below `max_height_m`."""
 
     def __init__(self, sensor: SensorConfig, max_height_m: float) -> None:
+        R_level_sensor = Mount.of(sensor.roll_deg, sensor.pitch_deg).R_level_sensor
+        self._R_sensor_level = None if R_level_sensor is None else R_level_sensor.T.astype(np.float32)
+        upright = R_level_sensor is None or R_level_sensor[2, 2] > 0
+        self._lowest, self._highest = (Cut.BOTTOM, Cut.TOP) if upright else (Cut.TOP, Cut.BOTTOM)
         sectors = np.deg2rad(sensor.blind_sectors_deg or ())
         self._edges = np.stack([np.cos(sectors), np.sin(sectors)], axis=1).astype(np.float32)
         self._edge_tangent, self._near_m = (
@@ -31,19 +36,20 @@ class ViewEnds:
             self._tangents = ends - outward * _STEPS * sensor.beams.step_rad(ends.astype(np.float32))
 
     def cut(self, coordinates: Float32, offsets: Int, box: Float64) -> Int:
-        """(P,) flags of Cut, of proposals that own (3, K) points by (P + 1,) offsets, in (P, 7) boxes."""
+        """(P,) flags of Cut, of proposals that own (3, K) level points by (P + 1,) offsets, in (P, 7) boxes."""
         cut, nearest_m = np.zeros(len(box), np.int64), np.hypot(*box[:, :2].T) - np.hypot(*box[:, 3:5].T) / 2
         near = (nearest_m < self._reach_m).nonzero()[0]  # farther away the beams pass beyond people
         if not len(near):
             return cut
         runs = zip(offsets[near].tolist(), offsets[near + 1].tolist(), strict=True)
-        x, y, z = np.concatenate([coordinates[:, first:end] for first, end in runs], axis=1)
+        xyz = np.concatenate([coordinates[:, first:end] for first, end in runs], axis=1)
+        x, y, z = xyz if self._R_sensor_level is None else self._R_sensor_level @ xyz
         count = (offsets[1:] - offsets[:-1])[near]
         starts, range_m = count.cumsum() - count, np.sqrt(x * x + y * y)  # a fifth of the time of hypot
         tangent = z / np.maximum(range_m, np.float32(1e-3))
         flags = Cut.NEAR * (np.minimum.reduceat(range_m, starts) < self._near_m).astype(np.int64)
-        flags |= Cut.BOTTOM * (np.minimum.reduceat(tangent, starts) < self._tangents[0])
-        flags |= Cut.TOP * (np.maximum.reduceat(tangent, starts) > self._tangents[1])
+        flags |= self._lowest * (np.minimum.reduceat(tangent, starts) < self._tangents[0])
+        flags |= self._highest * (np.maximum.reduceat(tangent, starts) > self._tangents[1])
         for c, s in self._edges:
             along, across = c * x + s * y, c * y - s * x
             at_edge = (np.abs(across) < self._edge_tangent * along) & (range_m < self._blind_m)

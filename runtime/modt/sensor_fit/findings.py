@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from modt.config import ProfileConfig, SegmentationConfig
+from modt.placement import Mount
 from modt.sensor_fit.beams import BeamPattern, nearest_profile, tangents
 from modt.sensor_fit.mount import ground_height_m
 from modt.types import Float32
@@ -129,9 +130,15 @@ def _beam_findings(pattern: BeamPattern) -> Iterator[Finding]:
     yield Finding("sensor", "azimuth_step_deg", step_deg, "most frequent step along a beam")
 
 
+def level(recording: Recording, config: ProfileConfig) -> Recording:
+    """The recording of a level sensor."""
+    mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
+    return replace(recording, sweeps=[mount.turn(points) for points in recording.sweeps])
+
+
 def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Height of the sensor above the ground."""
-    height_m = ground_height_m(recording.sweeps, config.sensor, config.segmentation)
+    height_m = ground_height_m(level(recording, config).sweeps, config.sensor)
     if height_m is None or not HEIGHTS_M[0] <= height_m <= HEIGHTS_M[1]:
         yield Finding("sensor", "height_m", None, "no flat ground in sight: estimated as it comes", sure=False)
     else:

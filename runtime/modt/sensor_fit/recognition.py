@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from modt.config import ProfileConfig, SensorConfig
+from modt.placement import Mount
 from modt.sensor_fit.beams import (
     COARSE_ORIGINS_M,
     azimuth_ratio,
@@ -24,6 +26,7 @@ from modt.sensor_fit.findings import (
     pattern_findings,
     reflectance_scale,
 )
+from modt.sensor_fit.tilt import MIN_TILT_DEG, Floor, find_floor
 from modt.types import Float32
 
 MAX_SPACING_RATIO = 1.35  # of the beams, median over the points, and of the returns along a beam
@@ -39,11 +42,31 @@ class Recognition:
         differences: in words, none if the profile fits.
         nearest: name of the shipped profile of the same beams, None where there is none.
         fitted: the profile with what was found in its place.
+        tilt_deg: roll and pitch of the sensor where the profile leaves them open and they are not small.
     """
 
     differences: tuple[str, ...]
     nearest: str | None
     fitted: ProfileConfig
+    tilt_deg: tuple[float, float] | None = None
+
+    def mounted(self, config: ProfileConfig) -> ProfileConfig:
+        """A profile with the tilt that was found, where it leaves the mount open."""
+        sensor = config.sensor
+        if self.tilt_deg is None or not _is_open(sensor):
+            return config
+        roll_deg, pitch_deg = self.tilt_deg
+        return replace(config, sensor=replace(sensor, roll_deg=roll_deg, pitch_deg=pitch_deg))
+
+    def warnings(self, name: str, *, replaced: bool) -> Iterator[str]:
+        """A line of what differs from the profile of a name, and one of the tilt."""
+        if self.differences:
+            yield self.warning(name, replaced=replaced)
+        if self.tilt_deg is not None:
+            roll, pitch = self.tilt_deg
+            how = "hangs upside down, " if abs(roll) > 90 else "is tilted, "
+            done = "its sweeps are turned level; sensor.roll_deg and pitch_deg of a profile state the mount"
+            yield f"the sensor {how}rolled by {roll:.1f} and pitched by {pitch:.1f} deg: {done}"
 
     def warning(self, name: str, *, replaced: bool) -> str:
         """One line of what differs from the profile of a name, what became of it, and the remedy."""
@@ -60,20 +83,33 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     if pattern is None:
         return Recognition((), None, config)
     found = apply(ProfileConfig(), pattern_findings(pattern))
-    found = apply(found, find_height(Recording([points[::2]], [0.0]), found))
-    found = apply(found, find_reflectance(Recording([points], [0.0]), found))
     tangent = tangents(points)
     of_sensor = _pattern_differences(config.sensor, found.sensor, tangent)
+    floor = find_floor(points, None if of_sensor else config.sensor.height_m)
+    tilt_deg = None
+    if floor is not None and floor.tilt_deg > MIN_TILT_DEG and _is_open(config.sensor):
+        tilt_deg = floor.roll_pitch_deg
+    mount = Mount.of(*(tilt_deg or (config.sensor.roll_deg, config.sensor.pitch_deg)))
+    found = apply(found, find_height(Recording([mount.turn(points[::2])], [0.0]), found))
+    found = apply(found, find_reflectance(Recording([points], [0.0]), found))
     scale, _ = reflectance_scale(points[:, 3])
     if NONE not in {config.sensor.reflectance, scale} and scale != config.sensor.reflectance:
         of_sensor.append(f"reflectance of another scale than {config.sensor.reflectance}")
     of_mount = _height_differences(config.sensor.height_m, found.sensor.height_m)
+    if floor is not None and not _is_open(config.sensor):
+        of_mount += _tilt_differences(mount, floor)
+    nearest, fitted = None, config
     if of_sensor:
-        return Recognition((*of_sensor, *of_mount), nearest_profile(found.sensor, tangent), _with_reach(found))
-    if of_mount:
-        mounted = replace(config.sensor, height_m=found.sensor.height_m)
-        return Recognition(tuple(of_mount), None, replace(config, sensor=mounted))
-    return Recognition((), None, config)
+        nearest, fitted = nearest_profile(found.sensor, tangent), _with_reach(found)
+    elif of_mount:
+        fitted = replace(config, sensor=replace(config.sensor, height_m=found.sensor.height_m))
+    recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg)
+    return replace(recognition, fitted=recognition.mounted(fitted))
+
+
+def _is_open(sensor: SensorConfig) -> bool:
+    """Whether a profile leaves roll and pitch to the first sweep."""
+    return sensor.roll_deg is None and sensor.pitch_deg is None
 
 
 def _pattern_differences(expected: SensorConfig, found: SensorConfig, tangent: Float32) -> list[str]:
@@ -84,6 +120,13 @@ def _pattern_differences(expected: SensorConfig, found: SensorConfig, tangent: F
     if azimuth_ratio(expected, found) > MAX_AZIMUTH_RATIO:
         said.append(f"returns {found.azimuth_step_deg:.2f} deg apart, not {expected.azimuth_step_deg:.2f}")
     return said
+
+
+def _tilt_differences(mount: Mount, floor: Floor) -> list[str]:
+    stated = np.array([0.0, 0.0, 1.0]) if mount.R_level_sensor is None else mount.R_level_sensor[2]
+    apart_deg = np.rad2deg(np.arccos(np.clip((stated * floor.up).sum(), -1.0, 1.0)))
+    roll, pitch = floor.roll_pitch_deg
+    return [f"rolled by {roll:.1f} and pitched by {pitch:.1f} deg"] if apart_deg > MIN_TILT_DEG else []
 
 
 def _height_differences(expected_m: float | None, found_m: float | None) -> list[str]:

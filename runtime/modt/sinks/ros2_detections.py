@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import chain
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from modt.classes import CLASS_NAMES
 from modt.ros2.cdr import CdrWriter, header_fields, text_fields
@@ -21,13 +22,13 @@ def encode(result: FrameResult, frame_id: str) -> bytes:
     """
     tracks, stamp_s = result.tracks, result.frame.stamp_s
     rows = np.flatnonzero(tracks.proposal != NONE)
-    boxes = result.proposals.box[tracks.proposal[rows]]
+    boxes, R_level_sensor = result.proposals.box[tracks.proposal[rows]], result.frame.R_level_sensor
     posterior, said = tracks.posterior[rows], tracks.object_class[rows]
     header, header_values = header_fields(stamp_s, frame_id)
     kinds = [_kind(header, class_) for class_ in range(len(CLASS_NAMES))]
     cdr = CdrWriter()
     cdr.record((*header, "I"), *header_values, len(rows))
-    columns = tracks.id[rows], said, posterior, box_poses(boxes), boxes[:, 3:6]
+    columns = tracks.id[rows], said, posterior, in_sensor_frame(box_poses(boxes), R_level_sensor), boxes[:, 3:6]
     for track, class_, probabilities, pose, size in zip(*(column.tolist() for column in columns), strict=True):
         fields, hypotheses = kinds[class_]
         results = [(*name, probabilities[k], *pose) for k, name in hypotheses]
@@ -49,3 +50,12 @@ def box_poses(boxes: Float64) -> Float64:
     half = boxes[:, 6] / 2
     zero = np.zeros(len(boxes))
     return np.column_stack([boxes[:, :3], zero, zero, np.sin(half), np.cos(half)])
+
+
+def in_sensor_frame(poses: Float64, R_level_sensor: Float64 | None) -> Float64:
+    """(n, 7) poses of the level frame in that of a tilted sensor, which the robot's tree of frames knows."""
+    if R_level_sensor is None or not len(poses):
+        return poses
+    turn = Rotation.from_matrix(R_level_sensor.T)
+    turned = turn * Rotation.from_quat(poses[:, 3:])
+    return np.column_stack([turn.apply(poses[:, :3]), turned.as_quat()])

@@ -6,7 +6,7 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
-from modt.sinks.ros2_detections import box_poses
+from modt.sinks.ros2_detections import box_poses, in_sensor_frame
 from modt.types import NONE, FrameResult
 
 TYPE = "visualization_msgs/MarkerArray"
@@ -47,6 +47,7 @@ def encode(result: FrameResult, frame_id: str) -> bytes:
     _add(cdr, header, "", (0, CUBE, DELETE_ALL), NOWHERE)
     poses, sizes = box_poses(boxes), boxes[:, 3:6]
     above = poses + np.array([0, 0, 1, 0, 0, 0, 0]) * (sizes[:, 2:] / 2 + ABOVE_M)
+    poses, above = (in_sensor_frame(at, result.frame.R_level_sensor) for at in (poses, above))
     columns = (tracks.id[rows], tracks.object_class[rows], tracks.x[rows, 3], poses, sizes, above)
     for track, class_, speed_mps, pose, size, top in zip(*(column.tolist() for column in columns), strict=True):
         label = f"{CLASS_NAMES[class_]} {track}, {abs(speed_mps):.1f} m/s"

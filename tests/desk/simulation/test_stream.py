@@ -5,7 +5,7 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
-from modt.geometry import FieldOfView, inverse, transform, transform_boxes
+from modt.geometry import FieldOfView, inverse, rotation_zyx, transform, transform_boxes
 from modt.types import NONE
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.simulator import N_SLICES, slice_delay_s
@@ -131,6 +131,32 @@ def test_a_sensor_without_rotation_is_not_distorted():
     )
     assert frame.turn_s == 0.0
     assert frame.points.tobytes() == plain.points.tobytes()
+
+
+@pytest.mark.parametrize("mount_deg", [(0.0, 15.0), (15.0, 0.0), (180.0, 0.0)])
+def test_a_turned_sensor_sees_the_floor_where_the_mount_says(mount_deg):
+    level, turned = (
+        SyntheticStream("yard", "vlp-16", 0.1, 3, height_m=0.5, mount_deg=m).simulator
+        for m in ((0.0, 0.0), mount_deg)
+    )
+    height = []
+    for simulator in (level, turned):
+        frame, truth = simulator.sweep(0)
+        on_floor = (truth.instance == NONE) & (np.hypot(*frame.points[:, :2].T) < 10)
+        assert on_floor.sum() > 1000
+        height.append(transform(frame.T_world_sensor, frame.points[on_floor, :3].astype(np.float64))[:, 2])
+    assert np.abs(np.concatenate(height)).max() < 0.15
+    T = inverse(level.world.ego_pose(0.0)) @ turned.world.ego_pose(0.0)
+    np.testing.assert_allclose(T[:3, :3], rotation_zyx(*np.deg2rad([*mount_deg, 0.0])), atol=0.01)
+
+
+@pytest.mark.parametrize("scene", ["hall", "corridor", "lobby", "lift"])
+def test_rooms_have_a_ceiling_above_the_sensor(scene):
+    frame, _ = SyntheticStream(scene, "os1-64", 0.1, 2, height_m=0.5).simulator.sweep(0)
+    z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]
+    top = np.quantile(z, 0.98)
+    assert 2.2 < top < 3.6
+    assert (np.abs(z - top) < 0.1).mean() > 0.03
 
 
 @pytest.mark.parametrize(

@@ -96,10 +96,12 @@ class Export:
             MisuseError: it is gone.
         """
         from modt.app.inputs import Request, stream
+        from modt_desk.evaluation.level_stream import LevelStream
 
         if self.run.live:
             return None
-        return stream(Request(path=self.run.stream, capture=self._capture, frames=self._frames))
+        read = stream(Request(path=self.run.stream, capture=self._capture, frames=self._frames))
+        return LevelStream(read, self.run.mount)
 
     def results(self) -> Iterator[FrameResult]:
         """The results without points."""

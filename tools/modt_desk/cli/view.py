@@ -130,6 +130,7 @@ def mark_truth(recorded: RecordedRun, directory: Path, labels: Path | None, stre
 def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream | None:
     """The stream that a run was made of, None where it was live or is not found any more."""
     from modt.app import inputs
+    from modt_desk.evaluation.level_stream import LevelStream, recorded_mount
 
     if recorded.live:
         return None
@@ -141,6 +142,6 @@ def source(recorded: RecordedRun, capture: Sequence[tuple[str, str]]) -> Stream 
         print(f"modt: without points: {error}", file=sys.stderr)
         return None
     if stream.info.name == facts["name"]:
-        return stream
+        return LevelStream(stream, recorded_mount(recorded.facts))
     print(f"modt: without points: {facts['name']} cannot be read again", file=sys.stderr)
     return None

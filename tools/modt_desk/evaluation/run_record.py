@@ -14,6 +14,7 @@ from modt.classes import CLASS_NAMES
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
+from modt.placement import LEVEL, Mount
 from modt.profile import from_yaml
 from modt.sinks.records import BROKEN, read_records
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
@@ -22,6 +23,7 @@ from modt.sources.stream import Stream
 from modt.types import Float32, Float64, Int
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.frames_by_number import FramesByNumber
+from modt_desk.evaluation.level_stream import recorded_mount
 from modt_desk.evaluation.truth import Truth
 
 LABELS = "labels"
@@ -40,6 +42,7 @@ class RunRecord:
     fov: str  # camera or full
     sensor: str  # name of its profile
     live: bool  # of a live source, which no one can open again
+    mount: Mount = LEVEL  # of its sensor
 
     @classmethod
     def open(cls, path: Path) -> RunRecord:
@@ -54,9 +57,10 @@ class RunRecord:
             stream, fov, sensor = facts["stream"]["path"], facts["fov"], facts["recognition"]["used"]
             stream, sensor = Path(stream) if stream else None, Path(sensor).stem
             live = stream is None and bool(facts.get("service", False))
+            mount = recorded_mount(facts)
         except (OSError, UnicodeDecodeError, TypeError, KeyError) as error:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
-        return cls(path, stream, fov, sensor, live)
+        return cls(path, stream, fov, sensor, live, mount)
 
     def records(self) -> Iterator[Record]:
         """The record of every frame.

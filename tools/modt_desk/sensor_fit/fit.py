@@ -10,8 +10,9 @@ import numpy as np
 from modt.config import ProfileConfig
 from modt.geometry.field_of_view import BlindSectors
 from modt.sensor_fit.beams import find_beams
-from modt.sensor_fit.findings import Finding, Recording, apply, find_height, find_reflectance, pattern_findings
+from modt.sensor_fit.findings import Finding, Recording, apply, find_height, find_reflectance, level, pattern_findings
 from modt.sensor_fit.mount import ground_height_m
+from modt.sensor_fit.tilt import find_floor
 from modt.types import Float32
 from modt_desk.sensor_fit.body import BODY_REACH_M, find_body
 
@@ -20,6 +21,8 @@ MAX_RANGE_M = 100.0
 MAX_MIN_RANGE_M = 2.0
 EMPTY_SECTOR_DEG = 10.0
 """Least sector without a return that is mentioned."""
+MOST_FLOORS, LEVEL_DEG = 10, 1.0
+"""Sweeps whose floor is fitted, and tilt of a sensor that counts as level."""
 
 Finder = Callable[[Recording, ProfileConfig], Iterable[Finding]]
 """Finds keys in a recording, given the profile that the finders before it have found."""
@@ -47,13 +50,25 @@ def find_pattern(recording: Recording, config: ProfileConfig) -> Iterator[Findin
     yield from pattern_findings(pattern)
 
 
+def find_mount(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
+    """Roll and pitch of the sensor, the median of sweeps."""
+    floors = [floor for points in recording.sweeps[:MOST_FLOORS] if (floor := find_floor(points)) is not None]
+    if not floors:
+        yield Finding("sensor", "roll_deg", None, "no floor in sight: by the first sweep that shows one", sure=False)
+        return
+    angles = np.median([floor.roll_pitch_deg for floor in floors], axis=0)
+    tilt_deg = float(np.median([floor.tilt_deg for floor in floors]))
+    said = f"by the floor in {len(floors)} sweeps: the sensor is tilted by {tilt_deg:.1f} deg"
+    for key, angle in zip(("roll_deg", "pitch_deg"), angles.tolist(), strict=True):
+        yield Finding("sensor", key, round(angle, 1) if tilt_deg > LEVEL_DEG else 0.0, said)
+
+
 def find_body_and_range(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """Returns of the robot itself, and the range of the others."""
+    recording = level(recording, config)
     points = np.concatenate(recording.sweeps)
     range_m = np.hypot(points[:, 0], points[:, 1])
-    height_m = ground_height_m(
-        recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M), config.segmentation
-    )
+    height_m = ground_height_m(recording.sweeps, replace(config.sensor, min_range_m=BODY_REACH_M))
     body = None if height_m is None else find_body(recording.sweeps, height_m)
     own = np.zeros(len(points), np.bool_)
     if body is not None and len(body.sectors_deg):
@@ -81,7 +96,10 @@ def empty_sectors(points: Float32) -> str:
     return f"; no returns at all from {' and from '.join(words)} deg" if words else ""
 
 
-FINDERS: tuple[Finder, ...] = (find_period, find_pattern, find_body_and_range, find_height, find_reflectance)
+FINDERS: tuple[Finder, ...] = (
+    *(find_period, find_pattern, find_mount),
+    *(find_body_and_range, find_height, find_reflectance),
+)
 """Each knows what those before it have found."""
 
 

@@ -14,17 +14,23 @@ from modt.geometry import Camera
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Frame
 from modt_desk.simulation.crossing import crossing
+from modt_desk.simulation.crowd import crowd
+from modt_desk.simulation.indoors import corridor, hall, lift, lobby, warehouse
 from modt_desk.simulation.sensors import sensor as sensor_model
 from modt_desk.simulation.simulator import Simulator, Truth
+from modt_desk.simulation.slopes import dock, ramp
 from modt_desk.simulation.street import street
-from modt_desk.simulation.yard import hall, yard
+from modt_desk.simulation.yard import yard
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0, 0.0]])
 CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
 """Intrinsics and mount of KITTI's left colour camera: level, 0.27 m ahead of the sensor, 0.08 m below it."""
 
-SCENES = {scene.__name__: scene for scene in (street, crossing, yard, hall)}
+SCENES = {
+    scene.__name__: scene
+    for scene in (street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse)
+}
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""
 
 
@@ -32,6 +38,8 @@ class SyntheticStream:
     """A drive through a synthetic scene; the same arguments give the same bytes.
 
     `seed` is that of the scene, its traffic and the noise; `distort` leaves the motion during a sweep in the scans.
+    The sensor is mounted as usual, or at `height_m`; `mount_deg`, its roll and pitch, adds to what is left of them
+    after it was levelled.
 
     Raises:
         MisuseError: an unknown scene or sensor, or an invalid duration or seed.
@@ -45,6 +53,8 @@ class SyntheticStream:
         seed: int = 0,
         *,
         distort: bool = False,
+        height_m: float | None = None,
+        mount_deg: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         if scene not in SCENES:
             raise MisuseError(scene, "no such scene", f"use one of {', '.join(SCENES)}")
@@ -53,7 +63,9 @@ class SyntheticStream:
         if seed < 0:
             raise MisuseError(seed, "no seed", "give an integer of at least 0")
         model = sensor_model(sensor)
-        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, model.height_m)
+        world = SCENES[scene](np.random.default_rng([seed, 0]), seconds, height_m or model.height_m)
+        roll, pitch = np.deg2rad(mount_deg) + world.mount_rad
+        world = replace(world, mount_rad=(float(roll), float(pitch)))
         self.simulator = Simulator(world, model, seed, distort=distort)
         self._indices = range(max(1, round(seconds / model.period_s)))
         self.faults = Faults()

@@ -17,7 +17,7 @@ NEAREST_M, N_DISTANCES = 0.5, 90
 N_HALVINGS = 6
 """Of the interval in which a ray meets the ground."""
 STEEPEST = 0.1
-"""Tangent of the rays that may meet rising ground."""
+"""Tangent of the rays that may meet the rising ground of streets."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Terrain:
     cell_m: float  # side of a cell
     height: Float32  # (X, Y) height of the ground [m, world]
     surface: UInt8  # (X, Y) its Material
+    steepest: float = STEEPEST  # tangent of the rays that may meet it where it rises
 
     def cells(self, x: Float32, y: Float32) -> Int:
         """Flat index of the cell under each point."""
@@ -48,7 +49,8 @@ class Terrain:
         sensor = caster.sensor
         distance = np.full(sensor.shape, np.inf, np.float32)
         surface = np.zeros(sensor.shape, np.uint8)
-        low = np.flatnonzero(caster.tangent[:, 0] < STEEPEST)
+        tilt = np.hypot(*T_world_sensor[2, :2]) / max(T_world_sensor[2, 2], 1e-9)  # infinite upside down
+        low = np.flatnonzero(caster.tangent[:, 0] < (self.steepest if tilt < STEEPEST else self.steepest + tilt))
         if not len(low):
             return distance, surface
         rows = slice(int(low[0]), int(low[-1]) + 1)

@@ -1,0 +1,117 @@
+"""Roll and pitch of a sensor, by the floor in a sweep."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.geometry import rotation_zyx
+from modt.types import Float32, Float64
+
+REACH_M, DEPTH_M = 12.0, 3.0
+"""Range within which the floor is looked for, and its greatest depth below the sensor."""
+WAY_M = 1.5
+"""Half the width of the way ahead and behind that a floor is fitted to: beside it are other slopes of a street."""
+CUBE_M, MOST_CUBES = 0.25, 2000
+"""Side of the cubes that count once each, since near returns are many, and how many a search takes."""
+TILTS_DEG = np.arange(-20.0, 20.1, 2.5)
+"""Rolls and pitches that are tried."""
+BIN_M = 0.1
+"""Resolution of the depth of a plane that is tried."""
+NEAR_M = (0.25, 0.12, 0.08, 0.06)
+"""Distance from the plane within which a cube counts, in each round of the fit."""
+MIN_CUBES = 30
+MIN_TILT_DEG = 2.0
+"""Of a mount that is turned level: streets fall to their sides, and cars lean on their springs."""
+OTHER_SHARE = 0.25
+"""Difference from the height of the mount, as a share of it, from which a plane is not its floor."""
+UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """A plane below the sensor.
+
+    Attributes:
+        up: (3,) normal, sensor frame.
+        depth_m: distance of the plane.
+        cubes: number of cubes on it.
+    """
+
+    up: Float64
+    depth_m: float
+    cubes: int
+
+    @property
+    def roll_pitch_deg(self) -> tuple[float, float]:
+        """Roll and pitch of the sensor, to a tenth."""
+        x, y, z = self.up.tolist()
+        return round(float(np.rad2deg(np.arctan2(y, z))), 1), round(float(np.rad2deg(-np.arcsin(x))), 1)
+
+    @property
+    def tilt_deg(self) -> float:
+        """Angle from the vertical to the sensor's axis."""
+        return float(np.rad2deg(np.arccos(np.clip(self.up[2], -1.0, 1.0))))
+
+
+def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
+    """The floor in (N, 3) or wider points, None where none is seen.
+
+    A ceiling looks like the floor of a sensor that hangs upside down. The floor is the plane whose depth is the
+    height of the mount, else the one below the sensor, unless the one above is nearer and larger.
+    """
+    near = points[np.hypot(points[:, 0], points[:, 1]) < REACH_M, :3]
+    near = near[(near != 0).any(axis=1)]
+    key = (np.floor(near / CUBE_M).astype(np.int64) * (1, 1_000, 1_000_000)).sum(axis=1)
+    cubes = near[np.unique(key, return_index=True)[1]].astype(np.float64).T
+    upright, hanging = _floor(cubes, np.eye(3)), _floor(cubes, UPSIDE_DOWN)
+    if upright is None or hanging is None:
+        return upright or hanging
+    if height_m is not None:
+        stands, hangs = (abs(f.depth_m - height_m) < OTHER_SHARE * height_m for f in (upright, hanging))
+        if stands != hangs:
+            return upright if stands else hanging
+    return hanging if hanging.depth_m < upright.depth_m and hanging.cubes > upright.cubes else upright
+
+
+def _floor(cubes: Float64, R: Float64) -> Floor | None:
+    """The floor in (3, C) cubes of a sensor that R (3, 3) turns about upright."""
+    if cubes.shape[1] < MIN_CUBES:
+        return None
+    x, y, z = _turned(R, cubes[:, :: 1 + cubes.shape[1] // MOST_CUBES])
+    ups = np.array([rotation_zyx(*np.deg2rad([roll, pitch, 0.0]))[2] for roll in TILTS_DEG for pitch in TILTS_DEG])
+    depth = np.floor((ups[:, :1] * x + ups[:, 1:2] * y + ups[:, 2:] * z) / -BIN_M).astype(np.int64)
+    bins = round(DEPTH_M / BIN_M)
+    column = np.where(depth < 0, bins + 1, np.minimum(depth, bins)) + np.arange(len(ups))[:, None] * (bins + 2)
+    count = np.bincount(column.ravel(), minlength=len(ups) * (bins + 2)).reshape(len(ups), -1)[:, : bins + 1]
+    deeper = count[:, ::-1].cumsum(axis=1)[:, ::-1]
+    score = count[:, :-2] + count[:, 1:-1] - deeper[:, 2:]  # nothing is below a floor
+    best, bin_ = np.unravel_index(int(score.argmax()), score.shape)
+    roll, pitch = TILTS_DEG[best // len(TILTS_DEG)], TILTS_DEG[best % len(TILTS_DEG)]
+    R = rotation_zyx(*np.deg2rad([roll, pitch, 0.0])) @ R
+    return _fitted(cubes, R, float(BIN_M * (bin_ + 1)))
+
+
+def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
+    """A plane by least squares, from that at a depth which R (3, 3) turns about level."""
+    x, y, z = _turned(R, cubes)
+    way = np.abs(y) < WAY_M
+    level, z = np.stack([np.ones(way.sum()), x[way], y[way]], axis=1), z[way]
+    plane, n = np.array([-depth_m, 0.0, 0.0]), 0
+    for near_m in NEAR_M:
+        on = np.abs(z - (level * plane).sum(axis=1)) < near_m
+        n = int(on.sum())
+        if n < MIN_CUBES:
+            return None
+        own = level[on]  # sums without BLAS, which would start threads
+        normal, right = (own[:, :, None] * own[:, None]).sum(axis=0), (own * z[on, None]).sum(axis=0)
+        plane = np.linalg.solve(normal, right)
+    steep = np.array([-plane[1], -plane[2], 1.0])
+    up = R.T @ (steep / np.linalg.norm(steep))
+    return Floor(up, -float(plane[0]) / float(np.linalg.norm(steep)), n)
+
+
+def _turned(R: Float64, columns: Float64) -> Float64:
+    """(3, C) columns after a rotation (3, 3)."""
+    return np.asarray((R[:, :, None] * columns[None]).sum(axis=1))

@@ -1,0 +1,92 @@
+"""The ceiling of a room is no object and joins none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from modt.config import SegmentationConfig
+from modt.config.segmentation import CeilingConfig
+from modt.geometry import FieldOfView
+from modt.profile import load
+from modt.segmentation.ground import below_ceiling_m
+from modt.segmentation.segmenter import Segmenter
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+
+CONFIG = CeilingConfig()
+RNG = np.random.default_rng(0)
+WALLS = RNG.uniform(0.3, 2.6, 2000)
+
+
+def heights(ceiling_m, n):
+    ceiling = RNG.normal(ceiling_m, 0.02, n)
+    return np.concatenate([WALLS, ceiling[ceiling < 2.6]]).astype(np.float32)
+
+
+@pytest.mark.parametrize("ceiling_m", [2.3, 2.4, 2.5, 2.62])
+def test_a_ceiling_is_cut_just_below(ceiling_m):
+    limit_m = below_ceiling_m(heights(ceiling_m, 4000), CONFIG)
+    assert ceiling_m - 0.25 < limit_m < ceiling_m - 0.05
+
+
+@pytest.mark.parametrize(("ceiling_m", "n"), [(2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000)])
+def test_few_returns_doors_and_what_is_higher_are_no_ceiling(ceiling_m, n):
+    assert below_ceiling_m(heights(ceiling_m, n), CONFIG) is None
+
+
+def test_no_returns_are_no_ceiling():
+    assert below_ceiling_m(np.zeros(0, np.float32), CONFIG) is None
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("above_m", 0.5), ("lowest_m", 2.55), ("bin_m", 0.01), ("min_returns", 9000), ("min_share", 0.99)],
+)
+def test_the_keys_of_a_ceiling_have_an_effect(key, value):
+    found = heights(2.4, 1500)
+    assert below_ceiling_m(found, CONFIG) is not None
+    assert below_ceiling_m(found, replace(CONFIG, **{key: value})) is None
+
+
+def test_its_edge_and_the_gap_below_have_an_effect():
+    found = heights(2.4, 4000)
+    limit_m = below_ceiling_m(found, CONFIG)
+    assert below_ceiling_m(found, replace(CONFIG, clearance_m=0.15)) == pytest.approx(limit_m - 0.1)
+    edges = {below_ceiling_m(heights(2.44, 4000), replace(CONFIG, edge_share=share)) for share in (0.001, 0.5)}
+    assert len(edges) == 2
+
+
+def found_of(scene, sensor, height_m, config):
+    """People of 20 points or more, and those that a proposal shares more than half of the points with."""
+    stage, people, found = Segmenter(config, load(sensor).sensor, FieldOfView()), 0, 0
+    stage.sensor = replace(stage.sensor, height_m=height_m)
+    for frame, truth in SyntheticStream(scene, sensor, 3.0, 901, height_m=height_m).sweeps():
+        if frame.index % 6:
+            continue
+        proposals = stage.segment(frame.points)
+        label = proposals.label(len(frame.points))
+        for body in truth.bodies[truth.points >= 20].tolist():
+            own = truth.instance == body
+            shared = np.bincount(label[own][label[own] >= 0], minlength=len(proposals))
+            people += 1
+            found += bool((shared > 0.5 * (own.sum() + proposals.count - shared)).any())
+    return people, found
+
+
+@pytest.mark.parametrize(("sensor", "height_m"), [("vlp-16", 0.8), ("os1-64", 0.5), ("mid-360", 0.3)])
+def test_people_under_a_low_ceiling_are_found_by_the_profile_of_the_sensor(sensor, height_m):
+    config = load(sensor).segmentation
+    people, found = found_of("hall", sensor, height_m, config)  # 2.5 m high
+    assert found >= 0.95 * people > 0
+    joined = found_of("hall", sensor, height_m, replace(config, ceiling=replace(config.ceiling, min_returns=10_000)))[
+        1
+    ]
+    assert found >= joined
+
+
+def test_a_street_has_no_ceiling():
+    config = SegmentationConfig()
+    stage = Segmenter(config, load("os1-64").sensor, FieldOfView())
+    for frame in SyntheticStream("street", "os1-64", 0.3, 901):
+        bounded = stage.kernels.above_ground(stage.ground, frame.points, 1.0, stage.bounds)
+        assert stage.above_ground(frame.points)[0].tolist() == bounded[0].tolist()

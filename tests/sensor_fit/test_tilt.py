@@ -1,0 +1,106 @@
+"""Roll and pitch of a sensor by the floor of a sweep."""
+
+import logging
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from modt.sensor_fit.fit import Recording, fit
+
+from modt import profile
+from modt.app.chosen_profile import choose
+from modt.sensor_fit.recognition import recognise
+from modt.sensor_fit.tilt import MIN_TILT_DEG, find_floor
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.sensor_fit.recordings import recording
+
+MOUNTS = [(0.0, 0.0), (0.0, 15.0), (-15.0, 0.0), (8.0, -10.0), (180.0, 0.0), (170.0, 10.0)]
+HEIGHTS_M = {"vlp-16": 0.8, "os1-64": 0.5, "mid-360": 0.3}
+
+
+def stream(scene, sensor, mount_deg, seed=3):
+    return SyntheticStream(scene, sensor, 2.0, seed, height_m=HEIGHTS_M[sensor], mount_deg=mount_deg)
+
+
+def degrees_between(a, b):
+    return float(np.rad2deg(np.arccos(np.clip(a @ b, -1, 1))))
+
+
+@pytest.mark.parametrize("mount_deg", MOUNTS)
+@pytest.mark.parametrize("sensor", HEIGHTS_M)
+@pytest.mark.parametrize("scene", ["yard", "corridor", "hall"])
+def test_the_floor_tells_the_mount_to_half_a_degree(scene, sensor, mount_deg):
+    frame = next(iter(stream(scene, sensor, mount_deg)))
+    floor = find_floor(frame.points, HEIGHTS_M[sensor])
+    assert degrees_between(floor.up, frame.T_world_sensor[2, :3]) < 0.5
+    assert floor.depth_m == pytest.approx(HEIGHTS_M[sensor], abs=0.05)
+
+
+@pytest.mark.parametrize("sensor", ["vlp-16", "os1-64", "hdl-64e"])
+@pytest.mark.parametrize("seed", range(900, 904))
+def test_a_level_sensor_in_a_street_stays_as_it_is(sensor, seed):
+    frame = next(iter(SyntheticStream("street", sensor, 0.1, seed)))
+    assert find_floor(frame.points).tilt_deg < MIN_TILT_DEG
+    assert recognise(frame.points, profile.load(sensor)).tilt_deg is None
+
+
+@pytest.mark.kitti
+def test_the_sensor_of_kitti_is_level(kitti_root):
+    from modt.sources.scan_file import read_scan
+
+    scans = sorted(kitti_root.glob("raw/*/*/velodyne_points/data/*.bin"))[::10]
+    tilts_deg = np.array([find_floor(read_scan(scan)[0]).tilt_deg for scan in scans])
+    assert np.median(tilts_deg) < 1.2
+    assert (tilts_deg > MIN_TILT_DEG).mean() < 0.05
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 3000), st.floats(0.01, 30.0))
+@settings(max_examples=20, deadline=None)
+def test_any_cloud_has_a_floor_or_none(seed, n, rise_m):
+    points = (np.random.default_rng(seed).normal(0, 1, (n, 4)) * [8.0, 8.0, rise_m, 0.0]).astype(np.float32)
+    floor = find_floor(points)
+    assert floor is None or np.linalg.norm(floor.up) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("mount_deg", "said"), [((0.0, 15.0), "is tilted"), ((180.0, 0.0), "hangs upside down")])
+def test_a_tilt_that_a_profile_leaves_open_is_said_once_and_applied(mount_deg, said, caplog):
+    tilted = stream("yard", "vlp-16", mount_deg)
+    with caplog.at_level(logging.WARNING):
+        chosen = choose("vlp-16", next(iter(tilted)), tilted.info)
+    assert [said in record.message for record in caplog.records] == [True]
+    assert chosen.recognition.differences == ()  # the height above all
+    sensor = chosen.config.sensor
+    # beside the mount the sensor was levelled by eye, to half a degree or so
+    assert abs((sensor.roll_deg - mount_deg[0] + 180) % 360 - 180) < 1.5
+    assert sensor.pitch_deg == pytest.approx(mount_deg[1], abs=1.5)
+
+
+def test_a_mount_that_a_profile_states_is_kept():
+    frame, base = next(iter(stream("yard", "vlp-16", (0.0, 15.0)))), profile.load("vlp-16")
+    stated = profile.parse("sensor: {roll_deg: 0, pitch_deg: 15.5}\nextends: vlp-16", "test")
+    found = recognise(frame.points, stated)
+    assert found.tilt_deg is None
+    assert found.differences == ()
+    assert found.mounted(stated) == stated
+    assert recognise(frame.points, base).mounted(base).sensor.pitch_deg == pytest.approx(15.5, abs=0.7)
+
+
+def test_another_tilt_than_a_profile_states_is_said():
+    frame = next(iter(stream("yard", "vlp-16", (0.0, 15.0))))
+    found = recognise(frame.points, profile.parse("sensor: {roll_deg: 0, pitch_deg: 0}\nextends: vlp-16", "test"))
+    assert any("pitched by 15" in difference for difference in found.differences)
+
+
+def test_a_fitted_profile_has_the_mount_and_the_height_of_a_level_sensor():
+    tilted = stream("yard", "vlp-16", (10.0, 12.0))
+    frames = [tilted.simulator.sweep(5 * k)[0] for k in range(4)]
+    config, _ = fit(Recording([frame.points for frame in frames], [frame.stamp_s for frame in frames]))
+    assert config.sensor.roll_deg == pytest.approx(10.0, abs=1.0)
+    assert config.sensor.pitch_deg == pytest.approx(12.5, abs=1.0)
+    assert config.sensor.height_m == pytest.approx(0.8, abs=0.05)
+
+
+def test_a_level_sensor_is_fitted_as_level():
+    config, _ = fit(recording("vlp-16", "yard"))
+    assert config.sensor.roll_deg == config.sensor.pitch_deg == 0.0
