@@ -6,14 +6,12 @@ import numpy as np
 import pytest
 
 from modt.config import SegmentationConfig
-from modt.config.segmentation import CeilingConfig
 from modt.geometry import FieldOfView
 from modt.profile import load
-from modt.segmentation.ground import below_ceiling_m
+from modt.segmentation.ceiling import below_ceiling_m
 from modt.segmentation.segmenter import Segmenter
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
-CONFIG = CeilingConfig()
 RNG = np.random.default_rng(0)
 WALLS = RNG.uniform(0.3, 2.6, 2000)
 
@@ -25,35 +23,17 @@ def heights(ceiling_m, n):
 
 @pytest.mark.parametrize("ceiling_m", [2.3, 2.4, 2.5, 2.62])
 def test_a_ceiling_is_cut_just_below(ceiling_m):
-    limit_m = below_ceiling_m(heights(ceiling_m, 4000), CONFIG)
+    limit_m = below_ceiling_m(heights(ceiling_m, 4000))
     assert ceiling_m - 0.25 < limit_m < ceiling_m - 0.05
 
 
 @pytest.mark.parametrize(("ceiling_m", "n"), [(2.5, 100), (2.5, 0), (2.0, 4000), (3.0, 4000)])
 def test_few_returns_doors_and_what_is_higher_are_no_ceiling(ceiling_m, n):
-    assert below_ceiling_m(heights(ceiling_m, n), CONFIG) is None
+    assert below_ceiling_m(heights(ceiling_m, n)) is None
 
 
 def test_no_returns_are_no_ceiling():
-    assert below_ceiling_m(np.zeros(0, np.float32), CONFIG) is None
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [("above_m", 0.5), ("lowest_m", 2.55), ("bin_m", 0.01), ("min_returns", 9000), ("min_share", 0.99)],
-)
-def test_the_keys_of_a_ceiling_have_an_effect(key, value):
-    found = heights(2.4, 1500)
-    assert below_ceiling_m(found, CONFIG) is not None
-    assert below_ceiling_m(found, replace(CONFIG, **{key: value})) is None
-
-
-def test_its_edge_and_the_gap_below_have_an_effect():
-    found = heights(2.4, 4000)
-    limit_m = below_ceiling_m(found, CONFIG)
-    assert below_ceiling_m(found, replace(CONFIG, clearance_m=0.15)) == pytest.approx(limit_m - 0.1)
-    edges = {below_ceiling_m(heights(2.44, 4000), replace(CONFIG, edge_share=share)) for share in (0.001, 0.5)}
-    assert len(edges) == 2
+    assert below_ceiling_m(np.zeros(0, np.float32)) is None
 
 
 def found_of(scene, sensor, height_m, config):
@@ -78,10 +58,6 @@ def test_people_under_a_low_ceiling_are_found_by_the_profile_of_the_sensor(senso
     config = load(sensor).segmentation
     people, found = found_of("hall", sensor, height_m, config)  # 2.5 m high
     assert found >= 0.95 * people > 0
-    joined = found_of("hall", sensor, height_m, replace(config, ceiling=replace(config.ceiling, min_returns=10_000)))[
-        1
-    ]
-    assert found >= joined
 
 
 def test_a_street_has_no_ceiling():

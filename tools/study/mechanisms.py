@@ -96,7 +96,6 @@ PAIRS = (
     ("StripMerger", "Reunion", "CarMerging"),
     ("person splitting", "ExpectedSplitting"),
     ("second matching", "Reunion"),
-    ("box update", "mismatch"),
 )
 """Mechanisms that repair the same thing."""
 MECHANISMS |= {" + ".join(names): together(*names) for names in PAIRS}

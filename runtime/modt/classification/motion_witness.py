@@ -62,5 +62,5 @@ def log_likelihood(moved_m: Float64, observed_s: Float64, length_m: Float64) -> 
     """(R, 4) log P(motion | class) over that of background; arguments as of `cells`."""
     length, cell = cells(moved_m, observed_s, length_m)
     out = np.zeros((len(cell), N_CLASSES))
-    out[:, 1:] = LOG_LIKELIHOOD_RATIO[length, :, cell]
+    out[:, 1 : 1 + LOG_LIKELIHOOD_RATIO.shape[1]] = LOG_LIKELIHOOD_RATIO[length, :, cell]  # of other classes nothing
     return out

@@ -43,19 +43,6 @@ class GroundConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CeilingConfig(StageConfig):
-    """The ceiling of a room below max_height_m, of which nothing becomes a proposal."""
-
-    above_m: float = number(1.95, 0.5, 10.0, "m", "above ground of the returns of which a ceiling has its share")
-    lowest_m: float = number(2.15, 0.5, 10.0, "m", "above ground of the lowest ceiling")
-    bin_m: float = number(0.05, 0.01, 0.5, "m", "of the histogram of heights, two of which hold a ceiling")
-    min_returns: int = number(50, 1, 10000, "", "above above_m in a room")
-    min_share: float = number(0.5, 0.0, 1.0, "", "of these returns that are on the ceiling")
-    edge_share: float = number(0.05, 0.0, 1.0, "", "of its returns, from which the bin below belongs to it too")
-    clearance_m: float = number(0.05, 0.0, 1.0, "m", "below a ceiling up to where objects reach")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterConfig(StageConfig):
     """Connection of grid cells, and what is kept of a cluster larger than max_extent_m."""
 
@@ -139,7 +126,6 @@ class SegmentationConfig(StageConfig):
     )
     sensor_height: SensorHeightConfig = mechanism(SensorHeightConfig)
     ground: GroundConfig = mechanism(GroundConfig)
-    ceiling: CeilingConfig = mechanism(CeilingConfig)
     clusters: ClusterConfig = mechanism(ClusterConfig)
     person_splitting: PersonSplitConfig = mechanism(PersonSplitConfig)
     car_merging: CarMergeConfig = mechanism(CarMergeConfig)

@@ -1,11 +1,10 @@
-"""Ground as piece-wise planes (section III-A), one height a polar cell, traced outwards; and the ceiling above it."""
+"""Ground as piece-wise planes (section III-A), one height a polar cell, traced outwards."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
-from modt.config.segmentation import CeilingConfig
 from modt.segmentation.grids import SECTORS, PointColumns, PolarGrid
 from modt.segmentation.groups import label_max, label_min
 from modt.types import Bool, Float32, Int
@@ -158,23 +157,3 @@ def _median_across(surface: Float32, step: int = 1) -> Float32:
     low, high = np.minimum(left, surface), np.maximum(left, surface)
     median: Float32 = np.maximum(low, np.minimum(high, right))
     return median
-
-
-def below_ceiling_m(height: Float32, config: CeilingConfig) -> float | None:
-    """Height [m] up to which objects reach under a ceiling, by (K,) heights of returns above ground; None outdoors.
-
-    Most of the returns above people's heads are at one height there; on walls, trees and houses they spread.
-    """
-    upper = height[height > np.float32(config.above_m)]
-    if len(upper) < config.min_returns:
-        return None
-    count = np.bincount(
-        ((upper - np.float32(config.above_m)) / np.float32(config.bin_m)).astype(np.int64), minlength=2
-    )
-    pair = count[:-1] + count[1:]
-    pair[: round((config.lowest_m - config.above_m) / config.bin_m)] = 0  # doors
-    first = int(pair.argmax())
-    if pair[first] < config.min_share * len(upper):
-        return None
-    begins = first - 1 if first and count[first - 1] > config.edge_share * pair[first] else first
-    return config.above_m + config.bin_m * begins - config.clearance_m

@@ -6,10 +6,11 @@ import numpy as np
 
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
+from modt.segmentation.ceiling import below_ceiling_m
 from modt.segmentation.clustering import Clusterer
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns
-from modt.segmentation.ground import GroundEstimator, HeightEstimator, below_ceiling_m
+from modt.segmentation.ground import GroundEstimator, HeightEstimator
 from modt.segmentation.groups import HEADINGS, has_reflectance, reflectance_statistics
 from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.view_ends import ViewEnds
@@ -65,7 +66,7 @@ class Segmenter:
         rows, above, height = self.kernels.above_ground(
             self.ground, points, self.sensor_height_m(points), self.bounds
         )
-        limit_m = below_ceiling_m(height, self.config.ceiling)
+        limit_m = below_ceiling_m(height)
         if limit_m is None:
             return rows, above, height
         kept = np.flatnonzero(height < np.float32(limit_m))

@@ -119,6 +119,11 @@ def efficient(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), config, "efficient")
 
 
+def product(config: ProfileConfig, _folder: Path) -> str:
+    """Views that are multiplied."""
+    return long_street(changed(config, "fusion.rule", "product"), _folder)
+
+
 def paper(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "tracking.association", "paper"))
 
@@ -280,6 +285,7 @@ SCENARIOS: dict[str, Scenario] = {
     "--mode accurate": street,
     "--mode efficient": efficient,
     "--mode accurate, efficient": street,
+    "--mode accurate, rule: product": product,
     "a binding budget": one_call,
     "a model that states no frequency": model_without_frequency,
     "scheduler.cpu_ms_per_frame or energy_mJ_per_frame": two_ms,
@@ -311,6 +317,7 @@ RARE: dict[str, Scenario] = {
     "tracking.background_map.": long_street,
     "odometry.registration.max_turn_rad": turning,
     "energy.windows.": windows,
+    "decision.hysteresis": long_street,
     "energy.busy_W": report_without_meter,
 }
 """Scenario of what a second of the street has no occasion for, by the beginning of the path."""

@@ -1,0 +1,36 @@
+"""The ceiling of a room: nothing of it becomes a proposal, and it joins none."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.types import Float32
+
+ABOVE_M = 1.95
+"""Above ground: returns from here on are those of which a ceiling has its share."""
+LOWEST_M = 2.15
+"""Of a ceiling above ground; what is lower is the lintel of a door."""
+BIN_M = 0.05
+"""Of the histogram of heights, two of which hold a ceiling."""
+MIN_RETURNS, MIN_SHARE = 50, 0.5
+"""Returns above ABOVE_M in a room, and share of them that are on the ceiling."""
+EDGE_SHARE, CLEARANCE_M = 0.05, 0.05
+"""Share of its returns from which the bin below belongs to it too; distance below it up to which objects reach."""
+
+
+def below_ceiling_m(height: Float32) -> float | None:
+    """Height [m] up to which objects reach under a ceiling, by (K,) heights of returns above ground; None outdoors.
+
+    Most of the returns above people's heads are at one height there; on walls, trees and houses they spread.
+    """
+    upper = height[height > np.float32(ABOVE_M)]
+    if len(upper) < MIN_RETURNS:
+        return None
+    count = np.bincount(((upper - np.float32(ABOVE_M)) / np.float32(BIN_M)).astype(np.int64), minlength=2)
+    pair = count[:-1] + count[1:]
+    pair[: round((LOWEST_M - ABOVE_M) / BIN_M)] = 0
+    first = int(pair.argmax())
+    if pair[first] < MIN_SHARE * len(upper):
+        return None
+    begins = first - 1 if first and count[first - 1] > EDGE_SHARE * pair[first] else first
+    return ABOVE_M + BIN_M * begins - CLEARANCE_M
