@@ -147,7 +147,7 @@ def noisy_clock(config: ProfileConfig, _folder: Path) -> str:
     ns = np.random.default_rng(0).integers(200_000, 1_400_000, 100_000).cumsum().tolist()
     clock = iter(ns).__next__
     with mock.patch.object(assembly, "time", type("Clock", (), {"thread_time_ns": clock})):
-        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 1.0), cpu_ns=clock)
+        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 0.3), cpu_ns=clock)
 
 
 def model_without_frequency(config: ProfileConfig, _folder: Path) -> str:

@@ -38,7 +38,7 @@ def test_table_marks_what_lies_beyond_its_interval():
 
 @pytest.mark.slow
 def test_mechanisms_earn_figures_on_a_simulated_drive():
-    drive = simulated("street", "vlp-16", 2.0, 300)
+    drive = simulated("street", "vlp-16", 4.0, 301)
     figures = dict(zip(FIGURES, run(drive, "accurate"), strict=True))
     assert all(0 < figures[name] <= 100 for name in ("recall", "said", "precision", "AP", "life"))
     merger, reunion = study(drive, "accurate", ["StripMerger", "Reunion"])
