@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from modt import assets, profile
 from modt.config import SensorConfig
 from modt.geometry.beams import Beams, BeamTable, EvenBeams
+from modt.sensor_fit.filters import gaussian, running_mean, running_median
 from modt.types import Float32, Float64, Int
 
 
@@ -131,11 +131,11 @@ class _Rings:
 
 
 def _histogram(bins: Int, weight: Float32) -> Float64:
-    return np.asarray(gaussian_filter1d(np.bincount(bins, weight, N_BINS), SMOOTH_BINS))
+    return gaussian(np.bincount(bins, weight, N_BINS).astype(np.float64), SMOOTH_BINS)
 
 
 def _mean(count: Float64) -> Float64:
-    return np.asarray(uniform_filter1d(uniform_filter1d(count, WINDOW_BINS), WINDOW_BINS))
+    return running_mean(running_mean(count, WINDOW_BINS), WINDOW_BINS)
 
 
 def _peaks(count: Float64) -> Int:
@@ -149,7 +149,7 @@ def _peaks(count: Float64) -> Int:
     peaks, mass = peaks[kept], mass[kept]
     while len(peaks) > 3:  # a gap far narrower than those around is within a blurred beam
         gap = np.diff(peaks)
-        usual = median_filter(gap, GAPS_AROUND)
+        usual = running_median(gap, GAPS_AROUND)
         narrowest = int(np.argmin(gap / usual))
         if gap[narrowest] >= MIN_GAP * usual[narrowest]:
             break
@@ -179,7 +179,7 @@ def _azimuth_step_deg(sweeps: Sequence[Float32], rings: _Rings) -> float:
     bins = (step[(step > 0.03) & (step < 5.0)] * 100).astype(np.int64)
     if not len(bins):
         return 5.0
-    mode = int(np.argmax(gaussian_filter1d(np.bincount(bins).astype(np.float64), 1.0))) / 100
+    mode = int(np.argmax(gaussian(np.bincount(bins).astype(np.float64), 1.0))) / 100
     near = step[np.abs(step - mode - 0.005) < 0.3 * mode + 0.01]
     return float(np.mean(near))
 
