@@ -37,7 +37,7 @@ def main() -> None:
     stream = inputs.stream(request)
     for mode in assembly.MODES:
         chosen, loaded = assembly.MODES[mode], profile.load()
-        pipeline = assembly.pipeline(chosen, loaded, inputs.field_of_view(request, stream), ledger)
+        pipeline = assembly.pipeline(chosen, loaded, inputs.field_of_view(request, stream.info), ledger)
         count = cpu_ns = 0
         budget = chosen.budget(loaded)
         for frame in stream:

@@ -41,10 +41,8 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
-    from modt.app.inputs import Request
-    from modt.app.live_loop import NamedSink
-    from modt.app.live_session import LiveSession
-    from modt.app.live_source import open_source, recorded_path
+    from modt.app.inputs import Request, live_source
+    from modt.app.session import service
     from modt.app.status import one_line
     from modt.app.supervisor import supervisor_of
     from modt.schemes import open_sink
@@ -54,14 +52,13 @@ def run(arguments: argparse.Namespace) -> int:
     for what in lacking:
         log.warning("%s", what)
     with host.elsewhere(cores):
-        source = open_source(arguments.source, cores)
+        source, path = live_source(arguments.source, cores)
         addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
-        sinks = [NamedSink(address, open_sink(address)) for address in dict.fromkeys(addresses)]
+        sinks = {address: open_sink(address) for address in addresses}
         command = ["modt", *sys.argv[1:]]
-        request = replace(Request.of(arguments), path=recorded_path(arguments.source))
-        out, metrics = arguments.out, arguments.metrics
-        session = LiveSession(request, source, sinks, out, metrics, pinned, cores, command, lacking)
-    status = session.run(supervisor)
+        request = replace(Request.of(arguments), path=path)
+        session = service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, lacking)
+    status = session.run(supervisor)["status"]
     print(
         f"modt: {status['counts']['frames']} frames; {one_line(status)}; records in {arguments.out}", file=sys.stderr
     )

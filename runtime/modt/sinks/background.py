@@ -33,6 +33,7 @@ class Background(Generic[T]):
         writer: used by the thread alone from now on.
         depth: items that may wait.
         retry_s: pause after a failure.
+        close_s: time limit of `close`.
         clock: [s].
     """
 
@@ -43,10 +44,11 @@ class Background(Generic[T]):
         depth: int,
         *,
         retry_s: float = RETRY_S,
+        close_s: float = CLOSE_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name, self._writer, self._depth = name, writer, depth
-        self._retry_s, self._clock = retry_s, clock
+        self._retry_s, self._close_s, self._clock = retry_s, close_s, clock
         self._jobs: deque[Callable[[], None]] = deque()
         self._changed = threading.Condition()
         self._end_s: float | None = None
@@ -78,17 +80,17 @@ class Background(Generic[T]):
         }
 
     def close(self) -> None:
-        """Write what waits and close the writer, within CLOSE_S; what is left is dropped."""
+        """Write what waits and close the writer, in time; what is left is dropped."""
         with self._changed:
             if self._end_s is None:
-                self._end_s = self._clock() + CLOSE_S / 2
+                self._end_s = self._clock() + self._close_s / 2
             self._changed.notify()
-        self._thread.join(CLOSE_S)
+        self._thread.join(self._close_s)
         with self._changed:
             self._dropped += len(self._jobs)
             self._jobs.clear()
         if self._thread.is_alive():
-            log.warning("%s: does not end within %g s and is left alone", self.name, CLOSE_S)
+            log.warning("%s: does not end within %g s and is left alone", self.name, self._close_s)
 
     def _put(self, job: Callable[[], None]) -> None:
         with self._changed:
