@@ -46,7 +46,7 @@ def links(page: Path) -> set[Path]:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_names_of_code_exist(page):
-    names = re.findall(r"`((?:modt|tools)\.[a-z_]\w*(?:\.\w+)*)(?:\(.*?\))?`", page.read_text())
+    names = re.findall(r"`((?:modt|modt_desk|tools)\.[a-z_]\w*(?:\.\w+)*)(?:\(.*?\))?`", page.read_text())
     commands = re.findall(r"python -m (tools\.[\w.]+)", page.read_text())
     missing = [n for n in (*names, *commands) if not n.endswith((".service", ".env")) and not resolves(n)]
     assert [n for n in missing if not re.fullmatch(r"modt\.\w+/\d+", n)] == []
@@ -75,10 +75,10 @@ def test_the_way_in_names_the_steps_in_order():
         "Segmenter.segment",
         "Odometry.locate",
         "Tracker.follow",
-        "KeyViews.asks",
+        "FurtherViews.asks",
         "Scheduler.select",
         "PointNet.classify",
-        "KeyViews.fuse",
+        "FurtherViews.fuse",
         "Tracker.conclude",
     ]
     places = [text.index(step) for step in steps]

@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import pytest
 
@@ -78,3 +79,44 @@ def test_a_receiver_without_permission_has_a_remedy(monkeypatch):
     monkeypatch.setattr(host.os, "sched_getparam", lambda _: os.sched_param(10))
     monkeypatch.setattr(host.os, "sched_setscheduler", refuse)
     assert "LimitRTPRIO=9" in host.serve_loop(None)
+
+
+def machine(folder, *, runtime="950000", cgroup="", share=None, capabilities="0"):
+    """A /proc and a /sys/fs/cgroup."""
+    files = {"proc/sys/kernel/sched_rt_runtime_us": runtime, "proc/self/cgroup": cgroup}
+    files["proc/self/status"] = f"Name:\tmodt\nCapEff:\t{capabilities}\n"
+    if share is not None:
+        files["cgroup/cpu,cpuacct/robot/cpu.rt_runtime_us"] = share
+    for name, text in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text + "\n")
+    return folder / "proc", folder / "cgroup"
+
+
+V1, V2 = "4:cpu,cpuacct:/robot\n1:name=systemd:/", "0::/system.slice/modt.service"
+
+
+@pytest.mark.parametrize(
+    ("facts", "cause", "remedy"),
+    [
+        ({"runtime": "0"}, "switched off", "sysctl -w kernel.sched_rt_runtime_us=950000"),
+        ({"cgroup": V1, "share": "0", "capabilities": "800000"}, "cpu.rt_runtime_us 0", "groups above it"),
+        ({"cgroup": V1, "share": "950000"}, "", "LimitRTPRIO=10"),
+        ({"cgroup": V2}, "", "ulimit -r 10"),
+        ({"cgroup": V2, "capabilities": "800000"}, "CONFIG_RT_GROUP_SCHED", "rt_group_sched=0"),
+        ({"cgroup": V2, "capabilities": "7fffff"}, "", "LimitRTPRIO=10"),
+    ],
+)
+def test_a_refused_priority_has_the_remedy_that_works(monkeypatch, tmp_path, facts, cause, remedy):
+    monkeypatch.setattr(host.resource, "getrlimit", lambda _: (0, 0))
+    said, helps = host.fifo_refusal(10, *machine(tmp_path, **facts))
+    assert cause in said if cause else said == ""
+    assert remedy in helps
+    if cause:
+        assert "ulimit" not in helps
+
+
+def test_the_unit_starts_where_the_kernel_refuses_real_time():
+    unit = (Path(__file__).parents[1] / "systemd" / "modt.service").read_text()
+    assert "\nCPUSchedulingPolicy" not in unit
+    assert "\nLimitRTPRIO=10" in unit

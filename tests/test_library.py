@@ -10,7 +10,7 @@ import modt
 from modt.app import assembly
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
-from modt.geometry import FieldOfView, inverse
+from modt.geometry import FieldOfView, inverse, se3
 from modt.profile import load
 from modt.types import NONE
 from modt_desk.simulation.synthetic_stream import SyntheticStream
@@ -53,6 +53,20 @@ def test_without_poses_the_pose_is_the_registered_one(frames):
         found = library.step(frame.points, frame.stamp_s)
         np.testing.assert_allclose(found.T_world_sensor, start @ frame.T_world_sensor, rtol=0, atol=0.2)
     assert np.linalg.norm(found.T_world_sensor[:3, 3]) > 1.0
+
+
+def test_poses_of_utm_give_the_tracks_of_poses_near_their_origin(frames):
+    utm = se3(np.eye(3), np.array([458_000.25, 5_430_000.5, 120.0]))
+    near, far = (modt.Pipeline.from_profile("vlp-16") for _ in range(2))
+    begin = frames[0].T_world_sensor[:3, 3]
+    for frame in frames:
+        expected = near.step(frame.points, frame.stamp_s, frame.T_world_sensor)
+        found = far.step(frame.points, frame.stamp_s, utm @ frame.T_world_sensor)
+        np.testing.assert_array_equal(found.id, expected.id)
+        np.testing.assert_allclose(found.position, expected.position - begin[:2], rtol=0, atol=1e-3)
+        np.testing.assert_allclose(
+            found.T_world_sensor[:3, 3], frame.T_world_sensor[:3, 3] - begin, rtol=0, atol=1e-6
+        )
 
 
 def test_rows_are_arrays_with_names_and_dictionaries(frames):

@@ -62,8 +62,8 @@ class Stages:
     def size(self, count):
         return 10 * int(count.sum())
 
-    def update(self, count, cpu_ms):
-        self.calls.append(("update", count.tolist(), cpu_ms))
+    def paid(self, count, cpu_ms):
+        self.calls.append(("paid", count.tolist(), cpu_ms))
 
     def classify(self, points, found, which):
         self.calls.append(("classify", found.count.tolist(), which.tolist()))
@@ -127,14 +127,19 @@ def test_without_a_selection_nothing_is_classified():
 
 
 @pytest.mark.parametrize(
-    ("budget", "learnt"), [(Budget(calls=5), []), (Budget(cpu_ms=9.0), [("update", [3, 4], 0.25)])]
+    ("budget", "learnt"),
+    [
+        (Budget(calls=5), []),
+        (Budget(cpu_ms=9.0), [("paid", [3, 4], 0.25)]),
+        (Budget(mean_ms=9.0), [("paid", [3, 4], 0.25)]),
+    ],
 )
 @pytest.mark.parametrize("books", [Ledger, NullLedger])
 def test_points_are_counted_and_the_cost_model_learns_where_cpu_time_binds(books, budget, learnt):
     stages, cpu_ns = Stages(), count(0, 250_000)
     pipe = replace(pipeline(stages), ledger=books(cpu_ns=lambda: next(cpu_ns)))
     pipe.step(FRAME, budget)
-    assert [call for call in stages.calls if call[0] == "update"] == learnt
+    assert [call for call in stages.calls if call[0] == "paid"] == learnt
     row = pipe.ledger.close_frame(7)["stages"].get(CLASSIFICATION)
     assert row is None if books is NullLedger else (row["calls"], row["items"], row["points"]) == (1, 2, 70)
 

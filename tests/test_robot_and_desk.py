@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from modt.app.kernel_choice import choose
-from modt.cli.main import COMMANDS
+from modt.cli import main, profile, profiles
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import environment
 
@@ -73,6 +73,13 @@ def test_no_frame_loads_scipy(command, tmp_path):
     assert [name for name in modules if name.startswith("scipy")] == []
 
 
-def test_the_desks_commands_are_told_by_their_module():
-    desk = {name for name, module in COMMANDS.items() if module.startswith("modt_desk.")}
-    assert desk == {"view", "evaluate", "export", "simulate", "track"}
+@pytest.mark.parametrize(
+    ("module", "of_the_desk"),
+    [
+        (main, {"view", "evaluate", "export", "simulate", "track"}),
+        (profiles, {"fit", "schema"}),
+        (profile, {"calibrate", "report", "compare", "predict", "regimes"}),
+    ],
+)
+def test_the_desks_commands_are_told_by_their_module(module, of_the_desk):
+    assert {name for name, path in module.COMMANDS.items() if path.startswith("modt_desk.")} == of_the_desk

@@ -1,9 +1,12 @@
 """Feed the pipeline with random sequences of frames, and hold it to what it promises.
 
     python -m tools.sequences --n 10000 --seed 1
+    python -m tools.sequences --n 1000 --live
 
-Frames are empty, huge, repeated, late, or not finite, poses leap, clocks are set, sensors change in mid-run. The
-first broken promise is printed with the shortest sequence that breaks it; then the exit status is 1.
+Frames are empty, huge, repeated, late, or not finite, poses leap, clocks are set, sensors change in mid-run. With
+--live it is packets, clouds and poses, thousands in a sequence, that are lost, forged or late on their way to the
+loop of a robot, whose process is stopped at times. The first broken promise is printed with the shortest sequence
+that breaks it; then the exit status is 1.
 """
 
 from __future__ import annotations
@@ -24,18 +27,23 @@ def main() -> None:
     options.add_argument("--n", type=int, default=1000, help="sequences (default: %(default)s)")
     options.add_argument("--steps", type=int, default=25, help="of each at most (default: %(default)s)")
     options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--live", action="store_true", help="what a live robot receives, in place of frames")
     given = options.parse_args()
     from hypothesis import HealthCheck, Phase, seed, settings
     from hypothesis.stateful import run_state_machine_as_test
 
-    from tests.sequences.machine import Sequences
+    if given.live:
+        from tests.sequences.live_machine import LiveSequences as Sequences
+    else:
+        from tests.sequences.machine import Sequences  # type: ignore[assignment]
 
     warnings.simplefilter("error")
-    logging.disable()
-    began_s = time.monotonic()
-    for done in range(0, given.n, BLOCK):
+    logging.lastResort = None
+    logging.disable(logging.CRITICAL if not given.live else logging.NOTSET)
+    began_s, block = time.monotonic(), 20 if given.live else BLOCK
+    for done in range(0, given.n, block):
         chosen = settings(
-            max_examples=min(BLOCK, given.n - done),
+            max_examples=min(block, given.n - done),
             stateful_step_count=given.steps,
             deadline=None,
             database=None,

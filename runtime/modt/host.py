@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
+import re
 import resource
 import sys
 from collections.abc import Iterator
@@ -22,6 +23,7 @@ _MAX_HELPER_SHARE = 0.01
 SWITCH_S = 0.0005
 """For which another thread may keep the interpreter from the loop; 5 ms by default."""
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4  # mlockall(2)
+_NICE = 23  # bit of CAP_SYS_NICE, capabilities(7)
 _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
 
 
@@ -90,12 +92,28 @@ def be_punctual(priority: int = 10) -> list[str]:
             policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
             os.sched_setscheduler(0, policy, os.sched_param(priority))
         except OSError as error:
-            remedy = "set CPUSchedulingPolicy=fifo in the unit, or ulimit -r"
-            lacking.append(f"ordinary priority: SCHED_FIFO is not permitted ({error.strerror}); {remedy}")
+            cause, remedy = fifo_refusal(priority)
+            lacking.append(f"ordinary priority: SCHED_FIFO is not permitted: {cause or error.strerror}; {remedy}")
     cause = _lock_memory()
     if cause:
         lacking.append(f"memory may be swapped out: {cause}; set LimitMEMLOCK=infinity in the unit, or ulimit -l")
     return lacking
+
+
+def fifo_refusal(priority: int, proc: Path = Path("/proc"), groups: Path = Path("/sys/fs/cgroup")) -> tuple[str, str]:
+    """Why the kernel refuses SCHED_FIFO, empty where this process lacks the right to it, and what helps."""
+    if content(proc / "sys/kernel/sched_rt_runtime_us").strip() == "0":
+        return "it is switched off (sched_rt_runtime_us 0)", "sysctl -w kernel.sched_rt_runtime_us=950000"
+    for controllers, path in (line.split(":", 2)[1:] for line in content(proc / "self/cgroup").splitlines()):
+        share = groups / controllers / path.lstrip("/") / "cpu.rt_runtime_us"
+        if "cpu" in controllers.split(",") and content(share).strip() == "0":
+            remedy = "write microseconds there, first in the groups above it, or go without"
+            return f"this control group has no real-time share ({share} 0)", remedy
+    rights = re.search(r"CapEff:\s*([0-9a-f]+)", content(proc / "self/status"))
+    if resource.getrlimit(resource.RLIMIT_RTPRIO)[0] < priority and not (rights and int(rights[1], 16) >> _NICE & 1):
+        return "", f"set LimitRTPRIO={priority} in the unit, or ulimit -r {priority}"
+    cause = "this process has the right to it, but its control group (CONFIG_RT_GROUP_SCHED) or a filter has not"
+    return cause, "boot with rt_group_sched=0, set RestrictRealtime=no in the unit, or go without"
 
 
 def serve_loop(cores: frozenset[int] | None) -> str:

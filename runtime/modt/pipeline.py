@@ -121,7 +121,7 @@ class Pipeline:
         run = self.ledger.run
         proposals = run(SEGMENTATION, self.segmenter.segment, frame.points)
         located = run(ODOMETRY, self.odometry.locate, frame, proposals, self.tracker.static_tracks)
-        tracked = run(TRACKING, self.tracker.follow, frame.stamp_s, proposals, located)
+        tracked = run(TRACKING, self.tracker.follow, frame.time_s, proposals, located)
         tracks, proposals = tracked.tracks, tracked.proposals
         asks = run(FUSION, self.fusion.asks, tracks, proposals, tracked.wants_class)
         chosen = run(SCHEDULING, self.scheduler.select, tracks, proposals, asks, budget)
@@ -136,11 +136,11 @@ class Pipeline:
         return FrameResult(frame, T_world_sensor, proposals, final, names, chosen.deferred, classified)
 
     def _classify(self, points: Float32, proposals: Proposals, which: Int, budget: Budget) -> Float64:
-        """(R, 4) likelihoods; the ledger counts the points, and the cost model learns where CPU time is limited."""
+        """(R, 4) likelihoods; the ledger counts the points, and the scheduler is told the price of limited time."""
         cost, count = self.scheduler.cost, proposals.count[which]
         classify = self.classifier.classify
         likelihood, cpu_ns = self.ledger.timed(CLASSIFICATION, classify, points, proposals, which)
         self.ledger.count(CLASSIFICATION, points=cost.size(count))
-        if budget.cpu_ms is not None:
-            cost.update(count, cpu_ns / 1e6)
+        if budget.cpu_ms is not None or budget.mean_ms is not None:
+            self.scheduler.paid(count, cpu_ns / 1e6)
         return likelihood

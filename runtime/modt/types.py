@@ -44,6 +44,7 @@ class Frame:
         turn_s: time that the head took to turn once [s], from the seam behind the sensor to there again, straight
             ahead at the stamp: clockwise seen from above, negative the other way. 0: all points are as if seen at the
             stamp, compensated or by a sensor that does not turn.
+        steady_s: the time by a clock that nobody sets, where the one of the stamps may be [s]; None: the stamp.
     """
 
     index: int
@@ -52,6 +53,12 @@ class Frame:
     T_world_sensor: Float64 | None = None
     restarts: int = 0
     turn_s: float = 0.0
+    steady_s: float | None = None
+
+    @property
+    def time_s(self) -> float:
+        """Time by which durations are measured [s]."""
+        return self.stamp_s if self.steady_s is None else self.steady_s
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,14 +168,20 @@ class Tracks:
     age: Int = column(int)  # frames since birth, the birth frame counting as 1
     hits: Int = column(int)  # frames with a proposal
     missed: Int = column(int)  # frames since the last proposal
+    moved_m: Float64 = column(float)  # displacement within about two seconds, as far as both ends show it
+    observed_s: Float64 = column(float)  # from the first proposal to the last
+    length_m: Float64 = column(float)  # greatest extent seen
     # Columns of the fusion
     prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | box) of the last box seen
-    posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, box)
-    views: Int = column(int)  # key views fused
-    key_prior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # at the last key view
-    key_posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)
-    key_points: Int = column(int)  # 0 before any key view
-    key_extent: Float64 = column(float, 3)  # l, w, h of the box [m]
+    posterior: Float64 = column(float, N_CLASSES, fill=1 / N_CLASSES)  # P(class | views, boxes, motion)
+    witness: Float64 = column(float, N_CLASSES)  # log P(motion | class) over that of background
+    box_evidence: Float64 = column(float, N_CLASSES)  # mean log P(box | class) of the boxes seen, up to a constant
+    evidence: Float64 = column(float, N_CLASSES)  # mean log P(view | class) of the views, up to a constant
+    weight: Float64 = column(float)  # of the views together in that mean
+    views: Int = column(int)  # views fused
+    key_points: Int = column(int)  # at the last view, 0 before any
+    key_age: Int = column(int)  # age at the last view
+    key_log_odds: Float64 = column(float)  # of an object by the box, at the last view
     # Column of the scheduler
     waiting: Int = column(int)  # frames since the track first asked for the class that it waits for
     # Column of the decision
@@ -249,6 +262,7 @@ class Budget:
 
     calls: int | None = None  # proposals classified
     cpu_ms: float | None = None  # CPU time by the cost model [ms]
+    mean_ms: float | None = None  # CPU time on average; what is not spent is carried over, for a second at most [ms]
 
 
 UNLIMITED = Budget()

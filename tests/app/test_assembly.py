@@ -42,13 +42,16 @@ def test_the_network_has_run_on_every_size_of_batch_before_the_first_frame(monke
         ("accurate", {}, False),
     ],
 )
-def test_a_budget_that_buys_no_call_is_warned_of(mode, scheduler, warned, monkeypatch, caplog):
+def test_a_budget_below_the_price_of_a_call_is_warned_of(mode, scheduler, warned, monkeypatch, caplog):
     """With a clock by which a call takes 0.4 ms, and a margin of half of that."""
     clock = type("Clock", (), {"thread_time_ns": itertools.count(0, 400_000).__next__})
     monkeypatch.setattr(assembly, "time", clock)
     with caplog.at_level(logging.WARNING):
         pipeline(mode, **scheduler)
-    assert ("pay for no classification" in caplog.text) is warned
+    assert (
+        "the budget is" in caplog.text and "one is made every" in caplog.text and "raise" in caplog.text
+    ) is warned
+    assert len(caplog.records) == warned
 
 
 @pytest.mark.parametrize(("budget", "learns"), [(Budget(cpu_ms=100.0), True), (Budget(calls=4), False)])

@@ -6,7 +6,7 @@ import signal
 import numpy as np
 import pytest
 
-from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment
+from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment, OncePerSecond
 from modt.app.deadlines import Deadlines
 from modt.app.ladder import Step
 from modt.app.loop import WAIT_S, Loop, Stop
@@ -258,6 +258,34 @@ def test_a_sink_that_fails_costs_neither_the_frame_nor_the_other_sinks():
     loop.run()
     assert sinks[1].indices == seen == list(range(1, 21))
     assert loop.failures.counts == {"sink 0: ConnectionError": 20}
+
+
+@pytest.mark.parametrize(("broken", "kind"), [("_observe", "records"), ("_report", "status")])
+def test_records_and_status_that_fail_cost_no_frame(broken, kind):
+    def fail(*_):
+        raise KeyError("wall_ns")
+
+    sink = Kept()
+    loop = loop_of(3.0, sinks=[sink])[0]
+    setattr(loop, broken, fail)
+    loop.run()
+    assert len(sink.indices) == 30
+    assert loop.failures.counts[f"{kind}: KeyError"] >= 3
+    assert loop.failures.in_a_row == 0
+
+
+def test_a_log_has_one_line_a_second_of_each_kind():
+    now_s = [0.0]
+    limit = OncePerSecond(lambda: now_s[0])
+    lines = []
+    for k in range(1000):
+        now_s[0] = 0.01 * k
+        for name, text in (("a", "%s: stepped"), ("a", "%s: silent"), ("b", "%s: stepped")):
+            record = logging.LogRecord(name, logging.WARNING, "", 0, text, (k,), None)
+            if limit.filter(record):
+                lines.append(record.getMessage())
+    assert len(lines) == 30
+    assert lines[:4] == ["0: stepped", "0: silent", "0: stepped", "100: stepped (and 99 lines like it)"]
 
 
 def test_a_reload_is_between_two_frames_and_an_invalid_one_is_refused(caplog):

@@ -116,6 +116,7 @@ def test_the_budget_is_the_time_that_is_left_or_less():
     assert budget_at(Step.ALL, Budget(16, None), 30.0, 0) == Budget(16, 30.0)
     assert budget_at(Step.ALL, Budget(16, 5.0), 30.0, 0) == Budget(16, 5.0)
     assert budget_at(Step.ALL, Budget(None, 5.0), 0.0, 0) == Budget(None, 0.0)
+    assert budget_at(Step.ALL, Budget(16, None, 2.0), 30.0, 0) == Budget(16, 30.0, 2.0)
 
 
 @pytest.mark.parametrize("step", [Step.DEFERRED, Step.REDUCED, Step.DROPPED])

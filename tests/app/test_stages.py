@@ -1,6 +1,7 @@
 """The stages of a service: usable after a failure of any of them, exchanged without losing tracks."""
 
 import dataclasses
+import threading
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ from modt.app.inputs import Request
 from modt.app.stages import SensorWatch, Stages, within
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
-from modt.types import NONE, UNLIMITED
+from modt.types import NONE, UNLIMITED, Frame
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 INFO = SyntheticStream("street", "vlp-16", 2.0, 0).info
@@ -83,6 +84,19 @@ def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after):
         assert np.isfinite(tracks.x).all()
     assert failures in (1, 2)  # a call that no track asks for is not made
     assert len(ids[7] & ids[10]) >= 0.8 * len(whole[7] & whole[10])
+
+
+@pytest.mark.parametrize("posed", [False, True])
+def test_a_clock_that_steps_costs_no_track(posed):
+    steady, stepping = stages_of(), stages_of()
+    pose = np.eye(4) if posed else None
+    for given in frames():
+        frame = dataclasses.replace(given, T_world_sensor=pose, steady_s=given.stamp_s)
+        expected = steady.step(frame, UNLIMITED, reduced=False)
+        step_s = 3600.0 * (frame.index >= 6) - 7200.0 * (frame.index >= 12)
+        result = stepping.step(dataclasses.replace(frame, stamp_s=frame.stamp_s + step_s), UNLIMITED, reduced=False)
+        assert result.tracks.id.tolist() == expected.tracks.id.tolist()
+        np.testing.assert_array_equal(result.tracks.x, expected.tracks.x)
 
 
 def test_renewed_stages_begin_without_tracks_and_never_give_an_id_twice():
@@ -176,6 +190,25 @@ def test_another_sensor_is_noticed_and_followed(caplog):
     assert stages.misfits == 1
     assert stages.chosen.name == "as found"
     assert stages.config.sensor.elevation_step_deg > 1.0 or stages.config.sensor.elevations_deg
+
+
+def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatch):
+    stages, may_end, looks = stages_of(), threading.Event(), []
+
+    def look(frame):
+        looks.append(frame.index)
+        may_end.wait(60)
+
+    monkeypatch.setattr(stages, "_look_again", look)
+    for k in range(100):
+        few = frames()[0].points[:: 8 if k // 10 % 2 else 1]
+        stages.watch(Frame(k, 0.1 * k, few))
+    assert len(looks) == 1
+    may_end.set()
+    stages.looking.join()
+    stages.watch(Frame(100, 10.0, few))
+    stages.looking.join()
+    assert looks[1:] == [100]  # what it could not look at meanwhile
 
 
 def test_fewer_returns_of_the_same_sensor_change_nothing():

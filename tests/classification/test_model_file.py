@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -72,9 +73,42 @@ def with_function() -> onnx.ModelProto:
     return model
 
 
+def with_initializer(tensor: TensorProto) -> Callable[[], onnx.ModelProto]:
+    model = network()
+    model.graph.initializer.append(tensor)
+    return lambda: model
+
+
+def with_node(*named: str, **attributes: object) -> Callable[[], onnx.ModelProto]:
+    model = network()
+    model.graph.node.append(helper.make_node(*named, ["points"], ["x"], **attributes))
+    return lambda: model
+
+
+def with_sparse_zeros() -> onnx.ModelProto:
+    model = network()
+    sparse = model.graph.sparse_initializer.add(dims=[1 << 20, 1 << 12])
+    sparse.values.CopyFrom(numpy_helper.from_array(np.zeros(1, np.float32), "s"))
+    sparse.indices.CopyFrom(numpy_helper.from_array(np.zeros(1, np.int64), "s_indices"))
+    return model
+
+
+TEXT = helper.make_tensor("t", TensorProto.STRING, [2], [b"a", b"b"])
+EMPTY_TEXT = TensorProto(name="t", data_type=TensorProto.STRING, dims=[1 << 26])
+EMPTY = TensorProto(name="t", data_type=TensorProto.FLOAT, dims=[1 << 20, 1 << 12])
+
+
 @pytest.mark.parametrize(
     ("model", "said"),
     [
+        (with_initializer(TEXT), "text"),
+        (with_initializer(EMPTY_TEXT), "text"),
+        (with_initializer(EMPTY), "more numbers than the file holds"),
+        (with_sparse_zeros, "more numbers than the file holds"),
+        (with_node("ConstantOfShape", value=TEXT), "text"),
+        (with_node("Constant", value_string="a"), "text"),
+        (with_node("Constant", value_strings=["a", "b"]), "text"),
+        (with_node("Cast", to=TensorProto.STRING), "text"),
         (with_weight_elsewhere, "another file"),
         (with_constant_elsewhere, "another file"),
         (with_sparse_weight_elsewhere, "another file"),
@@ -88,6 +122,12 @@ def test_what_reaches_beyond_the_file_is_refused_before_it_runs(model, said, tmp
     path = saved(tmp_path, model())
     with pytest.raises(MisuseError, match=said):
         read_model(path)
+
+
+def test_an_attribute_of_another_name_may_have_the_number_of_the_type_of_text(tmp_path):
+    for attributes in ({"axis": 8}, {"group": 8}, {"to": TensorProto.DOUBLE}, {"auto_pad": "SAME_UPPER"}):
+        path = saved(tmp_path, with_node("Cast", **attributes)())
+        assert read_model(path)[0] == path.read_bytes()
 
 
 def large(*nodes: onnx.NodeProto, **numbers: list[int]) -> onnx.ModelProto:

@@ -148,6 +148,54 @@ def test_a_budget_is_kept_in_99_of_100_frames_and_starves_nobody(budget_ms: floa
         assert times[500:].mean() > 0.5 * budget_ms
 
 
+def paid_ms(mean_ms: float, n: int, period_s: float = 0.1, ask: float = 1.0, cpu_ms: float | None = None) -> Float64:
+    """(n,) CPU time of frames in which a dozen proposals ask, or none, under a mean budget; a call takes 0.6 ms."""
+    rng, scheduler = np.random.default_rng(0), Scheduler(CONFIG.worth, cost_model(), period_s)
+    times = np.zeros(n)
+    tracks = new_tracks(blobs([20] * 12, rng)[1])
+    for k in range(n):
+        _, proposals = blobs(rng.integers(5, 300, 12).tolist(), rng)
+        asks = np.full(12, rng.random() < ask)
+        rows = scheduler.select(tracks, proposals, asks, Budget(cpu_ms=cpu_ms, mean_ms=mean_ms)).rows
+        if len(rows):
+            times[k] = work_ms(proposals.count[rows]) * rng.lognormal(0.0, 0.12)
+            scheduler.paid(proposals.count[rows], times[k])
+    return times
+
+
+@pytest.mark.parametrize("period_s", [0.05, 0.1, 0.5])
+@pytest.mark.parametrize("mean_ms", [0.01, 0.05, 0.3, 0.65, 2.0])
+def test_a_mean_budget_is_kept_in_the_mean_and_spent(mean_ms: float, period_s: float) -> None:
+    times = paid_ms(mean_ms, 3000, period_s)
+    assert times.mean() <= mean_ms + 1.0 / 3000  # at most one call on credit
+    assert times.mean() > 0.7 * mean_ms
+    longest = np.diff(times.nonzero()[0]).max()
+    assert longest <= 2 + 2.5 * times.max() / mean_ms
+
+
+def test_what_is_saved_is_a_seconds_worth_at_most() -> None:
+    times = paid_ms(1.0, 3000, ask=0.02)
+    assert 2.0 < times.max() <= 10.0
+    assert paid_ms(1.0, 3000, ask=0.02, cpu_ms=1.5).max() < 2.0  # nor beyond what is left of the period
+
+
+def test_a_budget_of_nothing_buys_nothing() -> None:
+    assert paid_ms(0.0, 300).sum() == 0.0
+
+
+def test_a_large_proposal_is_saved_for_while_small_ones_ask() -> None:
+    """Those that are worth less wait, else they would spend what it needs."""
+    _, proposals = blobs([400] + [5] * 11, np.random.default_rng(0))
+    tracks, scheduler = new_tracks(proposals), Scheduler(CONFIG.worth, cost_model())
+    served = np.zeros(12, np.int64)
+    for _ in range(400):
+        rows = scheduler.select(tracks, proposals, np.ones(12, np.bool_), Budget(mean_ms=0.3)).rows
+        served[rows] += 1
+        if len(rows):
+            scheduler.paid(proposals.count[rows], work_ms(proposals.count[rows]))
+    assert served.min() > 2
+
+
 @pytest.mark.parametrize("slow", [0.3, 3.0])
 def test_a_warm_up_that_was_wrong_is_corrected(slow: float) -> None:
     times, calls = frames(cost_model(slow=slow), 1.5, 1000)

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from modt import profile
-from modt.profile.schema import schema_text
+from modt_desk.cli.profile_schema import schema_text
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 from .commands import modt

@@ -13,10 +13,10 @@ import yaml
 
 from modt import profile
 from modt.classes import CLASS_NAMES
-from modt.reporting.run_report import run_tree
 from modt.sinks.records import read_records
 from modt.sinks.run_directory import RunDirectory
 from modt.sinks.tracks import SCHEMA
+from modt_desk.reporting.run_report import run_tree
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import layouts
 

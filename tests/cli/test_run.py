@@ -255,3 +255,13 @@ def test_a_power_limit_is_kept_and_named_an_estimate_where_it_is_one(scans, tmp_
         assert "loop.power_W is kept by the model" in done.stderr
     assert status["loop"]["steps_entered"]["deferred"] >= 1  # the board idles at 3 W
     assert "more power than the limit" in done.stderr
+
+
+def test_where_nothing_can_be_recorded_the_loop_goes_on_and_the_end_says_so(scans, tmp_path):
+    (tmp_path / "file").write_text("")
+    done = modt("run", scans, "--out", tmp_path / "file" / "run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "nothing is recorded: cannot be written (Not a directory)" in done.stderr.splitlines()[-1]
+    assert "records in" not in done.stderr
+    assert "recorded before is intact" not in done.stderr

@@ -77,7 +77,7 @@ def test_noiseless_windows_give_the_coefficients_back(tmp_path: Path) -> None:
     for coefficient in result.coefficients:
         assert coefficient.value == pytest.approx(TRUE[coefficient.name], rel=1e-3)
     assert result.explained > 0.99999
-    assert result.windows == 40
+    assert (result.windows, result.dropped) == (39, 1)  # nothing is known of a counter's power in the first one
 
 
 def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: Path) -> None:
@@ -92,7 +92,7 @@ def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: P
             hits[c.name] += c.low <= TRUE[c.name] <= c.high
             assert 0.0 <= c.low <= c.value <= c.high
     assert min(hits.values()) >= 90
-    assert wraps > 50
+    assert wraps > 40
     assert lost > 100
 
 

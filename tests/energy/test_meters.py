@@ -1,10 +1,13 @@
+import itertools
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from modt.energy.meters import meter as meter_module
 from modt.energy.meters.discovery import (
     Discovery,
     discover,
@@ -66,6 +69,49 @@ def test_every_zone_left_out_has_a_reason(tmp_path: Path) -> None:
     assert why["powercap intel-rapl:0:0 (core)"] == "counted by intel-rapl:0"
     assert why["powercap intel-rapl-mmio:0 (package-0)"] == "the same package again"
     assert why["powercap intel-rapl:2 (psys)"] == ""
+
+
+def dies(sys: Path, *energies_uJ: int) -> Discovery:
+    for n, energy_uJ in enumerate(energies_uJ):
+        write_zone(powercap(sys) / f"intel-rapl:{n}", f"package-0-die-{n}", energy_uJ=energy_uJ)
+    return look(sys)
+
+
+def test_two_zones_that_show_one_counter_count_once(tmp_path: Path) -> None:
+    """As on a Threadripper 1950X: each die shows the socket."""
+    found = dies(tmp_path, 1_000_000_000, 1_000_000_003)
+    assert sum(meter.read() for meter in found.best.meters) == pytest.approx(1000.0)
+    (left,) = (c for c in found.candidates if "die-1" in c.name)
+    assert left.why_not == "shows the counter of powercap intel-rapl:0 (package-0-die-0)"
+
+
+def test_two_dies_with_counters_of_their_own_are_summed(tmp_path: Path) -> None:
+    """As on a Cascade Lake-AP."""
+    found = dies(tmp_path, 1_000_000_000, 1_000_090_000)
+    assert sum(meter.read() for meter in found.best.meters) == pytest.approx(2000.09)
+
+
+@pytest.mark.parametrize("mirrors", [True, False])
+def test_counters_are_compared_while_they_count(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mirrors: bool
+) -> None:
+    """A mirror is read later than the counter itself, and shows more; another counter may be near by chance."""
+    dies(tmp_path, 0, 0)
+    true_uJ, own = itertools.count(10**9, 50_000), meter_module.read_number
+
+    def read_number(path: Path) -> float:
+        if path.name != "energy_uj":
+            return own(path)
+        return float(next(true_uJ)) if mirrors or "rapl:0" in str(path) else 1_000_075_000.0
+
+    monkeypatch.setattr(meter_module, "read_number", read_number)
+    assert len(look(tmp_path).best.meters) == 1 + (not mirrors)
+
+
+def test_a_memory_mapped_zone_alone_is_the_package(tmp_path: Path) -> None:
+    write_zone(powercap(tmp_path) / "intel-rapl-mmio:0", "package-0", energy_uJ=5_000_000)
+    best = look(tmp_path).best
+    assert (best.name, [meter.read() for meter in best.meters]) == ("RAPL packages", [pytest.approx(5.0)])
 
 
 def test_platform_counter_is_a_separate_candidate(tmp_path: Path) -> None:
@@ -154,7 +200,93 @@ def test_rails_are_listed_one_by_one_and_never_added(tmp_path: Path) -> None:
     assert watts["hwmon ina3221 VDD_IN"] == [pytest.approx(5.040 * 1.2)]
     assert watts["hwmon ina3221 VDD_CPU_GPU_CV"] == [pytest.approx(5.032 * 0.4)]
     assert not any("VDD_SOC" in name for name in watts)
-    assert look(tmp_path).choose("VDD_IN").meters[0].facts.scope is Scope.BOARD
+    assert look(tmp_path).choose("VDD_IN").meters[0].facts.scope is Scope.MODULE
+    assert look(tmp_path).best.name == "hwmon ina3221 VDD_CPU_GPU_CV"
+    assert not any("channel 4" in name for name in watts)  # the sum of the others
+
+
+AGX_ORIN = {"VDD_GPU_SOC": (20000, 320), "VDD_CPU_CV": (20000, 260), "VIN_SYS_5V0": (5000, 900)}
+AGX_XAVIER = dict.fromkeys(("GPU", "CPU", "SOC", "CV", "VDDRQ", "SYS5V"), (5000, 200))
+NANO = {"POM_5V_IN": (5000, 600), "POM_5V_GPU": (5000, 0), "POM_5V_CPU": (5000, 200)}
+NX = {"VDD_IN": (5000, 1000), "VDD_CPU_GPU_CV": (5000, 300), "VDD_SOC": (5000, 200)}
+
+
+def board(sys: Path, rails: dict[str, tuple[int, int]], model: str = "") -> Discovery:
+    """A Jetson of these rails (mV, mA), three a chip."""
+    for n, (label, (mV, mA)) in enumerate(rails.items()):
+        k = n % 3 + 1
+        channel = {f"in{k}_label": label, f"in{k}_input": mV, f"curr{k}_input": mA, f"in{k}_enable": 1}
+        write_files(sys / "class" / "hwmon" / f"hwmon{n // 3}", name="ina3221", **channel)
+    if model:
+        write_files(sys / "firmware" / "devicetree" / "base", model=f"{model}\0")
+    return look(sys)
+
+
+def watts_of(found: Discovery, name: str) -> float:
+    return sum(meter.read() for meter in found.choose(name).meters)
+
+
+def test_rails_of_an_agx_orin(tmp_path: Path) -> None:
+    """VIN_SYS_5V0 is one rail beside the others, which feeds the memory's; NC is not connected."""
+    found = board(tmp_path, AGX_ORIN | {"NC": (0, 0), "VDDQ_VDD2_1V8AO": (5000, 200)})
+    assert watts_of(found, "module") == pytest.approx(16.1)
+    assert found.choose("module").name == "Jetson AGX Orin module (VDD_GPU_SOC + VDD_CPU_CV + VIN_SYS_5V0)"
+    assert watts_of(found, "hwmon ina3221 VIN_SYS_5V0") == pytest.approx(4.5)
+    assert found.choose("hwmon ina3221 VIN_SYS_5V0").meters[0].facts.scope is Scope.RAIL
+    assert found.best.name == "hwmon ina3221 VDD_CPU_CV"
+    assert not any("NC" in c.name for c in found.candidates)
+
+
+@pytest.mark.parametrize(
+    ("rails", "model", "module", "watts", "best"),
+    [
+        (AGX_ORIN, "NVIDIA Jetson AGX Orin Developer Kit", "AGX Orin module", 16.1, "VDD_CPU_CV"),
+        (AGX_XAVIER, "Jetson-AGX", "AGX Xavier module", 6.0, "ina3221 CPU"),
+        (AGX_XAVIER, "NVIDIA Jetson AGX Xavier Developer Kit", "AGX Xavier module", 6.0, "ina3221 CPU"),
+        (NANO, "NVIDIA Jetson Nano Developer Kit", "POM_5V_IN", 3.0, "POM_5V_CPU"),
+        (NX, "NVIDIA Jetson Xavier NX Developer Kit", "VDD_IN", 5.0, "VDD_CPU_GPU_CV"),
+        (NX, "NVIDIA Orin Nano Developer Kit", "VDD_IN", 5.0, "VDD_CPU_GPU_CV"),
+        (NX, "NVIDIA Jetson Orin NX Engineering Reference Developer Kit", "VDD_IN", 5.0, "VDD_CPU_GPU_CV"),
+    ],
+)
+@pytest.mark.parametrize("named", [True, False])
+def test_the_module_of_a_board_by_its_table(
+    tmp_path: Path, rails: dict[str, tuple[int, int]], model: str, module: str, watts: float, best: str, named: bool
+) -> None:
+    found = board(tmp_path, rails, model if named else "")
+    chosen = found.choose(module)
+    assert watts_of(found, module) == pytest.approx(watts)
+    assert {meter.facts.scope for meter in chosen.meters} == {Scope.MODULE}
+    assert best in found.best.name
+    assert found.best.meters[0].facts.scope is Scope.CPU_RAIL
+
+
+@pytest.mark.parametrize(("rails", "model"), [(NX, "Some Carrier"), ({"VDD_IN": (5000, 1000)}, "")])
+def test_rails_of_an_unknown_board_are_of_unknown_extent(
+    tmp_path: Path, rails: dict[str, tuple[int, int]], model: str
+) -> None:
+    found = board(tmp_path, rails, model)
+    assert {m.facts.scope for c in found.candidates for m in c.meters} == {Scope.RAIL, Scope.PROCESS}
+
+
+def test_a_module_that_draws_less_than_its_rails_is_refused(tmp_path: Path) -> None:
+    found = board(tmp_path, NX | {"VDD_IN": (5000, 400)})
+    with pytest.raises(MisuseError, match="less than the rails that it feeds"):
+        found.choose("VDD_IN")
+
+
+def test_a_module_is_usable_while_a_rail_that_it_feeds_cannot_be_read(tmp_path: Path) -> None:
+    board(tmp_path, NX)
+    (tmp_path / "class" / "hwmon" / "hwmon0" / "curr3_input").write_text("none")
+    assert watts_of(look(tmp_path), "VDD_IN") == pytest.approx(5.0)
+
+
+def test_two_chips_with_one_label_are_two_rails(tmp_path: Path) -> None:
+    for n in (0, 1):
+        folder = tmp_path / "class" / "hwmon" / f"hwmon{n}"
+        write_files(folder, name="ina226", in1_label="motor", in1_input=5000, curr1_input=100 * (n + 1))
+    readings = sorted(m.read() for c in find_hwmon(tmp_path) for m in c.meters)
+    assert readings == [pytest.approx(0.5), pytest.approx(1.0)]
 
 
 def test_power_that_the_chip_computes_is_preferred(tmp_path: Path) -> None:
@@ -220,9 +352,9 @@ def test_battery_of_a_peripheral_is_left_out(tmp_path: Path) -> None:
 
 
 def test_pmic_sums_rails_with_voltage_and_current() -> None:
-    assert rail_power_W(PMIC) == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
+    assert rail_power_W(PMIC, set()) == pytest.approx(0.08784 * 3.7 + 2.1 * 0.8)
     with pytest.raises(MeterLostError, match="Raspberry Pi 5"):
-        rail_power_W("error=2 error_msg=Invalid arguments")
+        rail_power_W("error=2 error_msg=Invalid arguments", set())
 
 
 def script(folder: Path, body: str) -> str:
@@ -236,10 +368,40 @@ def test_pmic_is_read_through_its_command(tmp_path: Path) -> None:
     (tmp_path / "adc").write_text(PMIC)
     (pmic,) = find_pmic(script(tmp_path, f"[ $1 = pmic_read_adc ] && cat {tmp_path}/adc"))
     assert pmic.usable
-    assert pmic.meters[0].read() == pytest.approx(rail_power_W(PMIC))
+    assert pmic.meters[0].read() == pytest.approx(rail_power_W(PMIC, set()))
     (tmp_path / "adc").unlink()
     with pytest.raises(MeterLostError):
         pmic.meters[0].read()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("2.10000000A", "1.2.3A", "VDD_CORE is '1.2.3'"),
+        ("2.10000000A", "A", "VDD_CORE is ''"),
+        ("0.80000000V", "nanoV", "VDD_CORE is 'nano'"),
+        ("VDD_CORE_V", "VDD_C", "lacks VDD_CORE"),
+        ("VDD_CORE_A", "\\377\\376", "lacks VDD_CORE"),
+        (PMIC, "", "no rail"),
+    ],
+)
+def test_garbled_pmic_is_lost_for_now(tmp_path: Path, old: str, new: str, said: str) -> None:
+    (tmp_path / "adc").write_text(PMIC)
+    (pmic,) = find_pmic(script(tmp_path, f'printf "$(cat {tmp_path}/adc)\\n"'))
+    assert pmic.usable
+    (tmp_path / "adc").write_text(PMIC.replace(old, new))
+    with pytest.raises(MeterLostError, match=re.escape(said)):
+        pmic.meters[0].read()
+
+
+@pytest.mark.parametrize("content", ["9" * 400, "9" * 5000, "0x10", "1.5", "", "nan"])
+def test_a_file_without_an_integer_is_lost_for_now(tmp_path: Path, content: str) -> None:
+    zone = powercap(tmp_path) / "intel-rapl:0"
+    write_zone(zone, "package-0")
+    meter = look(tmp_path).best.meters[0]
+    (zone / "energy_uj").write_text(content)
+    with pytest.raises(MeterLostError):
+        meter.read()
 
 
 def test_failing_pmic_gives_its_message(tmp_path: Path) -> None:

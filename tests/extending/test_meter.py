@@ -1,5 +1,6 @@
 """How to add a meter (docs/extending.md): its facts, its reading, and a search for it."""
 
+import time
 from pathlib import Path
 
 from modt.app import metering
@@ -32,8 +33,10 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
     found = metering.discovery(EnergyConfig())
     assert found.best.name == "coulomb counter"
     windows = metering.windows(found.choose("coulomb").meters, None, WindowConfig())
-    counter.write_text("1004")
-    line = windows.close()
+    for reading_mJ in (1004, 1008):
+        time.sleep(0.05)
+        counter.write_text(str(reading_mJ))
+        line = windows.close()
     assert line["kind"] == "measured"
     assert abs(line["energy_J"] - 0.004) < 1e-9
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from modt.app import assembly
 from modt.pipeline import STAGES
-from modt.reporting.quantity import estimate, to_json
 from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
 from modt_desk.cli.export import FORMS, Export
 from modt_desk.comparison.compare_report import SCHEMA as COMPARE_SCHEMA
@@ -26,12 +25,13 @@ from modt_desk.comparison.prediction_report import (
     read_prediction,
 )
 from modt_desk.evaluation.run_record import RunRecord
+from modt_desk.reporting.quantity import estimate, to_json
 from modt_desk.viewer.recorded_run import RecordedRun
 from modt_desk.viewer.track_page import rows_of, track_page
 from tests.desk.comparison.test_prediction import CALIBRATION, FRAMES, TEST
+from tests.desk.reporting.test_run_report import ledger_line, track, window, write_run
 from tests.fuzz.runs import DESCRIPTION, described
 from tests.fuzz.target import Feed, of_file, target
-from tests.reporting.test_run_report import ledger_line, track, window, write_run
 
 ITSELF = {"stream": "elsewhere", "path": "/elsewhere"}
 ABOUT = {**ITSELF, "fov": "full", "asked": [0, 8], "frames": 8}

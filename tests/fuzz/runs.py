@@ -15,14 +15,15 @@ import onnx
 from modt import assets, profile
 from modt.app.status import SCHEMA
 from modt.classification.pointnet import PointNet
-from modt.cli import profile_report, status
+from modt.cli import status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
 from modt.sinks.run_directory import STATUS
+from modt_desk.cli import profile_report
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.evaluation.truth_files import open_truth
 from tests.desk.evaluation.test_truth_files import tracklets
+from tests.desk.reporting.test_run_report import write_run
 from tests.fuzz.target import Feed, of_file, target
-from tests.reporting.test_run_report import write_run
 from tests.sources import layouts
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(

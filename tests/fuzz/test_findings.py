@@ -13,10 +13,10 @@ from modt.errors import ModtError
 from modt.ros2.cdr import CdrWriter
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
+from tests.desk.reporting.test_run_report import ledger_line
 from tests.fuzz.execution import limits
 from tests.fuzz.runs import SENSOR_BOMB, network
 from tests.fuzz.targets import TARGETS
-from tests.reporting.test_run_report import ledger_line
 from tests.sources import bags
 from tests.sources.layouts import CAMERA
 

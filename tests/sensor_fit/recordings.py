@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from modt.sensor_fit.fit import SCALES, Recording
+from modt.sensor_fit.findings import SCALES, Recording
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 

@@ -20,7 +20,8 @@ from tests.sequences.world import SENSORS, World, broken
 
 SEED = st.integers(0, 9)
 GAPS_S = st.sampled_from([0.0, 5e-324, 1e-9, 0.01, 0.1, 0.5, 0.95, 60.0, 3600.0]) | st.floats(0.0, 3600.0)
-BUDGETS = st.builds(Budget, st.sampled_from([None, 0, 1, 3, 16]), st.sampled_from([None, 0.0, 1e-6, 0.02, 0.3, 5.0]))
+LIMITS_MS = st.sampled_from([None, 0.0, 1e-6, 0.02, 0.3, 5.0])
+BUDGETS = st.builds(Budget, st.sampled_from([None, 0, 1, 3, 16]), LIMITS_MS, LIMITS_MS)
 
 
 class Sequences(RuleBasedStateMachine):
@@ -101,7 +102,7 @@ class Sequences(RuleBasedStateMachine):
     def another_sensor(self, sensor: int) -> None:
         self.world.sensor = sensor
 
-    @rule(x_m=st.floats(-2e5, 2e5), y_m=st.sampled_from([0.0, 5.0, 1e5]), yaw=st.floats(-4, 4))
+    @rule(x_m=st.floats(-2e5, 2e5), y_m=st.sampled_from([0.0, 5.0, 1e5, 5.4e6, -8e7]), yaw=st.floats(-4, 4))
     def teleport(self, x_m: float, y_m: float, yaw: float) -> None:
         self.world.move(x_m, y_m, yaw)
 

@@ -44,6 +44,11 @@ class Watched:
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler, self.cost = scheduler, scheduler.cost
+        self._frames, self._spent_ms = 0, 0.0
+
+    def paid(self, points: Any, cpu_ms: float) -> None:
+        self._spent_ms += max(cpu_ms, 0.0)
+        self._scheduler.paid(points, cpu_ms)
 
     def select(self, tracks: Any, proposals: Any, asks: Any, budget: Budget) -> Selection:
         chosen = self._scheduler.select(tracks, proposals, asks, budget)
@@ -53,6 +58,12 @@ class Watched:
         assert budget.calls is None or len(chosen.rows) <= budget.calls
         if budget.cpu_ms is not None and len(points):
             assert self.cost.cost_ms(points) <= budget.cpu_ms or (self.cost.outdated and len(points) == 1)
+        self._frames += 1
+        if budget.mean_ms is not None and len(points):  # only what is saved is spent, or one call on credit
+            assert self._spent_ms <= budget.mean_ms * self._frames + 1e-9
+            assert (
+                len(points) == 1 or self.cost.cost_ms(points) <= budget.mean_ms * self._frames - self._spent_ms + 1e-9
+            )
         return chosen
 
 
@@ -130,7 +141,7 @@ class Run:
 
     def _posteriors(self, result: FrameResult) -> None:
         tracks, frequency = result.tracks, self.pipeline.decision.frequency
-        for column in (tracks.prior, tracks.posterior, tracks.key_prior, tracks.key_posterior, frequency[None]):
+        for column in (tracks.prior, tracks.posterior, frequency[None]):
             assert (column >= 0).all()
             np.testing.assert_allclose(column.sum(axis=1), 1.0, rtol=0, atol=1e-9)
 

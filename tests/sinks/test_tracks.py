@@ -28,6 +28,7 @@ def test_a_record_has_the_documented_fields():
         "state": "tracked",
         "class": "car",
         "posterior": CAR,
+        "witness": [0.0] * 4,
         "viewed": False,
         "final": False,
         "proposal": 0,

@@ -109,6 +109,62 @@ def test_a_driver_without_stamps_is_stamped_by_the_recording(write, tmp_path):
     assert [frame.stamp_s for frame in stream] == pytest.approx([0.0, 0.1, 0.2], abs=1e-6)
 
 
+def stamped(stamps, arrivals=None):
+    """Sweeps of a point more each, by their stamps and recorded times after BEGAN_S."""
+    arrivals = stamps if arrivals is None else arrivals
+    made = [messages.cloud(messages.xyzi(20 + k), stamp_s=BEGAN_S + s) for k, s in enumerate(stamps)]
+    return [("/points", CLOUD, BEGAN_S + a, messages.encode(m)) for m, a in zip(made, arrivals, strict=True)]
+
+
+@pytest.mark.parametrize("step_s", [-3.0, 3600.0, -1.6e9])
+def test_a_sensor_whose_clock_is_set_loses_less_than_a_second(write, tmp_path, step_s):
+    even = [k / 10 for k in range(30)]
+    stream = open_stream(write(tmp_path / "drive", stamped([s + step_s * (s > 0.95) for s in even], even)))
+    frames = list(stream)
+    assert len(frames) >= 25
+    assert frames[-1].index == 29
+    assert [frame.stamp_s for frame in frames] == pytest.approx([frame.index / 10 for frame in frames], abs=1e-3)
+    assert any("clock was set" in fault.cause for fault in stream.faults.first)
+    part = stream.between(20, None)  # the stamps of the whole
+    assert [frame.stamp_s for frame in part] == pytest.approx([k / 10 for k in range(20, 30)], abs=0.01)
+
+
+@pytest.mark.parametrize("liar", [0, 1, 7])
+def test_one_stamp_an_hour_ahead_costs_its_sweep_alone(write, tmp_path, liar):
+    even = [k / 10 for k in range(20)]
+    lying = [s + 3600.0 * (k == liar) for k, s in enumerate(even)]
+    stream = open_stream(write(tmp_path / "drive", by_time(stamped(lying, even), poses())))
+    frames = list(stream)
+    assert [frame.index for frame in frames] == [k for k in range(20) if k != liar]
+    began = frames[0].index / 10
+    assert [frame.stamp_s for frame in frames] == pytest.approx([f.index / 10 - began for f in frames], abs=1e-5)
+    assert stream.info.period_s == pytest.approx(0.1, abs=1e-3)
+    placed = {f.index: f.T_world_sensor[0, 3] for f in frames if f.T_world_sensor is not None and f.index < 6}
+    assert placed == pytest.approx({k: 10 + k / 10 for k in placed}, abs=1e-5)
+    assert len(placed) >= 5
+
+
+@pytest.mark.parametrize("lying", [lambda k, s: s + 3600 * (k == 3), lambda k, s: s + 3600 * (k == 0)])
+def test_a_lying_stamp_of_a_pose_costs_no_other_pose(write, tmp_path, lying):
+    recorded = []
+    for k, (topic, kind, recorded_s, _) in enumerate(poses()):
+        true_s = recorded_s - 0.001
+        message = messages.odometry(
+            lying(k, true_s), [10.0 + true_s - BEGAN_S, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], "lidar"
+        )
+        recorded.append((topic, kind, recorded_s, messages.encode(message)))
+    frames = list(open_stream(write(tmp_path / "drive", by_time(clouds(), recorded))))
+    assert [frame.T_world_sensor[0, 3] for frame in frames] == pytest.approx([10.0, 10.1, 10.2, 10.3], abs=1e-5)
+
+
+def test_the_cause_of_unusable_clouds_is_named(write, tmp_path):
+    rows = np.zeros((1, 5), [("x", "i2"), ("y", "i2"), ("z", "i2"), ("intensity", "u1")])
+    raw = messages.encode(messages.cloud(rows, stamp_s=BEGAN_S))
+    path = write(tmp_path / "drive", [("/points", CLOUD, BEGAN_S + k / 10, raw) for k in range(3)])
+    with pytest.raises(ModtError, match=r"they are int16, int16, int16.*float32"):
+        open_stream(path)
+
+
 def test_a_recording_in_several_files_is_read_in_their_order(tmp_path):
     recorded = clouds(12)
     for k, message in enumerate(recorded):

@@ -6,10 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.errors import ScanError
+from modt.ros2.point_cloud2 import read_cloud
 from modt.sources.pcd_file import decompress
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from modt.types import UNRECORDED
+from tests.ros2 import messages
 from tests.sources.point_clouds import literal, pcd, ply, table
 
 WRITERS = {
@@ -65,6 +67,40 @@ def test_reflectance_is_scaled(form, kind, values, reflectance):
     np.testing.assert_allclose(form(rows)[0][:, 3], reflectance, atol=1e-6)
 
 
+NAMES = (
+    "Intensity",
+    "I",
+    "scalar_Intensity",
+    "Scalar_field_intensity",
+    "scalar_Scalar_field_Reflectance",
+    "Remission",
+)
+NAMES += ("scalar_reflectivity", "remissions", "scalar_Scalar_field_Intensity")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reflectance_is_known_by_the_names_of_the_field_s_tools(form, name):
+    rows = table(**{"x": "f4", "y": "f4", "z": "f4", "scalar_Time": "f4", name: "u1"})
+    np.testing.assert_allclose(form(rows)[0][:, 3], rows[name] / 255, atol=1e-6)
+    cloud = read_cloud(messages.encode(messages.cloud(rows[None])))
+    np.testing.assert_allclose(cloud.points[:, 3], rows[name] / 255, atol=1e-6)
+
+
+def test_a_calibrated_reflectance_goes_before_an_intensity(form):
+    rows = table(x="f4", y="f4", z="f4", scalar_Intensity="u1", scalar_Reflectance="u1")
+    np.testing.assert_allclose(form(rows)[0][:, 3], rows["scalar_Reflectance"] / 255, atol=1e-6)
+
+
+def test_fields_of_no_numbers_hold_no_bytes(tmp_path):
+    rows = table(x="f4", y="f4", z="f4", i="u1")
+    head = {"FIELDS": "x _ y z i i _", "SIZE": "4 1 4 4 2 1 8", "TYPE": "F U F F U U F", "COUNT": "1 0 1 1 0 1 0"}
+    for data in ("binary", "ascii", "binary_compressed"):
+        points, flaws = read(tmp_path / "scan.pcd", pcd(rows, data, **head))
+        np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [0, 1, 2])
+        np.testing.assert_allclose(points[:, 3], rows["i"] / 255, atol=1e-6)
+        assert flaws == []
+
+
 def test_without_reflectance_none_is_recorded(form):
     assert (form(table(x="f4", y="f4", z="f4"))[0][:, 3] == UNRECORDED).all()
 
@@ -104,10 +140,11 @@ ROWS = table(x="f4", y="f4", z="f4", i="u1")
     ("name", "raw", "cause"),
     [
         ("a.pcd", b"nothing", "no header"),
-        ("a.pcd", pcd(ROWS, POINTS=10**18), "promises"),
+        ("a.pcd", pcd(ROWS, POINTS=10**18), "1000000000000000000 points"),
         ("a.pcd", pcd(ROWS, POINTS=-1), "promises"),
-        ("a.pcd", pcd(ROWS, COUNT="1 1 1 1000000000"), "promises"),
-        ("a.pcd", pcd(ROWS, COUNT="0 1 1 1"), "promises"),
+        ("a.pcd", pcd(ROWS, COUNT="1 1 1 1000000000"), "i of COUNT 1000000000"),
+        ("a.pcd", pcd(ROWS, COUNT="0 1 1 1"), "no column x"),
+        ("a.pcd", pcd(ROWS, COUNT="0 0 0 0", POINTS=9_000_000), "promises"),
         ("a.pcd", pcd(ROWS, COUNT="1 1 1"), "promises"),
         ("a.pcd", pcd(ROWS, SIZE="4 4 4 3"), "lacks a line, or one is broken"),
         ("a.pcd", pcd(ROWS, TYPE="F F F X"), "lacks a line, or one is broken"),

@@ -18,7 +18,7 @@ PERIOD_S = 0.1
 SPEED_MPS = 12.0
 KINDS = {  # of lies, by a scale, and the reason that they are refused for
     "far ahead": (lambda t, x, k=1.0: (t + 59.0 * k, x, 0.0), "early"),
-    "beyond any lead": (lambda t, x, k=1.0: (t + 1e6 * k, x, 0.0), "ahead"),
+    "beyond any lead": (lambda t, x, k=1.0: (t + 3e5 * k, x, 0.0), "ahead"),
     "ahead": (lambda t, x, k=1.0: (t + 1.5 * k, x, 0.0), "early"),
     "a little ahead": (lambda t, x, k=1.0: (t + 0.2 * k, x, 0.0), "leap"),
     "behind": (lambda t, x, k=1.0: (t - 0.15 * k, x, 0.0), "out_of_order"),
@@ -98,6 +98,62 @@ def test_a_sender_that_begins_with_a_lie_is_believed_within_a_second(robot, kind
     robot.send(KINDS[kind][0])
     errors = robot.drive(2.0)
     assert errors[3:].max() < 0.01
+
+
+@pytest.mark.parametrize("far_s", [-1e300, 1e300, -1e11, 1.7e18, 5e-324])
+def test_no_stamp_ends_what_follows(robot, far_s):
+    robot.drive(1.0)
+    for _ in range(50):
+        robot.send()
+        robot.send(lambda t, x: (far_s, x, 0.0))
+        robot.send(lambda t, x: (t - 5.0, x, 0.0))
+        robot.frame_error_m()
+    assert robot.odometry.refused["failed"] == 0
+    assert robot.drive(2.0)[10:].max() < 0.01
+
+
+@pytest.mark.parametrize("broken", ["_read", "_keep", "_take"])
+def test_a_source_that_fails_costs_poses_and_recovers(robot, broken, monkeypatch, caplog):
+    robot.drive(1.0)
+
+    def fail(*_):
+        raise ZeroDivisionError("by nought")
+
+    monkeypatch.setattr(robot.odometry, broken, fail)
+    assert np.isnan(robot.drive(1.0)[4:]).all()
+    assert robot.odometry.refused["failed"] >= 10
+    assert caplog.text.count("ZeroDivisionError: by nought; frames have no pose until it works") == 1
+    monkeypatch.undo()
+    assert robot.drive(2.0)[3:].max() < 0.01
+    assert robot.odometry.restarts == 0
+
+
+@pytest.mark.parametrize(
+    ("clock_s", "factor", "cause"),
+    [
+        (1.7e9, 1e9, "this one seems to be in nanoseconds; give seconds"),
+        (100.0, 1e3, "this one seems to be in milliseconds; give seconds"),
+        (1.7e9, 1e-3, "the sensor's seem to be in milliseconds; give seconds"),
+    ],
+)
+def test_stamps_in_another_unit_are_said_to_be(clock_s, factor, cause, caplog):
+    robot = Robot()
+    robot.sent = round(clock_s / robot.interval_s)
+    for _ in range(10):
+        robot.send(lambda t, x: (t * factor, 0.0, 0.0))
+        robot.frame_error_m()
+    robot.close()
+    assert robot.odometry.refused["unit"] == 10
+    assert caplog.text.count(cause) == 1
+
+
+def test_no_pose_is_farther_from_the_last_than_the_robot_can_be():
+    robot = Robot()
+    for stamp_s, x_m in ((1.0, 0.0), (1.000001, 0.4)):  # within their noise
+        robot.send(lambda t, x, told=(stamp_s, x_m, 0.0): told)
+    placed = robot.odometry.place(Frame(0, 1.2, EMPTY))
+    robot.close()
+    assert placed.T_world_sensor is None
 
 
 def test_repeated_datagrams_are_counted(robot):

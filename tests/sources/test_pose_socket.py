@@ -121,7 +121,7 @@ def test_both_forms_give_the_same_pose():
         (b'{"stamp": true, "x": 0, "y": 0, "yaw": 0}', "malformed", "stamp is no number"),
         (b'{"stamp": 1, "x": NaN, "y": 0, "yaw": 0}', "non_finite", "x is not finite"),
         (b'{"stamp": 1e999, "x": 0, "y": 0, "yaw": 0}', "non_finite", "stamp"),
-        (b'{"stamp": 1, "x": 6e5, "y": 0, "yaw": 0}', "malformed", "100 km"),
+        (b'{"stamp": 1, "x": 6e8, "y": 0, "yaw": 0}', "malformed", "100000 km"),
         (b'{"stamp": 1, "pose": [1, 2]}', "malformed", "12 or 16"),
         (b'{"stamp": 1, "pose": [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]}', "malformed", "no rotation"),
         (b'{"stamp": 1, "pose": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 1]}', "malformed", "last row"),
@@ -366,3 +366,12 @@ def a_free_port():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+def test_poses_far_from_their_origin_are_used(pair):
+    there, odometry = pair
+    for k in range(3):
+        there.send(planar(1.0 + 0.1 * k, 458_000.0 + k, 5_430_000.0))
+    T = pose_of(odometry, frame(1.15))
+    np.testing.assert_allclose(T[:3, 3], [458_001.5, 5_430_000.0, 0.0], rtol=0, atol=1e-6)
+    assert odometry.used == 3

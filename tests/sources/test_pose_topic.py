@@ -52,7 +52,7 @@ def test_a_frame_has_the_pose_of_the_sensor_at_its_stamp():
 def test_what_cannot_be_used_is_counted_by_its_reason():
     held = Scripted()
     topic = PoseTopic(held, OdometryConfig(), "odom", np.eye(4))
-    held.held = [pose(10.0, 3.0), pose(10.0, 3.0), pose(9.0, 3.0), pose(10.02, np.nan), pose(10.03, 1e7), b"\0"]
+    held.held = [pose(10.0, 3.0), pose(10.0, 3.0), pose(9.0, 3.0), pose(10.02, np.nan), pose(10.03, 1e9), b"\0"]
     assert topic.place(frame(10.0)).T_world_sensor is not None
     report = topic.report()
     assert (report["received"], report["used"]) == (6, 1)

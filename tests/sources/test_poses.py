@@ -48,7 +48,7 @@ GOOD = "1 0 0 0 0 1 0 0 0 0 1 0\n"
         (GOOD + "1 0 0 nan 0 1 0 0 0 0 1 0\n", r"p\.txt:2: not finite"),
         ("2 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
         ("-1 0 0 0 0 1 0 0 0 0 1 0\n", r"p\.txt:1: no rotation"),
-        ("1 0 0 5e6 0 1 0 0 0 0 1 0\n", r"p\.txt:1: farther than 100 km"),
+        ("1 0 0 5e8 0 1 0 0 0 0 1 0\n", r"p\.txt:1: farther than 100000 km"),
         ("\u00e9", "1 numbers"),
     ],
 )

@@ -156,6 +156,30 @@ def test_a_list_of_another_length_is_noted_and_used_by_line(tmp_path, end):
     np.testing.assert_allclose([f.turn_s for f in stream], 0.1, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("build", "file", "row", "named"),
+    [
+        (layouts.odometry, "sequences/07/calib.txt", "Tr", "get Tr from data_odometry_calib.zip"),
+        (layouts.odometry, "sequences/07/calib.txt", "Tr", "poses.txt needs the Tr of"),
+        (layouts.odometry, "sequences/07/calib.txt", "P2", "no P2: no camera"),
+        (layouts.tracking, "training/calib/0003.txt", "Tr_velo_cam", "no camera"),
+        (layouts.tracking, "training/calib/0003.txt", "R_rect", None),
+        (layouts.tracking, "training/calib/0003.txt", "Tr_imu_velo", "no odometry"),
+        (layouts.raw_drive, "2011_09_26/calib_cam_to_cam.txt", "P_rect_02", "no camera"),
+        (layouts.raw_drive, "2011_09_26/calib_velo_to_cam.txt", "T", "no camera"),
+        (layouts.raw_drive, "2011_09_26/calib_imu_to_velo.txt", "R", "no odometry"),
+    ],
+)
+def test_a_missing_row_is_noted_and_the_stream_works(tmp_path, build, file, row, named):
+    path, calib = build(tmp_path), tmp_path / file
+    lines = calib.read_text().splitlines(keepends=True)
+    calib.write_text("".join(line for line in lines if line.replace(":", " ").split()[0] != row))
+    stream = open_stream(path)
+    notes = " ".join((*stream.info.notes, *stream.info.pose_notes))
+    assert notes == "" if named is None else named in notes and calib.name in notes
+    assert len(list(stream)) >= 3
+
+
 def test_missing_frames_leave_gaps_and_a_note(tmp_path):
     stream = open_stream(layouts.raw_drive(tmp_path, [0, 1, 4]))
     assert [f.index for f in stream] == [0, 1, 4]
@@ -167,6 +191,7 @@ def test_missing_frames_leave_gaps_and_a_note(tmp_path):
     ("lost", "named"),
     [
         ("calib_cam_to_cam.txt", "no camera"),
+        ("calib_velo_to_cam.txt", "no camera"),
         ("calib_imu_to_velo.txt", "no odometry"),
         ("2011_09_26_drive_9999_sync/oxts", "no odometry"),
         ("2011_09_26_drive_9999_sync/velodyne_points/timestamps.txt", "0.1 s apart"),
@@ -270,9 +295,10 @@ def test_between_reads_only_its_part(tmp_path):
         (lambda root: root / "nowhere", "no such file"),
         (lambda root: root, "no stream"),
         (lambda root: (root / "a.bin").write_bytes(b"") or root / "a.bin", "no stream"),
+        (lambda root: (root / "a.bag").write_bytes(b"#ROSBAG V2.0\n") and root / "a.bag", "ROS 1; convert it"),
         (lambda root: layouts.raw_drive(root).parent.parent, "several streams.*drive_9999"),
     ],
-    ids=["missing", "empty", "a file", "a root"],
+    ids=["missing", "empty", "a file", "ROS 1", "a root"],
 )
 def test_a_path_without_a_stream_is_refused(tmp_path, make, cause):
     with pytest.raises(MisuseError, match=cause):

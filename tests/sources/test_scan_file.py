@@ -102,6 +102,14 @@ def test_an_invalid_scan_is_refused_with_its_cause(tmp_path, content, cause):
     assert str(path) in str(caught.value)
 
 
+def test_a_file_that_no_sweep_fills_is_refused_unread(tmp_path):
+    path = tmp_path / "0.bin"
+    with path.open("wb") as file:
+        file.truncate(2**40)
+    with pytest.raises(ScanError, match="larger than 256 MiB"):
+        read_scan(path)
+
+
 def test_a_missing_scan_is_an_error_of_that_scan(tmp_path):
     with pytest.raises(ScanError, match="cannot be read"):
         read_scan(tmp_path / "none.bin")

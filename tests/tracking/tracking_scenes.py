@@ -57,7 +57,7 @@ class Follower:
 def set_class(tracks, row, object_class):
     """Write what fusion and decision write of a classified track."""
     tracks.object_class[row] = object_class
-    tracks.posterior[row] = tracks.key_posterior[row] = np.eye(N_CLASSES)[object_class]
+    tracks.posterior[row] = np.eye(N_CLASSES)[object_class]
     tracks.key_points[row] = tracks.points[row]
 
 

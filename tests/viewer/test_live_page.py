@@ -2,7 +2,7 @@ import http.client
 import json
 import socket
 import time
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from modt.address import parse_address
 from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import SINKS
+from modt.viewer import live_server
 from modt.viewer.live_frame import live_cells
 from modt.viewer.live_page import open_view
 from modt.viewer.live_server import MOST_CLIENTS, MOST_CONNECTIONS
@@ -86,6 +87,24 @@ def test_connections_are_bounded(live, read):
             break
         except (http.client.HTTPException, OSError):
             assert time.monotonic() < until
+
+
+def asks_slowly(port):
+    """A byte every 20 ms, until it is left."""
+    ends_s = time.monotonic() + WAIT_S
+    with socket.create_connection(("127.0.0.1", port), 0.02) as slow:
+        slow.sendall(b"GET /")
+        while time.monotonic() < ends_s:
+            slow.sendall(b"x")
+            with suppress(TimeoutError):
+                if not slow.recv(1):
+                    raise ConnectionError
+
+
+def test_one_that_asks_too_slowly_is_left(live, monkeypatch):
+    monkeypatch.setattr(live_server, "SEND_S", 0.2)
+    with pytest.raises(ConnectionError):
+        asks_slowly(live.port)
 
 
 def test_a_frame_reaches_who_looks(live, read):

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from modt import assets
 from modt.config.profile import Key, keys
-from modt.profile.schema import FILE, schema_text
 from modt.profile.yaml_text import nested, value_text
+from modt_desk.cli.profile_schema import FILE, schema_text
 from tools.docs.sections import replace_section
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "profile-keys.md"
@@ -37,15 +37,12 @@ CONDITIONS = {
     "scheduler.cost": "scheduler.cpu_ms_per_frame or energy_mJ_per_frame",
     "fusion": "--mode accurate",
     "fusion.prior": "a model that states no frequency",
-    "fusion.box_update_weight": "--mode accurate, efficient",
-    "fusion.mismatch_probability": "--mode accurate, efficient",
+    "fusion.rule": "--mode accurate, efficient",
     "fusion.object_threshold": "--mode accurate, efficient",
-    "fusion.review_point_ratio": "--mode accurate, efficient",
-    "fusion.review_extra_points": "--mode accurate, efficient",
-    "fusion.first_view_min_object_probability": "--mode efficient",
-    "fusion.first_view_min_hits": "--mode efficient",
-    "fusion.first_view_final": "--mode efficient",
-    "fusion.first_view_background_threshold": "--mode efficient",
+    "fusion.background_threshold": "--mode accurate, efficient",
+    "fusion.first_view": "--mode efficient",
+    "fusion.start_frame": "--mode accurate, rule: product",
+    "fusion.point_change": "--mode accurate, rule: product",
     "odometry": "--odometry udp://, unix://",
     "odometry.registration": "frames without a pose",
     "odometry.registration.initial_turn_rad": "the first frames without a pose",

@@ -13,20 +13,24 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
+from modt.app import assembly
 from modt.classes import CLASS_NAMES
-from modt.geometry import wrap
-from modt.types import Float64
+from modt.cli.options import frames as number_range
+from modt.energy.ledger import NullLedger
+from modt.geometry import FieldOfView, wrap
+from modt.profile import load
+from modt.types import NONE, Float64, FrameResult, Int, Proposals
+from modt_desk.simulation.simulator import Truth
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from modt_desk.simulation.world import MOVING_MPS
 from tools.options import parser
-from tools.study.truth_replay import JudgedFrame, add_drives, replay
 
 MIN_HITS = 6
 """Minimum number of proposals of a track before its errors count."""
@@ -36,6 +40,47 @@ MIN_FRAMES = 10
 """Minimum length of a track."""
 DEGREES = 2
 CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFrame:
+    """Result and truth of a frame.
+
+    Attributes:
+        result: of the pipeline.
+        truth: of the sweep.
+        body: (P,) body with most points of each proposal, NONE for the ground.
+        share: (P,) of its points on that body.
+    """
+
+    result: FrameResult
+    truth: Truth
+    body: Int
+    share: Float64
+
+
+def replay(stream: SyntheticStream, profile_name: str, *, camera: bool = False) -> Iterator[JudgedFrame]:
+    """Run a stream in mode `efficient`, in the camera's view or over the full circle."""
+    profile, mode = load(profile_name), assembly.MODES["efficient"]
+    assert stream.info.camera is not None
+    fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
+    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
+    for frame, truth in stream.sweeps():
+        result = pipeline.step(frame, mode.budget(profile))
+        yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance))
+
+
+def majority_bodies(proposals: Proposals, instance: Int) -> tuple[Int, Float64]:
+    """(P,) body with most points of each proposal, NONE for the ground, and (P,) its share of the points."""
+    n = len(proposals)
+    if not n:
+        return np.zeros(0, np.int64), np.zeros(0)
+    bodies, number = np.unique(instance[proposals.members], return_inverse=True)
+    of = np.repeat(np.arange(n), proposals.count)
+    counts = np.bincount(of * len(bodies) + number, minlength=n * len(bodies)).reshape(n, len(bodies))
+    best = counts.argmax(axis=1)
+    body = np.where(bodies[best] < 0, NONE, bodies[best])
+    return body, counts.max(axis=1) / proposals.count
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +187,11 @@ def study(all_lives: Sequence[TrackLife]) -> dict[str, dict[str, Consistency]]:
 
 def main() -> None:
     options = parser(__doc__)
-    add_drives(options)
+    options.add_argument("--scene", nargs="+", default=["street", "crossing"])
+    options.add_argument("--sensor", default="hdl-64e", help="sensor with a profile of the same name")
+    options.add_argument("--seconds", type=float, default=10.0)
+    options.add_argument("--seeds", type=number_range, default=(0, 4), metavar="A:B")
+    options.add_argument("--fov", choices=("camera", "full"), default="full")
     arguments = options.parse_args()
     found: list[TrackLife] = []
     for seed in range(*arguments.seeds):

@@ -1,12 +1,11 @@
 """Leave-one-out: each mechanism switched off by itself, on simulated drives with truth.
 
     python -m tools.study.leave_one_out [--scene street crossing] [--sensors vlp-16 hdl-64e ...] [--seeds 300:306]
-                         [--seconds 12] [--mode accurate] [--no-poses] [--only NAME ...] [--kitti DRIVE] [--docs]
+                         [--seconds 12] [--mode accurate] [--no-poses] [--only NAME ...] [--kitti DRIVE]
 
 Drive k of a scene and seed has sensor k of --sensors, in turn. Every figure is that without the mechanism less that
 with it: the mean over drives with its 95 % bootstrap interval, bold where the interval excludes zero. A labelled
-recording (--kitti) is judged apart, without interval. --docs writes what is
-beyond its interval to docs/log/leave-one-out.md.
+recording (--kitti) is judged apart, without interval.
 
 recall, said, precision, AP, life [%]: found; found and of the class said; right of what is called; average precision;
 frames followed a track, of the ideal. breaks: in 1000 frames of an object. calls: a frame. error [cm]: rms of the
@@ -15,9 +14,7 @@ position of a track, where poses are given. CPU [ms]: a frame; the baseline is r
 
 from __future__ import annotations
 
-import datetime
 import gc
-import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,7 +24,6 @@ from pathlib import Path
 import numpy as np
 
 from modt.app import assembly
-from modt.classification.pointnet import PointNet
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
@@ -44,8 +40,7 @@ from modt_desk.simulation import simulator
 from modt_desk.simulation.kinds import TRUCK
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
-from tools.study import truth_replay
-from tools.study.filter_consistency import errors, lives
+from tools.study import filter_consistency
 from tools.study.mechanisms import MECHANISMS, Switch
 
 FIGURES = ("recall", "said", "precision", "AP", "life", "breaks", "calls", "error", "CPU")
@@ -54,8 +49,6 @@ MIN_OBJECTS = 20
 TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTRAL)}
 RESAMPLES, EVERY = 10_000, 5
 SENSORS = ("vlp-16", "hdl-64e", "os1-32", "os1-64", "hdl-32e", "os1-128")
-DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "log" / "leave-one-out.md"
-BEGIN, END = "<!-- tools/study/leave_one_out.py -->\n", "<!-- end of tools/study/leave_one_out.py -->"
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +102,10 @@ def run(drive: Drive, mode_name: str, switch: Switch | None = None) -> Float64:
     error = np.nan
     if drive.stream is not None and drive.frames[0][0].T_world_sensor is not None:  # else the worlds differ
         seen = (
-            truth_replay.JudgedFrame(r, t, *truth_replay.majority_bodies(r.proposals, t.instance))
+            filter_consistency.JudgedFrame(r, t, *filter_consistency.majority_bodies(r.proposals, t.instance))
             for r, t in zip(results, drive.bodies, strict=True)
         )
-        offsets = [errors(life)[0] for life in lives(drive.stream, seen)]
+        offsets = [filter_consistency.errors(life)[0] for life in filter_consistency.lives(drive.stream, seen)]
         error = 100 * np.sqrt((np.concatenate(offsets) ** 2).sum(axis=1).mean()) if offsets else np.nan
     calls = sum(len(result.classified) for result in results) / len(results)
     return np.array([*quality(evaluation), calls, error, cpu_ns / 1e6 / len(results)])
@@ -170,28 +163,6 @@ def table(names: Sequence[str], differences: Float64, apart: Sequence[tuple[str,
     return "\n".join(lines) + "\n"
 
 
-def brief(names: Sequence[str], differences: Float64) -> str:
-    """Markdown of the figures beyond their interval alone."""
-    lines = ["| without | beyond its interval |", "|---|---|"]
-    for k, name in enumerate(names):
-        cells = [
-            f"{figure} {mean:+.2f} ({low:+.2f}, {high:+.2f})"
-            for figure, column in zip(FIGURES, differences[:, k].T, strict=True)
-            for mean, low, high in (interval(column),)
-            if low > 0 or high < 0
-        ]
-        lines.append(f"| {name} | {', '.join(cells) or 'nothing'} |")
-    return "\n".join(lines) + "\n"
-
-
-def stamp(profile: ProfileConfig) -> str:
-    """Commit, model and date."""
-    git = ["git", "-C", str(DOCUMENT.parent), "describe", "--always", "--dirty"]
-    commit = subprocess.run(git, capture_output=True, text=True, check=False).stdout.strip() or "unknown"
-    model = PointNet(profile.classification, profile.sensor).facts()["sha256"][:12]
-    return f"commit {commit}, model {model}, {datetime.date.today()}"
-
-
 def main() -> None:
     options = parser(__doc__)
     options.add_argument("--scene", nargs="+", default=["street", "crossing"])
@@ -202,22 +173,16 @@ def main() -> None:
     options.add_argument("--no-poses", action="store_true")
     options.add_argument("--only", nargs="+", choices=MECHANISMS, default=list(MECHANISMS), metavar="NAME")
     options.add_argument("--kitti", type=Path, action="append", default=[], metavar="DRIVE")
-    options.add_argument("--docs", action="store_true", help="write the table to docs/log/leave-one-out.md")
     args = options.parse_args()
-    differences, last = [], None
+    differences = []
     for k, (seed, scene) in enumerate(product(range(*args.seeds), args.scene)):
-        last = simulated(scene, args.sensors[k % len(args.sensors)], args.seconds, seed, not args.no_poses)
-        differences.append(list(study(last, args.mode, args.only)))
-        print(f"{last.name}: {len(args.only)} mechanisms", flush=True)
+        drive = simulated(scene, args.sensors[k % len(args.sensors)], args.seconds, seed, not args.no_poses)
+        differences.append(list(study(drive, args.mode, args.only)))
+        print(f"{drive.name}: {len(args.only)} mechanisms", flush=True)
     apart = [(p.name, np.array(list(study(labelled(p), args.mode, args.only)))) for p in args.kitti]
-    assert last is not None
     about = f"{len(differences)} drives of {args.seconds:g} s, seeds {args.seeds[0]} to {args.seeds[1] - 1}, "
-    about += f"{', '.join(args.sensors)}; mode {args.mode}{', no poses' * args.no_poses}; {stamp(last.profile)}."
+    about += f"{', '.join(args.sensors)}; mode {args.mode}{', no poses' * args.no_poses}."
     print(f"{about}\n\n{table(args.only, np.array(differences), apart)}")
-    if args.docs:
-        before, rest = DOCUMENT.read_text(encoding="utf-8").split(BEGIN)
-        text = f"{BEGIN}{about}\n\n{brief(args.only, np.array(differences))}{END}"
-        DOCUMENT.write_text(before + text + rest.split(END)[1], encoding="utf-8")
 
 
 if __name__ == "__main__":

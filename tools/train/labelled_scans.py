@@ -81,7 +81,6 @@ class Scan:
         boxes: (B, 7) x, y, z of the centre of the bottom face, l, w, h, yaw, sensor frame; NaN where unknown.
         fov: region with complete labels.
         unlabelled: (N,) points without a label.
-        track_ids: of each object, constant over a drive; empty where not labelled.
         sensor: name of the sensor, by which results are grouped.
         profile: of the sensor.
     """
@@ -94,7 +93,6 @@ class Scan:
     boxes: Float64
     fov: FieldOfView
     unlabelled: Bool
-    track_ids: tuple[int, ...] = ()
     sensor: str = profile.DEFAULT
     profile: ProfileConfig = field(default_factory=profile.load)
 
@@ -216,9 +214,9 @@ def folder_scans(folder: Path, sensor: str, config: ProfileConfig) -> Iterator[S
         yield replace(scan, sensor=sensor, profile=config)
 
 
-def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
-    """Scans of a KITTI raw drive with tracklets; of the test drive only with `confirm`."""
-    assert confirm or drive.name != TEST_DRIVE, drive
+def raw_scans(drive: Path) -> Iterator[Scan]:
+    """Scans of a KITTI raw drive with tracklets, other than the test drive."""
+    assert drive.name != TEST_DRIVE, drive
     camera = camera_of_raw(drive.parent / "calib_cam_to_cam.txt")
     tracklets = read_tracklets(drive / "tracklet_labels.xml")
     for path in sorted((drive / "velodyne_points" / "data").glob("*.bin")):
@@ -227,8 +225,7 @@ def raw_scans(drive: Path, *, confirm: bool = False) -> Iterator[Scan]:
         points = np.fromfile(path, np.float32).reshape(-1, 4)
         boxes, kinds = [on_bottom(label.box).tolist() for label in present], [label.type_ for label in present]
         name, fov = f"{drive.name}/{path.stem}", FieldOfView.of_camera(camera)
-        scan = scan_from_boxes(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
-        yield replace(scan, track_ids=tuple(label.id for label in present))
+        yield scan_from_boxes(name, drive.name, points, boxes, kinds, fov, np.zeros(len(points), np.bool_))
 
 
 def semantic_scans(folder: Path) -> Iterator[Scan]:

@@ -97,7 +97,6 @@ def paste_objects(scan: Scan, cuts: list[ObjectCut], attempts: int, rng: Generat
                 boxes=np.array(boxes),
                 fov=FieldOfView(),
                 unlabelled=unknown,
-                track_ids=(),
             )
 
 

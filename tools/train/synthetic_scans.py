@@ -36,7 +36,6 @@ def labelled_scan(
         truth.boxes - np.outer(truth.boxes[:, 5] / 2, np.eye(7)[2]),
         FieldOfView.of_camera(CAMERA) if camera else FieldOfView(),
         np.zeros(len(frame.points), np.bool_),
-        tuple(truth.bodies.tolist()),
         sensor,
         profile.load(sensor),
     )

@@ -11,8 +11,9 @@ import numpy as np
 
 from modt import host
 from modt.app import kernel_choice
+from modt.classification import product_fusion
 from modt.classification.decision import Decision
-from modt.classification.fusion import EveryFrame, KeyViews, OneView
+from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
@@ -49,13 +50,21 @@ class Mode:
 
 
 def _profile_budget(profile: ProfileConfig) -> Budget:
-    return Budget(profile.scheduler.calls_per_frame, profile.classification_ms)
+    return Budget(profile.scheduler.calls_per_frame, mean_ms=profile.classification_ms)
+
+
+def _first_views(config: FusionConfig, prior: Prior) -> Fusion:
+    return (product_fusion.AnyView if config.rule == "product" else FirstViews)(config, prior)
+
+
+def _further_views(config: FusionConfig, prior: Prior) -> Fusion:
+    return (product_fusion.KeyViews if config.rule == "product" else FurtherViews)(config, prior)
 
 
 MODES = {
     "conventional": Mode(CONVENTIONAL, lambda config, prior: EveryFrame(), lambda profile: UNLIMITED),
-    "efficient": Mode(EFFICIENT, OneView, _profile_budget),
-    "accurate": Mode(ACCURATE, KeyViews, _profile_budget),
+    "efficient": Mode(EFFICIENT, _first_views, _profile_budget),
+    "accurate": Mode(ACCURATE, _further_views, _profile_budget),
 }
 """Fig. 2a, and the sections on efficient (Table I) and accurate detection (Table II)."""
 
@@ -86,11 +95,15 @@ def segmenter(profile: ProfileConfig, fov: FieldOfView, kernels: Kernels) -> Seg
     return SightedSegmenter(stage, BlindSectors(sensor.blind_sectors_deg, sensor.blind_range_m))
 
 
-def _check_budget(budget: Budget, cost: LinearCost) -> None:
-    least_ms = cost.cost_ms(np.ones(1, np.int64))
-    if budget.cpu_ms is not None and least_ms > budget.cpu_ms:
-        cause = f"{budget.cpu_ms:.2g} ms of CPU a frame pay for no classification on this machine ({least_ms:.2g} ms)"
-        log.warning("scheduler: %s; only one frame in a hundred has one; raise the budget", cause)
+def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> None:
+    """Warn of a budget that is below the price of one classification."""
+    price_ms = cost.cost_ms(np.ones(1, np.int64))
+    if budget.mean_ms is None or price_ms <= budget.mean_ms:
+        return
+    price = f"{budget.mean_ms:.2g} ms of CPU a frame, but a classification takes {price_ms:.2g} ms on this machine"
+    often = f"one is made every {price_ms / budget.mean_ms:.3g} frames" if budget.mean_ms else "none is made"
+    remedy = f"cpu_ms_per_frame to {price_ms:.2g} or energy_mJ_per_frame to {price_ms * profile.energy.active_W:.2g}"
+    log.warning("scheduler: the budget is %s: %s; for one in each raise %s", price, often, remedy)
 
 
 def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
@@ -105,7 +118,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     network = PointNet(limits, profile.sensor)
     cost = LinearCost(limits.max_points, padded_size(limits), profile.scheduler.cost)
     warm_up(network.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
-    _check_budget(mode.budget(profile), cost)
+    _check_budget(mode.budget(profile), cost, profile)
     return stages(mode, profile, network, segmenter(profile, fov, kernels), network, cost, ledger, kernels)
 
 
@@ -129,7 +142,7 @@ def stages(
         odometry=Odometry(profile.odometry, kernels),
         tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
         fusion=mode.fusion(fusion, prior),
-        scheduler=Scheduler(profile.scheduler.worth, cost),
+        scheduler=Scheduler(profile.scheduler.worth, cost, profile.sensor.period_s),
         classifier=classifier,
         decision=Decision(profile.decision, with_background(fusion.prior)),
         ledger=ledger,

@@ -1,9 +1,11 @@
-"""Failures of single frames: counted, said once of each kind, fatal only when they repeat."""
+"""Failures of single frames: counted, said once of each kind, fatal only when they repeat; and a log kept short."""
 
 from __future__ import annotations
 
 import logging
+import time
 from collections import Counter
+from collections.abc import Callable
 from typing import NoReturn
 
 from modt.errors import ModtError
@@ -63,6 +65,25 @@ class Containment:
             raise error
         cause = f"nothing can be received any more ({_kind(error)}: {error})"
         raise ModtError("source", cause, "check its network interface and start again") from error
+
+
+class OncePerSecond(logging.Filter):
+    """Passes one line a second of each kind, its text before the values; it says how many were held back."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._clock, self._passed = clock, dict[str, tuple[float, int]]()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether a line passes."""
+        kind, now_s = f"{record.name} {record.msg}", self._clock()
+        passed_s, held = self._passed.get(kind, (float("-inf"), 0))
+        if now_s - passed_s < 1.0:
+            self._passed[kind] = passed_s, held + 1
+            return False
+        self._passed[kind] = now_s, 0
+        record.msg = f"{record.msg} (and {held} lines like it)" if held else record.msg
+        return True
 
 
 def _kind(error: Exception) -> str:

@@ -59,7 +59,7 @@ class Deadlines:
         deadline_s = self._period_s + (self._start_s if self._fresh_s is None else arrived_s)
         left_ms = max(1e3 * (deadline_s - self._start_s) - self.rest.ms, 0.0)
         budget = budget_at(self.ladder.step, whole, left_ms, frame)
-        self.budget_ms = left_ms if budget.cpu_ms is None else budget.cpu_ms
+        self.budget_ms = min(ms for ms in (left_ms, budget.cpu_ms, budget.mean_ms) if ms is not None)
         return budget
 
     def finish(self, arrived_s: float, line: dict[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
 from modt.types import Budget
@@ -114,5 +114,5 @@ def budget_at(step: Step, budget: Budget, left_ms: float, frame: int) -> Budget:
     """What a frame may spend at a step, by the budget of the profile and the time that is left to it [ms]."""
     if step >= Step.DEFERRED:
         calls = 1 if frame % DEFERRED_EVERY == 0 else 0
-        return Budget(calls if budget.calls is None else min(calls, budget.calls), budget.cpu_ms)
-    return Budget(budget.calls, left_ms if budget.cpu_ms is None else min(budget.cpu_ms, left_ms))
+        return replace(budget, calls=calls if budget.calls is None else min(calls, budget.calls))
+    return replace(budget, cpu_ms=left_ms if budget.cpu_ms is None else min(budget.cpu_ms, left_ms))

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain
+from typing import Any
 
 from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.deadlines import Deadlines, NoDeadlines
@@ -154,7 +155,7 @@ class Loop:
             supervisor.alive()
             if self._clock() - reported_s >= REPORT_S:
                 reported_s = self._clock()
-                self._report(supervisor)
+                self._spare("status", self._report, supervisor)
 
     def _process(self, received: Received) -> None:
         if not self._deadlines.admit(received.arrived_s):
@@ -178,13 +179,17 @@ class Loop:
         budget = self._deadlines.budget(stages.budget, received.arrived_s, frame.index)
         result = stages.step(frame, budget, reduced=self._deadlines.reduced)
         for name, sink in self._sinks.items():
-            try:
-                stages.ledger.run(SINK, sink.write, result)
-            except Exception as error:
-                self._failures.note(error, name)
+            self._spare(name, stages.ledger.run, SINK, sink.write, result)
         line = stages.ledger.close_frame(frame.index)
-        self._observe(result, line)
+        self._spare("records", self._observe, result, line)
         return line
+
+    def _spare(self, where: str, call: Callable[..., None], *arguments: Any) -> None:
+        """Call what a frame can do without."""
+        try:
+            call(*arguments)
+        except Exception as error:
+            self._failures.note(error, where)
 
     def _reload(self, supervisor: Supervisor) -> None:
         supervisor.reloading()

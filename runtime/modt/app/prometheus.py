@@ -8,6 +8,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from modt.errors import ModtError
+from modt.sinks.output import replace_file
+
 COUNTERS = re.compile(
     r"(frames|proposals|classifications|deferred|missed_deadlines|shed_sweeps|reloads|refused_reloads|steps_entered"
     r"|failures|windows|unread_windows|\w*messages|\w*sweeps|silences|time_steps|faults|misfits|frames_without_reflectance|\w*lines|pauses|parts|(?:un)?sent|dropped)"
@@ -39,10 +42,8 @@ def metrics_text(status: Mapping[str, Any]) -> str:
 
 def write_metrics(path: Path, status: Mapping[str, Any]) -> None:
     """Replace a file by the metrics of a status; one that cannot be written is left as it is."""
-    partial = path.with_name(f".{path.name}.part")
-    with suppress(OSError):
-        partial.write_text(metrics_text(status), encoding="utf-8")
-        partial.replace(path)
+    with suppress(ModtError):
+        replace_file(path, metrics_text(status))
 
 
 Sample = tuple[str, dict[str, str], float]

@@ -191,7 +191,7 @@ class Session:
         writer.write(self.recording.finish)
         self.summary |= self._monitor.finish(self.status)
         text = json.dumps(self.summary, indent=2) + "\n"
-        writer.write(lambda: directory.write(SUMMARY, text))
+        writer.write(lambda: directory.write(SUMMARY, text) if self.recording.parts else None)
         writer.close()
 
 

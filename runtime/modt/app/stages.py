@@ -87,6 +87,7 @@ class Stages:
         self._mode = assembly.MODES[request.mode]
         self._first: Frame | None = None  # shows what the sensor is
         self.misfits = 0
+        self._unlike = False  # sweeps of another size wait to be looked at
         self.looking: Thread | None = None
         self._found: list[ChosenProfile] = []  # by the thread that looks again
         self.chosen = self._choose()
@@ -130,11 +131,13 @@ class Stages:
         return result
 
     def watch(self, frame: Frame) -> None:
-        """Between two frames: follow a sensor that has changed. Its sweep is compared in a thread, for long."""
+        """Between two frames: follow a sensor that has changed. One thread at a time compares its sweep, for long."""
+        self._unlike |= self._watch.unlike(frame.points)
         if self._found:
             self.misfits += 1
             self._use(self._found.pop())
-        elif self._watch.unlike(frame.points):
+        elif self._unlike and not (self.looking and self.looking.is_alive()):
+            self._unlike = False
             self.looking = Thread(target=self._look_again, args=(frame,), name="recognition", daemon=True)
             self.looking.start()
 

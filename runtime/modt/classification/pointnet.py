@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import re
 from collections.abc import Iterator, Mapping
@@ -42,9 +43,13 @@ _PARTS = {
 """Fields of onnx.proto3 that hold messages, by the message that they are in."""
 _REFUSED = {
     _MODEL: {20: "training", 25: "functions"},
-    _ATTRIBUTE: {6: "a graph within a node", 11: "a graph within a node"},
-    _TENSOR: {13: "numbers in another file"},
+    _ATTRIBUTE: {6: "a graph within a node", 9: "text", 11: "a graph within a node"},
+    _TENSOR: {6: "text", 13: "numbers in another file"},
 }
+_SIZES = {(_TENSOR, 1), (_SPARSE, 3)}
+"""Fields with the dimensions of a tensor."""
+_STRING = 8
+"""Type of tensors of text, of which few bytes stand for much memory."""
 _VARINT, _EIGHT_BYTES, _BYTES, _FOUR_BYTES = 0, 1, 2, 5
 
 
@@ -83,16 +88,35 @@ def _flaws(raw: memoryview) -> Iterator[str]:
     waiting = [(_MODEL, raw)]
     while waiting:
         kind, message = waiting.pop()
+        numbers, last = 1, dict[int, memoryview | int | None]()
         for number, value in _fields(message):
+            last[number] = value & 0xFFFFFFFF if isinstance(value, int) else value
             if number in _REFUSED.get(kind, {}):
                 yield _REFUSED[kind][number]
+            if (kind, number) in _SIZES and value is not None:
+                numbers *= value if isinstance(value, int) else math.prod(_varints(value))
             inner = _PARTS[kind].get(number)
-            if inner is not None and value is not None:
+            if inner is not None and isinstance(value, memoryview):
                 waiting.append((inner, value))
+        label = last.get(1)
+        name = bytes(label) if kind == _ATTRIBUTE and isinstance(label, memoryview) else b""
+        made = last.get(2) if kind == _TENSOR else last.get(3) if name == b"to" else None
+        if made == _STRING or name == b"value_string":
+            yield "text"
+        if numbers > 2 * len(raw):
+            yield "a tensor of more numbers than the file holds"
 
 
-def _fields(message: memoryview) -> Iterator[tuple[int, memoryview | None]]:
-    """Numbers of the fields of a message, and the bytes of those that have a length.
+def _varints(packed: memoryview) -> Iterator[int]:
+    """The numbers in a packed field."""
+    at = 0
+    while at < len(packed):
+        number, at = _varint(packed, at)
+        yield number
+
+
+def _fields(message: memoryview) -> Iterator[tuple[int, memoryview | int | None]]:
+    """Numbers of the fields of a message, and the bytes or the whole number of each.
 
     Raises:
         IndexError, ValueError: it is no message.
@@ -103,9 +127,9 @@ def _fields(message: memoryview) -> Iterator[tuple[int, memoryview | None]]:
         number, kind = key >> 3, key & 7
         if key >> 32:  # other readers would drop the bits beyond
             raise ValueError("no such field")
-        value = None
+        value: memoryview | int | None = None
         if kind == _VARINT:
-            _, at = _varint(message, at)
+            value, at = _varint(message, at)
         elif kind == _BYTES:
             length, at = _varint(message, at)
             value = message[at : at + length]

@@ -135,15 +135,22 @@ class Scheduler:
     """Greedy selection by worth.
 
     A call is worth more for an uncertain posterior, a view that differs from the last key view, and a near and whole
-    object; and more with each frame of waiting: every call that fits into one frame's budget is made eventually.
+    object; and more with each frame of waiting: every call that fits into the budget is made eventually.
 
     Args:
         config: weights of the worth.
         cost: CPU time of a call.
+        period_s: time between two frames, for a second of which a mean budget is saved.
     """
 
-    def __init__(self, config: CallWorthConfig, cost: LinearCost) -> None:
-        self._config, self.cost = config, cost
+    def __init__(self, config: CallWorthConfig, cost: LinearCost, period_s: float = 0.1) -> None:
+        self._config, self.cost, self._period_s = config, cost, period_s
+        self._saved_ms = 0.0  # of a mean budget; negative after a call beyond it
+
+    def paid(self, points: Int, cpu_ms: float) -> None:
+        """Take note of the measured CPU time of classifying proposals of (R,) points together."""
+        self.cost.update(points, cpu_ms)
+        self._saved_ms -= cpu_ms if 0.0 <= cpu_ms < math.inf else 0.0
 
     def select(self, tracks: Tracks, proposals: Proposals, asks: Bool, budget: Budget) -> Selection:
         """The tracks to classify in this frame; writes tracks.waiting.
@@ -180,18 +187,35 @@ class Scheduler:
         return value
 
     def _affordable(self, points: Int, budget: Budget) -> Bool:
-        """(R,) calls, in this order, that the budget pays for; a call that does not fit is skipped."""
-        granted = np.ones(len(points), np.bool_)
-        if budget.cpu_ms is not None:
-            left_ms = budget.cpu_ms - self.cost.cost_ms(points[:0])
+        """(R,) calls, in this order, that the budget pays for.
+
+        A call that does not fit into the frame is skipped. One that is beyond what is saved of a mean budget makes
+        those after it wait; once a second's worth is saved, it is made on credit.
+        """
+        granted, full = np.ones(len(points), np.bool_), False
+        frame_ms = limit_ms = budget.cpu_ms
+        if budget.mean_ms is not None:
+            most_ms = budget.mean_ms * max(1.0 / self._period_s, 1.0)
+            self._saved_ms = min(self._saved_ms + budget.mean_ms, most_ms)
+            full = self._saved_ms >= most_ms > 0.0
+            frame_ms = max(1e3 * self._period_s, budget.mean_ms) if frame_ms is None else frame_ms
+            limit_ms = min(self._saved_ms, frame_ms)
+        if limit_ms is not None and frame_ms is not None:
+            idle_ms = self.cost.cost_ms(points[:0])
+            left_ms = limit_ms - idle_ms
             for i, added_ms in enumerate(self.cost.added_ms(points).tolist()):
                 granted[i] = added_ms <= left_ms
                 left_ms -= added_ms * granted[i]
-            while granted.any() and self.cost.cost_ms(points[granted]) > budget.cpu_ms:  # by padding
+                if left_ms < added_ms <= frame_ms - idle_ms and not granted[i] and limit_ms < frame_ms:
+                    left_ms = -1.0
+            while granted.any() and self.cost.cost_ms(points[granted]) > limit_ms:  # by padding
                 granted[granted.nonzero()[0][-1]] = False
             if len(points) and not granted.any():
-                self.cost.starve()
-                granted[0] = self.cost.outdated and budget.cpu_ms > 0
+                if self.cost.cost_ms(points[:1]) <= frame_ms or budget.cpu_ms is None:
+                    granted[0] = full
+                else:
+                    self.cost.starve()
+                    granted[0] = self.cost.outdated and frame_ms > 0
         if budget.calls is not None:
             granted &= np.cumsum(granted) <= budget.calls
         return granted

@@ -8,8 +8,8 @@ from modt.cli.command import dispatch
 
 COMMANDS = {
     "meters": "modt.cli.profile_meters",
-    "calibrate": "modt.cli.profile_calibrate",
-    "report": "modt.cli.profile_report",
+    "calibrate": "modt_desk.cli.profile_calibrate",
+    "report": "modt_desk.cli.profile_report",
     "compare": "modt_desk.cli.profile_compare",
     "predict": "modt_desk.cli.profile_predict",
     "regimes": "modt_desk.cli.profile_regimes",

@@ -41,6 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     cores = host.other_cores(arguments.core)
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
+    from modt.app.containment import OncePerSecond
     from modt.app.inputs import Request, live_source
     from modt.app.session import service
     from modt.app.status import one_line
@@ -57,9 +58,12 @@ def run(arguments: argparse.Namespace) -> int:
         sinks = {address: open_sink(address) for address in addresses}
         command = ["modt", *sys.argv[1:]]
         request = replace(Request.of(arguments), path=path)
-        session = service(request, source, sinks, arguments.out, arguments.metrics, pinned, command, lacking)
+        out, metrics = arguments.out, arguments.metrics
+        session = service(request, source, sinks, out, metrics, pinned, command, lacking)
+    for handler in logging.getLogger().handlers:
+        handler.addFilter(OncePerSecond())
     status = session.run(supervisor)["status"]
-    print(
-        f"modt: {status['counts']['frames']} frames; {one_line(status)}; records in {arguments.out}", file=sys.stderr
-    )
+    counts, recording = status["counts"], session.recording.health()
+    records = f"records in {out}" if recording["parts"] else f"nothing is recorded: {recording['failing']}"
+    print(f"modt: {counts['frames']} frames; {one_line(status)}; {records}", file=sys.stderr)
     return INTERRUPTED if session.stop.signal == "SIGINT" else 0

@@ -46,8 +46,8 @@ class SchedulerConfig(StageConfig):
     """Budget of classification per frame; none: unlimited."""
 
     calls_per_frame: int | None = number(16, 0, 10000, "", "proposals classified")
-    cpu_ms_per_frame: float | None = number(None, 0.0, 10000.0, "ms", "CPU time by the cost model")
-    energy_mJ_per_frame: float | None = number(None, 0.0, 100000.0, "mJ", "above idle during that time")
+    cpu_ms_per_frame: float | None = number(None, 0.0, 10000.0, "ms", "CPU time, on average over a second")
+    energy_mJ_per_frame: float | None = number(None, 0.0, 100000.0, "mJ", "above idle, on average over a second")
     worth: CallWorthConfig = mechanism(CallWorthConfig)
     cost: CostModelConfig = mechanism(CostModelConfig)
 
@@ -70,37 +70,19 @@ class DecisionConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FusionConfig(StageConfig):
-    """Independent views and final classes (section V-C, Figs. 10 and 11), found by tools/study/sweep_fusion.py.
+    """Views, boxes and motion fused to a class, and final classes (section V-C, Figs. 10 and 11).
 
-    first_view_*: mode efficient; object_threshold, review_point_ratio, review_extra_points: both modes; the other
-    thresholds, start_frame, *_change and review_*: mode accurate.
+    first_view_*: mode efficient; min_object_probability: mode accurate; start_frame, point_change: rule product.
     """
 
+    rule: str = choice("mean", ("mean", "product"), "of fusing views; product: Equation 6, of the paper")
     prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency that a model assumes which states none")
-    box_update_weight: float = number(0.75, 0.0, 1.0, "", "exponent of the change of the box prior since a view")
-    mismatch_probability: float = number(0.1, 0.0, 1.0, "", "that a proposal is not the object of its track")
-    first_view_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, to be classified")
-    first_view_min_hits: int = number(3, 1, 1000, "frames", "with a proposal, to be classified")
-    first_view_final: str = choice("certain", ("certain", "any"), "view that is final; the paper: any")
-    first_view_background_threshold: float = number(
-        0.9, 0.25, 1.0, "", "posterior under equal frequencies; final background"
-    )
-    min_object_probability: float = number(0.05, 0.0, 1.0, "", "by the box prior, for the first of several views")
-    start_frame: int = number(5, 1, 1000, "frames", "age of a track from which views are fused")
     object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")
-    background_threshold: float = number(0.4, 0.25, 1.0, "", "posterior under equal frequencies; final background")
+    background_threshold: float = number(0.5, 0.25, 1.0, "", "posterior under equal frequencies; final background")
+    min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, for the first of several views")
+    first_view_min_object_probability: float = number(0.2, 0.0, 1.0, "", "by the box prior, to be classified")
+    first_view_min_hits: int = number(2, 1, 1000, "frames", "with a proposal, to be classified")
+    start_frame: int = number(4, 1, 1000, "frames", "age of a track from which views are fused")
     point_change: tuple[float, ...] = per_class(
         "point_change", 0.0, 10.0, "relative change of points (Equation 4) of an independent view", tuple(CLASSES)
     )
-    extent_change: float = number(0.6, 0.0, 10.0, "", "relative change of extent of an independent view")
-    memory: float = number(0.5, 0.0, 1.0, "", "weight of the evidence so far at a further view; 1: independent views")
-    review_point_ratio: float | None = number(
-        1.25,
-        1.0,
-        1000.0,
-        "",
-        "points over those of the key view, for another view of a class in doubt or final; none: never",
-    )
-    review_extra_points: int = number(5, 0, 1000, "", "more points than that ratio, beyond random variation")
-    review_max_points: int = number(100, 0, 10000, "", "of the last key view; with more, no review")
-    review_min_object_probability: float = number(0.1, 0.0, 1.0, "", "by the box prior, for a review")

@@ -15,6 +15,8 @@ from modt.config.tracking import TrackingConfig
 if TYPE_CHECKING:
     from modt.geometry.beams import Beams
 
+GRID_CELLS, MAX_CELLS = 200, 5e7
+"""Cells of both grids of the segmentation for each m of range and 1/m2 of cell_m, and most of them: 200 MB."""
 REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 """Sensors whose reflectance a model may have learnt."""
 
@@ -124,6 +126,11 @@ class ProfileConfig:
     recording: RecordingConfig = field(default_factory=RecordingConfig)
 
     def __post_init__(self) -> None:
+        cells = GRID_CELLS * self.sensor.max_range_m / self.segmentation.cell_m**2
+        if cells > MAX_CELLS:
+            cause = f"{self.segmentation.cell_m:g} m takes {cells / 1e6:.0f} million cells at this sensor.max_range_m"
+            least_m = (GRID_CELLS * self.sensor.max_range_m / MAX_CELLS) ** 0.5
+            raise ValueRangeError("segmentation.cell_m", cause, f"give at least {least_m:.3f} m, or a shorter range")
         if self.scheduler.energy_mJ_per_frame is not None and self.energy.active_W <= 0:
             raise ValueRangeError(
                 "scheduler.energy_mJ_per_frame",

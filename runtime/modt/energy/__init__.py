@@ -1,1 +1,1 @@
-"""Energy accounting: ledger, meters, attribution, reconciliation."""
+"""Energy accounting: ledger, meters, windows, attribution to the stages."""

@@ -16,10 +16,12 @@ import numpy as np
 
 from modt.config import EnergyConfig
 from modt.energy.ledger import Line
-from modt.energy.meters.meter import Kind, model_J, model_name
+from modt.energy.meters.meter import Kind, model_J, model_name, worst
 from modt.types import Float64
 
-_REJECTED_MARKS = frozenset({"suspended", "clock", "lost", "back", "reset", "implausible", "ambiguous"})
+_HARMLESS_MARKS = frozenset({"wrap", "clock-step"})
+_MAX_W = 10_000.0
+"""Power above which the record of a window is not believed [W]."""
 _MAX_CONDITION = 1e6
 """Condition number of the scaled regressors above which they are collinear."""
 _TAILS = (0.025, 0.975)
@@ -64,7 +66,7 @@ class Fit:
 
     coefficients: tuple[Coefficient, ...]  # in the order of the regressors
     windows: int  # used
-    dropped: int  # without a reading or with a rejected mark
+    dropped: int  # not usable
     residual_J: float  # standard deviation, a window
     explained: float  # share of the variance, at most 1
     condition: float  # number of the scaled regressors
@@ -77,10 +79,16 @@ class FitError(Exception):
     """The windows do not determine the coefficients; the message names the load to vary."""
 
 
+def usable(line: Line) -> bool:
+    """Whether a window has a reading that can be true, and no mark that forbids its use."""
+    energy_J = line["energy_J"]
+    known = energy_J is not None and _HARMLESS_MARKS.issuperset(line.get("marks", ()))
+    return known and 0.0 <= energy_J <= _MAX_W * IDLE.count(line)
+
+
 def usable_windows(lines: Iterable[Line]) -> list[Line]:
-    """Windows with a reading and without a rejected mark."""
-    known = (line for line in lines if line["energy_J"] is not None)
-    return [line for line in known if _REJECTED_MARKS.isdisjoint(line["marks"])]
+    """The windows that are usable."""
+    return [line for line in lines if usable(line)]
 
 
 def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 1000) -> Fit:
@@ -207,11 +215,12 @@ class EnergySums:
         self.marks: set[str] = set()
 
     def add_window(self, window: Line) -> None:
-        """Add a line of modt.energy; one without a reading or with a rejected mark is counted as dropped."""
+        """Add a line of modt.energy; one that is not usable is counted as dropped."""
         self.conditions = window["conditions"]
         self.marks.update(window["marks"])
-        if not usable_windows([window]):
+        if not usable(window):
             self.dropped += 1
+            self.marks.update(() if window["energy_J"] is None or window["marks"] else {"implausible"})
         elif window["frames"][2]:
             self._add(window)
 
@@ -230,8 +239,8 @@ class EnergySums:
         return {stage: watts for stage in stages if not math.isnan(watts := self.watts(stage))}
 
     def _add(self, window: Line) -> None:
-        if not self.count:
-            self.kind, self.meter = Kind(window["kind"]), window["meters"][0]["name"]
+        self.kind = worst([Kind(window["kind"]), *([self.kind] if self.count else [])])
+        self.meter = self.meter or window["meters"][0]["name"]
         self.count += 1
         self.frames += window["frames"][2]
         self.wall_ns += window["wall_ns"]

@@ -9,7 +9,8 @@ from typing import Any
 
 from modt.config import WindowConfig
 from modt.energy.ledger import Clock, Line
-from modt.energy.meters.meter import Conditions, Kind, Measurand, Meter, MeterLostError
+from modt.energy.meters.meter import Conditions, Kind, Measurand, Meter, MeterLostError, worst
+from modt.energy.readings import History, judge
 
 SCHEMA = "modt.energy/1"
 
@@ -24,52 +25,25 @@ class Clocks:
     process_ns: Clock = time.process_time_ns  # CPU time of all threads
 
 
+PRIMING_S = 0.05
+"""Length of the first window of a counter [s], which has no energy: there is no power yet to judge it by."""
+
+
 class EnergyAccumulator:
-    """Energy between successive readings of one meter, never negative; implausible readings give None and a mark."""
+    """Energy between successive readings of one meter, by the rule of `judge`."""
 
     def __init__(self, meter: Meter) -> None:
         self.meter = meter
-        self._last: float | None = None
-        self._lost = False
+        self._history = History()
 
-    def advance(self, seconds: float, *, suspended: bool = False) -> tuple[float | None, list[str]]:
-        """Energy since the last reading [J], None where unknown, and marks.
-
-        Marks: "lost" (unreadable), "back" (readable again), "wrap" (counter passed its range), "reset" (counter
-        decreased otherwise), "implausible" (above max_W), "ambiguous" (long enough for a full range of the counter),
-        "negative" (power below zero, taken as zero).
-        """
-        before, lost = self._last, self._lost
+    def advance(self, seconds: float) -> tuple[float | None, str]:
+        """Energy since the last reading [J], None where it is not measured, and the cause or mark."""
         try:
-            now = self.meter.read()
+            reading: float | None = self.meter.read()
         except MeterLostError:
-            self._last, self._lost = None, True
-            return None, ["lost"]
-        self._last, self._lost = now, False
-        if before is None:
-            return None, ["back"] if lost else []
-        if self.meter.facts.measurand is Measurand.POWER:
-            return (None, []) if suspended else self._integrated(before, now, seconds)
-        return self._counted(before, now, seconds)
-
-    def _integrated(self, before: float, now: float, seconds: float) -> tuple[float | None, list[str]]:
-        if max(before, now) > self.meter.facts.max_W:
-            return None, ["implausible"]
-        marks = ["negative"] if min(before, now) < 0 else []
-        return 0.5 * (max(before, 0.0) + max(now, 0.0)) * seconds, marks
-
-    def _counted(self, before: float, now: float, seconds: float) -> tuple[float | None, list[str]]:
-        facts = self.meter.facts
-        energy_J, marks = now - before, list[str]()
-        if energy_J < 0:
-            if facts.wrap_J is None:
-                return None, ["reset"]
-            energy_J, marks = energy_J + facts.wrap_J, ["wrap"]
-        if facts.wrap_J is not None and seconds * facts.max_W >= facts.wrap_J:
-            return None, [*marks, "ambiguous"]
-        if not 0 <= energy_J <= seconds * facts.max_W + facts.resolution:
-            return None, ["reset" if marks else "implausible"]
-        return energy_J, marks
+            reading = None
+        self._history, energy_J, mark = judge(self.meter.facts, self._history, reading, seconds)
+        return energy_J, mark
 
 
 class Windows:
@@ -79,6 +53,9 @@ class Windows:
         self._accumulators = [EnergyAccumulator(meter) for meter in meters]
         self._clocks, self._conditions, self._config = clocks, conditions, config
         self._index = 0
+        self._least_s = (
+            min(PRIMING_S, config.min_s) if any(m.facts.kind is Kind.MEASURED for m in meters) else config.min_s
+        )
         for accumulator in self._accumulators:
             accumulator.advance(0.0)
         self._open()
@@ -93,7 +70,7 @@ class Windows:
         self._overhead_ns += line["overhead_ns"]
         if "clock" in line["marks"]:
             self._marks.append("clock")
-        return self.close() if self._clocks.monotonic_ns() - self._start_ns >= 1e9 * self._config.min_s else None
+        return self.close() if self._clocks.monotonic_ns() - self._start_ns >= 1e9 * self._least_s else None
 
     def close(self) -> Line:
         """Line of the open window, however short; the next begins.
@@ -113,8 +90,8 @@ class Windows:
         readings: list[dict[str, Any]] = []
         resolution_J = 0.0
         for accumulator in self._accumulators:
-            energy_J, new_marks = accumulator.advance(seconds, suspended=suspended)
-            marks += new_marks
+            energy_J, mark = accumulator.advance(seconds)
+            marks += [mark] if mark else []
             facts = accumulator.meter.facts
             readings.append({"name": facts.name, "kind": facts.kind.value, "scope": facts.scope.value, "J": energy_J})
             resolution_J += facts.resolution * (seconds if facts.measurand is Measurand.POWER else 1.0)
@@ -134,13 +111,13 @@ class Windows:
             "idle_ns": wall_ns - spans_ns - self._overhead_ns,
             "stages": self._stages,
             "energy_J": sum(energies) if known else None,
-            "kind": readings[0]["kind"] if known else Kind.UNAVAILABLE.value,
+            "kind": worst(Kind(r["kind"]) for r in readings).value if known else Kind.UNAVAILABLE.value,
             "resolution_J": resolution_J,
             "meters": readings,
             "conditions": self._conditions.read(),
             "marks": sorted(set(marks)),
         }
-        self._index += 1
+        self._index, self._least_s = self._index + 1, self._config.min_s
         self._open()
         return line
 

@@ -69,6 +69,9 @@ def delays(proposals: Proposals, turn_s: float) -> Float64:
     return delay_s
 
 
+FAR_M = 1e5
+"""Greatest coordinate of a first pose from which the world keeps its origin: beyond it float32, used in the
+association, is coarser than a centimetre, and the world begins at the position of that pose."""
 _RANGE_M, _TOLERANCE_M = 20.0, 0.05
 """A second registration is worth its cost if the first one moves something within this range by more than this."""
 
@@ -85,7 +88,7 @@ class Odometry:
         self._kernels = kernels
         self._registration = Registration(config.registration, kernels)
         self._landmarks = LandmarkMap(config.landmarks)
-        self._stamp_s: float | None = None
+        self._time_s: float | None = None
         self._before = self._last = Placement(np.eye(4))
         self._T_world_odometry: Float64 | None = None
         self._restarts = 0
@@ -93,7 +96,7 @@ class Odometry:
     def adopt(self, other: Odometry) -> None:
         """Go on in the world of another odometry, where it stands."""
         self._landmarks.clear()
-        self._stamp_s, self._before, self._last = other._stamp_s, other._before, other._last
+        self._time_s, self._before, self._last = other._time_s, other._before, other._last
         self._T_world_odometry, self._restarts = other._T_world_odometry, other._restarts
 
     def locate(self, frame: Frame, proposals: Proposals, static_tracks: Callable[[float], StaticTracks]) -> Located:
@@ -102,16 +105,17 @@ class Odometry:
         Args:
             frame: its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
             proposals: of the frame.
-            static_tracks: by the stamp of a frame, those it may continue; called where there is no pose.
+            static_tracks: by the time of a frame, those it may continue; called where there is no pose.
         """
-        given, first = frame.T_world_sensor, self._stamp_s is None
+        given, first = frame.T_world_sensor, self._time_s is None
         if frame.restarts != self._restarts:
             self._restarts, self._T_world_odometry = frame.restarts, None
         if first and given is not None:
-            self._last = Placement(given)
-            self._T_world_odometry = np.eye(4)
+            far = np.abs(given[:3, 3]).max() > FAR_M
+            self._T_world_odometry = se3(np.eye(3), -given[:3, 3] if far else np.zeros(3))
+            self._last = Placement(self._T_world_odometry @ given)
         skew = SweepSkew.of(proposals, frame.turn_s)
-        dt_s = 0.0 if self._stamp_s is None else frame.stamp_s - self._stamp_s
+        dt_s = 0.0 if self._time_s is None else frame.time_s - self._time_s
         if 2 * dt_s < abs(frame.turn_s):  # errors of the poses would be extrapolated: assume no motion
             dt_s = np.inf
         before = self._last.T_world_sensor
@@ -129,7 +133,7 @@ class Odometry:
             self._landmarks.clear()
             placement = placed(self._T_world_odometry @ given)
         else:
-            landmarks = self._landmarks.update(static_tracks(frame.stamp_s))
+            landmarks = self._landmarks.update(static_tracks(frame.time_s))
             share = 1.0 if skew is None else skew.share(dt_s)
 
             def registered(placement: Placement) -> Placement:
@@ -143,7 +147,7 @@ class Odometry:
                 placement = registered(placement)
             if given is not None:  # an odometry that begins late, or anew, is brought to the world of the tracks
                 self._T_world_odometry = placement.T_world_sensor @ inverse(given)
-        self._before, self._last, self._stamp_s = self._last, placement, frame.stamp_s
+        self._before, self._last, self._time_s = self._last, placement, frame.time_s
         return Located(placement, observed(placement))
 
 

@@ -1,1 +1,1 @@
-"""Summaries, energy reports and comparisons, as text, JSON and HTML pages."""
+"""Summaries of runs."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +17,10 @@ TYPE = "sensor_msgs/PointCloud2"
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """NumPy's name of each sensor_msgs/PointField datatype."""
 FLOAT32 = 7
-REFLECTANCES = ("reflectivity", "reflectance", "intensity", "i")
+REFLECTANCES = ("reflectivity", "reflectance", "remission", "remissions", "intensity", "i")
 """Names of the field, by preference: a calibrated reflectance goes before a raw intensity."""
+_PREFIX = re.compile(r"^(?:(?:scalar|field|vertex|lidar)[_ .])+")
+"""What CloudCompare and others put before them, as in `scalar_Intensity` and `Scalar_field_intensity`."""
 TIMES = ("time", "t", "timestamp", "offset_time", "time_stamp")
 MAX_FIELDS = 64
 MAX_DELAY_S = 1.0
@@ -25,6 +29,12 @@ FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))
 """Full scale of the reflectances where more than MAX_SHARE_ABOVE of them lie above a limit."""
 MAX_SHARE_ABOVE = 0.02
 SAMPLES = 4096
+
+
+def reflectance_name(names: Iterable[str]) -> str | None:
+    """The name of the field of reflectance among those of a message or a file; None without one."""
+    plain = {_PREFIX.sub("", name.lower()): name for name in names}
+    return next((plain[name] for name in REFLECTANCES if name in plain), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,8 +158,11 @@ def _fields(cdr: CdrReader) -> dict[str, _Field]:
 def _points(table: _Table) -> Float32:
     xyz = [table.fields[name] for name in "xyz" if name in table.fields]
     if len(xyz) < 3 or any(NUMBERS[field.datatype][0] != "f" for field in xyz):
-        raise MessageError("fields", f"no x, y, z of floating point among {', '.join(table.fields) or 'none'}")
-    reflectance = table.first(REFLECTANCES)
+        kinds = ": they are " + ", ".join(str(np.dtype(NUMBERS[f.datatype])) for f in xyz) if len(xyz) == 3 else ""
+        there = ", ".join(table.fields) or "none"
+        raise MessageError("fields", f"no x, y, z of floating point among {there}{kinds}")
+    named = reflectance_name(table.fields)
+    reflectance = None if named is None else table.fields[named]
     points = np.empty((table.shape[0] * table.shape[1], 4), np.float32)
     rows = points.reshape(*table.shape, 4)
     in_row = [_Field(xyz[0].offset + 4 * k, FLOAT32) for k in range(4)]

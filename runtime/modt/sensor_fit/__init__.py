@@ -1,1 +1,1 @@
-"""The profile of a sensor, from a recording of it."""
+"""The sensor, recognised from its first sweep."""

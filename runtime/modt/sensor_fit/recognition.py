@@ -15,7 +15,7 @@ from modt.sensor_fit.beams import (
     spacing_ratio,
     tangents,
 )
-from modt.sensor_fit.fit import (
+from modt.sensor_fit.findings import (
     NONE,
     Recording,
     apply,

@@ -72,6 +72,29 @@ def sync_folder(path: Path) -> None:
         os.close(number)
 
 
+def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
+    """Write a file atomically, by way of .NAME.part, and follow no link; a lasting one is whole after a power cut.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    partial = path.with_name(f".{path.name}.part")
+    with writing(path):
+        partial.unlink(missing_ok=True)
+        try:
+            number = os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666)
+            with open(number, "w", encoding="utf-8") as file:
+                file.write(text)
+                file.flush()
+                if lasting:
+                    os.fsync(number)
+            partial.replace(path)
+        except OSError:
+            with suppress(OSError):
+                partial.unlink()
+            raise
+
+
 class LineFile(Generic[T]):
     """An unbuffered text file of whole lines; `encode` gives the lines of an item.
 

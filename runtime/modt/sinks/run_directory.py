@@ -10,13 +10,12 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from modt.errors import MisuseError, ModtError
-from modt.sinks.output import sync_folder, writing
+from modt.sinks.output import replace_file, sync_folder, writing
 
 RUN, TRACKS, LEDGER, SUMMARY, STATUS = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"
 MARK = "service: true"
 """Line of run.yaml in the directories of a service: no other directory is ever deleted."""
-_FILES = {name: f".{name}.part" for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS)}
-_KNOWN = {*_FILES, *_FILES.values()}
+_KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) for form in ("{}", ".{}.part")}
 
 
 class RunDirectory:
@@ -49,7 +48,9 @@ class RunDirectory:
         with ExitStack() as stack:
             try:
                 self.path.parent.mkdir(parents=True, exist_ok=True)
-                lock = os.open(self.path.with_name(f".{self.path.name}.lock"), os.O_RDONLY | os.O_CREAT)
+                lock = os.open(
+                    self.path.with_name(f".{self.path.name}.lock"), os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW
+                )
                 stack.callback(os.close, lock)
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
@@ -77,19 +78,7 @@ class RunDirectory:
         Raises:
             ModtError: it cannot be written.
         """
-        partial = self.path / _FILES[name]
-        with writing(self.path / name):
-            try:
-                with partial.open("w", encoding="utf-8") as file:
-                    file.write(text)
-                    file.flush()
-                    if lasting:
-                        os.fsync(file.fileno())
-                partial.replace(self.path / name)
-            except OSError:
-                with suppress(OSError):
-                    partial.unlink()
-                raise
+        replace_file(self.path / name, text, lasting=lasting)
 
     def sync(self) -> None:
         """Have the names of the present part and its files outlast a power cut.

@@ -32,6 +32,7 @@ from foxglove.messages import (
 from modt.address import Address
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.energy import ledger, windows
+from modt.energy.attribution import usable
 from modt.errors import MisuseError
 from modt.geometry import quaternion_of, yaw_of
 from modt.types import NONE, FrameResult
@@ -104,7 +105,7 @@ class Scene:
 
     def ledger(self, record: dict[str, Any]) -> None:
         """Publish the mean energy a frame of a window, or the CPU time of a frame's stages, at the last stamp."""
-        if record["schema"] == windows.SCHEMA and record["energy_J"] is not None and record["frames"][2]:
+        if record["schema"] == windows.SCHEMA and usable(record) and record["frames"][2]:
             self._energy.log(energy(record), log_time=self._stamp_ns)
         elif record["schema"] == ledger.SCHEMA:
             cpu_ms = {f"{stage}_ms": 1e-6 * row["cpu_ns"] for stage, row in record["stages"].items()}

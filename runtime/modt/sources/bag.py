@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import copy
-import logging
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import combinations, islice, pairwise
 from pathlib import Path
 from typing import Self
 
@@ -16,14 +15,15 @@ import numpy as np
 from modt.config import OdometryConfig
 from modt.errors import MisuseError, ModtError, ScanError
 from modt.ros2 import odometry, point_cloud2, static_transforms
-from modt.ros2.cdr import MessageError
+from modt.ros2.cdr import CdrReader, MessageError
 from modt.ros2.odometry import read_odometry
 from modt.ros2.point_cloud2 import PointCloud, read_cloud
 from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.bag_files import BagFile, BagMessage, BagTopic, bag_files, messages_of
 from modt.sources.pose_buffer import PoseBuffer
 from modt.sources.scan_file import sanitised
-from modt.sources.stream import MAX_KEPT_FAULTS, Fault, Faults, StreamInfo
+from modt.sources.stamp_check import CLOCK_SET, STEP_S, StampCheck
+from modt.sources.stream import Fault, Faults, StreamInfo
 from modt.types import Float64, Frame
 
 
@@ -67,10 +67,10 @@ def _base(message: BagMessage) -> str:
         return ""
 
 
-log = logging.getLogger(__name__)
-
 PEEKED = 50
-"""Messages of a topic read before the first frame, until one can be used."""
+"""Messages of a topic read before the first frame, until some can be used."""
+COMPARED = 4
+"""First sweeps whose stamps are compared."""
 
 
 class BagStream:
@@ -81,19 +81,24 @@ class BagStream:
     """
 
     def __init__(
-        self, info: StreamInfo, files: list[BagFile], topic: str, began_s: float, poses: Poses | None
+        self, info: StreamInfo, files: list[BagFile], topic: str, began: tuple[float, float], poses: Poses | None
     ) -> None:
+        """`began`: stamp and recorded time of the first sweep whose stamp is believed [s]."""
         self.info, self.faults = info, Faults()
-        self._files, self._topic, self._began_s, self._poses = files, topic, began_s, poses
+        self._files, self._topic, self._began, self._poses = files, topic, began, poses
         self._first, self._last = 0, info.n_frames or 0
 
     def __iter__(self) -> Iterator[Frame]:
         """The frames, with poses where there are any."""
-        buffer, held, last_s, index = PoseBuffer(OdometryConfig()), None, -np.inf, -1
+        buffer, held, index = PoseBuffer(OdometryConfig()), None, -1
+        stamps, pose_stamps = StampCheck(self._began), None
         topics = {self._topic} if self._poses is None else {self._topic, self._poses.topic}
         for message in self._readable(topics):
             if message.topic != self._topic:
-                self._keep(message, buffer)
+                if pose_stamps is None:  # poses begin by the clock of the sweeps, at any time
+                    began_s = message.recorded_s - STEP_S / 2
+                    pose_stamps = StampCheck((self._began[0] - self._began[1] + began_s, began_s))
+                self._keep(message, buffer, pose_stamps)
             else:
                 index += 1
             if held is not None and (message.topic == self._topic or buffer.newest_s >= held.stamp_s):
@@ -102,8 +107,10 @@ class BagStream:
             if index >= self._last:
                 return
             if message.topic == self._topic and index >= self._first:
-                held = self._frame(index, message, last_s)
-                last_s = last_s if held is None else held.stamp_s
+                held = self._frame(index, message, stamps)
+            elif message.topic == self._topic:
+                with suppress(MessageError):
+                    stamps.doubt(CdrReader(message.data).stamp_s() or message.recorded_s, message.recorded_s)
         if held is not None:
             yield replace(held, T_world_sensor=buffer.at(held.stamp_s))
 
@@ -123,33 +130,34 @@ class BagStream:
         except ModtError as error:
             self._fault(self._last, error.cause, skipped=True)
 
-    def _frame(self, index: int, message: BagMessage, last_s: float) -> Frame | None:
+    def _frame(self, index: int, message: BagMessage, stamps: StampCheck) -> Frame | None:
         try:
             cloud = read_cloud(message.data)
             points, flaws = sanitised(cloud.points, self._topic)
         except (MessageError, ScanError) as error:
             self._fault(index, error.cause if isinstance(error, ScanError) else str(error), skipped=True)
             return None
-        stamp_s = _stamp_s(cloud, message) - self._began_s
-        if stamp_s < last_s:
-            self._fault(index, f"stamped {last_s - stamp_s:.3f} s before the last sweep", skipped=True)
+        stamp_s, steps = _stamp_s(cloud, message), stamps.steps
+        if doubt := stamps.doubt(stamp_s, message.recorded_s):
+            self._fault(index, doubt, skipped=True)
             return None
+        if stamps.steps > steps:
+            flaws = [*flaws, CLOCK_SET]
         if flaws:
             self._fault(index, "; ".join(flaws), skipped=False)
-        return Frame(index, stamp_s, points, turn_s=cloud.turn_s)
+        return Frame(index, stamp_s + stamps.shift_s - self._began[0], points, turn_s=cloud.turn_s)
 
-    def _keep(self, message: BagMessage, buffer: PoseBuffer) -> None:
-        try:
+    def _keep(self, message: BagMessage, buffer: PoseBuffer, stamps: StampCheck) -> None:
+        with suppress(MessageError):
             pose = read_odometry(message.data)
-        except MessageError:
-            return
-        if self._poses is not None:
-            buffer.add(pose.stamp_s - self._began_s, pose.T_odom_child @ self._poses.T_base_sensor)
+            if self._poses is None or stamps.doubt(pose.stamp_s, message.recorded_s):
+                return
+            stamp_s = pose.stamp_s + stamps.shift_s - self._began[0]
+            if stamp_s > buffer.newest_s:
+                buffer.add(stamp_s, pose.T_odom_child @ self._poses.T_base_sensor)
 
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
-        if self.faults.add(Fault(index, self._topic, cause, skipped)):
-            more = "; later faults are only counted" if self.faults.count == MAX_KEPT_FAULTS else ""
-            log.warning("%s %d: %s%s%s", self._topic, index, cause, "; frame skipped" if skipped else "", more)
+        self.faults.report(Fault(index, self._topic, cause, skipped), f"{self._topic} {index}")
 
 
 def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream:
@@ -166,23 +174,23 @@ def open_bag(path: Path, period_s: float, topic: str | None = None) -> BagStream
         for name, found in file.topics().items():
             topics[name] = BagTopic(found.type, found.count + (topics[name].count if name in topics else 0))
     chosen = _choose(path, topics, topic)
-    began = list(islice(_clouds(files, chosen), 2))
-    if not began:
-        raise ModtError(path, f"no usable sweep at the begin of {chosen}", "record sensor_msgs/PointCloud2 in CDR")
-    stamps = [_stamp_s(cloud, message) for cloud, message in began]
+    began = _first_clouds(path, files, chosen)
+    stamps = [(_stamp_s(cloud, message), message.recorded_s) for cloud, message in began]
+    first = next((a for a, b in combinations(stamps, 2) if not StampCheck(a).doubt(*b)), stamps[0])
+    steps_s = (b[0] - a[0] for a, b in pairwise(stamps) if b[0] > a[0] and not StampCheck(a).doubt(*b))
     poses, notes = find_poses(files, topics, began[0][0].frame_id)
     info = StreamInfo(
         name=path.stem if path.is_file() else path.name,
         layout="rosbag2",
         sequence=0,
         n_frames=topics[chosen].count,
-        period_s=stamps[1] - stamps[0] if len(stamps) > 1 and stamps[1] > stamps[0] else period_s,
+        period_s=next(steps_s, period_s),
         camera=None,
         has_poses=poses is not None,
         pose_notes=notes,
         end=topics[chosen].count,
     )
-    return BagStream(info, files, chosen, stamps[0], poses)
+    return BagStream(info, files, chosen, first, poses)
 
 
 def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
@@ -194,7 +202,7 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
             raise MisuseError(path, f"no point clouds in {asked}", f"topics of sensor_msgs/PointCloud2: {there}")
         return asked
     if not clouds:
-        there = ", ".join(sorted({topic.type for topic in topics.values()})) or "nothing"
+        there = ", ".join(sorted({topic.type for topic in topics.values() if topic.count})) or "nothing"
         raise MisuseError(path, "no sensor_msgs/PointCloud2", f"record the driver's point clouds; it holds {there}")
     if len(clouds) > 1:
         raise MisuseError(
@@ -203,13 +211,29 @@ def _choose(path: Path, topics: dict[str, BagTopic], asked: str | None) -> str:
     return clouds[0]
 
 
-def _clouds(files: list[BagFile], topic: str) -> Iterator[tuple[PointCloud, BagMessage]]:
-    """The usable ones among the first messages."""
-    for message in islice(messages_of(files, {topic}), PEEKED):
-        try:
-            yield read_cloud(message.data), message
-        except MessageError:
-            continue
+def _first_clouds(path: Path, files: list[BagFile], topic: str) -> list[tuple[PointCloud, BagMessage]]:
+    """The first usable sweeps, at least one.
+
+    Raises:
+        ModtError: there are none.
+    """
+    clouds: list[tuple[PointCloud, BagMessage]] = []
+    refused = "no message"
+    try:
+        for message in islice(messages_of(files, {topic}), PEEKED):
+            try:
+                clouds.append((read_cloud(message.data), message))
+            except MessageError as error:
+                refused = str(error)
+            if len(clouds) == COMPARED:
+                break
+    except ModtError:
+        if not clouds:
+            raise
+    if not clouds:
+        remedy = "record sensor_msgs/PointCloud2 in CDR, with x, y, z [m] as float32"
+        raise ModtError(path, f"no usable sweep at the begin of {topic} ({refused})", remedy)
+    return clouds
 
 
 def _stamp_s(cloud: PointCloud, message: BagMessage) -> float:

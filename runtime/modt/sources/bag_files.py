@@ -11,6 +11,8 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
+from heapq import heappop, heappush
+from itertools import count
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 from urllib.parse import quote
@@ -25,6 +27,12 @@ ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 
 MAX_RECORD_BYTES = 2**28
 """Largest record of an MCAP file and largest unpacked message; a chunk has a few megabytes."""
+ALLOWANCE_BYTES, MOST_TIMES = 16 * 2**20, 64
+"""A file unpacks to as many bytes, and as many times its size, at most."""
+FOOTER_BYTES = 37
+"""Last record of a closed MCAP file, and what follows it."""
+STEPS = 10_000
+"""Instructions of a database between two looks at their number, which may be that of the bytes unpacked."""
 
 
 class BagMessage(NamedTuple):
@@ -53,13 +61,13 @@ class BagFile(ABC):
 
     def __init__(self, path: Path) -> None:
         self.path = self._plain = path
+        self._most = ALLOWANCE_BYTES + MOST_TIMES * path.stat().st_size
         if path.suffix == ZSTD:
             with self._refusals():
                 handle, unpacked = tempfile.mkstemp(suffix=_kind(path))
-                os.close(handle)
                 weakref.finalize(self, os.unlink, unpacked)
                 self._plain = Path(unpacked)
-                _unpack(path, unpacked)
+                self._unpack(handle)
 
     def topics(self) -> dict[str, BagTopic]:
         """Topics by name, of messages in CDR.
@@ -76,9 +84,12 @@ class BagFile(ABC):
         Raises:
             ModtError: the file cannot be read, or not beyond the messages before.
         """
+        left = self._most
         with self._refusals():
             for name, recorded_ns, data in self._messages(topics):
-                yield BagMessage(name, 1e-9 * recorded_ns, _unpacked(data))
+                message = _message(data, min(left, MAX_RECORD_BYTES))
+                left = self._less(left, len(message))
+                yield BagMessage(name, 1e-9 * recorded_ns, message)
 
     @abstractmethod
     def _topics(self) -> Iterable[tuple[str, str, int]]:
@@ -87,6 +98,28 @@ class BagFile(ABC):
     @abstractmethod
     def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         """Topic, time of the recording [ns] and bytes of each message."""
+
+    def _less(self, left: int, size: int) -> int:
+        """Bytes that may still be unpacked after some more.
+
+        Raises:
+            ModtError: there are none.
+        """
+        if size > left:
+            most = f"{MOST_TIMES} times its size and {ALLOWANCE_BYTES >> 20} MiB"
+            raise ModtError(self.path, f"unpacks to more than {most}", "record it with less compression")
+        return left - size
+
+    def _unpack(self, handle: int) -> None:
+        """Write what the compressed file holds."""
+        from zstandard import ZstdDecompressor
+
+        left = self._most
+        packed = ZstdDecompressor().stream_reader(self.path.open("rb"), read_across_frames=True)
+        with open(handle, "wb") as file, packed as reader:
+            while piece := reader.read(min(left + 1, 2**20)):
+                left = self._less(left, len(piece))
+                file.write(piece)
 
     @contextmanager
     def _refusals(self) -> Iterator[None]:
@@ -102,25 +135,38 @@ class BagFile(ABC):
 
 
 class DatabaseFile(BagFile):
-    """A .db3 file."""
+    """A .db3 file, which may hold plain tables only: views and triggers are programs."""
 
     def _topics(self) -> Iterator[tuple[str, str, int]]:
         yield from self._rows(
-            "SELECT name, type, (SELECT count(*) FROM messages WHERE topic_id = topics.id) FROM topics "
-            "WHERE serialization_format = 'cdr'"
+            "SELECT name, type, coalesce(n, 0) FROM topics LEFT JOIN "
+            "(SELECT topic_id, count(*) AS n FROM messages GROUP BY topic_id) ON topic_id = topics.id "
+            "WHERE serialization_format = 'cdr' AND typeof(name) = 'text' AND typeof(type) = 'text'"
         )
 
     def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         yield from self._rows(
             "SELECT name, timestamp, data FROM messages JOIN topics ON topic_id = topics.id "
-            f"WHERE name IN ({', '.join('?' * len(topics))}) AND typeof(data) = 'blob' ORDER BY timestamp",
+            f"WHERE name IN ({', '.join('?' * len(topics))}) AND typeof(data) = 'blob' "
+            "AND typeof(timestamp) = 'integer' ORDER BY timestamp",
             *topics,
         )
 
     def _rows(self, query: str, *values: str) -> Iterator[Any]:
         address = f"file:{quote(str(self._plain))}?immutable=1"
+        left = iter(range(self._most // STEPS))
         with closing(sqlite3.connect(address, uri=True, check_same_thread=False)) as database:
+            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(MAX_RECORD_BYTES, self._plain.stat().st_size))
+            database.set_progress_handler(lambda: next(left, None) is None, STEPS)
+            database.execute("PRAGMA trusted_schema = OFF")
+            for (name,) in database.execute(NO_TABLES):
+                raise ModtError(self.path, f"holds {name!r}, which is no table", REMEDY)
             yield from database.execute(query, values)
+
+
+NO_TABLES = (
+    "SELECT name FROM sqlite_master WHERE type != 'index' AND (type != 'table' OR sql NOT LIKE 'CREATE TABLE%')"
+)
 
 
 class McapFile(BagFile):
@@ -128,19 +174,21 @@ class McapFile(BagFile):
 
     def _topics(self) -> list[tuple[str, str, int]]:
         with self._plain.open("rb") as file:
-            reader, summary = _open_mcap(file)
+            summary, cause = _summary(file), ""
             if summary is not None:
                 counts = Counter(summary.statistics.channel_message_counts)
                 found = [(summary.schemas.get(channel.schema_id), channel) for channel in summary.channels.values()]
             else:
                 counts, seen = Counter(), {}
-                with suppress(Exception):  # at its end
-                    for schema, channel, _ in reader.iter_messages(log_time_order=False):
+                try:
+                    for schema, channel, _ in self._records(file, None):
                         seen[channel.id] = schema, channel
                         counts[channel.id] += 1
+                except Exception as error:  # at its end
+                    cause = f" ({error.cause})" if isinstance(error, ModtError) else ""
                 found = list(seen.values())
         if not found:
-            raise ModtError(self.path, "holds no message", REMEDY)
+            raise ModtError(self.path, f"holds no message{cause}", REMEDY)
         return [
             (channel.topic, schema.name, counts[channel.id])
             for schema, channel in found
@@ -149,9 +197,38 @@ class McapFile(BagFile):
 
     def _messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, bytes]]:
         with self._plain.open("rb") as file:
-            reader, summary = _open_mcap(file)
-            for _, channel, message in reader.iter_messages(list(topics), log_time_order=summary is not None):
+            for _, channel, message in self._records(file, _summary(file), topics):
                 yield channel.topic, message.log_time, message.data
+
+    def _records(self, file: BinaryIO, summary: Any, topics: Collection[str] | None = None) -> Iterator[Any]:
+        """Schema, channel and message: by the time of the recording where there is an index, else as they come."""
+        from mcap.records import Channel, Chunk, Message, Schema
+        from mcap.stream_reader import breakup_chunk
+
+        schemas, channels = ({}, {}) if summary is None else (summary.schemas, summary.channels)
+        known: dict[type, dict[int, Any]] = {Schema: schemas, Channel: channels}
+        left, waiting, order = self._most, list[Any](), count()
+        for begin_ns, record in _parts(file, summary, topics):
+            while waiting and waiting[0][0] < begin_ns:
+                yield heappop(waiting)[2]
+            parts = [record]
+            if isinstance(record, Chunk):
+                self._less(min(left, MAX_RECORD_BYTES), record.uncompressed_size)
+                record.data = _unpacked(record.compression, record.data, record.uncompressed_size)
+                left, record.compression = self._less(left, len(record.data)), ""
+                parts = breakup_chunk(record)
+            for part in parts:
+                if type(part) in known:
+                    known[type(part)][part.id] = part
+                elif isinstance(part, Message) and (topics is None or channels[part.channel_id].topic in topics):
+                    channel = channels[part.channel_id]
+                    found = schemas.get(channel.schema_id), channel, part
+                    if isinstance(record, Chunk) and summary is not None:
+                        heappush(waiting, (part.log_time, next(order), found))
+                    else:
+                        yield found
+        while waiting:
+            yield heappop(waiting)[2]
 
 
 KINDS: dict[str, type[BagFile]] = {".db3": DatabaseFile, ".mcap": McapFile}
@@ -177,34 +254,63 @@ def _kind(path: Path) -> str:
     return Path(path.name.removesuffix(ZSTD)).suffix
 
 
-def _open_mcap(file: BinaryIO) -> tuple[Any, Any]:
-    """Reader of an MCAP file, and its index and counts: None where the recording was not closed."""
-    from mcap.reader import NonSeekingReader, SeekingReader
+def _from(file: BinaryIO, at: int) -> Iterator[Any]:
+    """Records of an MCAP file from a place on; chunks as they are."""
+    from mcap.stream_reader import StreamReader
 
+    file.seek(at)
+    records = StreamReader(file, skip_magic=at > 0, emit_chunks=True, record_size_limit=MAX_RECORD_BYTES).records
+    return iter(records)
+
+
+def _summary(file: BinaryIO) -> Any:
+    """Index and counts of an MCAP file; None where the recording was not closed."""
+    from mcap.records import Channel, ChunkIndex, Schema, Statistics
+    from mcap.summary import Summary
+
+    summary = Summary()
     with suppress(Exception):
-        indexed = SeekingReader(file, record_size_limit=MAX_RECORD_BYTES)
-        summary = indexed.get_summary()
-        if summary is not None and summary.statistics is not None:
-            return indexed, summary
-    file.seek(0)
-    return NonSeekingReader(file, record_size_limit=MAX_RECORD_BYTES), None
+        start = next(_from(file, file.seek(-FOOTER_BYTES, os.SEEK_END))).summary_start
+        for record in _from(file, start) if start else ():
+            if isinstance(record, Schema):
+                summary.schemas[record.id] = record
+            elif isinstance(record, Channel):
+                summary.channels[record.id] = record
+            elif isinstance(record, ChunkIndex):
+                summary.chunk_indexes.append(record)
+            elif isinstance(record, Statistics):
+                summary.statistics = record
+    return None if summary.statistics is None else summary
 
 
-def _unpack(path: Path, target: str) -> None:
-    """Write what a compressed file holds."""
-    from zstandard import ZstdDecompressor
+def _parts(file: BinaryIO, summary: Any, topics: Collection[str] | None) -> Iterator[tuple[int, Any]]:
+    """Chunks with messages of these topics by the time of their begin [ns]; without an index all records, and 0."""
+    chunks = () if summary is None else summary.chunk_indexes
+    for index in sorted(chunks, key=lambda index: (index.message_start_time, index.chunk_start_offset)):
+        held = {summary.channels[number].topic for number in index.message_index_offsets}
+        if topics is None or not held or held & set(topics):
+            yield index.message_start_time, next(_from(file, index.chunk_start_offset))
+    if not chunks:
+        yield from ((0, record) for record in _from(file, 0))
 
-    with path.open("rb") as packed, open(target, "wb") as file:
-        ZstdDecompressor().copy_stream(packed, file)
+
+def _unpacked(compression: str, data: bytes, most: int) -> bytes:
+    """Uncompressed data, or their first `most` bytes."""
+    if compression == "lz4":
+        from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]
+
+        return bytes(LZ4FrameDecompressor().decompress(data, max_length=most))
+    if compression == "zstd":
+        from zstandard import ZstdDecompressor
+
+        return bytes(ZstdDecompressor().stream_reader(data).read(most))
+    return data
 
 
-def _unpacked(data: bytes) -> bytes:
+def _message(data: bytes, most: int) -> bytes:
     """A message, uncompressed; one that cannot be unpacked is left as it is."""
-    if not data.startswith(ZSTD_MAGIC):
-        return data
-    from zstandard import ZstdError, decompress, get_frame_parameters
-
-    with suppress(ZstdError, MemoryError):
-        if get_frame_parameters(data).content_size <= MAX_RECORD_BYTES:
-            return decompress(data)
+    if data.startswith(ZSTD_MAGIC):
+        with suppress(Exception):
+            unpacked = _unpacked("zstd", data, most + 1)
+            return unpacked if len(unpacked) <= most else data
     return data

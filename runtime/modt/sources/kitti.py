@@ -5,19 +5,21 @@ Every reader raises a MisuseError where there are no scans, or a file is invalid
 
 from __future__ import annotations
 
+import re
 from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources import kitti_calibration, oxts
+from modt.sources.file_names import files_in, time_ns, times_ns
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_stream import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
@@ -26,13 +28,13 @@ from modt.types import Float64
 
 MAX_NUMBER_DIGITS = 10
 """Of names that are numbers of frames, not times."""
-NANOSECOND_DIGITS = 19
-"""Of names that are times since 1970 [ns]."""
 MAX_SWEEP_PERIODS = 2
 """Longer sweeps are taken for wrong time stamps."""
 NO_SWEEP_TIMES = "sweeps are not deskewed"
+NO_CAMERA = "no camera, no --fov camera"
 NO_POSES = "no odometry, ego-motion is estimated from the proposals"
 
+T = TypeVar("T")
 Poses = dict[int, Float64]
 """T_world_sensor by frame."""
 
@@ -48,7 +50,8 @@ class Notes:
 def raw_drive(drive: Path) -> ScanStream:
     """A raw drive, .../2011_09_26_drive_0005_sync, with the calibration of the day in the parent folder."""
     notes = Notes()
-    camera = _camera(kitti_calibration.camera_of_raw, drive.parent / "calib_cam_to_cam.txt", notes)
+    calib = drive.parent / "calib_cam_to_cam.txt"
+    camera = _optional(kitti_calibration.camera_of_raw, calib, notes.of_stream, NO_CAMERA)
     poses = _poses_of_raw(drive, notes)
     data = drive / "velodyne_points" / "data"
     frames, _ = _scans(data)
@@ -65,16 +68,15 @@ def tracking_sequence(scans: Path) -> ScanStream:
     root, number = scans.parent.parent, scans.name
     notes = Notes()
     calib = root / "calib" / f"{number}.txt"
-    camera = _camera(kitti_calibration.camera_of_sequence, calib, notes)
+    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, NO_CAMERA)
     records = root / "oxts" / f"{number}.txt"
     poses: Poses = {}
     if not records.is_file():
         notes.of_poses.append(f"{records} is missing: {NO_POSES}")
-    elif not calib.is_file():
-        notes.of_poses.append(f"{calib} is missing, and its Tr_imu_velo: {NO_POSES}")
     else:
-        T_imu_sensor = kitti_calibration.T_imu_sensor_of_sequence(calib)
-        poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
+        T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, notes.of_poses, NO_POSES)
+        if T_imu_sensor is not None:
+            poses = dict(enumerate(oxts.poses(oxts.read_records(records)) @ T_imu_sensor))
     name, turns = f"tracking {number}", dict.fromkeys(_scans(scans)[0], PERIOD_S)
     return _stream(name, "KITTI tracking", scans, camera, poses, {}, notes, sequence=int(number), turns=turns)
 
@@ -86,12 +88,14 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     """
     notes = Notes()
     calib = sequence / "calib.txt"
-    camera = _camera(kitti_calibration.camera_of_sequence, calib, notes)
+    cost = f"{NO_CAMERA}; get Tr from data_odometry_calib.zip"
+    camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, cost)
     places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
     found = next((p for p in places if p.is_file()), None)
     poses: Poses = {}
     if found is None or camera is None:
-        notes.of_poses.append(f"{places[0] if found is None else calib} is missing: {NO_POSES}")
+        lacking = f"{places[0]} is missing" if found is None else f"{found} needs the Tr of {calib}"
+        notes.of_poses.append(f"{lacking}: {NO_POSES}")
     else:
         poses = dict(enumerate(sensor_poses(read_poses(found), camera.T_camera_sensor)))
     times = sequence / "times.txt"
@@ -107,24 +111,23 @@ def odometry_sequence(sequence: Path) -> ScanStream:
 
 
 def scan_folder(folder: Path, period_s: float = PERIOD_S, suffix: str = ".bin") -> ScanStream:
-    """A folder of scans, ordered by name, period_s apart or at the nanoseconds that are their names."""
+    """A folder of scans in the order of their names, at the times that these are, or period_s apart."""
     indices, files = _scans(folder, suffix)
-    if all(f.stem.isdigit() and len(f.stem) == NANOSECOND_DIGITS for f in files):
-        apart, began = "stamped by their names", int(files[0].stem)
-        stamps = {i: (int(f.stem) - began) / 1e9 for i, f in zip(indices, files, strict=True)}
-    else:
-        apart, stamps = f"{period_s} s apart", {i: i * period_s for i in indices}
+    times = times_ns([f.stem for f in files])
+    apart = f"{period_s} s apart in the order of their names" if times is None else "stamped by their names"
+    stamps = {i: i * period_s if times is None else (times[k] - times[0]) / 1e9 for k, i in enumerate(indices)}
     notes = Notes([f"folder of scans: no calibration, frames {apart}"], [f"folder of scans: {NO_POSES}"])
     return _stream(folder.name, "folder of scans", folder, None, {}, stamps, notes, period_s=period_s, suffix=suffix)
 
 
 def _scans(data: Path, suffix: str = ".bin") -> tuple[list[int], list[Path]]:
-    """Indices and files of the scans of a folder, ordered by name."""
-    files = sorted(data.glob(f"*{suffix}"))
+    """Indices and files of the scans of a folder in their order."""
+    files = files_in(data, suffix)
     if not files:
         raise MisuseError(data, f"no {suffix} scans", "give a folder of scans")
-    numbered = all(f.stem.isdigit() and len(f.stem) <= MAX_NUMBER_DIGITS for f in files)
-    return [int(f.stem) for f in files] if numbered else list(range(len(files))), files
+    numbers = [int(f.stem) for f in files if re.fullmatch(f"[0-9]{{1,{MAX_NUMBER_DIGITS}}}", f.stem)]
+    numbered = len(set(numbers)) == len(files) and times_ns([f.stem for f in files]) is None
+    return numbers if numbered else list(range(len(files))), files
 
 
 def _stream(
@@ -142,9 +145,10 @@ def _stream(
     suffix: str = ".bin",
 ) -> ScanStream:
     indices, files = _scans(data, suffix)
-    gaps = sorted(set(range(indices[0], indices[-1] + 1)) - set(indices))
-    if gaps:
-        notes.of_stream.append(f"{len(gaps)} frames are missing (the first is {gaps[0]})")
+    missing = indices[-1] - indices[0] + 1 - len(indices)
+    if missing:
+        first = next(a + 1 for a, b in pairwise(indices) if b > a + 1)
+        notes.of_stream.append(f"{missing} frames are missing (the first is {first})")
     if poses:
         lost = [i for i in indices if i not in poses]
         if lost:
@@ -179,12 +183,13 @@ def _filled(poses: Poses, indices: list[int]) -> Poses:
 
 
 def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
-    records = sorted((drive / "oxts" / "data").glob("*.txt"))
-    calib = drive.parent / "calib_imu_to_velo.txt"
-    if not records or not calib.is_file():
-        notes.of_poses.append(f"{calib if records else drive / 'oxts' / 'data'} is missing: {NO_POSES}")
+    records = [r for r in files_in(drive / "oxts" / "data", ".txt") if re.fullmatch("[0-9]+", r.stem)]
+    if not records:
+        notes.of_poses.append(f"{drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
-    T_imu_sensor = kitti_calibration.T_imu_sensor_of_raw(drive.parent)
+    T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_raw, drive.parent, notes.of_poses, NO_POSES)
+    if T_imu_sensor is None:
+        return {}
     T_world_imu = oxts.poses(np.concatenate([oxts.read_records(r)[:1, : len(oxts.FIELDS)] for r in records]))
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
@@ -229,7 +234,7 @@ def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_o
         notes.of_stream.append(f"{path} is missing: {cost}")
         return {}
     lines = path.read_text(encoding="utf-8", errors="replace").rstrip().split("\n")
-    times = {i: time for i, time in enumerate(map(_time_ns, lines)) if time is not None}
+    times = {i: time for i, time in enumerate(map(time_ns, lines)) if time is not None}
     if not times:
         notes.of_stream.append(f"{path} is no list of time stamps: {cost}")
         return {}
@@ -244,18 +249,10 @@ def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_o
     return times
 
 
-def _time_ns(line: str) -> int | None:
-    """A time in KITTI's format [ns], None if invalid."""
-    second, _, fraction = line.partition(".")
+def _optional(read: Callable[[Path], T], path: Path, notes: list[str], cost: str) -> T | None:
+    """A calibration; None where its file or a row of it is missing, which is noted with its cost."""
     try:
-        whole = int(datetime.fromisoformat(second).replace(tzinfo=UTC).timestamp())
-        return whole * 10**9 + int(fraction[:9].ljust(9, "0"))
-    except ValueError:
+        return read(path)
+    except kitti_calibration.MissingError as error:
+        notes.append(f"{error.subject}: {error.cause}: {cost}")
         return None
-
-
-def _camera(read: Callable[[Path], Camera], calib: Path, notes: Notes) -> Camera | None:
-    if not calib.is_file():
-        notes.of_stream.append(f"{calib} is missing: no camera, no --fov camera")
-        return None
-    return read(calib)

@@ -1,6 +1,6 @@
 """KITTI calibration files: left colour camera and inertial unit, relative to the sensor.
 
-All readers raise a MisuseError where a file or a row is missing or invalid.
+All readers raise a MissingError where a file or a row is missing, a MisuseError where one is invalid.
 """
 
 from __future__ import annotations
@@ -21,8 +21,18 @@ MAX_ELEMENT = 1e6
 """Greatest number in a calibration [pixel or m]."""
 
 
+class MissingError(MisuseError):
+    """A calibration file or a row of it that is not there: a recording goes on without."""
+
+
 def read_table(path: Path) -> dict[str, Float64]:
-    """Numeric rows by key."""
+    """Numeric rows by key.
+
+    Raises:
+        MissingError: there is no such file.
+    """
+    if not path.is_file():
+        raise MissingError(path, "is missing", REMEDY)
     table: dict[str, Float64] = {}
     for line in read_lines(path, REMEDY):
         key, _, values = line.replace(":", " ", 1).partition(" ")
@@ -43,7 +53,7 @@ def matrix(table: dict[str, Float64], path: Path, shape: tuple[int, int], *keys:
             if not (np.abs(table[key]) <= MAX_ELEMENT).all():
                 raise MisuseError(path, f"{key} holds a number beyond {MAX_ELEMENT:g}", REMEDY)
             return table[key].reshape(shape)
-    raise MisuseError(path, f"no {' or '.join(keys)}", REMEDY)
+    raise MissingError(path, f"no {' or '.join(keys)}", REMEDY)
 
 
 def rigid(table: dict[str, Float64], path: Path) -> Float64:

@@ -95,16 +95,20 @@ def _header(path: Path, raw: bytes) -> tuple[Header, int]:
     said = {line[0].upper(): line[1:] for line in lines if line and not line[0].startswith("#")}
     try:
         names = tuple(name.lower() for name in said["FIELDS"])
-        kinds = [np.dtype(TYPES[t + s]) for t, s in zip(said["TYPE"], said["SIZE"], strict=True)]
-        counts = [int(count) for count in said.get("COUNT", ["1"] * len(names))]
+        kinds = tuple(np.dtype(TYPES[t + s]) for t, s in zip(said["TYPE"], said["SIZE"], strict=True))
+        counts = tuple(map(int, said.get("COUNT", ["1"] * len(names))))
         n_points = int(said["POINTS"][0]) if "POINTS" in said else int(said["WIDTH"][0]) * int(said["HEIGHT"][0])
         encoding = said["DATA"][0]
     except (KeyError, ValueError, IndexError):
         raise ScanError(path, "its header lacks a line, or one is broken", SKIPPED) from None
-    possible = 0 <= n_points <= MAX_POINTS and all(1 <= count <= MAX_COUNT for count in counts)
-    if not possible or not len(names) == len(kinds) == len(counts):
-        raise ScanError(path, "its header promises what no scan has", SKIPPED)
-    return Header(names, tuple(kinds), tuple(counts), n_points, encoding), end + 1
+    fields = [field for field in zip(names, kinds, counts, strict=False) if field[2]]  # others hold no bytes
+    odd = [f"{name} of COUNT {count}" for name, _, count in fields if not 0 < count <= MAX_COUNT]
+    odd += [] if 0 <= n_points <= MAX_POINTS else [f"{n_points} points"]
+    odd += [] if fields and len(names) == len(kinds) == len(counts) else ["lines of unlike length"]
+    if odd:
+        raise ScanError(path, f"its header promises what no scan has ({odd[0]})", SKIPPED)
+    names, kinds, counts = zip(*fields, strict=True)
+    return Header(names, kinds, counts, n_points, encoding), end + 1
 
 
 def _ascii(path: Path, header: Header, body: bytes) -> Mapping[str, NDArray[Any]]:

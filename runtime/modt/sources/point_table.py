@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modt.errors import ScanError
+from modt.ros2.point_cloud2 import reflectance_name
 from modt.types import UNRECORDED, Float32
 
-REFLECTANCE = ("reflectivity", "reflectance", "intensity", "i")
-"""Names of its column; the first one there is taken."""
 MAX_POINTS = 10_000_000
 """In a sweep; a header that promises more is wrong."""
 BYTE_MAX, WORD_MAX = 255, 65_535
@@ -34,7 +33,7 @@ def points_of(columns: Mapping[str, NDArray[Any]], origin: object) -> Float32:
     with np.errstate(over="ignore"):  # double coordinates beyond float32: infinite, which counts as no return
         for i, axis in enumerate("xyz"):
             points[:, i] = columns[axis]
-    name = next((name for name in REFLECTANCE if name in columns), None)
+    name = reflectance_name(columns)
     points[:, 3] = UNRECORDED if name is None else _reflectance(columns[name])
     return points
 

@@ -58,7 +58,7 @@ class PoseBuffer:
             return "early"
         if self.leaps(stamp_s, T):
             return "leap"
-        slack_m = self.config.position_noise_m + self.config.max_acceleration_mps2 * dt_s**2
+        slack_m = self.config.position_noise_m + self.config.max_acceleration_mps2 * dt_s * dt_s
         return "leap" if self._off_m(stamp_s, T) > slack_m else None
 
     def leaps(self, stamp_s: float, T: Float64) -> bool:
@@ -85,7 +85,8 @@ class PoseBuffer:
             return b.copy()
         if max(abs(stamp_s - t1), min(stamp_s, t1) - t0) > self.config.max_age_s:
             return None
-        return interpolate(a, b, (stamp_s - t0) / (t1 - t0))
+        T = interpolate(a, b, (stamp_s - t0) / (t1 - t0))
+        return None if stamp_s > t1 and self.leaps(stamp_s, T) else T
 
     def _ends(self, stamp_s: float) -> tuple[int, int] | None:
         """The poses around a time or, after the latest, it and the one as long before; twice the one at the time."""
@@ -137,8 +138,12 @@ class PoseSequence:
 
     def __init__(self, config: OdometryConfig) -> None:
         self.config = config
-        self.believed, self._doubted, self._votes = PoseBuffer(config), PoseBuffer(config), 0
         self.restarts = 0
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all poses; the next one is believed."""
+        self.believed, self._doubted, self._votes = PoseBuffer(self.config), PoseBuffer(self.config), 0
 
     def add(self, stamp_s: float, T: Float64, now_s: float) -> str | None:
         """Take in a (4, 4) pose, received before a frame of time now_s; why it is doubted, None if it is believed."""

@@ -12,8 +12,8 @@ from modt.sources.text_file import read_lines
 from modt.types import Float64
 
 N_ELEMENTS = 12
-MAX_DISTANCE_M = 1e5
-"""Greatest coordinate: beyond it float32, used in the association, is coarser than a centimetre."""
+MAX_DISTANCE_M = 1e8
+"""Greatest coordinate, of any frame of the Earth; float64 holds it to some nanometres."""
 MAX_SKEW = 0.01
 """Greatest element of R R' - I of a rotation; files hold at least six digits."""
 

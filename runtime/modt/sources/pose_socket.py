@@ -102,17 +102,15 @@ class PoseSocket(ReceivedPoses):
         """Close the socket and remove its file."""
         self._queue.close()
 
-    def _drain(self, now_s: float) -> None:
-        """Read what has arrived, the newest `capacity` datagrams: a flood must not delay the frame."""
+    def _take(self) -> list[bytes]:
+        """The newest `capacity` datagrams: a flood must not delay the frame."""
         taken, crowded_out = self._queue.take()
         self.received, self.overflowed = self.received + len(taken) + crowded_out, self._queue.overflowed
         if crowded_out:
             self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"), crowded_out)
-        for raw in taken:
-            try:
-                self._keep(*read_datagram(raw), now_s)
-            except DatagramError as error:
-                self._refuse(error)
+        return taken
+
+    _read = staticmethod(read_datagram)
 
 
 def open_socket(address: Address) -> socket.socket:

@@ -10,7 +10,7 @@ from modt.errors import MisuseError
 from modt.geometry import rotation_zyx, se3
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
-from modt.ros2.dds import Subscription, participant
+from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
 from modt.sources.pose_datagram import DatagramError
 from modt.sources.pose_file import pose_defect
@@ -27,18 +27,14 @@ class PoseTopic(ReceivedPoses):
         super().__init__(config, name)
         self._subscription, self._T_base_sensor = subscription, T_base_sensor
 
-    def _drain(self, now_s: float) -> None:
-        for message in self._subscription.take():
-            self.received += 1
-            try:
-                self._keep(*self._pose(message.data), now_s)
-            except DatagramError as error:
-                self._refuse(error)
+    def _take(self) -> list[Message]:
+        taken = self._subscription.take()
+        self.received += len(taken)
+        return taken
 
-    def _pose(self, message: bytes) -> tuple[float, Float64]:
-        """Stamp [s] and (4, 4) T_world_sensor."""
+    def _read(self, message: Message, /) -> tuple[float, Float64]:
         try:
-            odometry = read_odometry(message)
+            odometry = read_odometry(message.data)
         except MessageError as error:
             raise DatagramError(error.reason, str(error)) from None
         T = odometry.T_odom_child @ self._T_base_sensor

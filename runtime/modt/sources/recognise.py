@@ -61,6 +61,8 @@ def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
     """
     if not path.exists():
         raise MisuseError(path, "no such file or directory", REMEDY)
+    if path.suffix == ".bag":
+        raise MisuseError(path, "is a recording of ROS 1", "convert it: pip install rosbags, then rosbags-convert")
     path = path.resolve()
     stream = _stream(path, period_s)
     if stream is not None:
@@ -116,7 +118,7 @@ def _is_odometry(path: Path) -> bool:
 
 
 def _has_scans(path: Path, suffix: str = ".bin") -> bool:
-    return path.is_dir() and next(path.glob(f"*{suffix}"), None) is not None
+    return path.is_dir() and any(f.is_file() and not f.name.startswith(".") for f in path.glob(f"*{suffix}"))
 
 
 def _nearby(path: Path) -> list[Path]:

@@ -10,6 +10,7 @@ from modt.errors import ScanError
 from modt.types import UNRECORDED, Float32
 
 ROW_BYTES = 16
+MAX_BYTES = 256 << 20
 MAX_COORDINATE_M = 1000.0
 MAX_IMPLAUSIBLE_SHARE = 0.02
 """Greatest share of implausible rows in a valid scan."""
@@ -26,11 +27,16 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
         ScanError: missing, unreadable, empty, truncated, or of other columns.
     """
     try:
-        raw = path.read_bytes()
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise ScanError(path, f"cannot be read ({error.strerror})", "the frame is skipped") from None
     if not raw:
         raise ScanError(path, "empty scan", "the frame is skipped; record it again")
+    if len(raw) > MAX_BYTES:
+        raise ScanError(
+            path, f"larger than {MAX_BYTES >> 20} MiB", "the frame is skipped; it is no sweep of a sensor"
+        )
     return sanitised(READERS.get(path.suffix, _read_rows)(path, raw), path)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,12 +9,11 @@ from typing import Self
 
 from modt.errors import ModtError, ScanError
 from modt.sources.scan_file import read_scan
-from modt.sources.stream import MAX_KEPT_FAULTS, Fault, Faults, StreamInfo
+from modt.sources.stream import Fault, Faults, StreamInfo
 from modt.types import Float64, Frame
 
 PERIOD_S = 0.1
 """Time between scans that have no stamps [s]."""
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +56,4 @@ class ScanStream:
         return type(self)(self.info, [s for s in self.scans if s.index >= first and (last is None or s.index < last)])
 
     def _fault(self, scan: ScanReference, cause: str, *, skipped: bool) -> None:
-        if self.faults.add(Fault(scan.index, str(scan.path), cause, skipped)):
-            more = "; later faults are only counted" if self.faults.count == MAX_KEPT_FAULTS else ""
-            log.warning("%s: %s%s%s", scan.path, cause, "; frame skipped" if skipped else "", more)
+        self.faults.report(Fault(scan.index, str(scan.path), cause, skipped), str(scan.path))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol, Self
 
 from modt.geometry import Camera
 from modt.types import Frame
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,16 @@ class Fault:
     skipped: bool  # the whole scan is skipped
 
 
+MAX_STAMP_S = 1e11
+"""Three thousand years: a stamp beyond it is no time in seconds."""
+
+
+def unit_of(ratio: float) -> str:
+    """Unit of a time that is so many times another one in seconds; empty where it is none."""
+    units = {1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+    return next((name for factor, name in units.items() if abs(ratio / factor - 1.0) < 0.02), "")
+
+
 MAX_KEPT_FAULTS = 20
 """Faults kept; later ones are only counted."""
 
@@ -58,6 +71,12 @@ class Faults:
         if kept:
             self.first.append(fault)
         return kept
+
+    def report(self, fault: Fault, place: str) -> None:
+        """Count a fault, and log it where it is kept; `place` is its subject for the log."""
+        if self.add(fault):
+            more = "; later faults are only counted" if self.count == MAX_KEPT_FAULTS else ""
+            log.warning("%s: %s%s%s", place, fault.cause, "; frame skipped" if fault.skipped else "", more)
 
 
 class Stream(Protocol):

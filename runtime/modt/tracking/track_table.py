@@ -16,6 +16,7 @@ class TrackTable(Tracks):
 
     last_class: Int = column(int)  # when the frame began
     kdop: Float64 = column(float, 8)  # last observed [m, world]
+    lagged_kdop: Float64 = column(float, 8)  # which follows the last observed with a lag [m, world]
     envelope: Float64 = column(float, 8, fill=-np.inf)  # of all observed, slowly decaying, about the position [m]
     mean_kdop: Float64 = column(float, 8)  # about the position; an end that jumped begins anew [m]
     end_variance: Float64 = column(float, 4)  # of the position along each axis, by ends that disagreed [m2]

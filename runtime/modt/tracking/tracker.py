@@ -17,6 +17,7 @@ from modt.tracking.fragments import NoReunion, Reunion
 from modt.tracking.kalman import HEADING, SPEED, components_first, standstill_of, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.merging import CarMerging
+from modt.tracking.motion import observe_motion
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.splitting import ExpectedSplitting
 from modt.tracking.states import Event, StateMachine
@@ -124,13 +125,14 @@ class Tracker:
             The live table, into which later stages write their columns; the proposals; and which tracks want a class.
         """
         self._forget(stamp_s)
-        self._predict(stamp_s)
+        dt_s = self._predict(stamp_s)
         matches = self.association.match(self._tracks, located.observations)
         matches = self._reunion.reunite(self._tracks, located.observations, matches)
         frame = Associated(proposals, located.observations, matches)
         for regrouping in self.regroupings:
             frame = regrouping.regroup(self._tracks, frame, located.placement)
         self._update(frame.matches, frame.observations)
+        observe_motion(self._tracks, frame.matches.rows, dt_s)
         self._observe_rest(frame.matches.rows)
         self._coast(frame.matches.rows)
         self._withdraw()
@@ -174,8 +176,8 @@ class Tracker:
         if lapse_s > most_s:
             self.background_map.clear()
 
-    def _predict(self, stamp_s: float) -> None:
-        """Equation 1, over the time since the last frame."""
+    def _predict(self, stamp_s: float) -> float:
+        """Equation 1, over the time since the last frame, which is returned [s]."""
         dt_s = self._lapse_s(stamp_s)
         self._stamp_s = stamp_s
         t, noise = self._tracks, self.config.filter
@@ -184,6 +186,7 @@ class Tracker:
         t.last_class = t.object_class
         x, P = components_first(t.x, t.P)
         t.x, t.P = tracks_first(*kalman.predict(x, P, dt_s, noise.acceleration_sigma_mps2, noise.turn_sigma_radps))
+        return dt_s
 
     def _update(self, matches: Matches, observations: Observations) -> None:
         """Equation 1's filter on the matched positions; the proposals take over the standing of their tracks."""
@@ -290,6 +293,8 @@ class Tracker:
         t.P[new] = self._P_new
         t.age[new] = t.hits[new] = 1
         t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
+        t.lagged_kdop[new] = t.kdop[new]
+        observe_motion(t, new, 0.0)
 
 
 def _oversized(object_class: Int, kdop: Float64) -> Int:

@@ -7,9 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from modt.reporting.page import THEME
 from modt.viewer import look
-from modt.viewer.look import REACH_M
+from modt.viewer.look import REACH_M, THEME
 from modt.viewer.point_cells import SIDE
 from modt.viewer.track_rows import COLUMNS, SCALE
 

@@ -127,7 +127,21 @@ class _Handler(BaseHTTPRequestHandler):
     server: LiveServer
     timeout = SEND_S
 
+    def handle(self) -> None:
+        """Answer; one that has not asked for anything after SEND_S, however slowly it writes, is left."""
+        self.late = threading.Timer(SEND_S, self._leave)
+        self.late.start()
+        try:
+            super().handle()
+        finally:
+            self.late.cancel()
+
+    def _leave(self) -> None:
+        with suppress(OSError):
+            self.connection.shutdown(socket.SHUT_RDWR)
+
     def do_GET(self) -> None:
+        self.late.cancel()
         name = self.headers.get("Host", "").rpartition(":")[0] or self.headers.get("Host", "")
         if self.server.names is not None and name not in self.server.names:
             self.send_error(403, "another host")

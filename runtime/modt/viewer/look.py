@@ -6,10 +6,24 @@ from collections.abc import Iterable, Sequence
 
 from modt.classes import CLASS_NAMES, CLASSES
 from modt.energy.ledger import STAGES
-from modt.reporting.page import COLOURS
 
 Entry = dict[str, str]
 """`name` and `colour` of a line of a legend."""
+
+COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a", "#3a97a6")
+LIGHT = {"ink": "#1c2430", "soft": "#5d6876", "line": "#d8dde4", "paper": "#ffffff", "panel": "#f6f8fa"}
+DARK = {"ink": "#e4e8ee", "soft": "#9aa6b5", "line": "#38424f", "paper": "#151a21", "panel": "#1d242d"}
+
+
+def _variables(theme: dict[str, str]) -> str:
+    return ":root{" + ";".join(f"--{name}:{colour}" for name, colour in theme.items()) + "}"
+
+
+THEME = f"""
+{_variables(LIGHT)}
+@media (prefers-color-scheme:dark){{{_variables(DARK)}}}
+"""
+"""Colours of pages, for light and dark screens."""
 
 REACH_M = 45.0
 """Half of the width that is shown [m]."""
@@ -24,7 +38,6 @@ _STATE_COLOURS = {
     "lost_classified": COLOURS[3],
     "lost_unclassified": COLOURS[6],
 }
-STATES = tuple(_STATE_COLOURS)
 
 
 def classes() -> list[Entry]:
@@ -35,12 +48,6 @@ def classes() -> list[Entry]:
 def states(names: Iterable[str]) -> list[Entry]:
     """Of states: waiting ones grey, final ones green, those in doubt orange, lost ones violet or ochre."""
     return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
-
-
-def truth() -> dict[str, Entry]:
-    """Of what became of labelled objects, and of tracks that are said to be what they are not."""
-    colours = {"found": COLOURS[7], "missed": "#d6177f", "not judged": _GREY, "false": "#e07b00"}
-    return {name: {"name": name, "colour": colour} for name, colour in colours.items()}
 
 
 def stages(names: Sequence[str] = STAGES) -> list[Entry]:

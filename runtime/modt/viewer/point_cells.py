@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from modt.config import ProfileConfig
-from modt.geometry import FieldOfView
-from modt.segmentation.grids import PointColumns
-from modt.segmentation.segmenter import Segmenter
 from modt.types import Float32, Int
 
 SIDE = 4096
 """Cells of the grid along x and along y: three bytes count them all."""
-STEP_CM = 4
-"""Least width of a cell."""
 LEVEL_M = 0.1
 LEVELS = 64
 """Heights above ground are whole multiples of LEVEL_M below LEVELS; level 0 is ground."""
@@ -41,26 +34,6 @@ class Cells:
                 kept[group] = rows[np.linspace(0, len(rows), room, endpoint=False).astype(np.int64)]
         rows = np.sort(np.concatenate(kept))
         return Cells(self.cell[rows], self.level[rows])
-
-
-class Grid:
-    """Sweeps to cells, in which the segmenter of a profile says what is ground."""
-
-    def __init__(self, config: ProfileConfig) -> None:
-        self._segmenter = Segmenter(config.segmentation, config.sensor, FieldOfView())
-        self._clearance_m = config.segmentation.clearance_m
-        self._range_m = config.sensor.max_range_m
-        self.step_cm = max(STEP_CM, math.ceil(200 * self._range_m / SIDE))
-
-    def cells(self, points: Float32) -> Cells:
-        """Cells of (N, 4) points; those beyond the range of the sensor count as none."""
-        sweep = PointColumns.from_array(points)
-        height = self._segmenter.ground.height_above(sweep, self._segmenter.sensor_height_m(points))
-        sweep_range = sweep.sqrt_range**2
-        used = (sweep_range > 0) & (sweep_range < self._range_m)
-        level = np.clip(np.rint(height[used] / LEVEL_M), 1, LEVELS - 1).astype(np.int64)
-        level[height[used] <= self._clearance_m] = 0
-        return occupied(sweep.x[used], sweep.y[used], level, self.step_cm)
 
 
 def occupied(x: Float32, y: Float32, level: Int, step_cm: int) -> Cells:

@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -85,3 +87,9 @@ def test_all_files_of_a_detector_share_a_scale(tmp_path):
     assert one(quiet).score.tolist() != [0.25]
     assert [d.score.tolist() for d in read([quiet, busy])] == [[0.25], [0.5, 7.0]]
     assert [d.name for d in read([quiet, busy])] == ["0", "1"]
+
+
+def test_a_folder_s_files_are_regular_ones(tmp_path):
+    (tmp_path / "0001.txt").write_text("")
+    os.mkfifo(tmp_path / "0002.txt")
+    assert [file.name for file in files(tmp_path)] == ["0001.txt"]

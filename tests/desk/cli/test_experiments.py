@@ -34,7 +34,7 @@ def test_results_are_written_as_a_table_and_a_document(results):
 
 
 def test_charts_are_drawn_with_the_extra(results, tmp_path):
-    pytest.importorskip("matplotlib", reason="extra 'report' is not installed")
+    pytest.importorskip("matplotlib", reason="extra 'view' is not installed")
     name = "budget-2-simulated-drives-average-precision"
     picture = (results / f"{name}.svg").read_text()
     assert "accurate, AP car" in picture
@@ -45,7 +45,7 @@ def test_without_the_extra_there_are_no_charts(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("modt_desk.cli.experiments.find_spec", lambda name: None)
     words = ["evaluate", "--experiment", "budget", "--simulated", "1", "--seconds", "0.2", "--out", str(tmp_path)]
     assert main(words) == 0
-    assert "modt[report]" in capsys.readouterr().err
+    assert "modt[view]" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results.csv", "results.md"]
 
 

@@ -9,14 +9,14 @@ from modt.config import EnergyConfig, WindowConfig
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions, Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
-from modt.reporting.energy_plots import stage_energy_mJ
-from modt.reporting.page import document_page
-from modt.reporting.quantity import to_json
 from modt.types import UNLIMITED, Frame
 from modt_desk.comparison.compare_report import Basis, compare_tree
 from modt_desk.comparison.compare_view import compare_document, compare_plots
 from modt_desk.comparison.comparison import ModeRun, interleave
-from tests.reporting.test_run_report import KINDS, figures
+from modt_desk.reporting.energy_plots import stage_energy_mJ
+from modt_desk.reporting.page import document_page
+from modt_desk.reporting.quantity import to_json
+from tests.desk.reporting.test_run_report import KINDS, figures
 from tests.results import CAR, result
 
 MODES = ("conventional", "efficient", "accurate")
@@ -75,6 +75,9 @@ def mode_run(name, metered):
     board = Board()
     ledger = Ledger(lambda: board.now_ns, lambda: board.cpu_ns)
     windows = Windows([board], board.clocks(), Conditions(), WindowConfig(min_s=0.1)) if metered else None
+    for _ in range(2 if windows else 0):  # its power is known
+        board.work(100)
+        windows.close()
     steps = Steps(board, ledger, EVERY[name])
     return ModeRun(steps, ledger, lambda index: UNLIMITED, windows)
 

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 
 from modt.energy.meters.meter import Kind
-from modt.energy.savings import UnitCosts
 from modt.pipeline import STAGES
-from modt.reporting.quantity import Quantity, format_number, quantity, to_json
 from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.gamma import RunCosts, estimate_gamma, mean, unit_costs
+from modt_desk.energy.savings import UnitCosts
+from modt_desk.reporting.quantity import Quantity, format_number, quantity, to_json
 
 TRUE = UnitCosts(seg=5e-3, track=1e-3, class_call=8e-4, class_item=2e-5, class_point=1.7e-6)
 FRAMES, N = 120, 50

@@ -7,12 +7,12 @@ from xml.etree import ElementTree
 import pytest
 
 from modt.errors import MisuseError
-from modt.reporting.page import document_page
-from modt.reporting.quantity import estimate, quantity, to_json
-from modt.reporting.svg import HEIGHT, LEFT, WIDTH
 from modt_desk.comparison.compare_report import SCHEMA
 from modt_desk.comparison.regimes import BLIND, regimes_tree
 from modt_desk.comparison.regimes_view import regimes_document, regimes_plots
+from modt_desk.reporting.page import document_page
+from modt_desk.reporting.quantity import estimate, quantity, to_json
+from modt_desk.reporting.svg import HEIGHT, LEFT, WIDTH
 
 
 def write(folder, name, share, gamma, predicted=None, **changed):

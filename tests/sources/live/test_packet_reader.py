@@ -12,10 +12,12 @@ import pytest
 
 from modt.errors import MisuseError
 from modt.schemes import open_sensor
+from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.velodyne import VelodyneDecoder
+from modt.sources.stream import StreamInfo
 from tests.sources.packets.simulated import packets
 from tools.send.loops import velodyne_loop
 from tools.send.packets import send
@@ -37,6 +39,11 @@ def to(port):
         yield sender
 
 
+def now():
+    """A time within some seconds of the present one."""
+    return pytest.approx(time.time(), abs=5.0)
+
+
 class EchoDecoder:
     """Each packet is a sweep."""
 
@@ -53,10 +60,10 @@ def test_a_group_is_joined_and_what_is_none_is_refused(port):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         if probe.connect_ex(("239.7.7.7", port)):
             pytest.skip("no route to a multicast group")
-    reader = PacketReader(bound_socket("sensor", port, "239.7.7.7"), EchoDecoder(), clock=lambda: 7.0)
+    reader = PacketReader(bound_socket("sensor", port, "239.7.7.7"), EchoDecoder())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(b"packet", ("239.7.7.7", port))
-    assert reader.read(5.0) == [(7.0, b"packet")]
+    assert reader.read(5.0) == [(now(), b"packet")]
     reader.close()
     for group in ("10.0.0.1", "nowhere"):
         with pytest.raises(MisuseError, match=f"group {group} cannot be joined"):
@@ -64,12 +71,64 @@ def test_a_group_is_joined_and_what_is_none_is_refused(port):
 
 
 def test_what_is_received_from_the_sensor_is_decoded_at_once(port, to):
-    reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "127.0.0.1", clock=lambda: 7.0)
+    reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "127.0.0.1")
     to.send(b"packet")
-    assert reader.read(5.0) == [(7.0, b"packet")]
+    assert reader.read(5.0) == [(now(), b"packet")]
     assert reader.read(0.0) == []
     reader.close()
     assert (reader.reception.messages, reader.reception.refused) == (1, {})
+
+
+def test_packets_are_as_of_when_the_kernel_received_them(port, to):
+    reader = PacketReader(bound_socket("sensor", port), EchoDecoder())
+    for _ in range(20):  # the kernel begins to take times a little after it was asked to
+        to.send(b"packet")
+        sent_s = time.time()
+        time.sleep(0.3)
+        ((received_s, _),) = reader.read(5.0)
+        if received_s - sent_s < 0.2:
+            break
+    reader.close()
+    assert abs(received_s - sent_s) < 0.2
+
+
+def test_packets_that_waited_for_a_stopped_process_are_discarded(port, to, caplog):
+    later_s = [6.0]
+    reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), clock=lambda: time.time() + later_s[0])
+    to.send(b"old")
+    assert reader.read(0.2) == []
+    later_s[0] = 0.0
+    to.send(b"new")
+    assert [payload for _, payload in reader.read(5.0)] == [b"new"]
+    reader.close()
+    assert sum(reader.reception.refused.values()) == 1
+    assert "packet refused: late: this process was stopped" in caplog.text
+
+
+class PoisonedDecoder(EchoDecoder):
+    """Fails at some packets."""
+
+    def decode(self, received_s, payload, reception):
+        if payload == b"poison":
+            raise IndexError(payload)
+        return super().decode(received_s, payload, reception)
+
+
+def test_a_packet_that_the_decoder_fails_at_costs_itself(port, to, caplog):
+    info = StreamInfo("sensor", "packets", 0, None, 0.1, None, has_poses=False)
+    live = LiveStream(info, PacketReader(bound_socket("sensor", port), PoisonedDecoder()))
+    got = []
+    live._put = got.append
+    live.start()
+    for payload in (b"first", b"poison", b"poison", b"last"):
+        to.send(payload)
+    until_s = time.monotonic() + 10
+    while len(got) < 2 and time.monotonic() < until_s:
+        time.sleep(0.01)
+    live.close()
+    assert [payload for _, payload in got] == [b"first", b"last"]
+    assert live.health()["refused_messages"] == {"failed (IndexError)": 2}
+    assert caplog.text.count("a message is left out") == 1
 
 
 def test_packets_of_another_address_are_refused(port, to):

@@ -3,9 +3,11 @@
 import struct
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from modt.errors import MisuseError
-from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture
+from modt.sources.packets.capture import COOKED, COOKED_2, ETHERNET, MAX_RECORD_BYTES, RAW_IP, Capture, Fragments
 from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
 
 PAYLOADS = [b"first", b"", bytes(range(256)) * 5]
@@ -57,6 +59,52 @@ def test_fragments_are_put_together_in_any_order(tmp_path):
     other = ipv4(udp(b"between", 7502))
     frames = [ethernet(p) for p in (parts[2], parts[0], other, parts[1], parts[0])]
     assert payloads(file_of(tmp_path / "a.pcap", frames)) == [b"between", whole[8:]]
+
+
+SOURCE = bytes.fromhex("fe80000000000000000000000000c901")
+
+
+def ipv6(payload, *, kind=17):
+    head = struct.pack(">IHBB", 6 << 28, len(payload), kind, 64)
+    return head + SOURCE + bytes.fromhex("ff020000000000000000000000000001") + payload
+
+
+def framed(packet):
+    return bytes(12) + b"\x86\xdd" + packet
+
+
+@pytest.mark.parametrize(
+    ("link", "frame"),
+    [
+        (ETHERNET, framed(ipv6(udp(b"payload", 2368))) + b"padding"),
+        (ETHERNET, bytes(12) + b"\x81\x00\x00\x05\x86\xdd" + ipv6(udp(b"payload", 2368))),
+        (RAW_IP, ipv6(udp(b"payload", 2368))),
+        (COOKED, bytes(14) + b"\x86\xdd" + ipv6(udp(b"payload", 2368))),
+        (
+            ETHERNET,
+            framed(ipv6(bytes((60, 0)) + bytes(6) + bytes((17, 1)) + bytes(14) + udp(b"payload", 2368), kind=0)),
+        ),
+    ],
+    ids=["Ethernet", "VLAN", "raw IP", "cooked", "extensions"],
+)
+def test_datagrams_over_ipv6(tmp_path, link, frame):
+    (datagram,) = Capture(file_of(tmp_path / "a.pcap", [frame], link=link))
+    assert (datagram.source, datagram.port, datagram.payload) == ("fe80::c901", 2368, b"payload")
+
+
+def test_fragments_over_ipv6(tmp_path):
+    whole = udp(bytes(i % 251 for i in range(4000)), 7502)
+    parts = [
+        ipv6(struct.pack(">BBHI", 17, 0, i | (i + 1480 < len(whole)), 9) + whole[i : i + 1480], kind=44)
+        for i in range(0, 4008, 1480)
+    ]
+    frames = [framed(p) for p in (parts[2], parts[0], parts[1])]
+    assert payloads(file_of(tmp_path / "a.pcap", frames)) == [whole[8:]]
+
+
+@given(st.binary(max_size=200), st.sampled_from([0x45, 0x60, 0x6F]))
+def test_any_bytes_are_a_packet_or_none(raw, first):
+    Fragments().whole(bytes([first]) + raw)
 
 
 def test_what_is_no_datagram_is_passed_over(tmp_path):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError
+from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.ouster import OusterDecoder
 from tests.sources.packets.simulated import bearing_deg, decoded, equal
@@ -128,3 +129,24 @@ def test_what_is_no_metadata_is_refused(tmp_path, text):
         OusterDecoder("sensor", path)
     with pytest.raises(MisuseError, match="cannot be read"):
         OusterDecoder("sensor", tmp_path / "nowhere.json")
+
+
+def test_a_sensor_that_was_switched_on_again_is_still_the_one_of_the_metadata(timed, metadata):
+    whole, _ = decoded(OusterDecoder("sensor", metadata), timed)
+    again = [(at_s, p[:4] + b"\x01\x02\x03" + p[7:]) for at_s, p in timed]  # the number of its initialisation
+    sweeps, reception = decoded(OusterDecoder("sensor", metadata), again)
+    assert equal(sweeps, whole)
+    assert reception.refused == {}
+    decoder, sweeps = OusterDecoder("sensor", metadata), []
+    for at_s, payload in [*timed[:128], *again[128:]]:
+        sweeps += decoder.decode(at_s, payload, reception)
+    assert [len(s.points) for s in sweeps] == [len(s.points) for s in whole]
+
+
+def test_a_frame_sent_twice_is_no_negative_loss(timed, metadata):
+    decoder, reception = OusterDecoder("sensor", metadata), Reception()
+    for k, (at_s, payload) in enumerate(timed[:64]):
+        if k == 63:
+            decoder._last_id = decoder._frame.frame_id
+        decoder.decode(at_s, payload, reception)
+    assert reception.lost == 0

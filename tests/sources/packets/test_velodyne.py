@@ -344,3 +344,57 @@ def test_points_are_those_of_another_decoder(kitti_root, name, median_m, n_sweep
     distance, _ = cKDTree(np.concatenate([s.points[:, :3] for s in sweeps])).query(theirs)
     assert np.median(distance) < median_m
     assert np.quantile(distance, 0.9) < 5 * median_m
+
+
+def test_another_model_is_adopted_once_the_one_before_is_silent(caplog):
+    other = packets("hdl-64e", 2)[:20]
+    later = [(at_s + 5.0, payload) for at_s, payload in packets("vlp-16", 20)]
+    decoder = VelodyneDecoder("sensor")
+    sweeps, reception = decoded(decoder, [*other, *later])
+    assert decoder.profile == "vlp-16"
+    assert decoder._own is None  # no calibration of the other is looked for
+    assert len(sweeps) >= 17
+    assert reception.refused["of another model than the packets before"] == 20
+    assert "packets are of another model, and those of the one before have ended" in caplog.text
+
+
+def test_another_model_beside_the_first_changes_nothing():
+    timed = packets("vlp-16", 20)
+    whole, _ = decoded(VelodyneDecoder("sensor"), timed)
+    mixed = sorted([*timed, *packets("hdl-64e", 5)[30:]])
+    decoder = VelodyneDecoder("sensor")
+    sweeps, _ = decoded(decoder, [*timed[:20], *[t for t in mixed if t not in timed[:20]]])
+    assert decoder.profile == "vlp-16"
+    assert equal(sweeps, whole)
+
+
+def at_time(payload, time_us):
+    return payload[:1200] + struct.pack("<I", int(time_us)) + payload[1204:]
+
+
+def test_a_turn_holds_no_more_packets_than_a_sensor_sends():
+    timed = packets("vlp-16", 5)
+    decoder, reception = VelodyneDecoder("sensor"), Reception()
+    for at_s, payload in timed[:130]:
+        decoder.decode(at_s, payload, reception)
+    began_us, last_us = (struct.unpack_from("<I", timed[k][1], 1200)[0] for k in (80, 129))
+    for k in range(3000):
+        within_us = began_us + (last_us - began_us) * (0.1 + 0.8 * (k * 0.618 % 1))
+        decoder.decode(timed[129][0], at_time(timed[100][1], within_us), reception)
+    assert len(decoder._turn.entries) <= decoder._most < 500
+    assert reception.refused["more than a turn has; do several sensors send to this port?"] > 2000
+    sweeps = [s for at_s, p in timed[130:] for s in decoder.decode(at_s, p, reception)]
+    assert len(sweeps) >= 2  # the sensor's own packets go on
+
+
+def test_lost_packets_are_never_negative():
+    decoder, reception = VelodyneDecoder("sensor"), Reception()
+    lost = 0
+    for k, (at_s, payload) in enumerate(packets("vlp-16", 8)):
+        stamp_us = struct.unpack_from("<I", payload, 1200)[0]
+        if k % 200 == 199:  # ever so slightly after the last, in a turn that has lasted for too long
+            decoder._longest_s = 0.0
+            stamp_us -= 1300
+        decoder.decode(at_s, at_time(payload, stamp_us), reception)
+        assert reception.lost >= lost
+        lost = reception.lost

@@ -32,14 +32,14 @@ from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
-from modt.reporting.run_report import run_tree
 from modt.segmentation.ground import HeightEstimator
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sources.pose_socket import PoseSocket
 from modt.types import Frame
+from modt_desk.reporting.run_report import run_tree
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
-from tests.reporting.test_run_report import write_run
+from tests.desk.reporting.test_run_report import write_run
 from tests.results import result
 from tools.docs.profile_keys import condition
 
@@ -142,7 +142,7 @@ def noisy_clock(config: ProfileConfig, _folder: Path) -> str:
     ns = np.random.default_rng(0).integers(200_000, 1_400_000, 100_000).cumsum().tolist()
     clock = iter(ns).__next__
     with mock.patch.object(assembly, "time", type("Clock", (), {"thread_time_ns": clock})):
-        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 1.5), cpu_ns=clock)
+        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 1.0), cpu_ns=clock)
 
 
 def model_without_frequency(config: ProfileConfig, _folder: Path) -> str:

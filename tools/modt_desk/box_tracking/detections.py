@@ -19,6 +19,7 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.errors import MisuseError
 from modt.geometry import wrap
+from modt.sources.file_names import files_in
 from modt.sources.text_file import read_lines
 from modt.types import Bool, Float64, Int
 from modt_desk.evaluation.kitti_labels import MAX_FRAME
@@ -71,7 +72,7 @@ def files(path: Path) -> list[Path]:
     Raises:
         MisuseError: the folder has none.
     """
-    found = sorted(path.glob("*.txt")) if path.is_dir() else [path]
+    found = files_in(path, ".txt") if path.is_dir() else [path]
     if not found:
         raise MisuseError(path, "no .txt files", "give a file of detections, or a folder of them")
     return found

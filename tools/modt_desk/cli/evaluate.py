@@ -63,7 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
     if len(sensors) > 1:
         sensors["all sensors"] = evaluation([rows for found in by_sensor.values() for rows in found])
     if arguments.html is not None:
-        from modt.reporting.page import save
+        from modt_desk.reporting.page import save
         from modt_desk.viewer.evaluation_page import evaluation_page
 
         save(arguments.html, evaluation_page(sensors))

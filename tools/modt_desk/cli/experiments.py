@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
             for experiment in experiments:
                 draw(out, experiment, [row for row in rows if row.experiment == experiment.name])
         else:
-            print("modt: no charts; pip install 'modt[report]' to have them", file=sys.stderr)
+            print("modt: no charts; pip install 'modt[view]' to have them", file=sys.stderr)
     print(f"{len(rows)} figures: {out / 'results.md'}, {out / 'results.csv'}")
     return 0
 

@@ -180,7 +180,7 @@ def _semantickitti(export: Export, target: Path) -> None:
 
 def _csv(export: Export, target: Path) -> None:
     from modt.sinks.output import LineFile
-    from modt.sinks.track_table import HEADER, track_rows
+    from modt_desk.cli.export_table import HEADER, track_rows
 
     with closing(LineFile[str](target)) as file:
         file.write(HEADER)

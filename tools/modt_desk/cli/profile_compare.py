@@ -36,12 +36,12 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app import inputs, metering
     from modt.app.chosen_profile import choose
     from modt.energy.meters.meter import Conditions, Kind
-    from modt.reporting.page import document_page, save
-    from modt.reporting.quantity import to_json
     from modt_desk.comparison.compare_report import Basis, compare_tree
     from modt_desk.comparison.compare_view import compare_document, compare_plots
     from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
+    from modt_desk.reporting.page import document_page, save
+    from modt_desk.reporting.quantity import to_json
 
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)

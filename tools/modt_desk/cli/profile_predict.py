@@ -33,11 +33,11 @@ def run(arguments: argparse.Namespace) -> int:
 
     from modt.app import inputs
     from modt.app.chosen_profile import choose
-    from modt.reporting.quantity import to_json
     from modt.sinks.output import writing
     from modt_desk.comparison.mode_runs import identity, observe
     from modt_desk.comparison.prediction import forecast
     from modt_desk.comparison.prediction_report import prediction_document, prediction_tree, read_calibration
+    from modt_desk.reporting.quantity import to_json
 
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)

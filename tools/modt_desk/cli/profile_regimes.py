@@ -20,10 +20,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 def run(arguments: argparse.Namespace) -> int:
     """Report."""
-    from modt.reporting.page import document_page, save
-    from modt.reporting.quantity import to_json
     from modt_desk.comparison.regimes import regimes_tree
     from modt_desk.comparison.regimes_view import regimes_document, regimes_plots
+    from modt_desk.reporting.page import document_page, save
+    from modt_desk.reporting.quantity import to_json
 
     tree = regimes_tree(arguments.comparisons)
     document = regimes_document(tree)

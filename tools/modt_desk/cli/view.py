@@ -47,8 +47,8 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: no run, a frame that is not recorded, a file of another kind, or a missing extra.
         ModtError: the file cannot be written.
     """
-    from modt.viewer.point_cells import Grid
     from modt_desk.viewer.recorded_run import RecordedRun
+    from modt_desk.viewer.sweeps import Grid
 
     directory = arguments.run_directory
     if arguments.track is not None:
@@ -73,7 +73,7 @@ def tell(arguments: argparse.Namespace) -> int:
         MisuseError: no run, or no such track.
         ModtError: the file cannot be written.
     """
-    from modt.reporting.page import save
+    from modt_desk.reporting.page import save
     from modt_desk.viewer.recorded_run import RecordedRun
     from modt_desk.viewer.track_page import rows_of, track_page, views
 

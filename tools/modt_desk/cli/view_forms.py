@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from modt.sources.stream import Stream
-    from modt.viewer.point_cells import Cells, Grid
+    from modt.viewer.point_cells import Cells
     from modt_desk.viewer.recorded_run import RecordedRun
+    from modt_desk.viewer.sweeps import Grid
 
 PLAYER, PICTURE, PIXELS, GIF, MP4 = ".html", ".svg", ".png", ".gif", ".mp4"
 PICTURE_WIDTH, FILM_WIDTH = 1280, 960

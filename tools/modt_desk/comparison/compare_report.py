@@ -10,15 +10,15 @@ import numpy as np
 
 from modt.config import EnergyConfig
 from modt.energy.attribution import EnergySums, usable_windows
-from modt.energy.meters.meter import Facts, Kind
-from modt.energy.savings import OtherCosts, UnitCosts, reconcile
+from modt.energy.meters.meter import Facts, Kind, worst
 from modt.pipeline import CLASSIFICATION, ODOMETRY, SEGMENTATION, STAGES, TRACKING
 from modt.reporting.histogram import Histogram
-from modt.reporting.quantity import Quantity, estimate, quantity
-from modt.reporting.reconciliation import reconciliation_tree
 from modt.types import Float64
 from modt_desk.comparison import gamma
 from modt_desk.comparison.comparison import COUNTS, ModeRun, Repetition, total
+from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
+from modt_desk.reporting.quantity import Quantity, estimate, quantity
+from modt_desk.reporting.reconciliation import reconciliation_tree
 
 SCHEMA = "modt.compare/3"
 _COUNTING = "Energy is assumed power times CPU time: the reconciliation tests counts and unit costs, not the physics."
@@ -58,7 +58,7 @@ def compare_tree(
         for mode in modes[1:]
     }
     meter, board = basis.meter, basis.board
-    metered = all(e["net_J"].kind is not Kind.ESTIMATED for e in energy.values())
+    metered = all(e["gross_J"].kind is not Kind.ESTIMATED for e in energy.values())
     return {
         "schema": SCHEMA,
         **about,
@@ -94,11 +94,12 @@ def _energy(
         gross_J = np.array([line["energy_J"] for line in good])
         net_J = gross_J - basis.board.idle_W * 1e-9 * np.array([line["wall_ns"] for line in good])
 
-        def per_frame(energy_J: Float64) -> Quantity:
+        def per_frame(energy_J: Float64, kind: Kind) -> Quantity:
             bounds = gamma.interval(len(good), lambda k: float(energy_J[k].sum() / max(frames[k].sum(), 1)), random)
-            return quantity(float(energy_J.sum() / frames.sum()), "J", Kind(good[0]["kind"]), bounds)
+            return quantity(float(energy_J.sum() / frames.sum()), "J", kind, bounds)
 
-        return {"net_J": per_frame(net_J), "gross_J": per_frame(gross_J)}
+        kind = worst(Kind(line["kind"]) for line in good)
+        return {"net_J": per_frame(net_J, Kind.ESTIMATED), "gross_J": per_frame(gross_J, kind)}
     net_J = basis.board.active_W * run.cost.sum(axis=1)
     gross_J = net_J + basis.board.idle_W * basis.period_s
     return {key: gamma.mean(J, "J", Kind.ESTIMATED, random) for key, J in (("net_J", net_J), ("gross_J", gross_J))}
@@ -132,16 +133,16 @@ def _saving(found: gamma.GammaEstimate, energy1: dict[str, Quantity], energy2: d
     net, gross = ((energy1[key].value, energy2[key].value) for key in ("net_J", "gross_J"))
     gamma_net, gamma_gross = (a / b if a is not None and b else None for a, b in (net, gross))
     saved_J = None if net[0] is None or net[1] is None else net[0] - net[1]
-    kind, reconciled = energy1["net_J"].kind, found.reconciliation
+    reconciled = found.reconciliation
     return reconciliation_tree(reconciled, found.measured.value) | {
         "short_form_error": estimate(reconciled.paper.short_form_error),
         "gamma_reconciled": found.reconciled,
         "gamma_measured_cpu": found.measured,
-        "gamma_net": quantity(gamma_net, "", kind),
-        "gamma_gross": quantity(gamma_gross, "", energy1["gross_J"].kind),
+        "gamma_net": estimate(gamma_net),
+        "gamma_gross": quantity(gamma_gross, "", worst(e["gross_J"].kind for e in (energy1, energy2))),
         "deviation_net": estimate(reconciled.model.gamma / gamma_net - 1.0 if gamma_net else None),
         "deviation": found.deviation,
-        "saved_J": quantity(saved_J, "J", kind),
+        "saved_J": estimate(saved_J, "J"),
     }
 
 

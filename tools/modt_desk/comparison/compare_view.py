@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from modt.energy.meters.meter import Kind
-from modt.reporting import energy_plots, svg
-from modt.reporting.document import Document, Table
-from modt.reporting.page import Plot
 from modt_desk.comparison.prediction_report import against_table
+from modt_desk.reporting import energy_plots, svg
+from modt_desk.reporting.document import Document, Table
+from modt_desk.reporting.page import Plot
 
 
 def compare_document(tree: dict[str, Any]) -> Document:
@@ -19,7 +19,7 @@ def compare_document(tree: dict[str, Any]) -> Document:
     for mode, s in tree["savings"].items():
         energy = f"gamma {s['gamma_net'].marked()} without idling, {s['gamma_gross'].marked()} with idling"
         results += [
-            (f"{mode}: gamma measured", s["gamma_measured_cpu"], _verdict(s)),
+            (f"{mode}: gamma of CPU time", s["gamma_measured_cpu"], _verdict(s)),
             (f"{mode}: energy saved a frame", s["saved_J"].scaled(1e3, "mJ"), f"{energy}{_against_meter(s)}"),
         ]
     about = [
@@ -68,7 +68,7 @@ def _verdict(saving: dict[str, Any]) -> str:
 def _against_meter(saving: dict[str, Any]) -> str:
     deviation, calibrated = saving["deviation_net"].value, saving["gamma_calibrated"]
     text = "" if calibrated.value is None else f"; gamma by calibrated joules is {calibrated.marked()}"
-    if saving["gamma_net"].kind is Kind.ESTIMATED or deviation is None:
+    if saving["gamma_gross"].kind is Kind.ESTIMATED or deviation is None:
         return text
     return f"{text}; deviation of the reconciliation {100 * deviation:+.1f} % against the meter"
 
@@ -77,7 +77,7 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
     """Plots over frames, over N_go and over the life of tracks."""
     series, modes = tree["series"], tree["modes"]
     base, *others = series
-    basis = energy_plots.basis(modes[base]["net_J"])
+    basis = energy_plots.basis(modes[base]["gross_J"])
     energy_mJ = {mode: energy_plots.stage_energy_mJ(series[mode]) for mode in series}
     sums_mJ = {mode: np.sum([*parts.values()], axis=0) for mode, parts in energy_mJ.items()}
     points = {mode: (modes[mode]["N_go"], s["gamma_measured_cpu"]) for mode, s in tree["savings"].items()}
@@ -85,8 +85,8 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
     classified = [svg.Trace(mode, frames, np.array(series[mode]["classified"], float)) for mode in series]
     return [
         energy_plots.cumulative_energy(sums_mJ, np.ones(len(frames)), f"E1: {base}; {basis}"),
-        energy_plots.gamma_curve(tree["unit_costs"]["a"], modes[base]["proposals"], points, "dots: measured"),
+        energy_plots.gamma_curve(tree["unit_costs"]["a"], modes[base]["proposals"], points, "dots: of CPU time"),
         *(energy_plots.stage_energy(f"{mode}: energy by stage", mJ, frames, basis) for mode, mJ in energy_mJ.items()),
         *(energy_plots.life_histogram(f"{mode}: life of tracks", series[mode]["lives"]) for mode in others),
-        ("Classifications a frame", svg.lines(classified, "frame", "classified"), "measured"),
+        ("Classifications a frame", svg.lines(classified, "frame", "classified"), "counted"),
     ]

@@ -11,11 +11,11 @@ import numpy as np
 
 from modt.classes import ObjectClass
 from modt.energy.ledger import Ledger, Line
-from modt.energy.savings import Counts
 from modt.energy.windows import Windows
 from modt.pipeline import CLASSIFICATION, STAGES, Fusion, Pipeline
 from modt.reporting.histogram import Histogram
 from modt.types import NONE, Bool, Budget, Float64, Frame, FrameResult, Int, Proposals, Tracks
+from modt_desk.energy.savings import Counts
 
 COUNTS = tuple(f.name for f in fields(Counts) if f.name != "frames")
 """Columns of a run's counts."""

@@ -9,12 +9,12 @@ from typing import Self
 import numpy as np
 
 from modt.energy.meters.meter import Kind
-from modt.energy.nonnegative import nonnegative_fit
-from modt.energy.savings import OtherCosts, Reconciliation, UnitCosts, reconcile
-from modt.reporting.quantity import Quantity, estimate, quantity
-from modt.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
 from modt.types import Float64, Int
 from modt_desk.comparison.comparison import COUNTS, ModeRun, total
+from modt_desk.energy.nonnegative import nonnegative_fit
+from modt_desk.energy.savings import OtherCosts, Reconciliation, UnitCosts, reconcile
+from modt_desk.reporting.quantity import Quantity, estimate, quantity
+from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
 
 _BLOCK = 8
 """Frames resampled together, since neighbouring frames are correlated."""

@@ -1,7 +1,7 @@
 """Energy of the modes on a stream before any of them has run on it.
 
 What a unit of work costs, and how often a track is classified, comes from other streams; from the stream itself comes
-what tracking alone sees. Unlike the reconciliation (modt.energy.savings) it can be wrong.
+what tracking alone sees. Unlike the reconciliation (modt_desk.energy.savings) it can be wrong.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Self
 import numpy as np
 from scipy import stats
 
-from modt.energy.equations import EnergyModel
-from modt.energy.nonnegative import nonnegative_fit
-from modt.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
 from modt.types import Float64, Int
 from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.gamma import RunCosts, blocks
+from modt_desk.energy.equations import EnergyModel
+from modt_desk.energy.nonnegative import nonnegative_fit
+from modt_desk.reporting.reconciliation import CLASS, SCHEDULE, SEG, TRACK
 
 Runs = dict[str, RunCosts]
 """A stream's runs: tracking-by-detection first, the run of varied load last, the modes between."""

@@ -12,14 +12,14 @@ import numpy as np
 from modt.app.assembly import MODES
 from modt.errors import MisuseError
 from modt.pipeline import STAGES
-from modt.reporting.document import Document, Table
-from modt.reporting.quantity import Quantity, estimate, from_json
 from modt.sinks.records import records_of
 from modt.types import Int
 from modt_desk.comparison.compare_report import SCHEMA as COMPARE_SCHEMA
 from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.gamma import RunCosts
 from modt_desk.comparison.prediction import OBSERVED, Forecast, Stream
+from modt_desk.reporting.document import Document, Table
+from modt_desk.reporting.quantity import Quantity, estimate, from_json
 
 SCHEMA = "modt.prediction/1"
 _SEEN = (*OBSERVED, *(f"asked_{k}" for k in range(len(MODES) - 1)))

@@ -8,9 +8,9 @@ from typing import Any
 
 from modt.errors import MisuseError
 from modt.pipeline import CLASSIFICATION
-from modt.reporting.quantity import Quantity, from_json, quantity
 from modt_desk.comparison.compare_report import SCHEMA as COMPARE_SCHEMA
 from modt_desk.comparison.prediction_report import read_tree
+from modt_desk.reporting.quantity import Quantity, from_json, quantity
 
 SCHEMA = "modt.regimes/1"
 FORMULAS = {"gamma = N_go": "gamma_short", "Equation 3": "gamma_equation_3"}

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from modt.reporting import svg
-from modt.reporting.document import Cell, Document, Table
-from modt.reporting.page import Plot
-from modt.reporting.quantity import Quantity, quantity
 from modt.types import Float64
 from modt_desk.comparison.regimes import BLIND, FORMULAS
+from modt_desk.reporting import svg
+from modt_desk.reporting.document import Cell, Document, Table
+from modt_desk.reporting.page import Plot
+from modt_desk.reporting.quantity import Quantity, quantity
 
 _ABOUT = (
     "gamma = N_go and Equation 3 take the counts and costs of the runs themselves; a blind prediction "

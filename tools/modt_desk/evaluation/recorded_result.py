@@ -33,6 +33,7 @@ def recorded_result(record: dict[str, Any]) -> FrameResult:
     tracks.state[:] = [names.index(row["state"]) for row in rows]
     tracks.object_class[:] = [CLASS_NAMES.index(row["class"]) for row in rows]
     tracks.posterior[:] = np.array([row["posterior"] for row in rows]).reshape(tracks.posterior.shape)
+    tracks.witness[:] = np.array([row["witness"] for row in rows]).reshape(tracks.witness.shape)
     tracks.key_points[:] = [row["viewed"] for row in rows]
     tracks.final[:] = [row["final"] for row in rows]
     tracks.proposal[:] = [NONE if row["proposal"] is None else row["proposal"] for row in rows]

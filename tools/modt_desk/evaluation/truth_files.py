@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
+from modt.sources.file_names import files_in
 from modt.sources.kitti_calibration import camera_of_sequence
 from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_scans
@@ -60,7 +62,8 @@ def open_truth(path: Path, run_path: Path | None = None, *, paper: bool = False)
             raise MisuseError(path, "holds several sequences", "give the label file, label_02/NNNN.txt")
         return open_truth(sequence, run_path, paper=paper)
     if (path / "label_2").is_dir():
-        frames = {int(file.stem): _object_frame(file, types) for file in sorted((path / "label_2").glob("*.txt"))}
+        files = [file for file in files_in(path / "label_2", ".txt") if re.fullmatch("[0-9]+", file.stem)]
+        frames = {int(file.stem): _object_frame(file, types) for file in files}
         return Truth(frames, _scans(path / "velodyne", run_path), KITTI_RULES)
     scans = _scans(path / SCANS, run_path)
     if (path / CUBOIDS).is_file():

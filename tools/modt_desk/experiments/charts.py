@@ -1,4 +1,4 @@
-"""Charts of experiments, drawn by Matplotlib (extra `report`)."""
+"""Charts of experiments, drawn by Matplotlib (extra `view`)."""
 
 from __future__ import annotations
 

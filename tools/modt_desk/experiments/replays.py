@@ -53,7 +53,7 @@ class NetworkReplay:
 
     def _results(self, known: SegmentedDrive) -> Iterator[tuple[FrameResult, SegmentedFrame]]:
         pipeline = self._pipeline(known)
-        budget = replace(assembly.MODES[self.mode].budget(self.config), cpu_ms=None)
+        budget = replace(assembly.MODES[self.mode].budget(self.config), mean_ms=None)
         for made in known.frames:
             frame = made.frame if self.poses else replace(made.frame, T_world_sensor=None)
             yield pipeline.step(frame, budget), made

@@ -18,15 +18,15 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from modt.geometry import corners
-from modt.reporting.page import LIGHT
 from modt.sinks.tracks import BOX_KEYS
 from modt.types import Float64
 from modt.viewer import look
-from modt.viewer.look import REACH_M
+from modt.viewer.look import LIGHT, REACH_M
 from modt.viewer.point_cells import SIDE, Cells
 from modt.viewer.track_rows import COLUMNS, SCALE
 from modt_desk.viewer.extent import RINGS_M, reach_m
 from modt_desk.viewer.recorded_run import RecordedRun
+from modt_desk.viewer.truth_marks import LEGEND
 
 SIZE_IN = (12.8, 9.1)
 TRAIL = 30
@@ -94,7 +94,7 @@ def _tracks(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     false = is_object & np.isin(of["id"], run.frames[at].get("false", ()))
     names = [entry["name"] for entry in look.classes()]
     fill = to_rgba_array([entry["colour"] for entry in look.classes()])[kind]
-    wrong = look.truth()["false"]["colour"]
+    wrong = LEGEND["false"]["colour"]
     edge = to_rgba_array([entry["colour"] for entry in look.states(run.states)])[of["state"].astype(int)]
     box, xy = corners(np.stack([of[key] for key in BOX_KEYS], axis=1)), np.column_stack([of["x"], of["y"]])
     boxes = PolyCollection(box, gid="tracks", linestyles=np.where(of["seen"] > 0, "-", "--").tolist())
@@ -126,7 +126,7 @@ def _truth(axes: Axes, run: RecordedRun, at: int) -> list[Label]:
     labels = []
     for o in run.frames[at].get("truth", ()):
         box = corners(np.array([[o["x"], o["y"], 0.0, o["l"], o["w"], 0.0, o["yaw"]]]))[0]
-        colour, missed = look.truth()[o["outcome"]]["colour"], o["outcome"] == "missed"
+        colour, missed = LEGEND[o["outcome"]]["colour"], o["outcome"] == "missed"
         axes.add_patch(Polygon(box, fill=False, edgecolor=colour, linewidth=3.0 if missed else 1.2, linestyle=":"))
         if missed:
             labels.append((o["x"], box[:, 1].max(), f"missed {look.classes()[o['class']]['name']}", colour))
@@ -159,7 +159,7 @@ def _caption(axes: Axes, run: RecordedRun, at: int) -> Text:
 
 def _legend(axes: Axes, run: RecordedRun, at: int) -> Legend:
     """Colours of the classes, the states and, where the frame has truth, of what became of it."""
-    outlines = look.states(run.states) + (list(look.truth().values()) if "truth" in run.frames[at] else [])
+    outlines = look.states(run.states) + (list(LEGEND.values()) if "truth" in run.frames[at] else [])
     entries = [(entry, True) for entry in look.classes()] + [(entry, False) for entry in outlines]
     patches = [Patch(fill=f, color=e["colour"], linewidth=2, label=e["name"].replace("_", " ")) for e, f in entries]
     style = {"facecolor": PAPER, "edgecolor": "none", "labelcolor": SOFT, "fontsize": _TEXT_PT}

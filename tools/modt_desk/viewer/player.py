@@ -13,6 +13,7 @@ from modt.viewer.packed import packed_cells, packed_table
 from modt.viewer.point_cells import Cells
 from modt_desk.viewer.extent import reach_m
 from modt_desk.viewer.recorded_run import RecordedRun
+from modt_desk.viewer.truth_marks import LEGEND
 
 POINT_BYTES = 20_000_000
 """Of the points of a page, about."""
@@ -59,7 +60,7 @@ def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any
     judged = any("truth" in frame for frame in run.frames)
     return content(look.states(run.states), run.budget, step_cm) | {
         "frames": frames,
-        "truth": look.truth() if judged else None,
+        "truth": LEGEND if judged else None,
         "reach_m": reach_m(run.tracks),
         "start": start,
     }

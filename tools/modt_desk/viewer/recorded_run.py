@@ -11,6 +11,7 @@ import numpy as np
 
 from modt import profile
 from modt.config import ProfileConfig
+from modt.energy.attribution import usable
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
@@ -21,7 +22,8 @@ from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA, recorded_pose
 from modt.types import Float64, Int
-from modt.viewer.track_rows import frame_rows, planar, track_table
+from modt.viewer.track_rows import planar
+from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
 COUNTS: dict[str, Callable[[Any], Any]] = {
     "frame": int,
@@ -136,7 +138,7 @@ def _costs(ledger: Path) -> dict[int, dict[str, Any]]:
         costs[line["frame"]] = {"cpu_ms": {name: s["cpu_ns"] / 1e6 for name, s in line["stages"].items()}}
     for window in read_records(ledger, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}):
         first, last, n = window["frames"]
-        if n and window["energy_J"] is not None:
+        if n and usable(window):
             energy = {"energy_mJ": 1e3 * window["energy_J"] / n, "kind": window["kind"]}
             for frame in range(first, last + 1):
                 if frame in costs:

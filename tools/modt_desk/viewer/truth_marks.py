@@ -11,6 +11,7 @@ from modt.geometry import inverse, transform_boxes
 from modt.sinks.tracks import BOX_KEYS
 from modt.sources.stream import Stream
 from modt.types import NONE, Float32, Int
+from modt.viewer.look import COLOURS, Entry
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.overlap import inside
 from modt_desk.evaluation.rows import Rows
@@ -19,6 +20,9 @@ from modt_desk.evaluation.truth import FrameTruth, Truth
 
 MARGIN_M = 0.02
 """Around the boxes of proposals, which are rounded."""
+_OUTCOMES = {"found": COLOURS[7], "missed": "#d6177f", "not judged": COLOURS[5], "false": "#e07b00"}
+LEGEND: dict[str, Entry] = {name: {"name": name, "colour": colour} for name, colour in _OUTCOMES.items()}
+"""What became of labelled objects; `false`: tracks that are said to be what they are not."""
 DRAWN = [BOX_KEYS.index(key) for key in ("x", "y", "l", "w", "yaw")]
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from modt.energy.meters.meter import (
     Candidate,
@@ -23,14 +25,19 @@ from modt.energy.meters.meter import (
 )
 from modt.errors import MisuseError
 
+if TYPE_CHECKING:
+    from modt.energy.meters.boards import Board
+
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
+_SAME_J = 1e-3
+"""Difference of two readings up to which they may be of one counter [J]."""
 
 
 def find_powercap(sys: Path) -> list[Candidate]:
     """RAPL packages, the platform counter, SCMI; and every zone left out, with the reason.
 
-    Nested zones are left out, since the outer one includes them; so is the memory-mapped duplicate of a package, and
-    all but the top zones of SCMI.
+    Nested zones are left out, since the outer one includes them; so is a memory-mapped zone beside the same package,
+    a zone that shows the counter of another one, and all but the top zones of SCMI.
     """
     root = sys / "class" / "powercap"
     zones = sorted(p for p in root.glob("*:*") if p.is_dir())
@@ -38,15 +45,17 @@ def find_powercap(sys: Path) -> list[Candidate]:
         cause = "no zone under /sys/class/powercap"
         remedy = "use bare metal with the intel_rapl_msr or arm_scmi_powercap module; virtual machines have none"
         return [Candidate("powercap", (), cause, remedy)]
+    labels = {zone.name: text_or_none(zone / "name") or "unnamed" for zone in zones}
+    registers = {label for name, label in labels.items() if not name.startswith("intel-rapl-mmio")}
     packages: list[Meter] = []
     found: list[Candidate] = []
     for zone in zones:
-        label = text_or_none(zone / "name") or "unnamed"
+        label = labels[zone.name]
         name = f"powercap {zone.name} ({label})"
-        if zone.name.startswith("intel-rapl-mmio"):
-            found.append(Candidate(name, (), "the same package again", "none needed: its duplicate is used"))
-        elif zone.name.count(":") > 1:
+        if zone.name.count(":") > 1:
             found.append(Candidate(name, (), f"counted by {zone.name.rpartition(':')[0]}", "none needed"))
+        elif zone.name.startswith("intel-rapl-mmio") and label in registers:
+            found.append(Candidate(name, (), "the same package again", "none needed: its duplicate is used"))
         elif not (zone / "energy_uj").exists() and (zone / "power_uw").exists():
             found.append(probe(name, (_scmi(zone, name),), "make its power_uw readable"))
         elif label == "psys":
@@ -55,54 +64,92 @@ def find_powercap(sys: Path) -> list[Candidate]:
             packages.append(_rapl(zone, name, Scope.CPU))
         else:
             found.append(Candidate(name, (), "of unknown extent", "none: its scope is not documented"))
-    if packages:
-        found.insert(0, probe("RAPL packages", tuple(packages), _RAPL_REMEDY))
-    return found
+    return _counters("RAPL packages", packages, _RAPL_REMEDY) + found
+
+
+def _counters(name: str, meters: list[Meter], remedy: str) -> list[Candidate]:
+    """The sum of the counters; beside it each that shows another's: every reading lies between two of the other."""
+    try:
+        pairs = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
+    except MeterLostError:
+        pairs = []
+    found, own = list[Candidate](), list[int]()
+    for k, meter in enumerate(meters):
+        same = (j for j in own if pairs and all(a[j] - _SAME_J <= a[k] <= b[j] + _SAME_J for a, b in pairs))
+        twin = next(same, None)
+        if twin is None:
+            own.append(k)
+        else:
+            cause = f"shows the counter of {meters[twin].facts.name}"
+            found.append(Candidate(meter.facts.name, (), cause, "none needed: it is counted once"))
+    return [probe(name, tuple(meters[k] for k in own), remedy), *found] if meters else []
 
 
 def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
     """An energy counter that wraps at the range of its zone."""
-    facts = Facts(
-        name=name,
-        unit="uJ",
-        resolution=61e-6,
-        max_W=1000.0,
-        scope=scope,
-        kind=Kind.MEASURED,
-        wrap_J=1e-6 * (number_or_none(zone / "max_energy_range_uj") or 0.0) or None,
-        privilege="root since Linux 5.10",
-    )
+    range_J = 1e-6 * (number_or_none(zone / "max_energy_range_uj") or 0.0) or None
+    facts = Facts(name, "uJ", 61e-6, 1000.0, scope, Kind.MEASURED, range_J, "root since Linux 5.10")
     return file_meter(facts, zone / "energy_uj")
 
 
 def _scmi(zone: Path, name: str) -> Meter:
-    facts = Facts(name=name, unit="uW", resolution=1e-3, max_W=1000.0, scope=Scope.SOC, kind=Kind.INTEGRATED)
-    return file_meter(facts, zone / "power_uw")
+    return file_meter(Facts(name, "uW", 1e-3, 1000.0, Scope.SOC, Kind.INTEGRATED), zone / "power_uw")
 
 
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
-_INPUT_RAILS = ("VDD_IN", "POM_5V_IN", "VIN_SYS_5V0", "VIN", "5V_IN")
-"""Rails that feed all others on boards known to be wired so."""
+_PART_SHARE = 1.1
+"""Sum of the parts over their whole, above which the one or the other is wrong: they are read one after the other."""
 
 
 def find_hwmon(sys: Path) -> list[Candidate]:
-    """AMD sockets, then every rail: rails may feed one another, so none are summed."""
+    """AMD sockets, then every rail; rails may feed one another, so that only a known board's are summed."""
     folders = sorted((sys / "class" / "hwmon").glob("hwmon*"), key=lambda p: (len(p.name), p.name))
     sockets: list[Meter] = []
-    rails: list[Meter] = []
+    rails: dict[str, Meter] = {}
     for folder in folders:
         chip = text_or_none(folder / "name")
         if chip == "amd_energy":
             sockets += _sockets(folder)
         elif chip in _INA_CHIPS:
-            rails += _rails(folder, chip)
-    found = [probe(rail.facts.name, (rail,), "make the chip's inputs readable") for rail in rails]
-    if sockets:
-        found.insert(0, probe("AMD sockets", tuple(sockets), "run as root, or chmod a+r its energy inputs"))
+            found_here = _rails(folder, chip)
+            rails |= {f"{label} of {folder.name}" if label in rails else label: m for label, m in found_here.items()}
+    found = _counters("AMD sockets", sockets, "run as root, or chmod a+r its energy inputs")
+    if rails:
+        found += _rails_of_board(text_or_none(sys / "firmware/devicetree/base/model") or "", rails)
     if not found:
         remedy = "wire an INA219, INA226 or INA3221 into the supply and load its driver"
         found.append(Candidate("hwmon", (), "no power monitor and no energy counter under /sys/class/hwmon", remedy))
     return found
+
+
+def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
+    """Each rail by itself; the module of a known board is the one that feeds the others, or the sum of several."""
+    from modt.energy.meters.boards import board_of  # for those that have rails
+
+    remedy, board = "make the chip's inputs readable", board_of(model, rails)
+    found = [] if board is None else [_module(board, rails, remedy)]
+    for label, meter in rails.items():
+        if board is None or board.whole != (label,):
+            own = _scoped(meter, Scope.CPU_RAIL) if board is not None and label == board.cpu else meter
+            found.append(probe(own.facts.name, (own,), remedy))
+    return found
+
+
+def _module(board: Board, rails: dict[str, Meter], remedy: str) -> Candidate:
+    whole = tuple(_scoped(rails[label], Scope.MODULE) for label in board.whole)
+    summed = f"{board.name} module ({' + '.join(board.whole)})"
+    module = probe(summed if len(whole) > 1 else whole[0].facts.name, whole, remedy)
+    parts = [rails[label] for label in board.parts if label in rails]
+    try:
+        beyond = sum(m.read() for m in parts) > _PART_SHARE * sum(m.read() for m in whole)
+    except MeterLostError:
+        return module
+    cause = "less than the rails that it feeds"
+    return replace(module, why_not=cause, remedy="check shunts and labels") if beyond else module
+
+
+def _scoped(meter: Meter, scope: Scope) -> Meter:
+    return replace(meter, facts=replace(meter.facts, scope=scope))
 
 
 def _channels(folder: Path, prefix: str) -> list[int]:
@@ -115,40 +162,27 @@ def _sockets(folder: Path) -> list[Meter]:
     sockets = []
     for n in _channels(folder, "energy"):
         if (text_or_none(folder / f"energy{n}_label") or "").startswith("Esocket"):
-            facts = Facts(
-                name=f"hwmon amd_energy socket {n}",
-                unit="uJ",
-                resolution=15.3e-6,
-                max_W=1000.0,
-                scope=Scope.CPU,
-                kind=Kind.MEASURED,
-                privilege="root",
-            )
+            name = f"hwmon amd_energy socket {n}"
+            facts = Facts(name, "uJ", 15.3e-6, 1000.0, Scope.CPU, Kind.MEASURED, privilege="root")
             sockets.append(file_meter(facts, folder / f"energy{n}_input"))
     return sockets
 
 
-def _rails(folder: Path, chip: str) -> list[Meter]:
-    """Enabled channels with a current, by their own power where the chip computes it, else by voltage x current.
+def _rails(folder: Path, chip: str) -> dict[str, Meter]:
+    """Enabled and connected channels, by label; the power that the chip computes, else voltage x current.
 
-    The sum channel of an INA3221 is not a rail.
+    The fourth channel of an INA3221 is the sum of the others.
     """
-    rails = []
+    rails = {}
     for n in _channels(folder, "curr"):
         voltage, current, power = (folder / f"{prefix}{n}_input" for prefix in ("in", "curr", "power"))
         label = text_or_none(folder / f"in{n}_label") or f"{folder.name} channel {n}"
-        if text_or_none(folder / f"in{n}_enable") == "0" or not voltage.exists() or label.startswith("sum"):
+        if n > 3 or text_or_none(folder / f"in{n}_enable") == "0" or not voltage.exists() or label == "NC":
             continue
         computed = power.exists()
-        facts = Facts(
-            name=f"hwmon {chip} {label}",
-            unit="uW" if computed else "mV x mA",
-            resolution=5e-3,  # 1 mA at 5 V
-            max_W=500.0,
-            scope=Scope.BOARD if label in _INPUT_RAILS else Scope.SOC if "CPU" in label else Scope.RAIL,
-            kind=Kind.INTEGRATED,
-        )
-        rails.append(file_meter(facts, *((power,) if computed else (voltage, current))))
+        unit, step_W = "uW" if computed else "mV x mA", 5e-3  # 1 mA at 5 V
+        facts = Facts(f"hwmon {chip} {label}", unit, step_W, 500.0, Scope.RAIL, Kind.INTEGRATED)
+        rails[label] = file_meter(facts, *((power,) if computed else (voltage, current)))
     return rails
 
 
@@ -166,14 +200,8 @@ def _battery(folder: Path) -> Meter:
     """Power drawn from a battery while it discharges."""
     power = folder / "power_now"
     computed = power.exists()
-    facts = Facts(
-        name=f"battery {folder.name}",
-        unit="uW" if computed else "uV x uA",
-        resolution=0.01,
-        max_W=2000.0,
-        scope=Scope.ROBOT,
-        kind=Kind.INTEGRATED,
-    )
+    unit = "uW" if computed else "uV x uA"
+    facts = Facts(f"battery {folder.name}", unit, 0.01, 2000.0, Scope.ROBOT, Kind.INTEGRATED)
     if computed:
         drawn = file_meter(facts, power)
     else:
@@ -188,18 +216,9 @@ def _battery(folder: Path) -> Meter:
     return Meter(facts, read)
 
 
-_RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=([0-9.]+)[AV]")
-
-
-_FACTS = Facts(
-    name="Raspberry Pi 5 PMIC",
-    unit="V x A",
-    resolution=0.02,  # from the width of the converter
-    max_W=50.0,
-    scope=Scope.BOARD,
-    kind=Kind.INTEGRATED,
-    privilege="group video",
-)
+_RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=(\S*)[AV](?!\S)")
+_STEP_W = 0.02  # from the width of the converter
+_FACTS = Facts("Raspberry Pi 5 PMIC", "V x A", _STEP_W, 50.0, Scope.MODULE, Kind.INTEGRATED, privilege="group video")
 
 
 def find_pmic(command: str = "vcgencmd") -> list[Candidate]:
@@ -211,14 +230,16 @@ def find_pmic(command: str = "vcgencmd") -> list[Candidate]:
     path = shutil.which(command)
     if path is None:
         return [Candidate(_FACTS.name, (), f"no {command} here", "on a Raspberry Pi 5, install raspi-utils")]
-    meter = Meter(_FACTS, lambda: rail_power_W(_adc_text(path)))
+    rails: set[str] = set()
+    meter = Meter(_FACTS, lambda: rail_power_W(_adc_text(path), rails))
     return [probe(_FACTS.name, (meter,), "on a Raspberry Pi 5, add the user to group video")]
 
 
 def _adc_text(command: str) -> str:
     """Currents and voltages of the rails, as the command prints them."""
+    arguments = [command, "pmic_read_adc"]
     try:
-        done = subprocess.run([command, "pmic_read_adc"], capture_output=True, text=True, timeout=2.0, check=False)
+        done = subprocess.run(arguments, capture_output=True, text=True, errors="replace", timeout=2.0, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise MeterLostError(f"{command}: {error}") from None
     if done.returncode:
@@ -227,22 +248,28 @@ def _adc_text(command: str) -> str:
     return done.stdout
 
 
-def rail_power_W(text: str) -> float:
-    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`."""
+def rail_power_W(text: str, known: set[str]) -> float:
+    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`; the same rails every time."""
     amperes: dict[str, float] = {}
     volts: dict[str, float] = {}
     for rail, quantity, value in _RAIL_VALUE.findall(text):
-        (amperes if quantity == "A" else volts)[rail] = float(value)
+        try:
+            (amperes if quantity == "A" else volts)[rail] = float(value)
+        except ValueError:
+            raise MeterLostError(f"pmic_read_adc: {rail} is {value[:20]!r}, not a number") from None
     rails = amperes.keys() & volts.keys()
     if not rails:
         raise MeterLostError("pmic_read_adc shows no rail with voltage and current (only a Raspberry Pi 5 does)")
+    if missing := known - rails:
+        raise MeterLostError(f"pmic_read_adc lacks {min(missing)}")
+    known |= rails
     return sum(amperes[rail] * volts[rail] for rail in sorted(rails))
 
 
 FINDERS = (find_powercap, find_hwmon, find_batteries)
 """Searches of a mount point of sysfs; each returns the candidates of one type of meter."""
 _KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
-_SCOPES = (Scope.CPU, Scope.SOC, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
+_SCOPES = (Scope.CPU, Scope.CPU_RAIL, Scope.SOC, Scope.MODULE, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
 """Order of preference: the narrower the scope, the larger the share of this program."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -18,6 +18,11 @@ class Kind(StrEnum):
     UNAVAILABLE = "unavailable"
 
 
+def worst(kinds: Iterable[Kind]) -> Kind:
+    """The least reliable kind, which is that of a sum."""
+    return max(kinds, key=list(Kind).index)
+
+
 class Measurand(StrEnum):
     """The physical quantity of a reading."""
 
@@ -30,7 +35,9 @@ class Scope(StrEnum):
 
     PROCESS = "this process, by a model"
     CPU = "CPU packages"
+    CPU_RAIL = "the rail of the CPU, with what shares it"
     SOC = "system on chip"
+    MODULE = "the module, without what its carrier board feeds"
     BOARD = "whole board"
     ROBOT = "everything on the battery"
     RAIL = "one rail, of unknown extent"
@@ -40,14 +47,14 @@ class MeterLostError(Exception):
     """The meter cannot be read now."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Facts:
     """Static properties of a meter."""
 
     name: str
     unit: str  # of the device's own readings
     resolution: float  # smallest step of a reading [J or W]
-    max_W: float  # upper bound of plausible power
+    max_W: float  # range: more power than it can show
     scope: Scope  # consumers covered
     kind: Kind  # reliability of the energy derived from it
     wrap_J: float | None = None  # range of an energy counter; None where it never wraps, or the range is unknown
@@ -57,6 +64,11 @@ class Facts:
     def measurand(self) -> Measurand:
         """Power where it is integrated, else energy."""
         return Measurand.POWER if self.kind is Kind.INTEGRATED else Measurand.ENERGY
+
+    @property
+    def must_draw(self) -> bool:
+        """Whether its consumers draw power whenever this program runs."""
+        return self.scope not in (Scope.PROCESS, Scope.RAIL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +98,8 @@ def read_number(path: Path) -> float:
     text = read_text(path)
     try:
         return float(int(text))
-    except ValueError:
-        raise MeterLostError(f"{path}: {text!r} is not a number") from None
+    except (ValueError, OverflowError):
+        raise MeterLostError(f"{path}: {text[:40]!r} is not a number") from None
 
 
 def text_or_none(path: Path) -> str | None:
@@ -145,14 +157,8 @@ def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns
         wall_ns: monotonic clock.
         cpu_ns: CPU time of this process.
     """
-    facts = Facts(
-        name=model_name(idle_W, busy_W),
-        unit="J",
-        resolution=1e-9,
-        max_W=max(idle_W, busy_W) * 1024,
-        scope=Scope.PROCESS,
-        kind=Kind.ESTIMATED,
-    )
+    most_W = max(idle_W, busy_W) * 1024
+    facts = Facts(model_name(idle_W, busy_W), "J", 1e-9, most_W, Scope.PROCESS, Kind.ESTIMATED)
     return Meter(facts, lambda: model_J(idle_W, busy_W, wall_ns(), cpu_ns()))
 
 

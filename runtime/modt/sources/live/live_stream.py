@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from modt import host
-from modt.errors import ScanError
-from modt.sources.live.sweep_reader import Sweep, SweepReader
+from modt.errors import ModtError, ScanError
+from modt.sources.live.sweep_reader import StreamEndedError, Sweep, SweepReader
+from modt.sources.packets.packet_decoder import DeviceClock
 from modt.sources.scan_file import sanitised
-from modt.sources.stream import Fault, Faults, StreamInfo
+from modt.sources.stream import MAX_STAMP_S, Fault, Faults, StreamInfo, unit_of
 from modt.types import Frame
 
 log = logging.getLogger(__name__)
@@ -26,6 +27,10 @@ STEP_S = 1.0
 """Difference of the time that passed by stamps and by arrivals, from which a stamp is doubted."""
 DOUBT_S = 0.5
 """Time for which doubtful stamps are refused; if they keep coming, a clock was set, and they are followed."""
+JITTER_S = 0.1
+"""Change of the least delay from stamp to arrival, beyond which the stamps have stepped."""
+LATE_S = 1.0
+"""Time after its arrival from which a sweep, or a packet of it, is no longer of use."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +59,7 @@ class LiveStream:
         faults: unusable sweeps and points.
         sweeps, incomplete, dropped: counts of sweeps received, of those with missing messages, of those replaced by a
             newer one before they were taken.
-        silences, time_steps: number of times that the sensor fell silent, and that its clock was set.
+        silences, time_steps: number of times that the sensor fell silent, and that its stamps stepped.
     """
 
     def __init__(
@@ -73,7 +78,8 @@ class LiveStream:
         self._newest: Arrival | None = None
         self._error: Exception | None = None
         self._ended = self._silent = False
-        self._last_s, self._index = clock(), 0
+        self._last_s = self._looked_s = clock()
+        self._index, self._steady_s, self._delay = 0, 0.0, DeviceClock()
         self._taken: tuple[float, float] | None = None  # stamp and arrival of the last frame
         self._doubted_s: float | None = None  # arrival of the first doubtful stamp since then
         self._thread = threading.Thread(target=self._receive, name="receiver", daemon=True)
@@ -85,7 +91,7 @@ class LiveStream:
 
     def start(self) -> None:
         """Begin to receive."""
-        self._last_s = self._clock()
+        self._last_s = self._looked_s = self._clock()
         self._thread.start()
 
     def take(self, timeout_s: float) -> Received | None:
@@ -103,6 +109,10 @@ class LiveStream:
             if self._newest is None and self._error is not None:
                 raise self._error
             taken, self._newest = self._newest, None
+        now_s = self._clock()
+        if now_s - self._looked_s > timeout_s + LATE_S:  # nobody has looked, so nobody was silent
+            self._last_s = now_s
+        self._looked_s = now_s
         if taken is None:
             self._watch_silence()
             return None
@@ -137,14 +147,17 @@ class LiveStream:
             log.warning("%s: %s", self.info.name, lacking)
         while not self._ended:
             try:
-                sweeps = self.reader.read(READ_S)
-            except Exception as error:
+                for sweep in self.reader.read(READ_S):
+                    self._put(sweep)
+            except (StreamEndedError, ModtError, OSError) as error:
                 with self._arrived:
                     self._error = None if self._ended else error
                     self._arrived.notify()
                 return
-            for sweep in sweeps:
-                self._put(sweep)
+            except Exception as error:
+                if self.reader.reception.refuse(f"failed ({type(error).__name__})"):
+                    log.exception("%s: a message is left out: report this; later ones are counted", self.info.name)
+                time.sleep(0.001)  # where each read fails, others need the CPU
 
     def _put(self, sweep: Sweep) -> None:
         try:  # here, off the loop's thread
@@ -162,7 +175,7 @@ class LiveStream:
         sweep, arrived_s = arrival.sweep, arrival.arrived_s
         if self._silent:
             log.warning("%s: sweeps again after %.1f s", self.info.name, arrived_s - self._last_s)
-        self._silent, self._last_s = False, arrived_s
+        self._silent, self._last_s = False, max(self._last_s, arrived_s)
         index = self._index if sweep.index is None else sweep.index
         self._index = index + 1
         doubt = self._doubt(sweep.stamp_s, arrived_s)
@@ -170,24 +183,34 @@ class LiveStream:
         used = arrival.usable and not doubt
         if flaws:
             self._fault(index, "; ".join(flaws), skipped=not used)
-        if not used:
-            return None
-        self._taken, self._doubted_s = (sweep.stamp_s, arrived_s), None
-        return Received(Frame(index, sweep.stamp_s, sweep.points, turn_s=sweep.turn_s), arrived_s)
+        frame = Frame(index, sweep.stamp_s, sweep.points, turn_s=sweep.turn_s, steady_s=self._steady_s)
+        return Received(frame, arrived_s) if used else None
 
     def _doubt(self, stamp_s: float, arrived_s: float) -> str:
-        """Why a stamp is refused; empty if it is not."""
-        if self._taken is None:
-            return ""
-        passed_s, waited_s = stamp_s - self._taken[0], arrived_s - self._taken[1]
-        if 0 < passed_s <= waited_s + STEP_S:
-            return ""
-        self._doubted_s = arrived_s if self._doubted_s is None else self._doubted_s
-        what = f"{abs(passed_s):.3f} s {'before' if passed_s < 0 else 'after'} the last sweep"
-        if arrived_s - self._doubted_s < DOUBT_S:
-            return f"stamped {what}, which arrived {waited_s:.3f} s ago"
-        self.time_steps += 1
-        log.warning("%s: its clock was set: stamps are %s; they are followed", self.info.name, what)
+        """Why a sweep is refused, empty if not: steady time passes as stamps do, or as arrivals where those step."""
+        if (age_s := self._looked_s - arrived_s) > LATE_S:
+            return f"taken {age_s:.1f} s after it came: this process was stopped, or has too little CPU time"
+        if not abs(stamp_s) < MAX_STAMP_S:
+            return f"stamp {stamp_s:g} is no time in seconds; have its driver write seconds"
+        before_s, passed_s, waited_s = self._delay.offset_s, stamp_s, stamp_s
+        if self._taken is not None:
+            passed_s, waited_s = stamp_s - self._taken[0], arrived_s - self._taken[1]
+            ahead_s = passed_s - waited_s
+            if passed_s <= 0 or abs(ahead_s) > STEP_S:
+                self._doubted_s = arrived_s if self._doubted_s is None else self._doubted_s
+                if arrived_s - self._doubted_s < DOUBT_S:
+                    what = f"{abs(passed_s):.3f} s {'before' if passed_s < 0 else 'after'} the last sweep"
+                    late = ": this process, the sender or the network was stopped" if passed_s > 0 > ahead_s else ""
+                    return f"stamped {what}, which arrived {waited_s:.3f} s ago{late}"
+                self.time_steps += 1
+                unit = unit_of(passed_s / waited_s)
+                why = f"are they in {unit}? have its driver write s" if unit else "a clock was set, or they come late"
+                what = f"stamps have stepped by {ahead_s:+.3f} s against their arrival"
+                log.warning("%s: %s: %s; they are followed", self.info.name, what, why)
+        self._delay.unwrapped(stamp_s, arrived_s)
+        stepped = self._doubted_s is not None or abs(self._delay.offset_s - before_s) > JITTER_S
+        self._steady_s += waited_s if stepped else passed_s
+        self._taken, self._doubted_s = (stamp_s, arrived_s), None
         return ""
 
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import logging
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sources.live.live_stream import LiveStream
+from modt.sources.live.live_stream import LATE_S, LiveStream
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import PacketDecoder, refuse
 from modt.sources.stream import StreamInfo
@@ -21,6 +23,8 @@ log = logging.getLogger(__name__)
 MAX_BYTES = 65_535
 BUFFER_BYTES = 4 * 2**20
 """Asked of the kernel for packets received: a second of the fastest sensor."""
+TIMESTAMP, TIMESPEC = 35, struct.Struct("@ll")
+"""SO_TIMESTAMPNS, which Python does not name: Linux states when it received a packet [s, ns]."""
 PAUSE_S = 0.01
 """Time without a packet after which a sensor that does not look all round may have ended its sweep."""
 
@@ -55,16 +59,21 @@ class PacketReader:
         self._socket.settimeout(min(timeout_s, PAUSE_S))
         while True:
             try:
-                payload, address = self._socket.recvfrom(MAX_BYTES)
+                payload, facts, _, address = self._socket.recvmsg(MAX_BYTES, socket.CMSG_SPACE(TIMESPEC.size))
             except (TimeoutError, BlockingIOError):
                 sweeps = self.decoder.pause(self.reception)
                 if sweeps or time.monotonic() >= until_s:
                     return sweeps
                 continue
             self.reception.messages += 1
+            now_s = self._clock()
+            received_s = next((s + 1e-9 * ns for _, _, raw in facts for s, ns in [TIMESPEC.unpack(raw)]), now_s)
             if self._source not in (None, address[0]):
                 refuse(self.reception, self.decoder.name, "from another address than the sensor's")
-            elif sweeps := self.decoder.decode(self._clock(), payload, self.reception):
+            elif now_s - received_s > LATE_S:
+                reason = "late: this process was stopped, or has too little CPU time, or the clock was set"
+                refuse(self.reception, self.decoder.name, reason)
+            elif sweeps := self.decoder.decode(received_s, payload, self.reception):
                 return sweeps
             if time.monotonic() >= until_s:
                 return []
@@ -83,6 +92,8 @@ def bound_socket(name: str, port: int, group: str = "") -> socket.socket:
         MisuseError: the port is taken or not allowed, or the group cannot be joined.
     """
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    with suppress(OSError):  # without it, packets are as of when they are read
+        made.setsockopt(socket.SOL_SOCKET, TIMESTAMP, 1)
     try:
         made.bind(("", port))
     except OSError as error:
@@ -159,15 +170,6 @@ def _stream(
 ) -> LiveStream:
     source = address_of(address.text, address.host)
     reader = PacketReader(bound_socket(address.text, port, address.option("group")), decoder, source)
-    info = StreamInfo(
-        name=address.text,
-        layout=f"{address.scheme} packets",
-        sequence=0,
-        n_frames=None,
-        period_s=period_s,
-        camera=None,
-        has_poses=False,
-        profile=decoder.profile,
-        elevations_deg=decoder.elevations_deg,
-    )
+    info = StreamInfo(address.text, f"{address.scheme} packets", 0, None, period_s, None, has_poses=False)
+    info = replace(info, profile=decoder.profile, elevations_deg=decoder.elevations_deg)
     return LiveStream(info, reader, cores=cores)

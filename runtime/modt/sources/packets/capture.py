@@ -1,7 +1,8 @@
-"""UDP datagrams of a PCAP file: either byte order, µs or ns; IPv4 over Ethernet, Linux cooked or raw IP."""
+"""UDP datagrams of a PCAP file: either byte order, µs or ns; IPv4 or IPv6 over Ethernet, Linux cooked or raw IP."""
 
 from __future__ import annotations
 
+import socket
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,11 +15,14 @@ MAX_PENDING = 64
 """Packets of which fragments are awaited; then the oldest is given up."""
 MORE, OFFSET = 0x2000, 0x1FFF
 MAX_PACKET_BYTES = 65_535
+IPV6_BYTES, FRAGMENT = 40, 44
+EXTENSIONS = (0, 43, FRAGMENT, 60)
+"""Headers of IPv6 before the payload: hop by hop, routing, fragment, destination."""
 
 
 @dataclass(frozen=True, slots=True)
 class Packet:
-    """A whole IPv4 packet without its header."""
+    """A whole IP packet without its headers."""
 
     source: str
     protocol: int
@@ -32,22 +36,32 @@ class Fragments:
         self._pending: dict[bytes, dict[int, tuple[bytes, bool]]] = {}
 
     def whole(self, raw: bytes) -> Packet | None:
-        """The packet that these bytes of an IPv4 packet complete, None while it lacks a part or is none."""
-        if len(raw) < 20 or raw[0] >> 4 != 4:
+        """The packet that these bytes of an IP packet complete, None while it lacks a part or is none."""
+        version = raw[0] >> 4 if raw else 0
+        if version == 6 and len(raw) >= IPV6_BYTES:
+            return self._whole_of_ipv6(raw)
+        if version != 4 or len(raw) < 20:
             return None
         start, length = 4 * (raw[0] & 15), int.from_bytes(raw[2:4], "big")
-        payload = raw[start : length or None]
         flags = struct.unpack_from(">H", raw, 6)[0]
-        offset, more = 8 * (flags & OFFSET), bool(flags & MORE)
-        if offset or more:
-            key = raw[12:20] + raw[4:6] + raw[9:10]
-            joined = self._join(key, offset, payload, more)
-            if joined is None:
-                return None
-            payload = joined
-        return Packet(".".join(map(str, raw[12:16])), raw[9], payload)
+        key = raw[12:20] + raw[4:6] + raw[9:10]
+        payload = self._joined(key, 8 * (flags & OFFSET), raw[start : length or None], bool(flags & MORE))
+        return None if payload is None else Packet(".".join(map(str, raw[12:16])), raw[9], payload)
 
-    def _join(self, key: bytes, offset: int, payload: bytes, more: bool) -> bytes | None:
+    def _whole_of_ipv6(self, raw: bytes) -> Packet | None:
+        length, kind, payload = int.from_bytes(raw[4:6], "big"), raw[6], raw[IPV6_BYTES:]
+        whole: bytes | None = payload[: length or None]
+        while whole and kind in EXTENSIONS and len(whole) >= 8:
+            kind, extension, size = whole[0], kind, 8 if kind == FRAGMENT else 8 * (whole[1] + 1)
+            where, key, whole = int.from_bytes(whole[2:4], "big"), raw[8:IPV6_BYTES] + whole[4:8], whole[size:]
+            if extension == FRAGMENT:
+                whole = self._joined(key, where & ~7, whole, bool(where & 1))
+        return None if whole is None else Packet(socket.inet_ntop(socket.AF_INET6, raw[8:24]), kind, whole)
+
+    def _joined(self, key: bytes, offset: int, payload: bytes, more: bool) -> bytes | None:
+        """The payload that a fragment completes; one that is no fragment is whole."""
+        if not offset and not more:
+            return payload
         parts = self._pending.setdefault(key, {})
         parts[offset] = (payload, more)
         out, at = b"", 0
@@ -75,7 +89,7 @@ PCAPNG = b"\x0a\x0d\x0d\x0a"
 ETHERNET, RAW_IP, COOKED, COOKED_2 = 1, 101, 113, 276
 LINK_HEADERS = {ETHERNET: (12, 14), COOKED: (14, 16), COOKED_2: (0, 20)}
 """Offsets of the protocol and of the payload."""
-IPV4, VLAN_TAGS, UDP = 0x0800, (0x8100, 0x88A8, 0x9100), 17
+IPS, VLAN_TAGS, UDP = (0x0800, 0x86DD), (0x8100, 0x88A8, 0x9100), 17
 MAX_RECORD_BYTES = 262_144
 """The greatest snapshot length of tcpdump; a record that promises more is none."""
 
@@ -86,7 +100,7 @@ class Datagram:
 
     Attributes:
         stamp_s: when it was captured [s since 1970].
-        source: IPv4 address of the sender.
+        source: IP address of the sender.
         port: of the receiver.
         payload: its bytes, fewer than were sent where the capture was cut short.
     """
@@ -98,7 +112,7 @@ class Datagram:
 
 
 class Capture:
-    """The datagrams of a file, in its order; what is no UDP over IPv4 is passed over.
+    """The datagrams of a file, in its order; what is no UDP is passed over.
 
     Attributes:
         flow: source and port of the datagrams wanted; None: all.
@@ -159,13 +173,13 @@ class Capture:
             yield second + fraction * self._unit_s, frame
 
     def _start_of_ip(self, frame: bytes) -> int | None:
-        """Offset of the IPv4 header, None where there is none."""
+        """Offset of the IP header, None where there is none."""
         if self._link == RAW_IP:
             return 0
         protocol_at, start = LINK_HEADERS[self._link]
         while len(frame) >= start:
             protocol = int.from_bytes(frame[protocol_at : protocol_at + 2], "big")
             if protocol not in VLAN_TAGS:
-                return start if protocol == IPV4 else None
+                return start if protocol in IPS else None
             protocol_at, start = start + 2, start + 4
         return None

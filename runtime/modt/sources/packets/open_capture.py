@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -26,8 +27,11 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     decoder, layout = _decoder(path, options)
     capture.flow = next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
     if capture.flow is None:
+        seen = Counter(f"{len(d.payload)} bytes to port {d.port}" for d in capture)
+        there = f"{seen.total()} UDP datagrams, mostly of {seen.most_common(1)[0][0]}" if seen else "no UDP datagram"
         remedy = f"for an Ouster, save its metadata as {path.with_suffix('.json')} or give metadata=FILE"
-        raise MisuseError(path, f"no packets of a {layout}", remedy)
+        remedy = remedy if layout == "Velodyne" else "give the metadata of the sensor that sent them"
+        raise MisuseError(path, f"no packets of a {layout} ({there})", remedy)
     first = _first_sweep(capture, decoder)
     if first is None:
         raise MisuseError(path, f"no whole sweep of a {layout}", "record at least two turns of the sensor")

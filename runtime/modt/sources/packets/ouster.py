@@ -63,7 +63,8 @@ class OusterDecoder:
         packet = self._sdk.LidarPacket(self._format)  # the batcher keeps it
         packet.buf[:] = np.frombuffer(payload, np.uint8)
         packet.host_timestamp = round(received_s * 1e9)
-        if packet.validate(self._info, self._format) != self._sdk.PacketValidationFailure.NONE:
+        valid = packet.validate(self._info, self._format) == self._sdk.PacketValidationFailure.NONE
+        if not valid and self._format.prod_sn(packet.buf) != self._info.sn:  # its other number changes at each start
             refuse(reception, self.name, "of another sensor than the metadata")
             return []
         return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
@@ -114,7 +115,7 @@ class OusterDecoder:
             return []
         lost = int(missing.sum())
         passed = 0 if last_id is None else (frame.frame_id - last_id) % (self._format.max_frame_id + 1) - 1
-        if passed <= MAX_LOST_FRAMES:
+        if 0 <= passed <= MAX_LOST_FRAMES:
             lost += passed * int(self._awaited.sum())
         reception.lost += lost
         stamp_s, turn_s = self._times()

@@ -17,8 +17,6 @@ MAX_DRIFT = 1e-4
 """Of a sensor's clock against the host's [s/s]."""
 MAX_ERROR_S = 1.0
 """A greater difference is a clock that was set, or a sensor that was switched on again."""
-
-
 WINDOW_S, STEP_S = 10.0, 0.02
 """Where even the least delay of so long is longer than the one known by so much, the host's clock was set forward."""
 

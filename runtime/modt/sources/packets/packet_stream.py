@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -13,10 +12,9 @@ from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.scan_file import sanitised
-from modt.sources.stream import MAX_KEPT_FAULTS, Fault, Faults, StreamInfo
+from modt.sources.stamp_check import CLOCK_SET, StampCheck
+from modt.sources.stream import Fault, Faults, StreamInfo
 from modt.types import Frame
-
-log = logging.getLogger(__name__)
 
 
 class PacketStream:
@@ -42,13 +40,14 @@ class PacketStream:
 
     def __iter__(self) -> Iterator[Frame]:
         self.reception = reception = Reception()
-        stamp_s, lost = float("-inf"), 0
-        for index, sweep in enumerate(islice(self._sweeps(reception), self._last)):
+        stamps, lost = StampCheck(), 0
+        for index, (arrived_s, sweep) in enumerate(islice(self._sweeps(reception), self._last)):
             missing, lost = reception.lost - lost, reception.lost
+            steps, doubt = stamps.steps, stamps.doubt(sweep.stamp_s, arrived_s)
             if index < self._first:
                 continue
-            if sweep.stamp_s < stamp_s:
-                self._fault(index, f"stamped {stamp_s - sweep.stamp_s:.3f} s before the last sweep", skipped=True)
+            if doubt:
+                self._fault(index, doubt, skipped=True)
                 continue
             try:
                 points, flaws = sanitised(sweep.points, self.info.name)
@@ -57,10 +56,11 @@ class PacketStream:
                 continue
             if missing:
                 flaws.append(f"{missing} packets are missing")
+            if stamps.steps > steps:
+                flaws.append(CLOCK_SET)
             if flaws:
                 self._fault(index, "; ".join(flaws), skipped=False)
-            stamp_s = sweep.stamp_s
-            yield Frame(index, sweep.stamp_s, points, turn_s=sweep.turn_s)
+            yield Frame(index, sweep.stamp_s + stamps.shift_s, points, turn_s=sweep.turn_s)
 
     def between(self, first: int, last: int | None) -> Self:
         """The frames with first <= index < last; the file is read up to the last one."""
@@ -70,16 +70,17 @@ class PacketStream:
         info = replace(self.info, end=end, n_frames=0 if nothing else None)
         return type(self)(info, self.capture, self.decoder, first, first if nothing else end)
 
-    def _sweeps(self, reception: Reception) -> Iterator[Sweep]:
-        """All sweeps; after them, what was refused and where the file is broken are faults."""
-        decoder, index = self.decoder.again(), 0
+    def _sweeps(self, reception: Reception) -> Iterator[tuple[float, Sweep]]:
+        """Arrival [s] and sweep of each turn; then faults for what was refused and where the file is broken."""
+        decoder, index, arrived_s = self.decoder.again(), 0, 0.0
         for datagram in self.capture:
             reception.messages += 1
-            sweeps = decoder.decode(datagram.stamp_s, datagram.payload, reception)
-            yield from sweeps
+            arrived_s = datagram.stamp_s
+            sweeps = decoder.decode(arrived_s, datagram.payload, reception)
+            yield from ((arrived_s, sweep) for sweep in sweeps)
             index += len(sweeps)
         last = decoder.finish(reception)
-        yield from last
+        yield from ((arrived_s, sweep) for sweep in last)
         index += len(last)
         for reason, count in reception.refused.items():
             self._fault(index, f"{count} packets refused: {reason}", skipped=False)
@@ -87,6 +88,5 @@ class PacketStream:
             self._fault(index, self.capture.flaw, skipped=False)
 
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:
-        if self.faults.add(Fault(index, str(self.capture.path), cause, skipped)):
-            more = "; later faults are only counted" if self.faults.count == MAX_KEPT_FAULTS else ""
-            log.warning("%s: sweep %d: %s%s%s", self.capture.path, index, cause, "; skipped" if skipped else "", more)
+        subject = str(self.capture.path)
+        self.faults.report(Fault(index, subject, cause, skipped), f"{subject}: sweep {index}")

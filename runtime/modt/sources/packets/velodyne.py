@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import logging
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -27,10 +28,8 @@ from modt.sources.packets.velodyne_models import (
 from modt.sources.packets.velodyne_turn import AHEAD, SAME_S, Entry, Turn
 from modt.types import Float32, Float64
 
-CYCLE = 4160
-"""Packets in which all of it is sent."""
-TAIL = slice(-6, None)
-"""Stamp, type and value of a status."""
+CYCLE, TAIL = 4160, slice(-6, None)
+"""Packets in which all of it is sent; stamp, type and value of a status."""
 
 
 class CalibrationBytes:
@@ -70,8 +69,6 @@ LEAST_TURN = 1000
 """A head that falls back by more has begun another turn [0.01 deg]; by less, it stands still."""
 SILENCE_S = 1.0
 """Packets missing for longer are those of a sensor that was off."""
-
-
 RETURN = 7
 """Column of the library's table: which return of a firing."""
 NO_TURN = Turn(0.0, None)
@@ -98,17 +95,17 @@ class VelodyneDecoder:
         self._first: list[tuple[float, bytes]] | None = []
         self._signature: Signature | None = None
         self._identity: bytes | None = None
-        self._reach, self._packet_s = 0, 0.0
+        self._reach, self._packet_s, self._most = 0, 0.0, 0
         self._own: CalibrationBytes | None = None
         self._forget()
 
     def _forget(self) -> None:
         self._clock = DeviceClock(HOUR_S)
         self._last: Entry | None = None
-        self._turn: Turn = NO_TURN
-        self._ending: Turn = NO_TURN
+        self._turn = self._ending = NO_TURN
         self._holes: Float64 | None = None
-        self._interval_s, self._longest_s = 0.0, LONGEST_TURN_S
+        self._interval_s, self._longest_s, self._heard_s = 0.0, LONGEST_TURN_S, -math.inf
+        self._others: list[tuple[float, bytes]] = []  # packets of another model since this one was heard
 
     def again(self) -> Self:
         """A decoder of the same sensor that has seen no packet yet."""
@@ -165,19 +162,17 @@ class VelodyneDecoder:
             for _ in first:
                 refuse(reception, self.name, "of a model of Velodyne that is unknown; give model=")
             return []
-        self._first, self._signature, self.profile = None, signature, model.profile
+        self._signature, self.profile = signature, model.profile
         self._identity = None if model.signature.identity is None else bytes([model.signature.identity])
         self._reach, self._packet_s = model.reach, model.interval_us * 1e-6
-        calibration = self._calibration
+        self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # of two returns
+        calibration, self._own = self._calibration, None
         if calibration is None and model.calibration is not None:
             calibration = self._library.get_bundled_calibration(model.calibration)
             self._own = CalibrationBytes(self._library)
-            log.warning(
-                "%s: beams as of another %s until it has sent its own; better give them by calibration=",
-                self.name,
-                model.name,
-            )
-        self._decoder = self._scan_decoder(model.member, calibration)
+            remedy = "until it has sent its own; better give them by calibration="
+            log.warning("%s: beams as of another %s %s", self.name, model.name, remedy)
+        self._decoder, self._first = self._scan_decoder(model.member, calibration), None
         return [s for r, p in first for s in self._packet(r, p, signature_of(p), reception)]
 
     def _scan_decoder(self, member: str, calibration: Any) -> Any:
@@ -195,8 +190,9 @@ class VelodyneDecoder:
         self, received_s: float, payload: bytes, signature: Signature | None, reception: Reception
     ) -> Sequence[Sweep]:
         if signature != self._signature:
-            refuse(reception, self.name, "of another model than the packets before")
-            return []
+            return self._foreign(received_s, payload, reception)
+        self._heard_s = received_s
+        self._others.clear()
         stamp_s = int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little") * 1e-6
         time_s = self._clock.unwrapped(stamp_s, received_s - self._packet_s)  # it is sent when it is full
         if self._own is not None:
@@ -208,14 +204,30 @@ class VelodyneDecoder:
         entry = Entry(time_s, phase, phase + (last - first) % TURN, self._library.VelodynePacket(time_s, payload))
         return self._follow(entry, reception)
 
+    def _foreign(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+        """Refuse a packet of another model; after RECOGNISED_BY while the known one is silent, recognise it anew."""
+        refuse(reception, self.name, "of another model than the packets before")
+        if abs(received_s - self._heard_s) < SILENCE_S:
+            return []
+        self._others.append((received_s, payload))
+        if len(self._others) < RECOGNISED_BY:
+            return []
+        log.warning("%s: packets are of another model, and those of the one before have ended", self.name)
+        self._first = self._others
+        self._forget()
+        return self._begin(reception)
+
     def _follow(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
         """Add a packet to its turn; the sweep that ends with it."""
         last = self._last
         gap_s = 0.0 if last is None else entry.time_s - last.time_s
         if last is None or max(abs(gap_s), entry.time_s - self._turn.began_s) > self._longest_s:
             if self._interval_s and 0 < gap_s < SILENCE_S:
-                reception.lost += round(gap_s / self._interval_s) - 1
+                reception.lost += max(round(gap_s / self._interval_s) - 1, 0)
             return self._start(entry)
+        if len(self._turn.entries) >= self._most:
+            refuse(reception, self.name, "more than a turn has; do several sensors send to this port?")
+            return [] if gap_s < SAME_S else self._start(entry)
         if gap_s < SAME_S:
             if not self._turn.insert(entry):
                 refuse(reception, self.name, "late or twice")
@@ -244,7 +256,7 @@ class VelodyneDecoder:
         lost, self._holes, self._interval_s = turn.missing(self._holes)
         reception.lost += lost
         ahead_s, turn_s = turn.times()
-        self._longest_s = 1.5 * turn_s
+        self._longest_s = min(1.5 * turn_s, LONGEST_TURN_S)
         return [Sweep(ahead_s + self._clock.offset_s, self._points(turn.entries), turn_s, complete=lost == 0)]
 
     def _points(self, entries: Sequence[Entry]) -> Float32:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from bisect import insort
+import math
+from bisect import bisect
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any
@@ -71,9 +72,11 @@ class Turn:
 
     def insert(self, entry: Entry) -> bool:
         """Add a packet that comes late; whether it is of this turn and new."""
-        if entry.time_s < self.began_s or any(abs(entry.time_s - e.time_s) < SAME_S for e in self.entries):
+        at = bisect(self.entries, entry.time_s - SAME_S, key=attrgetter("time_s"))
+        after_s = self.entries[at].time_s if at < len(self.entries) else math.inf
+        if entry.time_s < self.began_s or after_s < entry.time_s + SAME_S:
             return False
-        insort(self.entries, entry, key=attrgetter("time_s"))
+        self.entries.insert(at, entry)
         return True
 
     def shared(self, reach: int) -> list[Entry]:

@@ -14,8 +14,6 @@ from modt_desk.experiments.replays import NetworkReplay, Replay
 DETECTION, TRACKING = "det_only", "with_trk"
 """Each view by itself; views fused along a track. The paper's names."""
 ALPHAS = tuple(k / 50 for k in range(26))
-BY_POINTS_ALONE = 10.0
-"""A change of extent that makes no view independent."""
 START_FRAMES = (1, 2, 3, 4, 5, 6, 8, 10, 15, 20, 30, 40, 60)
 
 
@@ -28,15 +26,14 @@ _ideal, _real = partial(_replays, ideal=True), partial(_replays, ideal=False)
 
 
 def _of_alpha(config: ProfileConfig) -> dict[Label, Replay]:
-    swept = {
-        alpha: changed(config, fusion__point_change=(alpha,) * 4, fusion__extent_change=BY_POINTS_ALONE)
-        for alpha in ALPHAS
-    }
+    multiplied = changed(config, fusion__rule="product")
+    swept = {alpha: changed(multiplied, fusion__point_change=(alpha,) * 4) for alpha in ALPHAS}
     return _with_detection(config, swept)
 
 
 def _of_start(config: ProfileConfig) -> dict[Label, Replay]:
-    return _with_detection(config, {float(n): changed(config, fusion__start_frame=n) for n in START_FRAMES})
+    multiplied = changed(config, fusion__rule="product")
+    return _with_detection(config, {float(n): changed(multiplied, fusion__start_frame=n) for n in START_FRAMES})
 
 
 def _with_detection(config: ProfileConfig, swept: Mapping[float, ProfileConfig]) -> dict[Label, Replay]:

@@ -51,7 +51,7 @@ class Experiment:
 
 
 def changed(config: ProfileConfig, **values: Any) -> ProfileConfig:
-    """With values by the paths of their keys, dots written as two underscores: fusion__memory."""
+    """With values by the paths of their keys, dots written as two underscores: fusion__rule."""
     for path, value in values.items():
         config = _changed(config, path.split("__"), value)
     return config

@@ -20,12 +20,8 @@ def _fusions(config: ProfileConfig) -> dict[Label, Replay]:
         (f"mode {mode}", None): NetworkReplay(config, mode) for mode in ("conventional", "efficient", "accurate")
     }
     variants = {
-        "accurate, views as if independent": changed(config, fusion__memory=1.0),
-        "accurate, no review": changed(config, fusion__review_point_ratio=None),
-        "accurate, no update from boxes": changed(
-            config, fusion__box_update_weight=0.0, fusion__mismatch_probability=0.0
-        ),
-        "accurate, views by points alone": changed(config, fusion__extent_change=10.0),
+        "accurate, views multiplied": changed(config, fusion__rule="product"),
+        "accurate, every new track classified": changed(config, fusion__min_object_probability=0.0),
     }
     return modes | {(name, None): NetworkReplay(made) for name, made in variants.items()}
 

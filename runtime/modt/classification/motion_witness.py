@@ -1,0 +1,66 @@
+"""The witness of a track's motion: P(how far it went | class, how long it is), an expert beside network and box.
+
+It is a state, not a view: it replaces itself in every frame and is never multiplied twice. How far a track went is
+measured as far as both of its ends moved (`modt.tracking.motion`): where a changing part of a wall is seen, one does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.classes import N_CLASSES
+from modt.types import Float64, Int
+
+YOUNG_S = 0.5, 1.5
+"""Ages [s] that part tracks which stay where they are."""
+MOVED_M = 0.2, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0
+"""Displacements [m] that part the others."""
+LENGTH_M = 1.3, 2.6
+"""Greatest lengths [m] that part the tables."""
+LOG_LIKELIHOOD_RATIO: Float64 = (
+    np.array(
+        [
+            [
+                [-2, 2, 0, 2, 0, -1, -3, 6, 15, 15],
+                [-11, -6, -3, -1, 5, 15, 15, -6, -15, -15],
+                [-8, -15, -15, -1, 3, 9, 14, 15, 15, 15],
+            ],
+            [
+                [-2, 0, 0, -4, -5, -3, 4, 10, 15, 10],
+                [-9, -7, -3, -3, 2, 10, 14, 3, 4, -15],
+                [-15, -15, -15, -12, -6, 1, 10, 15, 15, -2],
+            ],
+            [
+                [-2, 0, 4, -2, -8, -12, -12, -7, 9, 15],
+                [-8, -3, -2, -1, 1, 4, 5, -4, -6, -15],
+                [-7, -15, -15, -11, -6, -3, 2, 8, 15, 13],
+            ],
+        ]
+    )
+    / 10.0
+)
+"""(3, 3, 10) log P(cell | class, length) / P(cell | background, length) by length, of car, pedestrian and cyclist.
+
+Halved, since box and motion are not independent, and within 1.5; by `python -m tools.train.motion_witness`.
+"""
+
+
+def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int, Int]:
+    """(R,) band of the length and (R,) cell of the motion: its displacement, or the age of what is still.
+
+    Args:
+        moved_m: (R,) displacement within about the last two seconds [m].
+        observed_s: (R,) time since the first proposal [s].
+        length_m: (R,) greatest length seen [m].
+    """
+    still = np.searchsorted(YOUNG_S, observed_s, side="right")
+    gone = np.searchsorted(MOVED_M, moved_m, side="right") + len(YOUNG_S)
+    return np.searchsorted(LENGTH_M, length_m, side="right"), np.where(moved_m < MOVED_M[0], still, gone)
+
+
+def log_likelihood(moved_m: Float64, observed_s: Float64, length_m: Float64) -> Float64:
+    """(R, 4) log P(motion | class) over that of background; arguments as of `cells`."""
+    length, cell = cells(moved_m, observed_s, length_m)
+    out = np.zeros((len(cell), N_CLASSES))
+    out[:, 1:] = LOG_LIKELIHOOD_RATIO[length, :, cell]
+    return out

@@ -1,0 +1,60 @@
+"""Fusion of profile `paper`: the likelihoods of independent views are multiplied (Equations 4 to 6)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modt.classification.fusion import Certainty, from_log_weights, log_frequency_of, normalise
+from modt.classification.prior import Prior
+from modt.config import FusionConfig
+from modt.types import Bool, Float64, Int, Proposals, Tracks
+
+
+class AnyView:
+    """Mode efficient of the paper: every track is classified once, and that is final (Table I)."""
+
+    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
+        self._log_frequency = log_frequency_of(config)
+
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks never viewed."""
+        return wants_class & ~tracks.viewed
+
+    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """Multiply the view into the posterior; (R,) True."""
+        posterior = from_log_weights(tracks.evidence[rows] + np.log(normalise(likelihood)))
+        tracks.posterior[rows], tracks.evidence[rows] = posterior, np.log(posterior) - self._log_frequency
+        tracks.views[rows] += 1
+        tracks.key_points[rows] = proposals.count[tracks.proposal[rows]]
+        return np.ones(len(rows), np.bool_)
+
+
+class KeyViews(AnyView):
+    """Mode accurate of the paper: views whose number of points differs are independent (Equation 4, Table II).
+
+    A new track is classified at once: a certain class is final, any other is replaced by the first view at or after
+    `start_frame`, since first views are often far and partial (Fig. 11).
+    """
+
+    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
+        super().__init__(config)
+        self._point_change, self._start_frame = np.array(config.point_change), config.start_frame
+        self._certain = Certainty(config)
+
+    def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
+        """(M,) tracks at their first or an independent view."""
+        rows = wants_class.nonzero()[0]
+        now, then = proposals.count[tracks.proposal[rows]], tracks.key_points[rows]
+        alpha = self._point_change[tracks.posterior[rows].argmax(axis=1)]
+        independent = (tracks.views[rows] == 0) | (np.abs(now - then) > alpha * then)
+        asks = wants_class.copy()
+        asks[rows] = ~tracks.viewed[rows] | (independent & (tracks.age[rows] >= self._start_frame))
+        return asks
+
+    def fuse(self, tracks: Tracks, proposals: Proposals, rows: Int, likelihood: Float64) -> Bool:
+        """Multiply the view into the posterior (Equation 6); (R,) which rows are certain now."""
+        tracks.evidence[rows[tracks.views[rows] == 0]] = 0.0
+        super().fuse(tracks, proposals, rows, likelihood)
+        certain = self._certain(tracks.posterior[rows])
+        tracks.views[rows] -= ~(certain | (tracks.age[rows] >= self._start_frame))
+        return certain

@@ -1,0 +1,133 @@
+"""The one rule that turns readings of a meter into joules, for counters and power samples alike.
+
+An interval is measured when the readings at both its ends are confirmed; any other one is marked with its cause.
+A reading is confirmed by the power that it implies: near what the meter has shown, counted from the last confirmed
+reading, or near what the doubtful reading before it implied. Only so does a doubtful reading become a base.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from modt.energy.meters.meter import Facts, Kind, Measurand
+
+SURGE = 4.0
+"""Factor beyond the lowest and the highest power shown up to which a reading is confirmed at once."""
+TICK_S = 0.01
+"""Time between two steps of a counter, at most [s]."""
+
+
+class Event(Enum):
+    """Relation of a reading to those before."""
+
+    FITS = "continues the confirmed reading, or one before a standstill"
+    AGREES = "continues the doubtful reading"
+    STRAYS = "continues neither"
+    LOST = "there is none"
+
+
+CONFIRMED, DOUBTED = True, False
+TABLE = {
+    (CONFIRMED, Event.FITS): (CONFIRMED, True),
+    (CONFIRMED, Event.STRAYS): (DOUBTED, False),
+    (CONFIRMED, Event.LOST): (DOUBTED, False),
+    (DOUBTED, Event.FITS): (CONFIRMED, False),
+    (DOUBTED, Event.AGREES): (CONFIRMED, True),
+    (DOUBTED, Event.STRAYS): (DOUBTED, False),
+    (DOUBTED, Event.LOST): (DOUBTED, False),
+}
+"""Whether the last reading is confirmed, by this and the event; and whether the interval up to it is measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """The readings so far, as far as the next one is judged by them."""
+
+    state: bool = DOUBTED
+    base: float | None = None  # last confirmed reading
+    base_s: float = 0.0  # time since
+    doubtful: float | None = None  # last reading, while it is doubted
+    doubtful_s: float = 0.0  # time for which it had stood still before
+    doubtful_W: float | None = None  # power that it implies
+    low_W: float = math.inf  # lowest and highest power measured
+    high_W: float = -math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class _Step:
+    """Change between two readings: its energy, the power that it implies within bounds, and what is wrong with it."""
+
+    joules: float
+    watts: float | None  # None where the interval is too short to tell
+    least_W: float
+    most_W: float
+    fault: str
+    mark: str = ""
+
+    def near(self, low_W: float, high_W: float) -> bool:
+        """Whether the power may lie in a range, or not far from it."""
+        return not self.fault and low_W / SURGE <= self.most_W and self.least_W <= SURGE * high_W
+
+
+def judge(facts: Facts, before: History, reading: float | None, seconds: float) -> tuple[History, float | None, str]:
+    """The history after a reading, the energy of the interval up to it [J], None where not measured, and its mark.
+
+    Marks: "wrap" (measured; a counter passed its range); without energy "first" (nothing to compare with), "lost"
+    (unreadable or out of range), "back" (the reading before was lost or doubtful), "implausible" (unlike what the
+    meter has shown), "reset" (counter decreased), "negative" (power below zero), "stuck" (nothing is drawn),
+    "ambiguous" (long enough for a full range of the counter).
+    """
+    shown, counts = (before.low_W, before.high_W), facts.measurand is Measurand.ENERGY
+    unsettled = replace(before, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None)
+    if reading is None or not math.isfinite(reading) or (counts and not 0 <= reading <= (facts.wrap_J or reading)):
+        return replace(unsettled, state=TABLE[before.state, Event.LOST][0]), None, "lost"
+    if facts.kind is Kind.ESTIMATED:  # a formula
+        return History(CONFIRMED, reading), None if before.base is None else reading - before.base, ""
+    step = from_base = _step(facts, before, before.base, reading, unsettled.base_s)
+    event, near_W = Event.STRAYS, before.doubtful_W
+    if before.doubtful is not None:
+        step = _step(facts, before, before.doubtful, reading, before.doubtful_s + seconds)
+    agrees = near_W is not None and not step.mark and step.near(near_W, near_W)
+    if step.fault != "stuck" and from_base.near(*shown):
+        step, event, agrees = from_base, Event.FITS, False
+    elif before.doubtful is not None and (agrees or step.near(*shown)):
+        event = Event.FITS if before.doubtful_s else Event.AGREES
+    state, measured = TABLE[before.state, event]
+    if state is DOUBTED:
+        mark = step.fault or ("first" if before.base is None else "implausible")
+        age_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
+        return replace(unsettled, state=state, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts), None, mark
+    levels = [W for W in (step.watts, near_W if agrees else None) if W is not None] if measured else []
+    after = History(state, reading, low_W=min(shown[0], *levels, math.inf), high_W=max(shown[1], *levels, -math.inf))
+    if not measured:
+        return after, None, "back"
+    start = before.base if event is Event.FITS else before.doubtful
+    joules = step.joules if counts else 0.5 * seconds * (max(start or 0.0, 0.0) + reading)
+    return after, max(joules, 0.0), step.mark
+
+
+def _step(facts: Facts, before: History, start: float | None, end: float, seconds: float) -> _Step:
+    """Change from a counter's reading to another; a power sample is judged by itself, as the joules of a second."""
+    counts, fault, mark, tick_s = facts.measurand is Measurand.ENERGY, "", "", TICK_S
+    if not counts:
+        start, seconds, tick_s = 0.0, 1.0, 0.0
+    elif start is None:
+        return _Step(0.0, None, 0.0, 0.0, "first")
+    joules, wrap_J = end - start, facts.wrap_J or math.inf
+    if joules < 0 and facts.wrap_J:
+        joules, mark = joules + wrap_J, "wrap"
+    least_W = (joules - facts.resolution) / (seconds + tick_s)
+    most_W = (joules + facts.resolution) / (seconds - tick_s) if seconds > tick_s else math.inf
+    # A wrap beyond what was shown may as well be a reset.
+    if joules < -facts.resolution or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
+        fault = "reset" if counts else "negative"
+    elif seconds * min(facts.max_W, SURGE * before.high_W if before.base is not None else math.inf) >= wrap_J:
+        fault = "ambiguous"
+    elif joules <= 0 and seconds > 10 * tick_s and facts.must_draw:
+        fault = "stuck"
+    elif least_W > facts.max_W:
+        fault = "implausible"
+    watts = joules / seconds if seconds > 2 * tick_s and not fault and not mark else None
+    return _Step(joules, watts, least_W, most_W, fault, mark)

@@ -1,0 +1,59 @@
+"""Order and times of files by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+
+_SINCE_1970 = re.compile(r"(?<![0-9])([1-9][0-9]{9})([._-]?)([0-9]*)")
+_CALENDAR = re.compile(
+    r"(?<![0-9])(19[7-9][0-9]|20[0-9]{2})[-_.]?([0-9]{2})[-_.]?([0-9]{2})[T _-]?"  # date
+    r"([0-9]{2})[-:_.]?([0-9]{2})[-:_.]?([0-9]{2})([.,_-]?)([0-9]*)"
+)
+_SECONDS = re.compile(r"([0-9]{1,9})(\.)([0-9]+)")
+
+
+def files_in(folder: Path, suffix: str) -> list[Path]:
+    """Regular files with a suffix in a folder, in the order of the times in their names, else of the numbers."""
+    files = [f for f in folder.glob(f"*{suffix}") if f.is_file() and not f.name.startswith(".")]
+    files.sort(key=lambda f: [int(part) if k % 2 else part for k, part in enumerate(re.split("([0-9]+)", f.stem))])
+    times = times_ns([f.stem for f in files])
+    return files if times is None else [f for _, f in sorted(zip(times, files, strict=True))]
+
+
+def times_ns(names: Sequence[str]) -> list[int] | None:
+    """Times in names [ns]; None where one has none, or two have the same.
+
+    A time is a date and time of day, or seconds with or without a fraction, since 1970 or, alone, since any moment.
+    """
+    found = [_time(name) for name in names]
+    if not found or None in found:
+        return None
+    known = [time for time in found if time is not None]
+    longest = max(len(fraction) for _, _, fraction in known)
+    uneven = any(len(fraction) < longest for _, _, fraction in known)
+    counted = uneven and (longest > 7 or known[0][1] != ".")  # without leading zeros; else without trailing ones
+    wide = longest if counted else 0
+    times = [second * 10**9 + int(f.rjust(wide, "0").ljust(9, "0")) for second, _, f in known]
+    return times if len(set(times)) == len(times) else None
+
+
+def time_ns(text: str) -> int | None:
+    """Time in a text [ns], None where there is none."""
+    found = _time(text.strip())
+    return None if found is None else found[0] * 10**9 + int(found[2].ljust(9, "0"))
+
+
+def _time(name: str) -> tuple[int, str, str] | None:
+    """Second, separator and digits of the fraction of a second."""
+    if match := _CALENDAR.search(name):
+        with suppress(ValueError):
+            second = datetime.strptime("".join(match.groups()[:6]) + "+0000", "%Y%m%d%H%M%S%z").timestamp()
+            return int(second), match[7], match[8][:9]
+    match = _SINCE_1970.search(name)
+    if match is None or not (match[2] or len(match[3]) in (0, 3, 6, 9)):
+        match = _SECONDS.fullmatch(name)
+    return None if match is None else (int(match[1]), match[2], match[3][:9])

@@ -1,0 +1,311 @@
+import json
+import pickle
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+import yaml
+
+from modt import profile
+from modt.classification.scheduler import padded_size
+from modt.config import ClassificationConfig, ProfileConfig
+from modt.errors import MisuseError
+from modt_desk.reporting.energy_plots import stage_energy_mJ
+from modt_desk.reporting.page import document_page
+from modt_desk.reporting.quantity import to_json
+from modt_desk.reporting.run_report import run_document, run_plots, run_tree
+from modt_desk.reporting.run_sums import FrameSums
+
+
+def run_text(tree):
+    return run_document(tree).text()
+
+
+def run_page(tree):
+    return document_page(run_document(tree), run_plots(tree))
+
+
+KINDS = {"measured", "integrated", "estimated", "unavailable"}
+MS = 1_000_000
+
+
+def ledger_line(frame, classified):
+    stages = {
+        "source": row(1, 0, 2),
+        "segmentation": row(1, 20, 10),
+        "tracking": row(1, 20, 2),
+        "fusion": row(2, 20, 1),
+        "scheduling": row(1, 0, 1),
+    }
+    if classified:
+        stages["classification"] = row(1, classified, 2 + classified, points=40 * classified)
+    spans = sum(s["wall_ns"] for s in stages.values())
+    return {
+        "schema": "modt.ledger/1",
+        "frame": frame,
+        "stages": stages,
+        "wall_ns": spans + 5 * MS,
+        "cpu_ns": spans + MS,
+        "overhead_ns": 20_000,
+        "idle_ns": 5 * MS - 20_000,
+        "marks": [],
+    }
+
+
+def row(calls, items, ms, points=0):
+    return {"calls": calls, "items": items, "points": points, "wall_ns": ms * MS, "cpu_ns": ms * MS}
+
+
+def track(id_, proposal, named):
+    return {
+        "id": id_,
+        "state": "tracked",
+        "class": "car" if named else "background",
+        "posterior": [0.1, 0.7, 0.1, 0.1] if named else [0.25] * 4,
+        "viewed": named,
+        "final": named,
+        "proposal": proposal,
+        "points": 40,
+        "age": 1,
+        "missed": 0,
+    }
+
+
+def window(index, lines, energy_J, kind="measured", marks=()):
+    stages = {}
+    for line in lines:
+        for name, own in line["stages"].items():
+            into = stages.setdefault(name, dict.fromkeys(own, 0))
+            for key, value in own.items():
+                into[key] += value
+    return {
+        "schema": "modt.energy/1",
+        "window": index,
+        "frames": [lines[0]["frame"], lines[-1]["frame"], len(lines)],
+        "wall_ns": sum(line["wall_ns"] for line in lines),
+        "process_ns": sum(line["cpu_ns"] for line in lines),
+        "overhead_ns": 0,
+        "idle_ns": 0,
+        "stages": stages,
+        "energy_J": energy_J,
+        "kind": kind,
+        "resolution_J": 1e-4,
+        "meters": [{"name": "RAPL packages", "kind": kind, "scope": "CPU packages", "J": energy_J}],
+        "conditions": {"governor": "performance", "frequency_MHz": 2600.0, "temperature_C": 50.0},
+        "marks": list(marks),
+    }
+
+
+@pytest.fixture
+def run(tmp_path):
+    return write_run(tmp_path / "run", windows=True)
+
+
+def write_run(path, *, windows=True, mode="efficient", frames=20, energy=None):
+    path.mkdir()
+    config = profile.dump(ProfileConfig())
+    config["energy"] |= energy or {}
+    facts = {"schema": "modt.run/1", "stream": {"name": "street"}, "mode": mode, "fov": "full", "core": 0}
+    (path / "run.yaml").write_text(yaml.safe_dump({**facts, "profile": config}))
+    lines = [ledger_line(k, (k * 7) % 5) for k in range(frames)]
+    with (path / "ledger.jsonl").open("w") as out:
+        for k, line in enumerate(lines):
+            out.write(json.dumps(line) + "\n")
+            if windows and k % 5 == 4:
+                out.write(json.dumps(window(k // 5, lines[k - 4 : k + 1], 1.5)) + "\n")
+    with (path / "tracks.jsonl").open("w") as out:
+        for k in range(frames):
+            tracks = [track(id_, id_, named=id_ < 15) for id_ in range(20)]
+            record = {"frame": k, "proposals": 20, "classifications": (k * 7) % 5, "deferred": 0, "tracks": tracks}
+            out.write(json.dumps({"schema": "modt.frame/3", **record}) + "\n")
+    (path / "summary.json").write_text("{}")
+    return path
+
+
+def test_energy_is_that_of_the_meter(run):
+    tree = run_tree(run)
+    assert tree["gross_J"].value == pytest.approx(1.5 / 5)
+    assert tree["gross_J"].kind.value == "measured"
+    assert tree["meter"] == {"name": "RAPL packages", "kind": "measured", "windows": 4}
+    assert tree["conditions"]["governor"] == "performance"
+    assert tree["ended"]
+
+
+def test_parts_sum_to_the_total(run):
+    tree = run_tree(run)
+    assert sum(p.value for p in tree["parts_J"].values()) == pytest.approx(tree["gross_J"].value)
+
+
+def test_parts_by_coefficients_sum_to_the_total(tmp_path):
+    board = {"idle_W": 2.0, "seg_J": 0.1, "class_J": 0.01, "point_J": 1e-5}
+    tree = run_tree(write_run(tmp_path / "run", energy=board))
+    assert sum(p.value for p in tree["parts_J"].values()) == pytest.approx(tree["gross_J"].value)
+    assert tree["parts_J"]["segmentation"].value == pytest.approx(0.1)
+
+
+def test_without_windows_energy_is_modelled(tmp_path):
+    tree = run_tree(write_run(tmp_path / "run", windows=False, energy={"idle_W": 2.0, "busy_W": 6.0}))
+    assert tree["gross_J"].kind.value == "estimated"
+    lines = [ledger_line(k, (k * 7) % 5) for k in range(20)]
+    expected = sum(2e-9 * line["wall_ns"] + 4e-9 * line["cpu_ns"] for line in lines) / 20
+    assert tree["gross_J"].value == pytest.approx(expected)
+    assert "not the physics" in tree["test"]
+
+
+@pytest.mark.parametrize("calibration", [{}, {"seg_J": 0.1, "class_J": 0.01, "point_J": 1e-5}])
+def test_plots_show_the_energy_that_the_report_attributes(tmp_path, calibration):
+    tree = run_tree(write_run(tmp_path / "run", energy={"idle_W": 2.0, **calibration}))
+    shown = {stage: mJ.mean() for stage, mJ in stage_energy_mJ(tree["series"]).items()}
+    for stage in ("segmentation", "classification"):
+        assert shown[stage] == pytest.approx(1e3 * tree["parts_J"][stage].value, rel=1e-3)
+    assert ("tracking" in shown) is not bool(calibration)
+    assert tree["saved"]["E_seg"].value == pytest.approx(tree["parts_J"]["segmentation"].value)
+    assert "measured, its split over stages" in run_page(tree)
+
+
+def test_counts_and_terms(run):
+    saved = run_tree(run)["saved"]
+    assert saved["N_go"].value == pytest.approx(20.0)
+    assert saved["beta"].value == pytest.approx(2 / 20)
+    changes = sum(t["change"].value for t in saved["terms"])
+    assert saved["gamma_short"].value + changes == pytest.approx(saved["gamma_of_this_run"].value)
+    assert saved["gamma_reconciled"].value == pytest.approx(saved["gamma_of_this_run"].value, rel=0.01)
+
+
+def test_a_report_of_a_long_run_holds_no_more_than_one_of_a_short_run(tmp_path):
+    """Tracks begin and end all the time; what is held after 1,500 frames is what is held after 3,000."""
+
+    def held(frames):
+        sums = FrameSums(padded_size(ClassificationConfig(max_points=400)))
+        for k in range(frames):
+            tracks = [track(id_, id_ - k, named=True) for id_ in range(k, k + 20)]
+            record = {"proposals": 20, "classifications": 1, "deferred": 0, "tracks": tracks}
+            sums.add(ledger_line(k, 1), record)
+        assert sums.counts().tracks == sums.counts().classified_tracks == frames + 19
+        assert sums.counts().proposals == 20 * frames
+        return len(pickle.dumps(sums))
+
+    assert held(3000) < 1.02 * held(1500)
+
+
+def test_text_says_what_it_is_computed_from(run):
+    text = " ".join(run_text(run_tree(run)).split())
+    assert "computed from this run" in text
+    assert "predict" not in text + run_page(run_tree(run))
+
+
+def test_unfinished_run_is_reported_so_far(run):
+    (run / "summary.json").unlink()
+    with (run / "ledger.jsonl").open("a") as out:
+        out.write('{"schema": "modt.led')
+    tree = run_tree(run)
+    assert not tree["ended"]
+    assert tree["frames"] == 20
+    assert "still running" in run_text(tree)
+
+
+def test_rejected_windows_are_dropped_and_counted(run):
+    lines = [ledger_line(k, 1) for k in range(5)]
+    with (run / "ledger.jsonl").open("a") as out:
+        out.write(json.dumps(window(9, lines, None, "unavailable", ["lost"])) + "\n")
+    tree = run_tree(run)
+    assert tree["dropped_windows"] == 1
+    assert tree["marks"] == ["lost"]
+    assert tree["gross_J"].value == pytest.approx(0.3)
+    assert "marked: lost" in run_text(tree)
+
+
+@pytest.mark.parametrize("energy_J", [-0.4, 1e300, 7e4, float("nan"), float("inf")])
+def test_windows_that_cannot_be_are_dropped_and_said(run, energy_J):
+    lines = [ledger_line(k, 1) for k in range(5)]
+    with (run / "ledger.jsonl").open("a") as out:
+        out.write(json.dumps(window(9, lines, energy_J)) + "\n")
+    tree = run_tree(run)
+    assert (tree["dropped_windows"], tree["marks"]) == (1, ["implausible"])
+    assert tree["gross_J"].value == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_run_is_as_reliable_as_its_least_reliable_window(run, order):
+    kept = [window(k, [ledger_line(k, 1)], 0.3, kind) for k, kind in enumerate(["measured", "estimated"][::order])]
+    ledger = (run / "ledger.jsonl").read_text().splitlines()
+    frames = [line for line in ledger if "modt.ledger" in line]
+    (run / "ledger.jsonl").write_text("\n".join([*frames, *map(json.dumps, kept)]) + "\n")
+    tree = run_tree(run)
+    assert tree["gross_J"].kind.value == "estimated"
+    assert "assumed power" in tree["test"]
+
+
+def test_what_is_not_measured_is_not_called_so(tmp_path):
+    """Energy above idling rests on the idle power of the profile, and without a meter all does."""
+    tree = run_tree(write_run(tmp_path / "metered"))
+    assert (tree["gross_J"].kind.value, tree["net_J"].kind.value) == ("measured", "estimated")
+    estimated = run_tree(write_run(tmp_path / "run", windows=False))
+    said = [run_text(estimated).replace("No mark: measured", ""), *(note for _, _, note in run_plots(estimated))]
+    assert not [line for text in said for line in text.splitlines() if "measured" in line and "E1 is" not in line]
+
+
+def test_the_baseline_saves_nothing(tmp_path):
+    tree = run_tree(write_run(tmp_path / "run", mode="conventional"))
+    assert tree["saved"]["gamma_of_this_run"].value == pytest.approx(1.0)
+    assert "nothing was saved" in run_text(tree)
+
+
+def figures(tree):
+    """Every place in plain data that holds a number outside a series or an identity."""
+    if isinstance(tree, dict):
+        if "value" in tree:
+            yield tree
+            return
+        for key, value in tree.items():
+            if key not in ("series", "conditions", "meter"):
+                yield from figures(value)
+    elif isinstance(tree, list):
+        for value in tree:
+            yield from figures(value)
+    elif isinstance(tree, float):
+        yield {"bare": tree}
+
+
+def test_every_figure_carries_its_kind(run):
+    found = list(figures(to_json(run_tree(run))))
+    assert len(found) > 40
+    assert all(f.get("kind") in KINDS for f in found), [f for f in found if f.get("kind") not in KINDS]
+
+
+def test_text_has_results_first_and_fits_a_terminal(run):
+    text = run_text(run_tree(run))
+    assert text.splitlines()[3].startswith("  energy a frame: 300 mJ; ")
+    assert max(map(len, text.splitlines())) <= 100
+    assert "In brackets: 95 %" in text
+
+
+def test_page_is_one_self_contained_file(run):
+    page = run_page(run_tree(run))
+    assert not re.search(r"(src|href)=|@import|url\(|https?://(?!www\.w3\.org)", page)
+    plots = re.findall(r"<svg.*?</svg>", page, re.S)
+    assert len(plots) == 5
+    for plot in plots:
+        root = ElementTree.fromstring(plot)
+        assert not re.search(r"nan|inf\b", plot)
+        assert root.attrib["viewBox"]
+    assert "(measured)" in page
+    assert "(estimated)" in page
+
+
+def test_page_names_are_escaped(run):
+    tree = run_tree(run) | {"stream": "<b>street</b>"}
+    assert "<b>street" not in run_page(tree)
+
+
+@pytest.mark.parametrize("missing", ["run.yaml", "ledger.jsonl", "tracks.jsonl"])
+def test_missing_files_are_named(run, missing):
+    (run / missing).unlink()
+    with pytest.raises(MisuseError, match=missing.replace(".", r"\.")):
+        run_tree(run)
+
+
+def test_run_without_a_frame_is_refused(run):
+    (run / "ledger.jsonl").write_text("")
+    with pytest.raises(MisuseError, match="no whole frame"):
+        run_tree(run)

@@ -1,0 +1,119 @@
+"""Profiles from recordings: the keys besides the beams."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from modt import assets, profile
+from modt.config import ProfileConfig
+from modt.config.profile import REFLECTANCE_SCALES
+from modt.sensor_fit.findings import SCALES, Finding, Recording, cell_m
+from modt.sources.recognise import open_stream
+from modt_desk.sensor_fit.fit import FINDERS, fit
+from modt_desk.sensor_fit.profile_text import doubts, profile_text
+from modt_desk.simulation.sensors import sensor
+from tests.sensor_fit.recordings import recording, with_mast, with_scale
+
+PROFILES = [path.stem for path in sorted(assets.folder("profiles").glob("*.yaml"))]
+
+
+@pytest.mark.parametrize("scene", ["street", "hall"])
+@pytest.mark.parametrize("name", ["vlp-16", "hdl-64e", "pandar64", "mid-360"])
+def test_the_height_is_found(name, scene):
+    config, _ = fit(recording(name, scene))
+    assert config.sensor.height_m == pytest.approx(sensor(name).height_m, abs=0.1)
+
+
+def test_the_period_is_the_median_step_of_the_stamps():
+    recorded = recording("vlp-16")
+    stamps_s = np.cumsum(np.random.default_rng(0).normal(0.1, 0.002, 30)).tolist()
+    config, findings = fit(dataclasses.replace(recorded, stamps_s=stamps_s))
+    assert config.sensor.period_s == pytest.approx(0.1, rel=0.05)
+    assert not any("period_s" in doubt for doubt in doubts(findings))
+    _, findings = fit(dataclasses.replace(recorded, stamps_s=[0.1 * k for k in range(30)]))
+    assert any("period_s" in doubt for doubt in doubts(findings))
+
+
+def test_a_mast_of_the_robot_is_a_blind_sector():
+    config, _ = fit(with_mast(recording("vlp-16", "street"), 150.0, 1.9))
+    first, last = config.sensor.blind_sectors_deg
+    assert first == pytest.approx(145, abs=3)
+    assert last == pytest.approx(155, abs=3)
+    assert 1.9 < config.sensor.blind_range_m < 2.3
+    assert fit(recording("vlp-16", "street"))[0].sensor.blind_sectors_deg is None
+
+
+def test_a_recording_that_stands_still_does_not_tell_the_robot_from_what_is_around_it():
+    recorded = with_mast(recording("vlp-16", "street", 1), 150.0, 1.9)
+    _, findings = fit(Recording([*recorded.sweeps] * 6, [0.1 * k for k in range(6)]))
+    assert not any(f.key == "blind_sectors_deg" for f in findings)
+    assert any("min_range_m" in doubt and "stands still" in doubt for doubt in doubts(findings))
+
+
+@pytest.mark.parametrize(("name", "scale"), [("hdl-64e", "hdl-64e"), ("vlp-16", "none")])
+def test_the_scale_of_the_reflectance_is_found(name, scale):
+    assert fit(recording(name))[0].sensor.reflectance == scale
+
+
+@pytest.mark.parametrize(("name", "scale"), [("pandar64", "pandar64"), ("vlp-16", "none")])
+def test_a_scale_of_several_sensors_counts_with_the_beams_that_are_known(name, scale):
+    config, findings = fit(with_scale(recording(name), "pandar64"))
+    assert config.sensor.reflectance == scale
+    said = next(f.evidence for f in findings if f.key == "reflectance")
+    assert "as of the pandar64" in said
+    assert ("other beams" in said) is (scale == "none")
+
+
+def test_every_scale_that_models_may_learn_can_be_found():
+    assert tuple(SCALES) == REFLECTANCE_SCALES
+
+
+def test_reflectance_that_is_not_recorded_has_no_scale():
+    swept = [np.column_stack([p[:, :3], np.full(len(p), -1, np.float32)]) for p in recording("hdl-64e").sweeps]
+    config, findings = fit(Recording(swept, recording("hdl-64e").stamps_s))
+    assert config.sensor.reflectance == "none"
+    assert next(f.evidence for f in findings if f.key == "reflectance") == "none is recorded"
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_cells_of_the_profiles_are_near_the_rule(name):
+    config = profile.load(name)
+    elevations = config.sensor.elevations_deg
+    spacing = np.median(-np.diff(elevations)) if elevations else config.sensor.elevation_step_deg
+    assert config.segmentation.cell_m == pytest.approx(cell_m(spacing, config.sensor.azimuth_step_deg), rel=0.27)
+
+
+@pytest.mark.parametrize("name", ["vlp-16", "pandar64"])
+def test_the_text_is_the_profile(name):
+    config, findings = fit(with_mast(recording(name), 150.0, 1.9))
+    text = profile_text("a sensor", findings)
+    assert profile.parse(text) == config
+    assert text.count("check this") == len(doubts(findings)) > 0
+    assert max(map(len, text.split("\n"))) < 200
+
+
+def test_a_finder_adds_keys_that_rest_on_those_before_it():
+    def frequencies(_: Recording, config: ProfileConfig):
+        assert config.sensor.height_m == pytest.approx(0.8, abs=0.1)
+        yield Finding("fusion", "prior", (0.1, 0.1, 0.1), "counted")
+
+    config, findings = fit(recording("vlp-16"), (*FINDERS, frequencies))
+    assert config.fusion.prior == (0.1, 0.1, 0.1)
+    assert profile.parse(profile_text("with frequencies", findings)) == config
+
+
+@pytest.mark.kitti
+@pytest.mark.parametrize(
+    ("path", "height_m", "reflectance"),
+    [
+        ("raw/2011_09_26/2011_09_26_drive_0005_sync", 1.73, "hdl-64e"),
+        ("pandaset_002/scans", 2.13, "pandar64"),
+    ],
+)
+def test_real_sensors(kitti_root, path, height_m, reflectance):
+    frames = list(open_stream(kitti_root / path).between(0, 40))
+    config, _ = fit(Recording([f.points for f in frames[::5]], [f.stamp_s for f in frames]))
+    assert config.sensor.height_m == pytest.approx(height_m, abs=0.1)
+    assert config.sensor.period_s == pytest.approx(0.1, rel=0.05)
+    assert config.sensor.reflectance == reflectance

@@ -1,0 +1,47 @@
+import numpy as np
+import pytest
+
+from modt.classes import CLASS_NAMES
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
+from modt.viewer.track_rows import COLUMNS
+from modt_desk.viewer.recorded_tracks import frame_rows, track_table
+
+
+def track(id_, box, world, state="tracked", class_="car"):
+    """A track of a line of tracks.jsonl."""
+    return {
+        "id": id_, "state": state, "class": class_, "posterior": [0.1, 0.7, 0.15, 0.05],
+        "viewed": True, "final": False,
+        "proposal": None if box is None else 0, "points": 12, "age": 3, "missed": 0,
+        "box": None if box is None else dict(zip(BOX_KEYS, box, strict=True)),
+        "world": dict(zip(WORLD_KEYS, world, strict=True)),
+    }  # fmt: skip
+
+
+def posts(x):
+    """Two things that stand, seen by a sensor that has gone x ahead and turned to the left by a quarter."""
+    return [track(k, (y, x, 0, 1, 1, 1, 0), (0.0, y, 0, 0)) for k, y in ((7, 5.0), (8, -9.0))]
+
+
+def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
+    seen, lost = track(3, (4, 0, -1, 4.5, 1.8, 1.5, 0.5), (0, 4, 0, 1.0)), track(3, None, (0, 6, 0, 1.0), "lost")
+    records = [{"tracks": [*posts(0.0), seen], "classified": [3]}, {"tracks": [lost, *posts(1.0)], "classified": []}]
+    states: list[str] = []
+    poses = np.array([[0, 0, np.pi / 2], [1, 0, np.pi / 2]])
+    table = track_table((frame_rows(at, record, states) for at, record in enumerate(records)), poses)
+    assert states == ["tracked", "lost"]
+    rows = [dict(zip(COLUMNS, row, strict=True)) for row in table.tolist()]
+    assert [(row["id"], row["at"]) for row in rows] == [(3, 0), (3, 1), (7, 0), (7, 1), (8, 0), (8, 1)]
+    assert [(row["seen"], row["classified"], row["state"]) for row in rows[:2]] == [(1, 1, 0), (0, 0, 1)]
+    assert [rows[1][key] for key in BOX_KEYS] == [600, 100, -100, 450, 180, 150, 500]
+    assert [rows[0][f"p_{name}"] for name in CLASS_NAMES] == [100, 700, 150, 50]
+
+
+def test_a_record_without_identities_of_what_was_classified_is_read():
+    table = track_table([frame_rows(0, {"tracks": posts(0.0)}, [])], np.zeros((1, 3)))
+    assert not table[:, COLUMNS.index("classified")].any()
+
+
+@pytest.mark.parametrize("frames", [[], [[]]])
+def test_no_track_is_no_row(frames):
+    assert track_table(frames, np.zeros((len(frames), 3))).shape == (0, len(COLUMNS))

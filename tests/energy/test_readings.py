@@ -1,0 +1,186 @@
+"""The rule that turns readings into joules: its table, faults of real meters, and a model that knows the truth."""
+
+import math
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.energy.meters.meter import Facts, Kind, Scope
+from modt.energy.readings import CONFIRMED, DOUBTED, TABLE, Event, History, judge
+
+RANGE_J = 65_532.610987
+
+
+def facts(kind: Kind = Kind.MEASURED, wrap_J: float | None = RANGE_J, scope: Scope = Scope.CPU) -> Facts:
+    return Facts(name="test", unit="J", resolution=61e-6, max_W=1000.0, scope=scope, kind=kind, wrap_J=wrap_J)
+
+
+RAIL = facts(Kind.INTEGRATED, None, Scope.SOC)
+
+
+def judged(meter: Facts, readings: list[float | None], seconds: float = 1.0) -> list[tuple[float | None, str]]:
+    """Energy and mark of each interval between readings a second apart."""
+    history, found = History(), []
+    for reading in readings:
+        history, joules, mark = judge(meter, history, reading, seconds)
+        found.append((joules if joules is None else round(joules, 6), mark))
+    return found[1:]
+
+
+KNOWN = [1000.0, 1040.0, 1080.0]
+"""Readings of a counter after which its power, 40 W, is known."""
+
+
+def test_every_state_and_event_has_a_row() -> None:
+    """But for a confirmed reading, there is no doubtful one to continue."""
+    assert TABLE.keys() == set(product((CONFIRMED, DOUBTED), Event)) - {(CONFIRMED, Event.AGREES)}
+
+
+@pytest.mark.parametrize(
+    ("readings", "found"),
+    [
+        ([1120.0, 1160.0], [(40.0, ""), (40.0, "")]),
+        ([0.0, 1160.0, 1200.0], [(None, "reset"), (None, "back"), (40.0, "")]),
+        ([9000.0, 1160.0, 1200.0], [(None, "implausible"), (None, "back"), (40.0, "")]),
+        ([1080.0, 1080.0, 1200.0, 1240.0], [(None, "stuck"), (None, "stuck"), (None, "back"), (40.0, "")]),
+        ([None, 1160.0, 1200.0], [(None, "lost"), (None, "back"), (40.0, "")]),
+        ([math.inf, math.nan, 1200.0], [(None, "lost"), (None, "lost"), (None, "back")]),
+        ([5.0, 45.0, 85.0], [(None, "reset"), (40.0, ""), (40.0, "")]),
+        ([1380.0, 1680.0, 1690.0], [(None, "implausible"), (300.0, ""), (10.0, "")]),
+        ([1082.0, 1085.0, 1088.0], [(None, "implausible"), (3.0, ""), (3.0, "")]),
+        ([9000.0, 30_000.0, 1200.0], [(None, "implausible"), (None, "implausible"), (None, "back")]),
+        ([-40.0, RANGE_J + 1, 1200.0], [(None, "lost"), (None, "lost"), (None, "back")]),
+    ],
+    ids=["steady", "zero", "jump", "stuck", "lost", "none", "reset", "busier", "idle", "garbage", "out of range"],
+)
+def test_faults_of_a_counter(readings: list[float | None], found: list[tuple[float | None, str]]) -> None:
+    assert judged(facts(), KNOWN + readings)[2:] == found
+
+
+@pytest.mark.parametrize(
+    ("readings", "found"),
+    [
+        ([6.0, 6.4, 5.6], [(6.2, ""), (6.0, "")]),
+        ([6.0, 6.0, 450.0, 6.0, 6.0], [(6.0, ""), (None, "implausible"), (None, "back"), (6.0, "")]),
+        ([6.0, 6.0, 0.0, 6.0, 6.0], [(6.0, ""), (None, "stuck"), (None, "back"), (6.0, "")]),
+        ([6.0, 6.0, 0.02, 6.0, 6.0], [(6.0, ""), (None, "implausible"), (None, "back"), (6.0, "")]),
+        ([-6.0, -6.0, -6.0], [(None, "negative"), (None, "negative")]),
+        ([450.0, 6.0, 6.0], [(None, "first"), (6.0, "")]),
+        ([6.0, 6.0, 30.0, 31.0], [(6.0, ""), (None, "implausible"), (30.5, "")]),
+        ([6.0, 6.0, 1e300, 1e300], [(6.0, ""), (None, "implausible"), (None, "implausible")]),
+    ],
+    ids=["steady", "spike", "zero", "drop", "reversed", "first", "busier", "beyond"],
+)
+def test_faults_of_a_power_sensor(readings: list[float | None], found: list[tuple[float | None, str]]) -> None:
+    assert judged(RAIL, readings) == found
+
+
+def test_a_rail_that_feeds_nothing_now_draws_nothing() -> None:
+    rail = facts(Kind.INTEGRATED, None, Scope.RAIL)
+    assert judged(rail, [0.0, 0.0, 0.0, 2.0, 2.0]) == [
+        (0.0, ""), (0.0, ""), (None, "implausible"), (2.0, ""),
+    ]  # fmt: skip
+
+
+def test_a_counter_that_passes_its_range_is_measured_and_one_that_is_reset_below_it_is_not() -> None:
+    near = [RANGE_J - J for J in (100.0, 60.0, 20.0)]
+    assert judged(facts(), [*near, 20.0, 60.0])[2:] == [(40.0, "wrap"), (40.0, "")]
+    assert judged(facts(), [RANGE_J - 700.0 + J for J in (0.0, 40.0, 80.0)] + [0.0, 40.0])[2:] == [
+        (None, "reset"), (40.0, ""),
+    ]  # fmt: skip
+
+
+def test_a_counter_is_ambiguous_over_an_interval_in_which_it_may_go_round() -> None:
+    meter = facts(wrap_J=200.0)
+    assert judged(meter, [0.0, 10.0, 20.0, 30.0], seconds=0.1)[-1] == (10.0, "")
+    assert judged(meter, [0.0, 40.0, 80.0, 120.0], seconds=1.0)[-1] == (None, "ambiguous")
+
+
+def counted(random: np.random.Generator, energy_J: np.ndarray) -> Iterator[float | None]:
+    """What a counter shows at each time, by the true energy of each interval before it.
+
+    A fault is one that can be told: a value, alone among five, that no machine of several times the power reaches, a
+    counter that stands still (and has, or has not, counted meanwhile), is gone, or begins anew far from its range.
+    """
+    most_J = 5 * float(energy_J.max())
+    value_J, held_J, left, stalled, rest = float(random.uniform(0, RANGE_J)), None, 0, False, 0
+    for true_J in energy_J.tolist():
+        left = max(left - 1, 0)
+        value_J = (value_J + true_J * (not (left and stalled))) % RANGE_J
+        fault = random.choice(["none", "glitch", "stick", "gone", "reset"], p=[0.8, 0.08, 0.05, 0.05, 0.02])
+        if left:
+            yield held_J
+        elif fault == "glitch" and rest <= 0:
+            rest = 4
+            wild_J = value_J + most_J * random.uniform(1, 4) * random.choice([-1, 1])
+            yield float(random.choice([0.0 if value_J > most_J else np.nan, wild_J, np.nan, 1e300]))
+        elif fault in ("stick", "gone"):
+            left, held_J = int(random.integers(2, 5)), floor(value_J) if fault == "stick" else None
+            stalled = bool(held_J is not None and random.random() < 0.5)
+            yield held_J
+        else:
+            value_J = 0.0 if fault == "reset" and rest < 0 and most_J < value_J < RANGE_J - most_J else value_J
+            yield floor(value_J)
+        rest -= 1
+
+
+def floor(joules: float) -> float:
+    """In steps of a counter."""
+    return math.floor(joules / 61e-6) * 61e-6
+
+
+def sampled(random: np.random.Generator, power_W: np.ndarray) -> Iterator[float | None]:
+    """What a power sensor shows at each time; a shunt may be reversed for a while."""
+    left, rest = 0, 0
+    for true_W in power_W.tolist():
+        fault = random.choice(["none", "glitch", "reversed", "gone"], p=[0.8, 0.1, 0.05, 0.05])
+        if left:
+            left -= 1
+            yield -true_W
+        elif fault == "glitch" and rest <= 0:
+            rest = 4
+            yield float(random.choice([0.0, true_W * 50, true_W / 50, np.inf, 1e300]))
+        elif fault == "gone":
+            yield None
+        else:
+            left = int(random.integers(1, 4)) if fault == "reversed" else 0
+            yield true_W
+        rest -= 1
+
+
+@pytest.mark.parametrize("kind", [Kind.MEASURED, Kind.INTEGRATED])
+def test_no_joule_is_invented_and_none_is_lost_unmarked(kind: Kind) -> None:
+    """Over 1,000 random meters: each interval with energy has the true one, each other a cause, and most have it."""
+    intervals = measured = wraps = 0
+    counter = kind is Kind.MEASURED
+    meter = facts(kind, RANGE_J if counter else None)
+    for seed in range(1000):
+        random = np.random.default_rng(seed)
+        power_W = random.uniform(1, 60) * random.uniform(0.6, 1.6, 40)
+        seconds = random.uniform(0.5, 2.0)
+        energy_J = seconds * (power_W if counter else 0.5 * (power_W + np.roll(power_W, 1)))
+        shown = counted(random, energy_J) if counter else sampled(random, power_W)
+        history = History()
+        for k, reading in enumerate(shown):
+            history, joules, mark = judge(meter, history, reading, seconds)
+            assert (joules is None) == (mark not in ("", "wrap"))
+            assert joules is None or joules == pytest.approx(energy_J[k], abs=3e-4), (seed, k, mark)
+            intervals, measured, wraps = intervals + 1, measured + (joules is not None), wraps + (mark == "wrap")
+    assert measured > 0.5 * intervals
+    assert wraps > 0 or not counter
+
+
+@given(
+    st.lists(st.tuples(st.one_of(st.none(), st.floats()), st.floats(0.0, 100.0))),
+    st.sampled_from([facts(), facts(wrap_J=None), RAIL]),
+)
+def test_any_readings_give_energy_in_range_or_a_cause(tape: list[tuple[float | None, float]], meter: Facts) -> None:
+    history = History()
+    for reading, seconds in tape:
+        history, joules, mark = judge(meter, history, reading, seconds)
+        assert (joules is None) == (mark not in ("", "wrap"))
+        assert joules is None or 0.0 <= joules <= (seconds + 0.01) * meter.max_W + 61e-6

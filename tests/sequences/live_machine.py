@@ -1,0 +1,203 @@
+"""Sequences of what a live robot receives, as hypothesis makes them: a rule a kind of misfortune."""
+
+from __future__ import annotations
+
+import importlib.util
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, precondition, rule
+
+from modt.sources.packets.velodyne_models import AZIMUTHS, IDENTITY_AT, RETURN_AT
+from tests.sequences.live_world import LiveWorld, cpu_s, turn
+
+SEED = st.integers(0, 9)
+ROS = importlib.util.find_spec("cyclonedds") is not None
+STEPS_S = st.sampled_from([-1e9, -3600.0, -1.0, -0.5, -0.05, 0.05, 0.3, 0.7, 0.95, 1.05, 3600.0, 1e9]) | st.floats(
+    -5, 5
+)
+STAMPS_S = st.sampled_from([0.0, 5e-324, -1e300, 1e300, 1.7e308, -5.0, 5.0, 59.0, 1e11, -1e11, 1.7e18, 1e-9])
+PLACES_M = st.sampled_from([0.0, 0.4, 5.0, -80.0, 458_000.0, 5_430_000.0, 9.9e7, -1e8, 1e9, np.nan, np.inf])
+
+
+class LiveSequences(RuleBasedStateMachine):
+    """A robot that lives through anything."""
+
+    @initialize(
+        source=st.sampled_from(["velodyne", "velodyne", "ros2"] if ROS else ["velodyne"]),
+        odometry=st.sampled_from(["datagrams", "topic"] if ROS else ["datagrams"]),
+        others=st.sampled_from([0, 0, 20]),
+    )
+    def begin(self, source, odometry, others) -> None:
+        self.world = LiveWorld(source, odometry)
+        self._cpu_s, self._messages = cpu_s(), 0
+        for payload in turn("hdl-64e")[: others if source == "velodyne" else 0]:
+            self.world.packet(self.world.stamped(payload))
+
+    def check(self) -> None:
+        world = self.world
+        world.check(cpu_s() - self._cpu_s, world.messages - self._messages)
+        self._cpu_s, self._messages = cpu_s(), world.messages
+
+    @rule(turns=st.integers(1, 12), posed=st.booleans())
+    def drive(self, turns, posed) -> None:
+        self.world.drive(turns, posed=posed)
+        self.check()
+
+    @rule(seconds=st.sampled_from([0.3, 0.9, 1.5, 6.0, 100.0]), posed=st.booleans())
+    def the_sensor_is_silent(self, seconds, posed) -> None:
+        self.world.drive(min(round(seconds * 10), 60), posed=posed, sensing=False)
+        self.world.now_s += max(seconds - 6.0, 0.0)
+        self.check()
+
+    @rule(seconds=st.sampled_from([0.3, 1.1, 6.0, 3600.0]), half_s=st.sampled_from([0.0, 0.05]))
+    def the_process_is_stopped(self, seconds, half_s) -> None:
+        world = self.world
+        world.drive(1)
+        if world.source == "velodyne":
+            for payload in turn(world.model)[: round(half_s * 750)]:
+                world.packet(world.stamped(payload))
+        else:
+            world.cloud(world.calendar_s, np.full((10, 4), 5.0, np.float32))
+        world.now_s += seconds
+        world.take()
+        self.check()
+
+    @rule(step_s=STEPS_S)
+    def the_calendar_is_set(self, step_s) -> None:
+        self.world.set_s = float(np.clip(self.world.set_s + step_s, 0.0, 1.9e9))
+        self.world.drive(3)
+        self.check()
+
+    @rule(step_s=STEPS_S, turns=st.sampled_from([1, 8]))
+    def the_clock_of_the_sensor_is_set(self, step_s, turns) -> None:
+        self.world.sensor_s += step_s
+        self.world.drive(turns)
+        self.check()
+
+    @precondition(lambda self: self.world.source == "velodyne")
+    @rule(seed=SEED, share=st.sampled_from([0.01, 0.3, 0.9]), turns=st.sampled_from([1, 5]))
+    def packets_are_lost_doubled_and_overtaken(self, seed, share, turns) -> None:
+        rng = np.random.default_rng(seed)
+
+        def faults(packets):
+            kept = [p for p in packets if rng.random() > share / 2]
+            kept += [p for p in packets if rng.random() < share / 2]
+            late = 0.003 * rng.random(len(kept)) * (rng.random(len(kept)) < share)
+            return [(min(at_s + d, 0.1), payload, -d) for (at_s, payload, _), d in zip(kept, late, strict=True)]
+
+        self.world.drive(turns, faults=faults)
+        self.check()
+
+    @precondition(lambda self: self.world.source == "velodyne")
+    @rule(
+        seed=SEED,
+        scale_s=st.sampled_from([0.0, 1e-6, 0.001, 0.05, 0.3, 3.0, 3600.0]),
+        ahead=st.sampled_from([0.0, 0.5]),
+        n=st.sampled_from([1, 30, 1000]),
+    )
+    def valid_packets_of_any_time(self, seed, scale_s, ahead, n) -> None:
+        rng, world = np.random.default_rng(seed), self.world
+        payloads = turn(world.model)
+        for _ in range(n):
+            world.packet(world.stamped(payloads[rng.integers(len(payloads))], scale_s * rng.uniform(-1, ahead)))
+        world.take()
+        self.check()
+
+    @precondition(lambda self: self.world.source == "velodyne")
+    @rule(seed=SEED, azimuth=st.sampled_from([None, 0, 17_999, 18_000, 35_999]), n=st.sampled_from([5, 200]))
+    def heads_that_stand_or_leap(self, seed, azimuth, n) -> None:
+        rng, world = np.random.default_rng(seed), self.world
+        for k in range(n):
+            payload = bytearray(turn(world.model)[k % 70])
+            chosen = rng.integers(0, 36_000, 12) if azimuth is None else np.full(12, azimuth)
+            for block, degrees in enumerate(chosen.tolist()):
+                payload[100 * block + 2 : 100 * block + 4] = degrees.to_bytes(2, "little")
+            assert len(AZIMUTHS.unpack_from(payload)) == 12
+            world.now_s += 0.0013
+            world.packet(world.stamped(bytes(payload)))
+        world.take()
+        self.check()
+
+    @precondition(lambda self: self.world.source == "velodyne")
+    @rule(model=st.sampled_from(["vlp-16", "hdl-64e"]), n=st.sampled_from([1, 19, 20, 60]))
+    def packets_of_some_model(self, model, n) -> None:
+        for k in range(n):
+            self.world.now_s += 0.0005
+            self.world.packet(self.world.stamped(turn(model)[k % 70]))
+        self.check()
+
+    @precondition(lambda self: self.world.source == "velodyne")
+    @rule(
+        at=st.sampled_from([0, 1, IDENTITY_AT, RETURN_AT]),
+        value=st.sampled_from([0, 0x21, 0x22, 0x28, 0x37, 0x39, 0xA1, 0xFF]),
+        n=st.sampled_from([1, 40]),
+    )
+    def factory_bytes(self, at, value, n) -> None:
+        for payload in turn(self.world.model)[:n]:
+            changed = bytearray(payload)
+            changed[at] = value
+            self.world.now_s += 0.0013
+            self.world.packet(self.world.stamped(bytes(changed)))
+        self.check()
+
+    @precondition(lambda self: self.world.source == "velodyne")
+    @rule(seed=SEED, length=st.sampled_from([0, 1205, 1206, 65_000]), n=st.sampled_from([1, 50]))
+    def garbage(self, seed, length, n) -> None:
+        rng = np.random.default_rng(seed)
+        for _ in range(n):
+            self.world.packet(rng.bytes(length))
+        self.check()
+
+    @precondition(lambda self: self.world.source == "ros2")
+    @rule(
+        off_s=st.sampled_from([0.0, 1e-9, -0.05, 0.5, -0.5, 3.0, 1e9, -1e9]),
+        fill=st.sampled_from([5.0, 0.0, np.nan, np.inf, 5e4]),
+        name=st.sampled_from(["lidar", "map", "", "x" * 4000]),
+        n=st.sampled_from([1, 20]),
+    )
+    def clouds_of_any_kind(self, off_s, fill, name, n) -> None:
+        world = self.world
+        for k in range(n):
+            world.now_s += 0.02
+            world.cloud(world.calendar_s + off_s, np.full((10, 4), fill, np.float32), f"{name}{k % 2}"[-4000:])
+        world.take()
+        self.check()
+
+    @rule(off_s=STAMPS_S, honest=st.booleans(), x_m=PLACES_M, y_m=PLACES_M, n=st.sampled_from([1, 7, 60]))
+    def poses_that_lie(self, off_s, honest, x_m, y_m, n) -> None:
+        world = self.world
+        for k in range(n):
+            world.now_s += 0.005
+            stamp_s = off_s if abs(off_s) > 1e6 else world.calendar_s + off_s
+            if honest and k % 3 == 0:
+                world.honest_pose()
+            world.pose(stamp_s, x_m + 0.001 * k, y_m, 0.1 * k)
+        world.drive(1, posed=honest)
+        self.check()
+
+    @rule(seed=SEED, n=st.sampled_from([3, 300]), digits=st.integers(0, 9))
+    def poses_in_disorder(self, seed, n, digits) -> None:
+        rng, world = np.random.default_rng(seed), self.world
+        for offset_s in rng.normal(0.0, 0.5, n).round(digits):
+            world.honest_pose(float(offset_s))
+        world.drive(1)
+        self.check()
+
+    @rule(x_m=st.sampled_from([0.0, 1.0, -400.0, 458_000.0]), y_m=st.sampled_from([0.0, 5_430_000.0]))
+    def the_odometry_begins_anew(self, x_m, y_m) -> None:
+        self.world.origin_m = np.array([x_m - 5.0 * self.world.now_s, y_m])
+        self.world.drive(6)
+        self.check()
+
+    @rule()
+    def all_is_well_again(self) -> None:
+        self.world.recovers()
+        self.check()
+
+    def teardown(self) -> None:
+        if hasattr(self, "world"):
+            try:
+                self.world.recovers()
+            finally:
+                self.world.close()

@@ -1,0 +1,277 @@
+"""A robot whose sensor, odometry, clocks and scheduler may lie or stop, up to the frames that its loop takes."""
+
+from __future__ import annotations
+
+import json
+import logging
+import struct
+import time
+from collections import Counter, deque
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from modt.app.containment import OncePerSecond
+from modt.config import OdometryConfig
+from modt.ros2.odometry import write_odometry
+from modt.ros2.point_cloud2 import write_cloud
+from modt.sources.live.live_stream import LiveStream
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.packets.velodyne import CYCLE, RECOGNISED_BY, VelodyneDecoder
+from modt.sources.packets.velodyne_models import STAMP_AT, azimuths
+from modt.sources.pose_datagram import read_datagram
+from modt.sources.pose_topic import PoseTopic
+from modt.sources.received_poses import ReceivedPoses
+from modt.sources.stream import MAX_KEPT_FAULTS, StreamInfo
+from modt.types import Float64, Frame
+from tests.sources.packets.simulated import packets
+
+CONFIG = OdometryConfig()
+SPEED_MPS = 5.0
+TURN_S = 0.1
+POSES_A_TURN = 5
+HOUR_US = 3_600_000_000
+REACH_M = CONFIG.position_noise_m + 2 * CONFIG.max_speed_mps * CONFIG.max_age_s
+"""No pose of a frame is farther from every pose that was sent."""
+MOST_KINDS, MOST_REASONS = 60, 40
+MESSAGE_CPU_S, SLACK_CPU_S = 0.004, 1.0
+"""CPU time that a message may take on average, and a whole step besides."""
+
+
+@cache
+def turn(model: str) -> tuple[bytes, ...]:
+    """The packets of one turn."""
+    payloads = [payload for _, payload in packets(model, 3)]
+    phases = np.array([(azimuths(p)[0] + 18_000) % 36_000 for p in payloads])
+    first, end = (np.flatnonzero(np.diff(phases) < 0) + 1)[:2]
+    return tuple(payloads[first:end])
+
+
+class Datagrams(ReceivedPoses):
+    """Poses of datagrams that a test hands over."""
+
+    _read = staticmethod(read_datagram)  # type: ignore[assignment]
+
+    def __init__(self) -> None:
+        super().__init__(CONFIG, "datagrams")
+        self.held: list[bytes] = []
+
+    def _take(self) -> list[bytes]:
+        taken, self.held = self.held[-CONFIG.capacity :], []
+        self.received += len(taken)
+        return taken
+
+
+class Held:
+    """A subscription that holds what a test hands over, of which it gives the latest."""
+
+    def __init__(self, depth: int) -> None:
+        self.depth, self.held = depth, list[Any]()
+
+    def take(self, timeout_s: float = 0.0) -> list[Any]:
+        taken, self.held = self.held[-self.depth :], []
+        return taken
+
+
+class Lines(logging.Handler):
+    """Counts of the lines that were logged, before and after they are held back, by kind."""
+
+    def __init__(self, world: LiveWorld) -> None:
+        super().__init__()
+        self.said, self.passed = Counter[str](), Counter[tuple[str, float]]()
+        self._world, self._limit = world, OncePerSecond(lambda: world.now_s)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        kind = f"{record.name} {record.msg}"
+        self.said[kind] += 1
+        assert len(record.getMessage()) < 10_000
+        assert "Traceback" not in str(record.exc_info)
+        self.passed[kind, self._world.now_s // 1.0] += self._limit.filter(record)
+
+
+class Reader:
+    """Has the reception of a source; the world hands its sweeps over itself."""
+
+    profile = None
+
+    def __init__(self) -> None:
+        self.reception = Reception()
+
+
+class LiveWorld:
+    """What stands between a robot's sockets and its loop, without threads, on clocks of the test.
+
+    Attributes:
+        now_s: monotonic.
+        set_s: by which the calendar is ahead of it.
+        sensor_s: the same of the sensor's own clock.
+        origin_m: of the odometry.
+    """
+
+    def __init__(self, source: str, odometry: str) -> None:
+        self.now_s, self.set_s, self.sensor_s, self.origin_m = 100.0, 1.6e9, 0.0, np.zeros(2)
+        self.source, self.model = source, "vlp-16"
+        self.reader: Any = Reader()
+        if source == "ros2":
+            from modt.sources.live.ros2 import DEPTH, PointCloudReader
+
+            self.clouds = Held(DEPTH)
+            self.reader = PointCloudReader(self.clouds, "points")  # type: ignore[arg-type]
+        self.decoder = VelodyneDecoder("sensor")
+        info = StreamInfo("sensor", "test", 0, None, TURN_S, None, has_poses=False)
+        self.stream = LiveStream(info, self.reader, clock=lambda: self.now_s)
+        self.messages, self.frames = 0, list[Frame]()
+        self._taken: list[tuple[float, float]] = []
+        self.sent: deque[tuple[float, float, float]] = deque(maxlen=2000)
+        self.poses: Any = Datagrams() if odometry == "datagrams" else PoseTopic(Held(256), CONFIG, "odom", np.eye(4))  # type: ignore[arg-type]
+        self._counts: dict[str, float] = {}
+        self.lines = Lines(self)
+        logging.getLogger("modt").addHandler(self.lines)
+
+    def close(self) -> None:
+        logging.getLogger("modt").removeHandler(self.lines)
+
+    @property
+    def calendar_s(self) -> float:
+        return self.now_s + self.set_s
+
+    def packet(self, payload: bytes, received_s: float | None = None) -> None:
+        """The sensor's port receives something."""
+        self.messages += 1
+        self.reader.reception.messages += 1
+        received_s = self.calendar_s if received_s is None else received_s
+        self._put(self.decoder.decode(received_s, payload, self.reader.reception))
+
+    def stamped(self, payload: bytes, ahead_s: float = 0.0) -> bytes:
+        """A packet with the time of the sensor's clock."""
+        stamp_us = round((self.now_s + self.sensor_s + ahead_s) * 1e6) % HOUR_US
+        return payload[:STAMP_AT] + struct.pack("<I", stamp_us) + payload[STAMP_AT + 4 :]
+
+    def cloud(self, stamp_s: float, points: Any, frame_id: str = "lidar") -> None:
+        """The topic receives a sweep."""
+        from modt.ros2 import dds
+
+        self.messages += 1
+        seconds = min(max(stamp_s, -2e9), 2e9) if np.isfinite(stamp_s) else 0.0
+        self.clouds.held.append(dds.Message(write_cloud(seconds, frame_id, points), self.calendar_s))
+        self._put(self.reader.read(0.0))
+
+    def pause(self) -> None:
+        """Nothing comes for a moment."""
+        self._put(self.decoder.pause(self.reader.reception))
+
+    def _put(self, sweeps: Iterable[Sweep]) -> None:
+        for sweep in sweeps:
+            self.stream._put(sweep)
+
+    def pose(self, stamp_s: float, x_m: float, y_m: float = 0.0, yaw: float = 0.0) -> None:
+        """The odometry sends a pose."""
+        self.messages += 1
+        if np.isfinite([x_m, y_m]).all():
+            self.sent.append((x_m, y_m, 0.0))
+        if isinstance(self.poses, Datagrams):
+            message = {"stamp": stamp_s, "x": x_m, "y": y_m, "yaw": yaw}
+            self.poses.held.append(json.dumps(message).encode())
+        elif abs(stamp_s) < 2e9 and np.isfinite([x_m, y_m, yaw]).all():
+            from modt.ros2 import dds
+
+            T = np.eye(4)
+            T[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+            T[:2, 3] = x_m, y_m
+            self.poses._subscription.held.append(dds.Message(write_odometry(stamp_s, "odom", "base", T), stamp_s))
+
+    def honest_pose(self, ahead_s: float = 0.0) -> None:
+        """The pose of a robot that drives straight on."""
+        x_m, y_m = self.origin_m + np.array([SPEED_MPS * (self.now_s + ahead_s), 0.0])
+        self.pose(self.calendar_s + ahead_s, float(x_m), float(y_m))
+
+    def take(self) -> None:
+        """The loop looks for a sweep, and places it."""
+        received = self.stream.take(0.0)
+        if received is None:
+            return
+        frame = self.poses.place(received.frame)
+        self.frames = [*self.frames[-50:], frame]
+        assert np.isfinite(frame.stamp_s)
+        assert np.isfinite(frame.time_s)
+        self._taken = [*self._taken[-50:], (received.arrived_s, frame.time_s)]
+        if len(self._taken) > 1:
+            (before_s, last_s), (arrived_s, time_s) = self._taken[-2:]
+            assert -1e-6 <= time_s - last_s <= arrived_s - before_s + 1.1, "steady time stepped"
+        if frame.T_world_sensor is not None:
+            self._pose_is_near_what_was_sent(frame.T_world_sensor)
+
+    def _pose_is_near_what_was_sent(self, T: Float64) -> None:
+        assert np.isfinite(T).all()
+        assert np.linalg.norm(np.array(self.sent) - T[:3, 3], axis=1).min() <= REACH_M, "a pose that nobody sent"
+
+    def drive(self, turns: int, *, posed: bool = True, sensing: bool = True, faults: Any = None) -> None:
+        """All that comes and is taken in some turns of the sensor; `faults` may change a turn's packets."""
+        for _ in range(turns):
+            payloads = list(turn(self.model))
+            packets_ = [(k / len(payloads) * TURN_S, payload, 0.0) for k, payload in enumerate(payloads)]
+            packets_ = packets_ if faults is None else faults(packets_)
+            began_s, due = self.now_s, 0
+            for at_s, payload, ahead_s in packets_ if sensing and self.source == "velodyne" else []:
+                self.now_s = max(self.now_s, began_s + at_s)
+                self.packet(self.stamped(payload, ahead_s))
+                if posed and at_s >= due / POSES_A_TURN * TURN_S:
+                    self.honest_pose()
+                    due += 1
+            for _ in range(due, POSES_A_TURN if posed else 0):
+                self.now_s += (began_s + TURN_S - self.now_s) / POSES_A_TURN
+                self.honest_pose()
+            self.now_s = max(self.now_s, began_s + TURN_S)
+            if sensing and self.source == "ros2":
+                self.cloud(self.calendar_s - 0.05, np.full((10, 4), 5.0, np.float32))
+            self.pause()
+            self.take()
+
+    def check(self, cpu_s: float, messages: int) -> None:
+        """What holds after every step, which took a CPU time and brought some messages."""
+        assert cpu_s < SLACK_CPU_S + MESSAGE_CPU_S * messages, "it took too long"
+        self._bounded()
+        counts = self._present_counts()
+        for name, count in counts.items():
+            assert count >= self._counts.get(name, 0), f"{name} fell"
+        self._counts = counts
+        assert max(self.lines.passed.values(), default=0) <= 1, "a log line more than once a second"
+        assert len(self.lines.said) <= MOST_KINDS, "too many kinds of lines"
+
+    def _present_counts(self) -> dict[str, float]:
+        health, report = self.stream.health(), self.poses.report()
+        counts = {key: value for key, value in health.items() if isinstance(value, int)} | {"silent": 0}
+        counts |= {f"refused {reason}": n for reason, n in health["refused_messages"].items()}
+        counts |= {key: value for key, value in report.items() if isinstance(value, int)}
+        counts |= {f"pose {reason}": n for reason, n in report["refused"].items()}
+        assert report["refused"]["failed"] == 0
+        assert len(health["refused_messages"]) <= MOST_REASONS
+        return counts | {"faults": self.stream.faults.count}
+
+    def _bounded(self) -> None:
+        decoder, poses = self.decoder, self.poses._poses
+        most = decoder._most + 200
+        assert len(decoder._turn.entries) <= most
+        assert len(decoder._ending.entries) <= most
+        assert len(decoder._first or []) <= RECOGNISED_BY
+        assert len(decoder._others) <= RECOGNISED_BY
+        assert decoder._own is None or len(decoder._own._tails) <= CYCLE + 1
+        assert max(len(poses.believed), len(poses._doubted)) <= CONFIG.capacity
+        assert len(self.stream.faults.first) <= MAX_KEPT_FAULTS
+
+    def recovers(self) -> None:
+        """Three seconds after everything is honest again, sweeps come and have their poses."""
+        self.drive(30)
+        frames, posed = self.stream.sweeps, self.poses.posed
+        refused = self.stream.faults.skipped
+        self.drive(10)
+        assert self.stream.sweeps - frames >= 9, "blind"
+        assert self.stream.faults.skipped - refused == 0, "sweeps are refused"
+        assert self.poses.posed - posed >= 9, "without poses"
+
+
+def cpu_s() -> float:
+    """CPU time of this thread so far."""
+    return time.thread_time()

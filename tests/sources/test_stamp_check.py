@@ -1,0 +1,79 @@
+"""Stamps that lie, and clocks that are set."""
+
+import itertools
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.sources.stamp_check import StampCheck
+
+PERIOD_S = 0.1
+MOST_LOST = 10
+"""Sweeps of a second."""
+
+
+def believed(stamps, arrivals):
+    """Numbers of the messages believed, their corrected stamps, and the check."""
+    check, kept = StampCheck(), []
+    for k, (stamp_s, arrived_s) in enumerate(zip(stamps, arrivals, strict=True)):
+        if not check.doubt(stamp_s, arrived_s):
+            kept.append((k, stamp_s + check.shift_s))
+    return [k for k, _ in kept], [stamp_s for _, stamp_s in kept], check
+
+
+def even(n, begin=0.0):
+    return [begin + k * PERIOD_S for k in range(n)]
+
+
+@given(st.integers(1, 58), st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2))
+def test_a_clock_that_is_set_costs_less_than_a_second_and_stamps_go_on(at, step_s):
+    stamps = [s + (step_s if k >= at else 0.0) for k, s in enumerate(even(60, 1.7e9))]
+    numbers, corrected, check = believed(stamps, even(60))
+    assert len(numbers) >= min(60 - MOST_LOST, at)
+    assert numbers[:at] == list(range(at))
+    assert corrected == pytest.approx([1.7e9 + k * PERIOD_S for k in numbers], abs=1e-5)
+    assert check.steps == (len(numbers) > at)
+
+
+@given(st.integers(1, 58), st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2))
+def test_one_stamp_that_lies_costs_its_sweep_alone(at, step_s):
+    stamps = [s + (step_s if k == at else 0.0) for k, s in enumerate(even(60))]
+    numbers, corrected, check = believed(stamps, even(60))
+    assert numbers == [k for k in range(60) if k != at]
+    assert corrected == pytest.approx([k * PERIOD_S for k in numbers])
+    assert check.steps == 0
+
+
+@given(st.integers(1, 58), st.floats(-1e9, 1e9).filter(lambda s: abs(s) > 2))
+def test_a_clock_that_stamps_and_arrivals_share_costs_nothing_when_it_is_set_back(at, step_s):
+    both = [s + (-abs(step_s) if k >= at else 0.0) for k, s in enumerate(even(60))]
+    numbers, corrected, _ = believed(both, both)
+    assert numbers == list(range(60))
+    assert corrected == pytest.approx(even(60), abs=1e-5)
+
+
+@given(st.integers(1, 58), st.floats(-1e9, 1e9))
+def test_a_clock_of_arrivals_that_is_set_costs_nothing(at, step_s):
+    arrivals = [s + (step_s if k >= at else 0.0) for k, s in enumerate(even(60))]
+    numbers, corrected, _ = believed(even(60), arrivals)
+    assert numbers == list(range(60))
+    assert corrected == pytest.approx(even(60))
+
+
+def test_a_pause_is_no_lie():
+    stamps = even(10) + even(10, 100.0)
+    assert believed(stamps, stamps)[0] == list(range(20))
+
+
+def test_arrivals_that_stand_still_do_not_end_the_recording():
+    stamps = even(10) + even(20, 100.0)
+    numbers, _, _ = believed(stamps, [0.0] * 30)
+    assert len(numbers) >= 30 - MOST_LOST
+    assert numbers[-1] == 29
+
+
+@given(st.lists(st.tuples(st.floats(-1e10, 1e10), st.floats(-1e10, 1e10)), max_size=50))
+def test_corrected_stamps_never_fall_by_more_than_rounding(messages):
+    _, corrected, _ = believed(*zip(*messages, strict=True)) if messages else ([], [], None)
+    assert all(b >= a - 1e-3 for a, b in itertools.pairwise(corrected))

@@ -1,0 +1,1 @@
+"""Energy that the method saves: the paper's equations, and costs fitted to runs."""

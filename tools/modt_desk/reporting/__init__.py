@@ -1,0 +1,1 @@
+"""Reports of energy and savings, as text, JSON and HTML pages."""

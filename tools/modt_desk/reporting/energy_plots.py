@@ -1,0 +1,87 @@
+"""Plots, tables and sentences that the reports of a run and of a comparison share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modt.energy.meters.meter import Kind
+from modt.types import Float64
+from modt_desk.energy.equations import EnergyModel
+from modt_desk.reporting import svg
+from modt_desk.reporting.document import Table
+from modt_desk.reporting.page import Plot
+from modt_desk.reporting.quantity import Quantity
+
+_MAX_LIFE = 1000.0
+"""Upper end of the N_go axis of the curve of Equation 3 [frames]."""
+
+
+def stage_energy_mJ(series: dict[str, Any]) -> dict[str, Float64]:
+    """(frames,) energy attributed to each stage [mJ]: its power above idling times its CPU time."""
+    return {stage: watts * np.array(series["cpu_ms"][stage], float) for stage, watts in series["stage_W"].items()}
+
+
+def basis(gross_J: Quantity) -> str:
+    """Origin of the energy that the plots show."""
+    if gross_J.kind is Kind.ESTIMATED:
+        return "estimated from CPU time, without idling"
+    return f"{gross_J.kind}, its split over stages and frames estimated; without idling and what is unattributed"
+
+
+def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64, note: str) -> Plot:
+    """Stacked energy of the stages over (points,) frames."""
+    return (title, svg.areas(frames, energy_mJ, "frame", "mJ a frame"), note)
+
+
+def cumulative_energy(energy_mJ: dict[str, Float64], each: Float64, note: str, dashed: str = "") -> Plot:
+    """Energy a frame summed over points of so many frames each, a line a run; the one named is dashed."""
+    traces = [
+        svg.Trace(name, np.cumsum(each), 1e-3 * np.cumsum(each * mJ), dashed=name == dashed)
+        for name, mJ in energy_mJ.items()
+    ]
+    return ("Cumulative energy, E1 against E2", svg.lines(traces, "frame", "J"), note)
+
+
+def life_histogram(title: str, lives: dict[str, list[int]]) -> Plot:
+    """Histogram of the lives of tracks [frames], by the occurrences of each life."""
+    life = np.array(lives["values"], float)
+    edges = np.linspace(0.5, max(life.max(initial=1.0), 1.0) + 0.5, 31)
+    heights = np.histogram(life, edges, weights=np.array(lives["counts"], float))[0]
+    return (title, svg.bars(edges, heights, "frames seen", "tracks"), "counted")
+
+
+def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quantity]], note: str) -> Plot:
+    """Equation 3 over N_go at a and n, the short form, and (N_go, gamma) of each run."""
+    traces = []
+    if a.value is not None and n.value is not None:
+        life = np.geomspace(1.0, _MAX_LIFE, 100)
+        curve = np.array([EnergyModel(1.0, a.value, n.value, n_go).gamma for n_go in life.tolist()])
+        short = life[life <= 10 * curve[-1]]
+        traces = [
+            svg.Trace("Equation 3 at this a and n", life, curve),
+            svg.Trace("gamma = N_go", short, short, dashed=True),
+        ]
+        traces += [
+            svg.Trace(name, np.array([x.value], float), np.array([y.value], float), dots=True)
+            for name, (x, y) in runs.items()
+        ]
+    note = f"dashed: gamma = N_go; line: Equation 3; {note}"
+    return ("Gamma against N_go", svg.lines(traces, "N_go [frames]", "gamma", log=True), note)
+
+
+def gamma_terms(title: str, saving: dict[str, Any]) -> Table:
+    """Table of the terms from gamma = N_go to the ratio of the runs."""
+    short = ["the short form, gamma = N_go", "", saving["gamma_short"]]
+    rows = [[term["name"], f"~{term['change'].value:+.3f}", term["gamma"]] for term in saving["terms"]]
+    return Table([title, "change", "gamma"], [short, *rows])
+
+
+def conditions_text(conditions: dict[str, Any]) -> str:
+    """Governor, frequency and core, where available."""
+    governor, frequency = conditions.get("governor"), conditions.get("frequency_MHz")
+    return (
+        f"governor {governor or 'unavailable'}, "
+        f"frequency {'unavailable' if frequency is None else f'{frequency:.0f} MHz'}, core {conditions.get('core')}"
+    )

@@ -1,0 +1,98 @@
+"""What a report needs of a run's records, summed while they are read: bounded memory at any length of the run."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+
+from modt.classes import CLASS_NAMES, ObjectClass
+from modt.pipeline import CLASSIFICATION, STAGES
+from modt.reporting.histogram import Histogram
+from modt.types import Int
+from modt_desk.energy.savings import Counts
+from modt_desk.reporting.frame_series import FrameSeries
+
+_BACKGROUND = CLASS_NAMES[ObjectClass.BACKGROUND]
+COLUMNS = (*STAGES, "classified", "deferred", "proposals", "all_points")
+"""Of the series: CPU time of the stages [s], counts, and points if all proposals were classified."""
+
+
+class FrameSums:
+    """Counts and costs over the lines of ledger.jsonl and tracks.jsonl.
+
+    Of the tracks only those alive are held.
+    """
+
+    def __init__(self, size: Callable[[Int], int]) -> None:
+        self._size = size  # points that the network processes for proposals of (R,) points
+        self.series = FrameSeries(len(COLUMNS))
+        self.stages: defaultdict[str, Counter[str]] = defaultdict(Counter)  # sums of the ledger's columns
+        self.overhead_ns = self.cpu_ns = 0
+        self.marks: set[str] = set()
+        self.lives = Histogram()  # frames with a proposal, of the tracks that ended
+        self.foreground = self.tracks = self.classified_tracks = 0
+        self.load_gram, self.load_moment = np.zeros((3, 3)), np.zeros(3)  # of calls, items, points and CPU s
+        self._life: dict[int, int] = {}  # of the tracks alive
+        self._viewed: set[int] = set()
+
+    def add(self, line: dict[str, Any], record: dict[str, Any]) -> None:
+        """Add a frame by its two lines."""
+        for stage, row in line["stages"].items():
+            self.stages[stage].update(row)
+        self.overhead_ns += line["overhead_ns"]
+        self.cpu_ns += line["cpu_ns"]
+        self.marks.update(line["marks"])
+        cpu_s = {stage: 1e-9 * line["stages"].get(stage, {}).get("cpu_ns", 0) for stage in STAGES}
+        row = line["stages"].get(CLASSIFICATION, {})
+        load = np.array([row.get("calls", 0), record["classifications"], row.get("points", 0)], float)
+        self.load_gram += np.outer(load, load)
+        self.load_moment += load * cpu_s[CLASSIFICATION]
+        all_points = self._add_tracks(record["tracks"])
+        counts = (record["classifications"], record["deferred"], record["proposals"], all_points)
+        self.series.add([*cpu_s.values(), *counts])
+
+    def finish(self) -> None:
+        """Count the lives of the tracks still alive."""
+        self._end(self._life.keys())
+
+    def column(self, name: str) -> float:
+        """Sum of a column of the series over all frames."""
+        return float(self.series.total[COLUMNS.index(name)])
+
+    def counts(self) -> Counts:
+        """The work of the run."""
+        row = self.stages[CLASSIFICATION]
+        return Counts(
+            frames=self.series.count,
+            proposals=int(self.column("proposals")),
+            foreground=self.foreground,
+            tracks=self.tracks,
+            classified_tracks=self.classified_tracks,
+            classified=int(self.column("classified")),
+            reacquired=0,
+            points=row["points"],
+            calls=row["calls"],
+        )
+
+    def _add_tracks(self, tracks: list[dict[str, Any]]) -> int:
+        """Points of all proposals as the network would process them, padding included."""
+        alive = {track["id"] for track in tracks}
+        self._end(self._life.keys() - alive)
+        seen = [track for track in tracks if track["proposal"] is not None]
+        self.foreground += sum(track["class"] != _BACKGROUND for track in seen)
+        for track in seen:
+            life = self._life.get(track["id"], 0)
+            self.tracks += not life
+            self._life[track["id"]] = life + 1
+        viewed = {track["id"] for track in tracks if track["viewed"]}
+        self.classified_tracks += len(viewed - self._viewed)
+        self._viewed = (self._viewed | viewed) & alive
+        sizes = np.array([track["points"] for track in seen], np.int64)
+        return self._size(sizes)
+
+    def _end(self, ids: Iterable[int]) -> None:
+        for id_ in tuple(ids):
+            self.lives.add(self._life.pop(id_))

@@ -1,0 +1,1 @@
+"""The profile of a sensor, fitted to a recording of it."""
