@@ -248,7 +248,7 @@ def test_frames_without_a_proposal_are_frames_like_any_other(tmp_path):
 
 def test_a_full_disk_is_one_line_and_what_was_recorded_stays(tmp_path):
     def small_files():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 
     done = modt("replay", "--frames", "0:30", "--out", "run", cwd=tmp_path, preexec_fn=small_files)
     assert done.returncode == 1, done.stderr
