@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
+from modt.errors import ModtError
 from modt.sinks.output import Health, LedgerSink, Reporting, Writer
 
 log = logging.getLogger(__name__)
@@ -25,8 +26,8 @@ RETRY_S = 1.0
 class Background(Generic[T]):
     """Writes in a thread of its own, in order; where no room is left, the oldest item that waits gives way.
 
-    A failure of the writer is logged once, until it writes again; the item is lost and counted, and after a pause the
-    next one is tried.
+    A failure of the writer is logged once, until it writes again, with a traceback where it is none of the system; the
+    item is lost and counted, and after a pause the next one is tried.
 
     Args:
         name: for messages.
@@ -125,11 +126,17 @@ class Background(Generic[T]):
 
     def _fail(self, error: Exception) -> None:
         self._failed += 1
+        known = isinstance(error, (ModtError, OSError))
+        what = f"{error}" if known else f"{type(error).__name__}: {error}"
         if self._state == "ok":
             log.warning(
-                "%s: %s; tried again every %g s, what cannot be written is counted", self.name, error, self._retry_s
+                "%s: %s; tried again every %g s, what cannot be written is counted",
+                self.name,
+                what,
+                self._retry_s,
+                exc_info=None if known else error,
             )
-        self._state = str(error)
+        self._state = what
         with self._changed:
             self._changed.wait_for(lambda: self._end_s is not None, self._retry_s)
 
