@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.schemes import open_sink
 
     supervisor = supervisor_of(os.environ)
-    sinks = {address: open_sink(address) for address in arguments.sink}
+    sinks = {address: open_sink(address) for address in dict.fromkeys(arguments.sink)}
     session = replay(Request.of(arguments), sinks, arguments.out, pinned, ["modt", *sys.argv[1:]])
     info, directory, show = session.stages.info, session.recording.directory, not arguments.quiet
     if show:

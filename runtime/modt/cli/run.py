@@ -55,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
     with host.elsewhere(cores):
         source, path = live_source(arguments.source, cores)
         addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
-        sinks = {address: open_sink(address) for address in addresses}
+        sinks = {address: open_sink(address) for address in dict.fromkeys(addresses)}
         command = ["modt", *sys.argv[1:]]
         request = replace(Request.of(arguments), path=path)
         out, metrics = arguments.out, arguments.metrics
