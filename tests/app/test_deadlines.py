@@ -11,8 +11,7 @@ from modt.app.deadlines import Deadlines
 from modt.app.ladder import Step
 from modt.app.loop import WAIT_S, Loop, Stop
 from modt.errors import MisuseError, ModtError
-from modt.sources.live.live_stream import Received
-from modt.sources.live.sweep_reader import StreamEndedError
+from modt.sources.live.sweep_reader import Received, StreamEndedError
 from modt.types import Budget, Frame
 from tests.results import result
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl
 
 from modt import profile
@@ -15,9 +16,11 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.schemes import POSES, open_poses, open_sensor
-from modt.sources.live.live_stream import LiveStream
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.stream import Stream, StreamInfo
+
+if TYPE_CHECKING:
+    from modt.sources.live.live_stream import LiveStream
 
 STREET = "modt_desk.simulation.synthetic_stream"
 """Module of the synthetic street, loaded only where no recording is given."""
@@ -82,6 +85,7 @@ def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Pa
     """
     if "://" in text:
         return open_sensor(text, cores), None
+    from modt.sources.live.live_stream import LiveStream
     from modt.sources.live.played_reader import PlayedReader
 
     place, _, query = text.partition("?")

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.deadlines import Deadlines, NoDeadlines
@@ -21,9 +21,11 @@ from modt.energy.ledger import Line
 from modt.errors import ModtError
 from modt.pipeline import SINK
 from modt.sinks.output import Writer
-from modt.sources.live.live_stream import LiveStream, Received
-from modt.sources.live.sweep_reader import StreamEndedError
+from modt.sources.live.sweep_reader import Received, StreamEndedError
 from modt.types import FrameResult
+
+if TYPE_CHECKING:
+    from modt.sources.live.live_stream import LiveStream
 
 log = logging.getLogger(__name__)
 

@@ -9,8 +9,7 @@ from typing import Any
 
 from modt.energy.ledger import Ledger
 from modt.pipeline import SOURCE
-from modt.sources.live.live_stream import Received
-from modt.sources.live.sweep_reader import StreamEndedError
+from modt.sources.live.sweep_reader import Received, StreamEndedError
 from modt.sources.stream import Stream
 
 

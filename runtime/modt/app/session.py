@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from modt import host, profile
 from modt.app import inputs, metering
@@ -25,12 +25,13 @@ from modt.classes import CLASS_NAMES
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Kind, Meter
 from modt.reporting.summary import Summary
-from modt.sinks.background import Background
 from modt.sinks.output import LedgerSink, Sink, close_together
 from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecording
 from modt.sinks.run_directory import SUMMARY, RunDirectory
-from modt.sources.live.live_stream import LiveStream
 from modt.types import FrameResult, Tracks
+
+if TYPE_CHECKING:
+    from modt.sources.live.live_stream import LiveStream
 
 log = logging.getLogger(__name__)
 
@@ -245,6 +246,8 @@ def service(
     Raises:
         MisuseError: an invalid request.
     """
+    from modt.sinks.background import Background
+
     stages = Stages(request, source.info, Ledger(), SensorWatch())
     meter = metering.discovery(stages.config.energy).best
     if stages.config.loop.power_W is not None and meter.facts is not None and meter.facts.kind is Kind.ESTIMATED:

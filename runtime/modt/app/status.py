@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from modt.app.prometheus import write_metrics
 from modt.app.supervisor import Supervisor
 from modt.app.timing import Timing
 from modt.classes import CLASS_NAMES
@@ -135,6 +134,8 @@ class Monitor:
     def _write(self, status: dict[str, Any]) -> None:
         self._recording.state(json.dumps(status, indent=1) + "\n")
         if self._metrics is not None:
+            from modt.app.prometheus import write_metrics
+
             write_metrics(self._metrics, status)
 
 

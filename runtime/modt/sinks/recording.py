@@ -5,19 +5,20 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from modt.config import RecordingConfig
 from modt.errors import ModtError
 from modt.geometry import Camera
-from modt.sinks.background import Background
 from modt.sinks.kitti import KittiResults
-from modt.sinks.labels import PointLabels
 from modt.sinks.output import Health, LineFile, Writer
 from modt.sinks.records import line
 from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
 from modt.sinks.tracks import frame_line
 from modt.types import FrameResult
+
+if TYPE_CHECKING:
+    from modt.sinks.background import Background
 
 log = logging.getLogger(__name__)
 
@@ -210,6 +211,8 @@ class WholeRecording(Recording):
         path = self.directory.path
         self._more.append(KittiResults(path / "kitti" / f"{self._sequence:04d}.txt", self._camera))
         if self._labels:
+            from modt.sinks.labels import PointLabels
+
             self._more.append(PointLabels(path / "labels"))
 
     def write(self, result: FrameResult) -> None:
