@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from modt.app.kernel_choice import choose
 from modt.cli import main, profile, profiles
+from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import environment
 
 MAX_MODULES = 130
@@ -16,13 +18,14 @@ MAX_MODULES = 130
 LOADED = """
 import atexit, sys
 from modt.cli.main import main
-atexit.register(lambda: print(*sorted(name for name in sys.modules if name.partition(".")[0].startswith("modt"))))
+names = "modt", "modt_desk", "scipy"
+atexit.register(lambda: print(*sorted(name for name in sys.modules if name.partition(".")[0] in names)))
 raise SystemExit(main())
 """
 
 
 def loaded(*arguments: object, cwd: Path, seconds: float | None = None) -> list[str]:
-    """Modules of the project that a command has loaded at its end, or when it is stopped."""
+    """Modules of the project, and of SciPy, that a command has loaded at its end, or when it is stopped."""
     command = [sys.executable, "-c", LOADED, *map(str, arguments)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(), cwd=cwd) as running:
         try:
@@ -55,6 +58,19 @@ def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, seconds, 
     assert "modt.pipeline" in modules
     assert [name for name in modules if name.startswith("modt_desk")] == []
     assert len(modules) <= MAX_MODULES
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(choose("auto").name == "numpy", reason="the kernels in NumPy use SciPy")
+@pytest.mark.parametrize("command", ["run", "replay"])
+def test_no_frame_loads_scipy(command, tmp_path):
+    drive = SyntheticStream("street", "vlp-16", 1.5, 0)
+    (tmp_path / "scans").mkdir()
+    for frame in drive:
+        frame.points.tofile(tmp_path / "scans" / f"{frame.index:06d}.bin")
+    modules = loaded(command, "scans", "--core", "none", "--out", "out", cwd=tmp_path)
+    assert "modt.sensor_fit.recognition" in modules
+    assert [name for name in modules if name.startswith("scipy")] == []
 
 
 @pytest.mark.parametrize(

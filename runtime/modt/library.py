@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
@@ -11,18 +10,16 @@ from numpy.typing import ArrayLike
 
 from modt import profile
 from modt.app import assembly
+from modt.app.chosen_profile import choose
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
 from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
-from modt.sensor_fit.recognition import recognise
 from modt.sources.pose_file import pose_defect
 from modt.sources.scan_file import sanitised
 from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int
-
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +100,7 @@ class Pipeline:
         if mode not in assembly.MODES:
             raise MisuseError(f"mode {mode!r}", "unknown", f"use one of {', '.join(assembly.MODES)}")
         self.mode = mode
-        self._asked: profile.Resolved | None = None  # by name or file
+        self._asked: profile.Names | ProfileConfig = config
         self._use(config)
         self._index, self._stamp_s = 0, -np.inf
 
@@ -112,18 +109,6 @@ class Pipeline:
         self.config = config
         self._pipeline = assembly.pipeline(chosen, config, FieldOfView(), NullLedger())
         self._budget = chosen.budget(config)
-
-    def _recognise(self, points: Float32) -> None:
-        """Warn of what the first sweep shows of sensor and mount; level it, and replace a profile not asked for."""
-        found, asked = recognise(points, self.config), self._asked
-        free = asked is not None and asked.sensor is None
-        name = (asked.sensor or profile.DEFAULT) if asked else "given"
-        for line in found.warnings(name, replaced=free):
-            log.warning("%s", line)
-        if asked and free and found.differences:
-            self._use(asked.over(found.fitted))
-        elif found.tilt_deg is not None:
-            self._use(found.mounted(self.config))
 
     @classmethod
     def from_profile(cls, names: profile.Names = None, mode: str = "accurate") -> Self:
@@ -134,9 +119,8 @@ class Pipeline:
         Raises:
             MisuseError: no such profile or mode, or a profile with an error; it names the line.
         """
-        asked = profile.resolve(names)
-        pipeline = cls(asked.config, mode)
-        pipeline._asked = asked
+        pipeline = cls(profile.load(names), mode)
+        pipeline._asked = names
         return pipeline
 
     def step(
@@ -164,7 +148,9 @@ class Pipeline:
             raise MisuseError("T_world_sensor", str(cause), "give a rigid (4, 4) transform from sensor to world")
         frame = Frame(self._index, float(stamp_s), _checked(points), pose, turn_s=turn_s)
         if self._index == 0:
-            self._recognise(frame.points)
+            chosen = choose(self._asked, frame, None)
+            if chosen.config != self.config:
+                self._use(chosen.config)
         self._index, self._stamp_s = self._index + 1, float(stamp_s)
         result = self._pipeline.step(frame, self._budget)
         tracks, visible = result.tracks, result.tracks.proposal != NONE

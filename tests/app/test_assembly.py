@@ -25,7 +25,9 @@ def pipeline(mode="accurate", **scheduler):
 
 def test_the_network_has_run_on_every_size_of_batch_before_the_first_frame(monkeypatch):
     batches, infer = set(), PointNet.infer
-    monkeypatch.setattr(PointNet, "infer", lambda self, batch: (batches.add(batch.shape[:2]), infer(self, batch))[1])
+    monkeypatch.setattr(
+        PointNet, "infer", lambda self, batch, *more: (batches.add(batch.shape[:2]), infer(self, batch, *more))[1]
+    )
     pipeline()
     batch, most = BASE.classification.batch, BASE.classification.max_points
     assert {(1, most), (batch, most)} <= batches

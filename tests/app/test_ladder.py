@@ -1,4 +1,4 @@
-"""The ladder: its table state by event, and when the events come."""
+"""The ladder: its steps by event, and when the events come."""
 
 import itertools
 
@@ -9,11 +9,11 @@ from modt.app.ladder import (
     DEFERRED_EVERY,
     GIVEN_UP,
     MAX_PATIENCE_S,
-    TRANSITIONS,
     Event,
     Ladder,
     Step,
     budget_at,
+    step_after,
 )
 from modt.types import Budget
 
@@ -23,7 +23,7 @@ UP = (Event.OVERRUN, Event.OVER_POWER)
 @pytest.mark.parametrize("step", Step)
 @pytest.mark.parametrize("event", Event)
 def test_every_state_by_every_event(step, event):
-    after = TRANSITIONS.get((step, event), step)
+    after = step_after(step, event)
     expected = {
         Event.OVERRUN: min(step + 1, Step.DROPPED),
         Event.OVER_POWER: min(step + 1, Step.DROPPED),

@@ -10,13 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.app.loop import NAP_S, FixedPeriod, FullSpeed, Stop, drive
+from modt.app.containment import Containment
+from modt.app.deadlines import NoDeadlines
+from modt.app.loop import NAP_S, Loop, Stop
+from modt.app.playback import FixedPeriod, FullSpeed, Playback
+from modt.app.supervisor import NoSupervisor
 from modt.config import OdometryConfig
 from modt.energy.ledger import NullLedger
 from modt.sources.pose_socket import PoseSocket
-from modt.sources.pose_source import PosedStream
 from modt.sources.stream import Faults, StreamInfo
-from modt.types import UNLIMITED, Frame
+from modt.types import Budget, Frame
 from tests.results import result
 
 
@@ -85,20 +88,21 @@ def test_full_speed_never_waits():
     assert FullSpeed().report() == {"rate_hz": None}
 
 
-class NullLines:
-    def write(self, record):
-        pass
-
-
-class Pipe:
-    ledger = NullLedger()
+class Stages:
+    ledger, budget = NullLedger(), Budget(7)
 
     def __init__(self):
-        self.seen = []
+        self.seen, self.recognised = [], []
 
-    def step(self, frame, budget):
-        self.seen.append((frame.index, budget))
+    def recognise(self, frame, named):
+        self.recognised.append(frame.index)
+
+    def step(self, frame, budget, *, reduced):
+        self.seen.append((frame.index, budget, reduced))
         return result(frame.index, [3], {0: 1})
+
+    def watch(self, frame):
+        pass
 
 
 class Kept:
@@ -112,16 +116,47 @@ class Kept:
         pass
 
 
+class Frames(list):
+    info = StreamInfo("frames", "made up", 0, 4, 0.125, None, False)
+    faults = Faults()
+
+
+def replay(stages, sinks, stop=None, observe=lambda r, line: None, pace=None, frames=()):
+    """Play frames through stages, to the end or a signal."""
+    source = Playback(Frames(frames), pace or FullSpeed(), stages.ledger)
+    sinks = {f"sink {k}": sink for k, sink in enumerate(sinks)}
+    deadlines, contained = NoDeadlines(FullSpeed().report), Containment(contains=False)
+    loop = Loop(source, stages, sinks, observe, lambda supervisor: None, deadlines, contained, stop or Stop())
+    loop.run(NoSupervisor())
+
+
+def made(n=9):
+    return [result(i, [], {}).frame for i in range(n)]
+
+
 def test_every_frame_reaches_every_sink_and_the_observer():
-    pipe, sinks, observed = Pipe(), [Kept(), Kept()], []
-    frames = [result(i, [], {}).frame for i in range(4)]
-    done = drive(
-        frames, pipe, sinks, NullLines(), UNLIMITED, FullSpeed(), Stop(), lambda r, line: observed.append(line)
-    )
-    assert done == 4
+    stages, sinks, observed = Stages(), [Kept(), Kept()], []
+    replay(stages, sinks, observe=lambda r, line: observed.append(line), frames=made(4))
     assert [s.indices for s in sinks] == [[0, 1, 2, 3]] * 2
     assert [line["frame"] for line in observed] == [0, 1, 2, 3]
-    assert pipe.seen == [(i, UNLIMITED) for i in range(4)]
+    assert stages.seen == [(i, Budget(7), False) for i in range(4)]
+    assert stages.recognised == [0]
+
+
+def test_a_failure_of_a_replay_is_not_contained():
+    class Broken(Kept):
+        def write(self, r):
+            raise ConnectionError("gone")
+
+    with pytest.raises(ConnectionError):
+        replay(Stages(), [Broken()], frames=made())
+
+    class Failing(Stages):
+        def step(self, frame, budget, *, reduced):
+            raise IndexError("a bug")
+
+    with pytest.raises(IndexError):
+        replay(Failing(), [], frames=made())
 
 
 class Sender(Time):
@@ -137,40 +172,33 @@ class Sender(Time):
         self.out.send(json.dumps({"stamp": stamp_s, "x": 8 * stamp_s, "y": 0.0, "yaw": 0.0}).encode())
 
 
-class Frames(list):
-    info = StreamInfo("frames", "made up", 0, 4, 0.125, None, False)
-    faults = Faults()
-
-
 def test_poses_received_while_waiting_apply_to_the_next_frame():
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     time, placed = Sender(there), []
-    frames = Frames(Frame(i, 0.125 * i, np.zeros((0, 4), np.float32)) for i in range(4))
-    stream = PosedStream(frames, PoseSocket(here, OdometryConfig(), "test"))
+    poses = PoseSocket(here, OdometryConfig(), "test")
 
-    class Placed(Pipe):
-        def step(self, frame, budget):
+    class Placed(Stages):
+        def step(self, frame, budget, *, reduced):
+            frame = poses.place(frame)
             placed.append(None if frame.T_world_sensor is None else frame.T_world_sensor[0, 3])
-            return super().step(frame, budget)
+            return super().step(frame, budget, reduced=reduced)
 
-    pace = FixedPeriod(0.125, time, time.sleep)
-    drive(stream, Placed(), [], NullLines(), UNLIMITED, pace, Stop(), lambda r, line: None)
+    frames = [Frame(i, 0.125 * i, np.zeros((0, 4), np.float32)) for i in range(4)]
+    replay(Placed(), [], pace=FixedPeriod(0.125, time, time.sleep), frames=frames)
     assert placed == [None, 1.0, 2.0, 3.0]
     there.close()
-    stream.odometry.close()
+    poses.close()
 
 
 def test_a_signal_ends_the_loop_after_the_frame_in_hand():
-    pipe, sink = Pipe(), Kept()
-    frames = [result(i, [], {}).frame for i in range(9)]
+    sink = Kept()
 
     def interrupt(r, line):
         if r.frame.index == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
     with Stop().on_signals() as stop:
-        done = drive(frames, pipe, [sink], NullLines(), UNLIMITED, FullSpeed(), stop, interrupt)
-    assert done == 3
+        replay(Stages(), [sink], stop, interrupt, frames=made())
     assert sink.indices == [0, 1, 2]
     assert stop.signal == "SIGINT"
 
@@ -198,7 +226,7 @@ def test_naps_do_not_add_up_to_more_than_the_sleep():
 
 
 def test_a_reload_is_asked_for_once_by_a_signal():
-    with Stop().on_signals(reload=True) as stop:
+    with Stop(reload=True).on_signals() as stop:
         assert not stop.take_reload()
         os.kill(os.getpid(), signal.SIGHUP)
         assert stop.take_reload()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from modt.app.sensor_watch import SWEEPS, SensorWatch
+from modt.app.stages import SWEEPS, SensorWatch
 
 
 def sweep(returns):

@@ -42,15 +42,15 @@ def listeners():
 
 
 @pytest.mark.parametrize("abstract", [False, True])
-def test_ready_with_the_first_frame_and_watchdog_with_every_one(tmp_path, listen, abstract):
+def test_ready_is_said_first_and_the_watchdog_served(tmp_path, listen, abstract):
     name = f"modt-test-{os.getpid()}"
     systemd = listen(f"\0{name}" if abstract else str(tmp_path / "notify"))
     told = supervisor_of({"NOTIFY_SOCKET": f"@{name}" if abstract else str(tmp_path / "notify")})
     assert systemd.heard() == []
-    told.frame_done()
+    told.alive()
     assert systemd.heard() == ["READY=1\nWATCHDOG=1"]
-    told.frame_done()
-    told.frame_done()
+    told.alive()
+    told.alive()
     assert systemd.heard() == ["WATCHDOG=1"] * 2
     told.close()
     assert systemd.heard() == ["STOPPING=1"]
@@ -60,7 +60,7 @@ def test_ready_with_the_first_frame_and_watchdog_with_every_one(tmp_path, listen
 def test_without_a_socket_there_is_no_supervisor(environment):
     told = supervisor_of(environment)
     assert isinstance(told, NoSupervisor)
-    told.frame_done()
+    told.alive()
     told.close()
 
 
@@ -73,11 +73,11 @@ def test_invalid_address_is_named(place):
 def test_unreachable_supervisor_is_logged_once_and_retried(tmp_path, listen, caplog):
     told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     with caplog.at_level(logging.WARNING):
-        told.frame_done()
-        told.frame_done()
+        told.alive()
+        told.alive()
     assert [r.levelname for r in caplog.records] == ["WARNING"]
     systemd = listen(str(tmp_path / "notify"))
-    told.frame_done()
+    told.alive()
     assert systemd.heard() == ["READY=1\nWATCHDOG=1"]
     told.close()
 
@@ -86,10 +86,10 @@ def test_slow_supervisor_does_not_block(tmp_path, listen):
     systemd = listen(str(tmp_path / "notify"))
     told = supervisor_of({"NOTIFY_SOCKET": str(tmp_path / "notify")})
     for _ in range(10_000):  # far more than a socket holds
-        told.frame_done()
+        told.alive()
     heard = systemd.heard()
     assert heard[0] == "READY=1\nWATCHDOG=1"
     assert 1 < len(heard) < 10_000
-    told.frame_done()
+    told.alive()
     assert systemd.heard() == ["WATCHDOG=1"]
     told.close()

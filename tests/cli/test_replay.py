@@ -14,6 +14,7 @@ import yaml
 from modt import profile
 from modt.classes import CLASS_NAMES
 from modt.sinks.records import read_records
+from modt.sinks.run_directory import RunDirectory
 from modt.sinks.tracks import SCHEMA
 from modt_desk.reporting.run_report import run_tree
 from modt_desk.simulation.synthetic_stream import SyntheticStream
@@ -174,7 +175,7 @@ def test_two_runs_are_the_same_byte_for_byte(runs):
         (["--frames", "900:901"], ["no frames in 900:901"]),
         (["scans", "--fov", "camera"], ["no calibration", "--fov full"]),
         (["--out", "a-file"], ["a-file", "is a file"]),
-        (["--out", "foreign"], ["foreign", "no run"]),
+        (["--out", "foreign"], ["foreign", "no record"]),
     ],
 )
 def test_misuse_is_one_line_and_status_2(tmp_path, arguments, words):
@@ -247,7 +248,7 @@ def test_frames_without_a_proposal_are_frames_like_any_other(tmp_path):
 
 def test_a_full_disk_is_one_line_and_what_was_recorded_stays(tmp_path):
     def small_files():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
 
     done = modt("replay", "--frames", "0:30", "--out", "run", cwd=tmp_path, preexec_fn=small_files)
     assert done.returncode == 1, done.stderr
@@ -256,6 +257,14 @@ def test_a_full_disk_is_one_line_and_what_was_recorded_stays(tmp_path):
     kept = tracks(tmp_path / "run")
     assert [f["frame"] for f in kept] == list(range(len(kept)))
     assert kept
+
+
+def test_a_directory_into_which_another_run_records_is_left_alone(tmp_path):
+    with RunDirectory(tmp_path / "run").locked():
+        done = modt("replay", "--frames", "0:2", "--out", "run", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "another run of modt records into it" in done.stderr
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
@@ -294,8 +303,8 @@ def test_systemd_is_notified(tmp_path):
         environment_ = environment() | {"NOTIFY_SOCKET": str(tmp_path / "notify")}
         done = modt("replay", "--frames", "0:3", "--out", "run", cwd=tmp_path, env=environment_)
         assert done.returncode == 0, done.stderr
-        heard = [systemd.recv(4096) for _ in range(4)]
-    assert heard == [b"READY=1\nWATCHDOG=1", b"WATCHDOG=1", b"WATCHDOG=1", b"STOPPING=1"]
+        heard = [systemd.recv(4096) for _ in range(5)]
+    assert heard == [b"READY=1", *3 * [b"WATCHDOG=1"], b"STOPPING=1"]
 
 
 def test_a_killed_run_stays_readable(tmp_path):

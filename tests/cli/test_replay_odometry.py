@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from modt.app.inputs import Request
-from modt.app.replay_session import Session
+from modt.app.session import replay
 from modt.app.supervisor import NoSupervisor
 from modt.geometry import inverse, rotation_zyx, se3
 from modt.sinks.records import read_records
@@ -32,12 +32,12 @@ def the_embedded_street():
 
 
 def session(out, **options):
-    return Session(Request(mode="efficient", frames=(0, FRAMES), **options), out, None, ["modt"])
+    return replay(Request(mode="efficient", frames=(0, FRAMES), **options), {}, out, None, ["modt"])
 
 
 def run(out, **options):
     """Summary of a run and the bytes of its tracks."""
-    summary = session(out, **options).run(lambda result: None, NoSupervisor())
+    summary = session(out, **options).run(NoSupervisor())
     return summary, (out / "tracks.jsonl").read_bytes()
 
 
@@ -87,8 +87,8 @@ class Feeder:
 def fed(tmp_path, street, **options):
     url = f"unix://{tmp_path / 's'}"
     played = session(tmp_path / "run", odometry=url)
-    played.pace = Feeder(tmp_path / "s", street, **options)
-    summary = played.run(lambda result: None, NoSupervisor())
+    played.source.pace = Feeder(tmp_path / "s", street, **options)
+    summary = played.run(NoSupervisor())
     assert not (tmp_path / "s").exists()
     return summary, (tmp_path / "run" / "tracks.jsonl").read_bytes()
 
@@ -153,12 +153,13 @@ def test_a_stream_without_poses_is_said_to_have_none_unless_they_come_from_elsew
     places = {"poses.txt": tmp_path / "poses.txt", "unix": f"unix://{tmp_path / 's'}"}
     (tmp_path / "poses.txt").write_text(3 * GOOD)
     request = Request(path=layouts.bare(tmp_path), **{key: places.get(name, name) for key, name in options.items()})
-    made = Session(request, tmp_path / "run", None, ["modt"])
-    made.odometry.close()
-    assert any("no calibration" in note for note in made.notes)
-    assert any("no odometry" in note for note in made.notes) == said
+    made = replay(request, {}, tmp_path / "run", None, ["modt"])
+    made.run(NoSupervisor())
+    notes = [*made.stages.info.notes, *made.stages.info.pose_notes]
+    assert any("no calibration" in note for note in notes)
+    assert any("no odometry" in note for note in notes) == said
     written = yaml.safe_load((tmp_path / "run" / "run.yaml").read_text())["stream"]["notes"]
-    assert written == made.notes
+    assert written == notes
 
 
 @pytest.mark.parametrize(

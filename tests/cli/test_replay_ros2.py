@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from modt.app.inputs import Request
-from modt.app.replay_session import Session
+from modt.app.session import replay
 from modt.app.supervisor import NoSupervisor
 from modt.ros2 import odometry
 from modt.ros2.odometry import write_odometry
@@ -28,12 +28,12 @@ def the_embedded_street():
 
 
 def session(out, **options):
-    return Session(Request(mode="efficient", frames=(0, FRAMES), **options), out, None, ["modt"])
+    return replay(Request(mode="efficient", frames=(0, FRAMES), **options), {}, out, None, ["modt"])
 
 
 def run(out, **options):
     made = session(out, **options)
-    return made, made.run(lambda result: None, NoSupervisor())
+    return made, made.run(NoSupervisor())
 
 
 def tracks(out):
@@ -49,7 +49,7 @@ def test_a_recording_gives_the_tracks_of_what_was_recorded(street, tmp_path):
         recorded.append(("/odom", ODOMETRY, s, write_odometry(s, "odom", "lidar", frame.T_world_sensor)))
         recorded.append(("/points", CLOUD, s, write_cloud(s, "lidar", frame.points)))
     made, _ = run(tmp_path / "bag", path=write_mcap(tmp_path / "drive", recorded), profile="hdl-64e")
-    assert made.stream.info.layout == "rosbag2"
+    assert made.stages.info.layout == "rosbag2"
     run(tmp_path / "street", profile="hdl-64e")
     for a, b in zip(tracks(tmp_path / "bag"), tracks(tmp_path / "street"), strict=True):
         assert [row[0] for row in a] == [row[0] for row in b]
@@ -61,11 +61,11 @@ def test_the_poses_of_a_topic_place_the_sweeps(street, tmp_path, loopback):
 
     made = session(tmp_path / "run", odometry=f"ros2:///odom?domain={NEAR}")
     sent = dds.Publication(dds.participant(FAR), "odom", odometry.TYPE)
-    until(lambda: sent.receivers and made.odometry._subscription.senders)
+    until(lambda: sent.receivers and made.stages.odometry._subscription.senders)
     for frame in street:
         sent.write(write_odometry(frame.stamp_s, "odom", "lidar", frame.T_world_sensor))
-    until(lambda: made.odometry.place(street[0]).T_world_sensor is not None)
-    summary = made.run(lambda result: None, NoSupervisor())
+    until(lambda: made.stages.odometry.place(street[0]).T_world_sensor is not None)
+    summary = made.run(NoSupervisor())
     assert summary["odometry"]["frames_unposed"] <= FRAMES
     assert summary["odometry"]["frames_posed"] >= FRAMES
     assert summary["odometry"]["used"] == FRAMES

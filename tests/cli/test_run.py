@@ -213,7 +213,7 @@ def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path)
         service.hear("STATUS=")
     second = modt("run", scans, "--out", service.out, cwd=tmp_path)
     assert second.returncode == 1
-    assert "another modt run records into it; end it" in second.stderr
+    assert "another run of modt records into it; end it" in second.stderr
     running = modt("status", service.out, cwd=tmp_path)
     assert running.returncode == 0, running.stderr
     assert "running for" in running.stdout

@@ -9,13 +9,13 @@ import pytest
 
 from modt.config import OdometryConfig
 from modt.sources.pose_socket import PoseSocket
-from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
+from modt.sources.pose_source import NoPoses, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
-from modt.sources.stream import PeekedStream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets
 from tests.sources.point_clouds import pcd
+from tests.sources.posed_stream import PosedStream
 from tools.send.pcap_writer import write_capture
 
 
@@ -58,7 +58,6 @@ SOURCES = {
     "listed": listed,
     "sent": sent,
     "bag": lambda root: open_stream(bags.write_rosbag2(root / "bag", bags.by_time(bags.clouds(), bags.poses()))),
-    "peeked": lambda root: PeekedStream(open_stream(layouts.bare(root))),
     "clouds": clouds,
     "capture": capture,
     "puck": lambda root: SyntheticStream("street", "vlp-16", 0.4, seed=3),

@@ -10,13 +10,13 @@ from contextlib import contextmanager, suppress
 import pytest
 
 from modt.config import RecordingConfig
-from modt.sinks.recording import RETRY_S, Recording
+from modt.sinks.recording import RETRY_S, AtOnce, Recording
 from modt.sinks.records import read_records
-from modt.sinks.service_directory import ServiceDirectory
+from modt.sinks.run_directory import RunDirectory
 from modt.sinks.tracks import SCHEMA
 from tests.crash.test_power_cut import OURS
 from tests.results import CAR, result
-from tests.sinks.test_recording import AtOnce, Time
+from tests.sinks.test_recording import Time
 
 
 def mount(*arguments):
@@ -42,7 +42,8 @@ class Service:
         self.time, self.n = Time(), 0
         self.path = folder / "run"
         config = RecordingConfig(disk_mb=10.0, keep="tracks")
-        self.recording = Recording(ServiceDirectory(self.path), config, AtOnce(), lambda: OURS, self.time)
+        self.recording = Recording(RunDirectory(self.path), config, AtOnce(), lambda: OURS, self.time)
+        self.recording.start()
 
     def run(self, frames):
         for _ in range(frames):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 
 from modt.config import RecordingConfig
-from modt.sinks.recording import Recording
+from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.records import read_records
-from modt.sinks.service_directory import MARK, ServiceDirectory
+from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sinks.tracks import SCHEMA
 from tests.crash.power_cut import PowerCuts
 from tests.results import CAR, result
-from tests.sinks.test_recording import AtOnce, Time
+from tests.sinks.test_recording import Time
 
 OURS = f"schema: modt.run/1\n{MARK}\n"
 FRAMES, A_SECOND = 50, 5
@@ -19,7 +19,9 @@ FRAMES, A_SECOND = 50, 5
 
 def recorded(folder, time=None):
     config = RecordingConfig(disk_mb=1.0)
-    return Recording(ServiceDirectory(folder / "run"), config, AtOnce(), lambda: OURS, time or Time())
+    recording = Recording(RunDirectory(folder / "run"), config, AtOnce(), lambda: OURS, time or Time())
+    recording.start()
+    return recording
 
 
 def parts(folder):

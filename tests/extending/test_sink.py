@@ -2,15 +2,12 @@
 
 import csv
 
-from modt.app import assembly
-from modt.app.loop import FullSpeed, Stop, drive
+from modt.app.inputs import Request
+from modt.app.session import replay
+from modt.app.supervisor import NoSupervisor
 from modt.classes import CLASS_NAMES
-from modt.energy.ledger import Ledger
-from modt.geometry import FieldOfView
-from modt.profile import load
 from modt.sinks.output import LineFile
-from modt.types import UNLIMITED, FrameResult
-from modt_desk.simulation.synthetic_stream import SyntheticStream
+from modt.types import FrameResult
 
 
 class ObjectTable(LineFile[FrameResult]):
@@ -26,24 +23,13 @@ class ObjectTable(LineFile[FrameResult]):
         return "".join(f"{result.frame.index},{tracks.id[k]},{CLASS_NAMES[tracks.object_class[k]]}\n" for k in rows)
 
 
-class Lines(list):
-    """Ledger lines, kept."""
-
-    write = list.append
-
-    def close(self):
-        pass
-
-
-def test_the_loop_writes_every_frame_to_the_sink_and_books_it(tmp_path):
-    profile = load("vlp-16")
-    pipeline = assembly.pipeline(assembly.MODES["efficient"], profile, FieldOfView(), Ledger())
-    sink, ledger = ObjectTable(tmp_path / "objects.csv"), Lines()
-    results = []
-    stream = SyntheticStream("street", "vlp-16", 0.5, seed=0)
-    drive(stream, pipeline, [sink], ledger, UNLIMITED, FullSpeed(), Stop(), lambda result, _: results.append(result))
-    sink.close()
+def test_a_replay_writes_every_frame_to_the_sink_and_books_it(tmp_path):
+    sink, results = ObjectTable(tmp_path / "objects.csv"), []
+    request = Request(profile=["vlp-16"], mode="efficient", frames=(0, 5))
+    session = replay(request, {"objects": sink}, tmp_path / "run", None, ["test"])
+    summary = session.run(NoSupervisor(), results.append)
     rows = list(csv.reader((tmp_path / "objects.csv").read_text().splitlines()))
     assert {int(frame) for frame, _, _ in rows} == set(range(5))
     assert len(rows) == sum(len(result.proposals) for result in results)
-    assert all(line["stages"]["sink"]["calls"] == 1 for line in ledger)
+    assert summary["sinks"] == {"objects": {"written": 5}}
+    assert summary["stages"]["sink"]["calls"] == 10  # and the records

@@ -17,7 +17,7 @@ from modt.app.status import SCHEMA
 from modt.classification.pointnet import PointNet
 from modt.cli import status
 from modt.config import ClassificationConfig, ProfileConfig, SensorConfig
-from modt.sinks.service_directory import STATUS
+from modt.sinks.run_directory import STATUS
 from modt_desk.cli import profile_report
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.evaluation.truth_files import open_truth

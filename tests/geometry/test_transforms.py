@@ -4,16 +4,20 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
 
 from modt.geometry import (
     Camera,
     FieldOfView,
     corners,
     inverse,
+    quaternion_of,
+    rotation_of,
     rotation_zyx,
     se3,
     transform,
     transform_boxes,
+    turn_between,
     wrap,
     yaw_of,
 )
@@ -25,6 +29,29 @@ pose = st.builds(
 )
 planar = st.builds(lambda y, t: se3(rotation_zyx(0, 0, y), np.array(t)), angle, st.tuples(metre, metre, metre))
 boxes = arrays(np.float64, (3, 7), elements=st.floats(0.1, 20))
+
+
+turns = st.lists(st.floats(-1, 1), min_size=4, max_size=4).map(np.array).filter(lambda q: np.linalg.norm(q) > 0.01)
+"""Rotations, as quaternions of any length."""
+half_turns = st.sampled_from([np.eye(4)[i] for i in range(4)])
+
+
+@given(turns | half_turns)
+def test_quaternions_are_those_of_scipy(quaternion):
+    R = Rotation.from_quat(quaternion).as_matrix()
+    np.testing.assert_allclose(rotation_of(quaternion), R, atol=1e-12)
+    found, expected = quaternion_of(se3(R, np.zeros(3))), quaternion / np.linalg.norm(quaternion)
+    np.testing.assert_allclose(found * np.sign(found @ expected), expected, atol=1e-7)
+
+
+@given(turns, turns | half_turns, st.floats(-2, 2))
+def test_a_share_of_a_turn_is_that_of_its_rotation_vector(q, turn, share):
+    a, rotation = Rotation.from_quat(q), Rotation.from_quat(turn)
+    part = Rotation.from_rotvec(share * rotation.as_rotvec())
+    if rotation.magnitude() > np.pi - 1e-3:  # either way round
+        return
+    found = turn_between(se3(a.as_matrix(), np.ones(3)), se3((a * rotation).as_matrix(), np.ones(3)), share)
+    np.testing.assert_allclose(found, (a * part).as_matrix(), atol=1e-6)
 
 
 @given(angle)

@@ -240,6 +240,22 @@ def test_certain_pairs(kernels, seed, n, ties):
     assert same(*(k.certain_pairs(rows, columns, cost, 1.0) for k in (NUMPY, kernels)))
 
 
+@given(seed=st.integers(0, 10_000), n=st.integers(0, 12), k=st.integers(0, 12), ties=st.sampled_from([0, 1, 2, 5]))
+@settings(max_examples=300, deadline=None)
+def test_least_cost_assignment(kernels, seed, n, k, ties):
+    rng = np.random.default_rng(seed)
+    cost = rng.integers(0, ties, (n, k)) / 4 if ties else np.minimum(rng.uniform(-1, 1, (n, k)), 0.5)
+    np.testing.assert_array_equal(*(each.least_cost_assignment(cost) for each in (NUMPY, kernels)))
+
+
+def test_an_assignment_of_infinite_cost_is_refused(kernels):
+    cost = np.array([[0.0, 1.0], [np.inf, np.inf]])
+    for each in (NUMPY, kernels):
+        with pytest.raises(ValueError, match=r"infeasible|no assignment"):
+            each.least_cost_assignment(cost)
+        np.testing.assert_array_equal(each.least_cost_assignment(cost[:1]), [[True, False]])
+
+
 def test_another_kind_of_array_is_refused(kernels):
     with pytest.raises(TypeError, match="contiguous array of float32"):
         kernels.group_sums(np.zeros((1, 4)), np.array([0, 4]))

@@ -5,6 +5,7 @@ import threading
 
 import pytest
 
+from modt.errors import ModtError
 from modt.sinks.background import Background
 from modt.sinks.output import LedgerSink
 
@@ -109,6 +110,26 @@ def test_a_failure_is_logged_once_counted_and_tried_again(slow, caplog):
         "test: written again",
     ]
     assert slow.items == ["again"]
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (ModtError("disk", "full", "free it"), "test: disk: full; free it"),
+        (OSError("gone"), "test: gone"),
+        (KeyError("x"), "test: KeyError: 'x'"),
+    ],
+)
+def test_a_failure_of_the_system_is_one_line_and_any_other_a_traceback(error, said, slow, caplog):
+    background = Background("test", slow, 10, retry_s=0.0)
+    slow.failure = error
+    background.write(1)
+    slow.released.release()
+    assert settled(background, failed=1)
+    background.close()
+    (record,) = caplog.records
+    assert record.getMessage().startswith(f"{said}; tried again")
+    assert bool(record.exc_info) == isinstance(error, KeyError)
 
 
 def test_the_end_does_not_wait_for_a_writer_that_hangs(slow, caplog):

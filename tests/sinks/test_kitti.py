@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.geometry import corners
+from modt.placement import Mount
 from modt.sinks.kitti import KittiResults
 from tests.geometry.test_transforms import forward_camera
 from tests.results import CAR, proposals, result
@@ -54,3 +55,14 @@ def test_without_a_camera_coordinates_are_written_without_image_boxes(tmp_path):
     row = written(tmp_path, result(0, [5], {0: 1}, {1: CAR}), None)[0]
     assert row[6:10] == ["-1.00"] * 4
     assert np.allclose([float(v) for v in row[13:16]], [0, 1.75, 10])
+
+
+def test_boxes_of_a_tilted_sensor_are_those_of_its_camera(tmp_path):
+    box = np.array([[12.0, 2.0, -0.5, 4.0, 1.8, 1.5, 0.0]])
+    shown = replace(result(0, [5], {0: 1}, {1: CAR}), proposals=proposals([5], box))
+    mount = Mount.of(0.0, 10.0)
+    tilted = replace(shown, frame=replace(shown.frame, R_level_sensor=mount.R_level_sensor))
+    level = written(tmp_path / "level", shown, forward_camera())[0]
+    (row,) = written(tmp_path / "tilted", tilted, forward_camera())
+    assert row == written(tmp_path / "camera", shown, mount.camera(forward_camera()))[0]
+    assert row[13:16] != level[13:16]

@@ -7,25 +7,29 @@ import logging
 import pytest
 
 from modt.config import RecordingConfig
+from modt.errors import ModtError
 from modt.sinks import output
-from modt.sinks.recording import KEPT, RETRY_S, Recording
+from modt.sinks.recording import KEPT, RETRY_S, AtOnce, Recording, WholeRecording
 from modt.sinks.records import read_records
-from modt.sinks.service_directory import MARK, ServiceDirectory
+from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sinks.tracks import SCHEMA
 from tests.results import CAR, result
 
 OURS = f"schema: modt.run/1\n{MARK}\n"
 
 
-class AtOnce:
-    """A background that runs jobs where they are handed over."""
+class Full(AtOnce):
+    """A writer that has no room once it is full."""
 
-    fits = True
+    full, dropped = False, 0
 
-    def submit(self, job):
-        if self.fits:
+    def write(self, job):
+        self.dropped += self.full
+        if not self.full:
             job()
-        return self.fits
+
+    def health(self):
+        return {"dropped": self.dropped}
 
 
 class Time:
@@ -36,8 +40,11 @@ class Time:
 
 
 def made(path, background=None, time=None, **config):
-    directory = ServiceDirectory(path / "run")
-    return Recording(directory, RecordingConfig(**config), background or AtOnce(), lambda: OURS, time or Time())
+    directory = RunDirectory(path / "run")
+    writer = background or AtOnce()
+    recording = Recording(directory, RecordingConfig(**config), writer, lambda: OURS, time or Time())
+    recording.start()
+    return recording
 
 
 def frame(k):
@@ -107,7 +114,7 @@ def test_a_full_disk_pauses_the_recording_until_there_is_room(tmp_path, monkeypa
 
 def test_a_disk_that_is_full_at_the_start_is_no_obstacle(tmp_path, monkeypatch):
     time, room = Time(), []
-    real = ServiceDirectory.write
+    real = RunDirectory.write
 
     def write(directory, name, text, **options):
         if not room:
@@ -115,7 +122,7 @@ def test_a_disk_that_is_full_at_the_start_is_no_obstacle(tmp_path, monkeypatch):
                 raise OSError(errno.ENOSPC, "No space left on device")
         real(directory, name, text, **options)
 
-    monkeypatch.setattr(ServiceDirectory, "write", write)
+    monkeypatch.setattr(RunDirectory, "write", write)
     recording = made(tmp_path, time=time)
     recording.write(frame(0))
     assert recording.health()["failing"]
@@ -138,9 +145,32 @@ def test_another_profile_changes_what_is_kept_and_the_description(tmp_path):
 
 
 def test_lines_that_the_writer_has_no_room_for_are_counted(tmp_path):
-    background = AtOnce()
+    background = Full()
     recording = made(tmp_path, background)
-    background.fits = False
+    background.full = True
     recording.write(frame(0))
     recording.ledger(json.loads("{}"))
     assert recording.health()["lost_lines"] == 2
+
+
+def test_a_replay_is_recorded_whole_whatever_the_profile_keeps(tmp_path):
+    recording = WholeRecording(RunDirectory(tmp_path / "run"), lambda: "schema: modt.run/1\n", 3, None, labels=True)
+    recording.start()
+    recording.follow(RecordingConfig(keep="none"))
+    for k in range(2):
+        recording.write(frame(k))
+        recording.ledger({"schema": "modt.ledger/1", "frame": k})
+    recording.finish()
+    assert [r["frame"] for r in read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA)] == [0, 1]
+    names = {str(p.relative_to(tmp_path / "run")) for p in (tmp_path / "run").rglob("*") if p.is_file()}
+    labels = {"labels/000000.label", "labels/000001.label"}
+    assert names == {"run.yaml", "tracks.jsonl", "ledger.jsonl", "kitti/0003.txt", *labels}
+
+
+def test_a_full_disk_ends_a_replay(tmp_path, monkeypatch):
+    recording = WholeRecording(RunDirectory(tmp_path / "run"), lambda: OURS, 0, None, labels=False)
+    recording.start()
+    FullDisk(monkeypatch, 0)
+    with pytest.raises(ModtError, match="No space left on device"):
+        recording.write(frame(0))
+    recording.finish()

@@ -1,45 +1,113 @@
-"""The run directory: no earlier result is lost."""
+"""The run directory: no earlier run is lost, half-made ones are no obstacle, nothing else is touched."""
 
 import pytest
 
 from modt.errors import MisuseError, ModtError
-from modt.sinks.run_directory import RunDirectory
-from tests.results import result
+from modt.sinks.run_directory import MARK, STATUS, RunDirectory
+
+OURS = f"schema: modt.run/1\n{MARK}\n"
 
 
-def test_a_new_directory_is_created_with_its_parents(tmp_path):
-    directory = RunDirectory(tmp_path / "a" / "b")
-    directory.describe("x: 1\n")
-    directory.summarise({"frames": 3})
-    assert sorted(p.name for p in directory.path.iterdir()) == ["run.yaml", "summary.json"]
-    assert directory.kept is None
+def begun(path, limit_bytes=1e9):
+    directory = RunDirectory(path)
+    directory.begin(OURS, limit_bytes)
+    return directory
 
 
-def test_an_earlier_run_is_kept(tmp_path):
-    for n in range(3):
-        lines = RunDirectory(tmp_path / "run").tracks()
-        lines.write(result(n, [], {}))
-        lines.close()
-    kept = sorted(p.name for p in tmp_path.iterdir())
-    assert kept == ["run", "run~1", "run~2"]
+def fill(path, size=1000):
+    (path / "tracks.jsonl").write_bytes(b"x" * size)
+
+
+def names(folder):
+    return sorted(p.name for p in folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    "left", [[], [".run.yaml.part"], ["run.yaml"], ["run.yaml", "status.json"], [".status.json.part"]]
+)
+def test_a_half_made_directory_is_made_anew(tmp_path, left):
+    run = tmp_path / "run"
+    run.mkdir()
+    for name in left:
+        (run / name).write_text("half")
+    begun(run)
+    assert names(tmp_path) == ["run"]
+    assert names(run) == ["run.yaml"]
+    assert (run / "run.yaml").read_text() == OURS
+
+
+def test_it_says_where_the_part_before_is_kept(tmp_path):
+    first = begun(tmp_path / "a" / "run")
+    assert first.before is None
+    fill(first.path)
+    assert begun(first.path).before == tmp_path / "a" / "run~1"
+
+
+def test_each_part_is_kept_under_the_next_number(tmp_path):
+    for k in range(4):
+        fill(begun(tmp_path / "run").path, 10 + k)
+    assert names(tmp_path) == ["run", "run~1", "run~2", "run~3"]
+    assert (tmp_path / "run~1" / "tracks.jsonl").stat().st_size == 10
+    assert not (tmp_path / "run~1" / STATUS).exists()
+
+
+def test_the_oldest_parts_go_first_and_numbers_go_on(tmp_path):
+    for _ in range(6):
+        fill(begun(tmp_path / "run", 2500).path)
+    assert names(tmp_path) == ["run", "run~4", "run~5"]
+
+
+def test_numbers_beyond_nine_are_older_than_those_after(tmp_path):
+    for _ in range(13):
+        fill(begun(tmp_path / "run", 2500).path)
+    assert names(tmp_path) == ["run", "run~11", "run~12"]
+
+
+def test_nothing_but_records_of_a_service_is_deleted(tmp_path):
+    replay, notes, foreign = tmp_path / "run~1", tmp_path / "run~2", tmp_path / "run~3"
+    for folder in (replay, notes, foreign):
+        folder.mkdir()
+        fill(folder, 5000)
+    (replay / "run.yaml").write_text("schema: modt.run/1\ncommand: [modt, replay]\n")
+    (foreign / "run.yaml").write_text(OURS)
+    (foreign / "thesis.tex").write_text("mine")
+    begun(tmp_path / "run", 0.0)
+    assert names(tmp_path) == ["run", "run~1", "run~2", "run~3"]
+    assert (replay / "tracks.jsonl").stat().st_size == 5000
+    assert (notes / "tracks.jsonl").stat().st_size == 5000
+    assert names(foreign) == ["thesis.tex"]
 
 
 @pytest.mark.parametrize("kind", ["file", "foreign"])
-def test_a_path_that_is_no_run_is_not_touched(tmp_path, kind):
+def test_a_path_that_is_no_run_is_refused(tmp_path, kind):
     out = tmp_path / "out"
     if kind == "file":
         out.write_text("mine")
     else:
         out.mkdir()
         (out / "thesis.tex").write_text("mine")
-    with pytest.raises(MisuseError, match=r"--out|directory"):
+    with pytest.raises(MisuseError):
         RunDirectory(out)
-    kept = out if kind == "file" else out / "thesis.tex"
-    assert kept.read_text() == "mine"
 
 
-def test_a_path_that_cannot_be_written_is_an_error():
-    from pathlib import Path
-
+def test_a_directory_that_cannot_be_made_is_an_error_of_the_disk(tmp_path):
+    (tmp_path / "file").write_text("")
+    directory = RunDirectory(tmp_path / "file" / "run")
     with pytest.raises(ModtError, match="cannot be written"):
-        RunDirectory(Path("/proc/modt-run"))
+        directory.begin(OURS, 1e9)
+
+
+def test_two_services_do_not_share_a_directory(tmp_path):
+    out = tmp_path / "state" / "run"
+    with RunDirectory(out).locked():
+        second = RunDirectory(out).locked()
+        with pytest.raises(ModtError, match="another run of modt records into it"):
+            second.__enter__()
+    with RunDirectory(out).locked(), RunDirectory(tmp_path / "other").locked():
+        pass
+
+
+def test_where_no_lock_can_be_written_the_service_goes_on(tmp_path):
+    (tmp_path / "file").write_text("")
+    with RunDirectory(tmp_path / "file" / "run").locked():
+        pass

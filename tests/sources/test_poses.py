@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 from modt.errors import MisuseError
 from modt.geometry import Camera, inverse, rotation_zyx, se3
 from modt.sources.pose_file import read_poses
-from modt.sources.pose_source import NoPoses, PosedStream, PoseFile, RecordedPoses
+from modt.sources.pose_source import NoPoses, PoseFile, RecordedPoses
 from modt.sources.recognise import open_stream
 
 from . import layouts
+from .posed_stream import PosedStream
 
 T_CAMERA_SENSOR = np.array([[0.0, -1, 0, 0.1], [0, 0, -1, -0.08], [1, 0, 0, -0.27], [0, 0, 0, 1]])
 CAMERA = Camera(np.zeros((3, 4)), T_CAMERA_SENSOR, 100.0, 100.0)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from modt.errors import MisuseError, ModtError
-from modt.sources.pose_source import NoPoses, PosedStream
+from modt.sources.pose_source import NoPoses
 from modt.sources.recognise import open_stream
 from modt.sources.stream import MAX_KEPT_FAULTS
 
 from . import layouts
+from .posed_stream import PosedStream
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from modt.geometry.kdop import DIRECTIONS
-from modt.tracking.motion import LAG_S, observe_motion
-from modt.tracking.track_table import TrackTable
+from modt.tracking.track_table import LAG_S, TrackTable
 
 PERIOD_S = 0.1
 ROW = np.array([0])
@@ -29,7 +28,7 @@ def follow(frames: list[np.ndarray]) -> TrackTable:
         tracks.envelope[:] = np.maximum(tracks.envelope, tracks.kdop)
         if not k:
             tracks.lagged_kdop[:] = tracks.kdop
-        observe_motion(tracks, ROW, PERIOD_S * (k > 0))
+        tracks.observe_motion(ROW, PERIOD_S * (k > 0))
     return tracks
 
 

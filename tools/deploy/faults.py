@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from modt.app.live_session import LiveSession
 from modt.energy.meters.discovery import Discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Meter, MeterLostError, Scope
 from modt.pipeline import Pipeline
@@ -110,7 +109,7 @@ class Fault:
 
     name: str
     seconds: float
-    told: Callable[[LiveSession], int]
+    told: Callable[[Any], int]
     sweeps: Callable[[Sweep, np.random.Generator], Sweeps] = lambda sweep, _: (sweep,)
     switch: Callable[[World, bool], None] = lambda world, on: None
     silent_if_steady: bool = False
@@ -163,11 +162,11 @@ def _hangup(_world: World, on: bool) -> None:
         os.kill(os.getpid(), signal.SIGHUP)
 
 
-def _late_frames(session: LiveSession) -> int:
+def _late_frames(session: Any) -> int:
     """Frames that began late, and steps of the ladder; a hog need not cost a deadline."""
-    lateness = session.loop.timing.late_or_later()
+    lateness = session.deadlines.timing.late_or_later()
     late = max((n for ms, n in zip(lateness["ms"], lateness["frames"], strict=True) if ms > LATE_MS), default=0)
-    return int(late) + session.loop.changes.total()
+    return int(late) + session.deadlines.changes.total()
 
 
 FAULTS = (
@@ -182,7 +181,7 @@ FAULTS = (
     Fault("clock set back", 0.2, lambda s: s.source.time_steps, switch=_set_back),
     Fault(FULL_DISK, 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
     Fault("meter lost", 3.0, lambda s: s.power.unread, switch=_switch("meter_lost")),
-    Fault("failing stage", 1.0, lambda s: s.loop.failures.counts.total(), switch=_switch("stage_broken")),
+    Fault("failing stage", 1.0, lambda s: s.failures.counts.total(), switch=_switch("stage_broken")),
     Fault("hog", 4.0, _late_frames, switch=World.set_hogs, silent_if_steady=True),
     Fault("reload", 0.2, lambda s: s.loop.reloads, switch=_hangup),
 )

@@ -24,10 +24,10 @@ import numpy as np
 
 from modt import host
 from modt.app import metering
+from modt.app.deadlines import Deadlines
 from modt.app.inputs import Request, stream
 from modt.app.ladder import Step
-from modt.app.live_loop import NamedSink
-from modt.app.live_session import LiveSession
+from modt.app.session import Session, service
 from modt.app.supervisor import NoSupervisor
 from modt.sinks.output import Health
 from modt.sources.live.live_stream import LiveStream
@@ -60,7 +60,7 @@ class Witness:
     """A sink that notes when results come, what has been missed, the memory and the open descriptors."""
 
     def __init__(self) -> None:
-        self.session: LiveSession | None = None
+        self.session: Session | None = None
         self.times_s: list[float] = []
         self.full: list[bool] = []  # nothing was given up
         self.missed: list[int] = []
@@ -70,10 +70,11 @@ class Witness:
     def write(self, result: FrameResult) -> None:
         """Note a result."""
         assert self.session is not None
-        loop = self.session.loop
+        deadlines = self.session.deadlines
+        assert isinstance(deadlines, Deadlines)
         self.times_s.append(time.monotonic())
-        self.full.append(loop.ladder.step is Step.ALL)
-        self.missed.append(loop.timing.missed)
+        self.full.append(deadlines.ladder.step is Step.ALL)
+        self.missed.append(deadlines.timing.missed)
         if len(self.times_s) % 50 == 0:
             self.resident_mb.append(host.resident_mb())
             self.descriptors.append(len(os.listdir("/proc/self/fd")))
@@ -98,7 +99,7 @@ class FaultyReader:
         self._rest_s += WARM_UP_S
         self._end_s = self._begin_s + seconds
         self._waiting: list[Fault] = []
-        self.session: LiveSession | None = None
+        self.session: Session | None = None
         self.episodes: list[Episode] = []
         self._now: Episode | None = None
 
@@ -145,7 +146,7 @@ class FaultyReader:
             self._now, self._rest_s = None, now_s + REST_S + float(self._rng.uniform(0, 2))
 
 
-def judge(witness: Witness, episodes: list[Episode], session: LiveSession) -> list[str]:
+def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[str]:
     """Print the figures; returns what is wrong."""
     wrong: list[str] = []
     times_s = np.array(witness.times_s)
@@ -177,7 +178,7 @@ def judge(witness: Witness, episodes: list[Episode], session: LiveSession) -> li
     descriptors, late = _thirds(witness.descriptors)
     print(f"frames {len(times_s)}, in {times_s[-1] - times_s[0]:.0f} s; {clear.sum()} of them between faults")
     share = missed / max(int(clear.sum()), 1)
-    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.loop.timing.report()}")
+    print(f"deadlines missed between faults: {missed} ({100 * share:.3f} %); {session.deadlines.report()}")
     print(f"memory {max(witness.resident_mb):.0f} MB at most, growth {100 * growth:.1f} %; recording {recording}")
     print(f"descriptors {max(witness.descriptors)} at most, {descriptors:.0f} midway, {late:.0f} at the end")
     if share > MAX_MISSED:
@@ -221,7 +222,8 @@ def main(arguments: list[str] | None = None) -> int:
     witness = Witness()
     source = LiveStream(recording.info, reader, cores=others)
     request = Request(profile=given.profile)
-    session = LiveSession(request, source, [NamedSink("witness", witness)], given.out, None, core, others, ["soak"])
+    with host.elsewhere(others):
+        session = service(request, source, {"witness": witness}, given.out, None, core, ["soak"])
     witness.session = reader.session = session
     try:
         session.run(NoSupervisor())

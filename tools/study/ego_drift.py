@@ -26,7 +26,7 @@ from modt.observations import Located, StaticTracks
 from modt.pipeline import Odometry
 from modt.profile import load
 from modt.sources import kitti_calibration, oxts
-from modt.sources.pose_source import NoPoses, PosedStream
+from modt.sources.pose_source import NoPoses
 from modt.sources.recognise import open_scans
 from modt.sources.stream import Stream
 from modt.types import Float64, Frame, Proposals
@@ -89,7 +89,7 @@ def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
     recorder = PoseRecorder(pipeline.odometry)
     pipeline = replace(pipeline, odometry=recorder)
-    for frame in PosedStream(stream, NoPoses()):
+    for frame in map(NoPoses().place, stream):
         pipeline.step(frame, mode.budget(profile))
     return np.array(recorder.poses)
 

@@ -1,1 +1,1 @@
-"""The live loop: on time, within its limits, observable."""
+"""A run: its session, stages and loop, and what is known of it."""

@@ -11,7 +11,6 @@ import numpy as np
 
 from modt import host
 from modt.app import kernel_choice
-from modt.classification import product_fusion
 from modt.classification.decision import Decision
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
@@ -55,11 +54,19 @@ def _profile_budget(profile: ProfileConfig) -> Budget:
 
 
 def _first_views(config: FusionConfig, prior: Prior) -> Fusion:
-    return (product_fusion.AnyView if config.rule == "product" else FirstViews)(config, prior)
+    if config.rule == "product":
+        from modt.classification.product_fusion import AnyView
+
+        return AnyView(config, prior)
+    return FirstViews(config, prior)
 
 
 def _further_views(config: FusionConfig, prior: Prior) -> Fusion:
-    return (product_fusion.KeyViews if config.rule == "product" else FurtherViews)(config, prior)
+    if config.rule == "product":
+        from modt.classification.product_fusion import KeyViews
+
+        return KeyViews(config, prior)
+    return FurtherViews(config, prior)
 
 
 MODES = {

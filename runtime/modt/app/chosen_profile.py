@@ -15,6 +15,8 @@ log = logging.getLogger(__name__)
 
 FOUND = "as found"
 """Name of a sensor's profile that the first sweep has replaced."""
+GIVEN = "given"
+"""Name of a configuration that a program has given."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +35,13 @@ class ChosenProfile:
     names: tuple[str, ...]
     recognition: Recognition
 
+    @property
+    def name(self) -> str:
+        """Of all profiles put together."""
+        return " + ".join(self.names)
 
-def choose(asked_for: profile.Names, first: Frame | None, info: StreamInfo) -> ChosenProfile:
+
+def choose(asked_for: profile.Names | ProfileConfig, first: Frame | None, info: StreamInfo | None) -> ChosenProfile:
     """The profile of a stream by its first frame; what differs is warned of.
 
     What is found takes the place of the default profile, and of that which the source has named, never of one of a
@@ -44,20 +51,29 @@ def choose(asked_for: profile.Names, first: Frame | None, info: StreamInfo) -> C
     Raises:
         MisuseError: a profile that cannot be used.
     """
+    if isinstance(asked_for, ProfileConfig):
+        recognition = _compared(first, asked_for, GIVEN, replaced=False)
+        return ChosenProfile(recognition.mounted(asked_for), GIVEN, (GIVEN,), recognition)
     asked = profile.resolve(asked_for)
-    base = info.profile or profile.DEFAULT
-    config = asked.config if asked.sensor else _with_beams(asked.over(profile.load(base)), info)
-    recognition = Recognition((), None, config) if first is None else recognise(first.points, config)
-    for line in recognition.warnings(asked.sensor or base, replaced=asked.sensor is None):
-        log.warning("%s", line)
     if asked.sensor:
-        return ChosenProfile(recognition.mounted(config), asked.sensor, asked.used(""), recognition)
+        recognition = _compared(first, asked.config, asked.sensor, replaced=False)
+        return ChosenProfile(recognition.mounted(asked.config), asked.sensor, asked.used(""), recognition)
+    base = info.profile if info and info.profile else profile.DEFAULT
+    recognition = _compared(first, _with_beams(asked.over(profile.load(base)), info), base, replaced=True)
     sensor = FOUND if recognition.differences else base
     config = _with_beams(asked.over(recognition.fitted), info)
     return ChosenProfile(config, sensor, asked.used(sensor), recognition)
 
 
-def _with_beams(config: ProfileConfig, info: StreamInfo) -> ProfileConfig:
-    if info.elevations_deg is None:
+def _compared(first: Frame | None, config: ProfileConfig, name: str, *, replaced: bool) -> Recognition:
+    """Differences between a sweep and the profile of a name, which is replaced or not."""
+    recognition = Recognition((), None, config) if first is None else recognise(first.points, config)
+    for line in recognition.warnings(name, replaced=replaced):
+        log.warning("%s", line)
+    return recognition
+
+
+def _with_beams(config: ProfileConfig, info: StreamInfo | None) -> ProfileConfig:
+    if info is None or info.elevations_deg is None:
         return config
     return replace(config, sensor=replace(config.sensor, elevations_deg=info.elevations_deg))

@@ -6,6 +6,7 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable
+from typing import NoReturn
 
 from modt.errors import ModtError
 
@@ -18,9 +19,14 @@ RENEW_AFTER = 5
 
 
 class Containment:
-    """Counts of contained exceptions by kind."""
+    """Counts of contained exceptions by kind.
 
-    def __init__(self) -> None:
+    Args:
+        contains: whether anything is contained; else every exception ends the run as it is.
+    """
+
+    def __init__(self, *, contains: bool = True) -> None:
+        self._contains = contains
         self.counts: Counter[str] = Counter()
         self.in_a_row = 0
 
@@ -42,10 +48,23 @@ class Containment:
 
     def note(self, error: Exception, where: str) -> None:
         """Count an exception that cost no frame."""
+        if not self._contains:
+            raise error
         kind = f"{where}: {_kind(error)}"
         self.counts[kind] += 1
         if self.counts[kind] == 1:
             log.error("%s; later ones are only counted", kind, exc_info=error)
+
+    def end(self, error: Exception) -> NoReturn:
+        """Report that the source has failed.
+
+        Raises:
+            ModtError: it has.
+        """
+        if not self._contains:
+            raise error
+        cause = f"nothing can be received any more ({_kind(error)}: {error})"
+        raise ModtError("source", cause, "check its network interface and start again") from error
 
 
 class OncePerSecond(logging.Filter):

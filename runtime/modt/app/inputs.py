@@ -8,16 +8,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from importlib import import_module
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
+from urllib.parse import parse_qsl
 
 from modt import profile
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.placement import LEVEL, Mount
-from modt.schemes import POSES, open_poses
+from modt.schemes import POSES, open_poses, open_sensor
 from modt.sources.pose_source import NoPoses, PoseFile, PoseSource, RecordedPoses
 from modt.sources.stream import Stream, StreamInfo
+
+if TYPE_CHECKING:
+    from modt.sources.live.live_stream import LiveStream
 
 STREET = "modt_desk.simulation.synthetic_stream"
 """Module of the synthetic street, loaded only where no recording is given."""
@@ -34,7 +38,6 @@ class Request:
     capture: Sequence[tuple[str, str]] = ()
     mode: str = "accurate"
     profile: Sequence[str] = ()
-    sink: Sequence[str] = ()
     fov: str = "full"
     frames: tuple[int, int | None] = (0, None)
     rate_hz: float | None = None
@@ -47,12 +50,6 @@ class Request:
         """The options that a command has; the defaults of the others."""
         names = {field.name for field in fields(cls)}
         return cls(**{name: value for name, value in vars(arguments).items() if name in names})
-
-
-class Described(Protocol):
-    """A recorded or a live stream."""
-
-    info: StreamInfo
 
 
 def stream(request: Request) -> Stream:
@@ -76,20 +73,41 @@ def stream(request: Request) -> Stream:
     return cut
 
 
-def identity(request: Request, stream: Described) -> dict[str, str | None]:
-    """Name and place of a stream: names of drives repeat."""
-    path = None if request.path is None else str(request.path.resolve())
-    return {"stream": stream.info.name, "path": path}
+def live_source(text: str, cores: frozenset[int] | None) -> tuple[LiveStream, Path | None]:
+    """A sensor by its address, or a recording by its path, played as if it were live; "" is the embedded stream.
+
+    `PATH?loop=yes` plays a recording for ever.
+
+    Returns:
+        the source, and the path where its frames can be read again by their numbers, None where they cannot.
+
+    Raises:
+        MisuseError: no such sensor or recording.
+    """
+    if "://" in text:
+        return open_sensor(text, cores), None
+    from modt.sources.live.live_stream import LiveStream
+    from modt.sources.live.played_reader import PlayedReader
+
+    place, _, query = text.partition("?")
+    options = dict(parse_qsl(query, keep_blank_values=True))
+    loop = options.pop("loop", "no")
+    if options or loop not in ("yes", "no"):
+        raise MisuseError(text, f"option {query!r} is unknown", "write PATH or PATH?loop=yes")
+    path = Path(place) if place else None
+    recording = stream(Request(path=path))
+    again = loop == "yes"
+    return LiveStream(recording.info, PlayedReader(recording, loop=again), cores=cores), None if again else path
 
 
-def odometry(request: Request, stream: Described, config: OdometryConfig) -> PoseSource:
+def odometry(request: Request, info: StreamInfo, config: OdometryConfig) -> PoseSource:
     """Where the poses of a stream's frames come from.
 
     Raises:
         MisuseError: a file of poses that cannot be used, an address that cannot be bound or is none.
     """
     if request.poses is not None:
-        return PoseFile(request.poses, stream.info.camera, stream.info.end)
+        return PoseFile(request.poses, info.camera, info.end)
     if request.odometry == RECORDED:
         return RecordedPoses()
     if request.odometry == NONE:
@@ -100,7 +118,7 @@ def odometry(request: Request, stream: Described, config: OdometryConfig) -> Pos
     return open_poses(request.odometry, config)
 
 
-def field_of_view(request: Request, stream: Described, mount: Mount = LEVEL) -> FieldOfView:
+def field_of_view(request: Request, info: StreamInfo, mount: Mount = LEVEL) -> FieldOfView:
     """The part of space to look at, for the level points of a mount.
 
     Raises:
@@ -108,7 +126,7 @@ def field_of_view(request: Request, stream: Described, mount: Mount = LEVEL) -> 
     """
     if request.fov == "full":
         return FieldOfView()
-    if stream.info.camera is None:
-        missing = next((n for n in stream.info.notes if "camera" in n), "it has no calibration")
-        raise MisuseError(stream.info.name, missing, "restore the calibration, or use --fov full")
-    return FieldOfView.of_camera(mount.camera(stream.info.camera))
+    if info.camera is None:
+        missing = next((n for n in info.notes if "camera" in n), "it has no calibration")
+        raise MisuseError(info.name, missing, "restore the calibration, or use --fov full")
+    return FieldOfView.of_camera(mount.camera(info.camera))

@@ -47,21 +47,11 @@ class Event(Enum):
     AMPLE = "ample slack"
 
 
-TRANSITIONS = {
-    (Step.ALL, Event.OVERRUN): Step.DEFERRED,
-    (Step.ALL, Event.OVER_POWER): Step.DEFERRED,
-    (Step.DEFERRED, Event.OVERRUN): Step.REDUCED,
-    (Step.DEFERRED, Event.OVER_POWER): Step.REDUCED,
-    (Step.DEFERRED, Event.SLACK): Step.ALL,
-    (Step.DEFERRED, Event.AMPLE): Step.ALL,
-    (Step.REDUCED, Event.OVERRUN): Step.DROPPED,
-    (Step.REDUCED, Event.OVER_POWER): Step.DROPPED,
-    (Step.REDUCED, Event.SLACK): Step.DEFERRED,
-    (Step.REDUCED, Event.AMPLE): Step.ALL,
-    (Step.DROPPED, Event.SLACK): Step.REDUCED,
-    (Step.DROPPED, Event.AMPLE): Step.ALL,
-}
-"""The next step; an event without an entry changes nothing."""
+def step_after(step: Step, event: Event) -> Step:
+    """The next step: up or down by one, and from ample slack to the first at once."""
+    if event is Event.AMPLE:
+        return Step.ALL
+    return Step(max(step - 1, Step.ALL) if event is Event.SLACK else min(step + 1, Step.DROPPED))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +100,7 @@ class Ladder:
 
     def _fire(self, event: Event, now_s: float) -> Change | None:
         before = self.step
-        self.step = TRANSITIONS.get((before, event), before)
+        self.step = step_after(before, event)
         if self.step > before:
             failed = now_s - self._down_s < PROBE_S
             self.patience_s = min(2 * self.patience_s, MAX_PATIENCE_S) if failed else CALM_S

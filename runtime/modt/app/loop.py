@@ -1,88 +1,59 @@
-"""The loop that drives the pipeline, at a fixed rate or at full speed."""
+"""The loop over the frames of a source, live or recorded, and the signals that end it."""
 
 from __future__ import annotations
 
 import gc
+import logging
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Any
+from itertools import chain
+from typing import TYPE_CHECKING, Any
 
-from modt.pipeline import SINK, SOURCE, Pipeline
-from modt.sinks.output import LineSink, Sink
-from modt.sources.stream import Stream
-from modt.types import Budget, FrameResult
+from modt.app.containment import RENEW_AFTER, Containment
+from modt.app.deadlines import Deadlines, NoDeadlines
+from modt.app.playback import Playback
+from modt.app.stages import Stages
+from modt.app.supervisor import Supervisor
+from modt.energy.ledger import Line
+from modt.errors import ModtError
+from modt.pipeline import SINK
+from modt.sinks.output import Writer
+from modt.sources.live.sweep_reader import Received, StreamEndedError
+from modt.types import FrameResult
+
+if TYPE_CHECKING:
+    from modt.sources.live.live_stream import LiveStream
+
+log = logging.getLogger(__name__)
 
 STOPPING = (signal.SIGINT, signal.SIGTERM)
 NAP_S = 0.05
-"""Longest sleep without a look at the signals."""
-
-
-class FullSpeed:
-    """Frames without waiting."""
-
-    def wait(self) -> None:
-        """Return at once."""
-
-    def report(self) -> dict[str, Any]:
-        """No rate was requested."""
-        return {"rate_hz": None}
-
-
-@dataclass
-class FixedPeriod:
-    """Frames at absolute deadlines, which restart after an overrun so that no burst follows."""
-
-    period_s: float
-    clock: Callable[[], float] = time.monotonic
-    sleep: Callable[[float], None] = time.sleep
-    max_lateness_s: float = 0.0
-    lost_s: float = 0.0  # by which the deadlines were put off
-    _deadline_s: float | None = None
-
-    @property
-    def missed(self) -> int:
-        """Periods without a frame."""
-        return int(self.lost_s / self.period_s + 1e-6)
-
-    def wait(self) -> None:
-        """Sleep until the deadline; when late by more than a period, begin a new row of deadlines."""
-        now = self.clock()
-        if self._deadline_s is None:
-            self._deadline_s = now
-        if now < self._deadline_s:
-            self.sleep(self._deadline_s - now)
-            now = self.clock()
-        late_s = now - self._deadline_s
-        self.max_lateness_s = max(self.max_lateness_s, late_s)
-        if late_s > self.period_s:
-            self.lost_s += late_s
-            self._deadline_s = now
-        self._deadline_s += self.period_s
-
-    def report(self) -> dict[str, Any]:
-        """Rate, deadlines missed, and largest delay [ms]."""
-        return {
-            "rate_hz": 1.0 / self.period_s,
-            "missed_deadlines": self.missed,
-            "max_lateness_ms": 1e3 * self.max_lateness_s,
-        }
-
-
-Pace = FullSpeed | FixedPeriod
+"""Longest sleep without a look at the signals [s]."""
+WAIT_S = 0.2
+"""Longest wait for a sweep without a look at the signals and the watchdog [s]."""
+REPORT_S = 1.0
+"""Time between two reports of the status [s]."""
 
 
 class Stop:
     """Requests by signals: SIGINT and SIGTERM end the loop after the current frame, SIGHUP asks for a reload."""
 
     def __init__(
-        self, sleep: Callable[[float], None] = time.sleep, clock: Callable[[], float] = time.monotonic
+        self,
+        sleep: Callable[[float], None] = time.sleep,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        reload: bool = False,
     ) -> None:
+        """`reload`: whether SIGHUP is handled."""
         self.signal: str | None = None
         self._reload, self._sleep, self._clock = False, sleep, clock
+        self._handlers: dict[signal.Signals, Callable[[int, object], None]] = dict.fromkeys(STOPPING, self._on_stop)
+        if reload:
+            self._handlers[signal.SIGHUP] = self._on_reload
 
     def sleep(self, seconds: float) -> None:
         """Sleep, in naps: a signal does not end one, and is seen after it."""
@@ -96,15 +67,12 @@ class Stop:
         return asked
 
     @contextmanager
-    def on_signals(self, *, reload: bool = False) -> Iterator[Stop]:
-        """Handle the signals within the context, SIGHUP where `reload`; a second one to stop ends the process."""
+    def on_signals(self) -> Iterator[Stop]:
+        """Handle the signals within the context; a second one to stop ends the process."""
         if threading.current_thread() is not threading.main_thread():
             yield self
             return
-        handlers: dict[signal.Signals, Callable[[int, object], None]] = dict.fromkeys(STOPPING, self._on_stop)
-        if reload:
-            handlers[signal.SIGHUP] = self._on_reload
-        previous = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+        previous = {number: signal.signal(number, handler) for number, handler in self._handlers.items()}
         try:
             yield self
         finally:
@@ -120,41 +88,119 @@ class Stop:
         self._reload = True
 
 
-Observer = Callable[[FrameResult, dict[str, Any]], None]
-"""Called with every result and its ledger line."""
+class Loop:
+    """Drives the stages by the frames of a source.
 
+    Args:
+        source: of the frames.
+        stages: process them.
+        sinks: of the results, by their names in messages.
+        observe: called with every result and its ledger line.
+        report: called once a second.
+        deadlines, failures, stop: say what is processed, what is contained, and when to end.
 
-def drive(
-    stream: Stream,
-    pipeline: Pipeline,
-    sinks: Sequence[Sink],
-    ledger_lines: LineSink,
-    budget: Budget,
-    pace: Pace,
-    stop: Stop,
-    observe: Observer,
-) -> int:
-    """Process a stream; returns the number of frames.
-
-    Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
+    Attributes:
+        reloads, refused_reloads: counts.
     """
-    run = pipeline.ledger.run
-    frames = iter(stream)
-    gc.collect()
-    gc.freeze()
-    done = 0
-    while stop.signal is None:
-        pace.wait()  # before the frame is taken, so that poses received meanwhile apply to it
-        if stop.signal is not None:
-            break
-        frame = run(SOURCE, next, frames, None)
-        if frame is None:
-            break
-        result = pipeline.step(frame, budget)
-        for sink in sinks:
-            run(SINK, sink.write, result)
-        line = pipeline.ledger.close_frame(frame.index)
-        ledger_lines.write(line)
-        observe(result, line)
-        done += 1
-    return done
+
+    def __init__(
+        self,
+        source: LiveStream | Playback,
+        stages: Stages,
+        sinks: Mapping[str, Writer[FrameResult]],
+        observe: Callable[[FrameResult, Line], None],
+        report: Callable[[Supervisor], None],
+        deadlines: Deadlines | NoDeadlines,
+        failures: Containment,
+        stop: Stop,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._source, self._stages, self._sinks = source, stages, sinks
+        self._observe, self._report = observe, report
+        self._deadlines, self._failures, self._stop, self._clock = deadlines, failures, stop, clock
+        self.reloads = self.refused_reloads = 0
+
+    def run(self, supervisor: Supervisor) -> None:
+        """Process frames until a signal, or the end of the source. The first one shows what the sensor is.
+
+        Garbage is collected and frozen once at the start, so that no full collection falls into a frame.
+
+        Raises:
+            ModtError: what cannot be contained.
+        """
+        gc.collect()
+        gc.freeze()
+        supervisor.ready()
+        frames = self._frames(supervisor)
+        first = next(frames, None)
+        if first is not None:
+            self._stages.recognise(first.frame, self._source.profile)
+            for received in chain([first], frames):
+                self._process(received)
+
+    def _frames(self, supervisor: Supervisor) -> Iterator[Received]:
+        """Frames as they come; between them reloads, watchdog and reports are served."""
+        reported_s = float("-inf")
+        while self._stop.signal is None:
+            if self._stop.take_reload():
+                self._reload(supervisor)
+            try:
+                received = self._source.take(WAIT_S)
+            except StreamEndedError:
+                return
+            except ModtError:
+                raise
+            except Exception as error:
+                self._failures.end(error)
+            if received is not None and self._stop.signal is None:
+                yield received
+            supervisor.alive()
+            if self._clock() - reported_s >= REPORT_S:
+                reported_s = self._clock()
+                self._spare("status", self._report, supervisor)
+
+    def _process(self, received: Received) -> None:
+        if not self._deadlines.admit(received.arrived_s):
+            return
+        try:
+            line = self._step(received)
+        except ModtError:
+            raise
+        except Exception as error:
+            self._stages.ledger.close_frame(received.frame.index)
+            self._failures.fail(error, "frame")
+            self._stages.recover(anew=self._failures.in_a_row == RENEW_AFTER)
+            return
+        self._failures.succeed()
+        self._deadlines.finish(received.arrived_s, line)
+        self._stages.watch(received.frame)
+
+    def _step(self, received: Received) -> Line:
+        """Process a frame; returns its ledger line."""
+        stages, frame = self._stages, received.frame
+        budget = self._deadlines.budget(stages.budget, received.arrived_s, frame.index)
+        result = stages.step(frame, budget, reduced=self._deadlines.reduced)
+        for name, sink in self._sinks.items():
+            self._spare(name, stages.ledger.run, SINK, sink.write, result)
+        line = stages.ledger.close_frame(frame.index)
+        self._spare("records", self._observe, result, line)
+        return line
+
+    def _spare(self, where: str, call: Callable[..., None], *arguments: Any) -> None:
+        """Call what a frame can do without."""
+        try:
+            call(*arguments)
+        except Exception as error:
+            self._failures.note(error, where)
+
+    def _reload(self, supervisor: Supervisor) -> None:
+        supervisor.reloading()
+        try:
+            self._stages.reload()
+        except ModtError as error:
+            self.refused_reloads += 1
+            log.error("%s; the profile before stays in use", error)
+        else:
+            self.reloads += 1
+            log.warning("profile loaded again")
+        supervisor.ready()

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from modt.app.live_loop import LiveLoop
+from modt.app.supervisor import Supervisor
+from modt.app.timing import Timing
 from modt.classes import CLASS_NAMES
-from modt.types import NONE, FrameResult
+from modt.config import EnergyConfig
+from modt.energy.attribution import attribute
+from modt.reporting.summary import Summary
+from modt.sinks.recording import Recording
+from modt.types import NONE, Tracks
 
 SCHEMA = "modt.status/1"
 MIN_RATE_S = 0.5
@@ -18,56 +26,74 @@ STALE_S = 5.0
 
 
 class Counts:
-    """Frames and tracks since the start, and their rate."""
+    """Frames and tracks since the start, and their rate.
 
-    def __init__(self, now_s: float) -> None:
-        self.classifications = self.deferred = self.proposals = 0
-        self.classes = dict.fromkeys(CLASS_NAMES, 0)
-        self.tracks = 0
-        self.rate_hz = 0.0
-        self._frames = self._last_frames = 0
-        self._last_s = now_s
+    Args:
+        totals: counts of the run.
+        now_s: time of the start.
+    """
 
-    def add(self, result: FrameResult) -> None:
-        """Add a frame."""
-        self._frames += 1
-        self.proposals += len(result.proposals)
-        self.classifications += len(result.classified)
-        self.deferred += result.n_deferred
-        self.tracks = len(result.tracks)
-        seen = result.tracks.object_class[result.tracks.proposal != NONE]
-        self.classes = dict(zip(CLASS_NAMES, np.bincount(seen, minlength=len(CLASS_NAMES)).tolist(), strict=True))
+    def __init__(self, totals: Summary, now_s: float) -> None:
+        self._totals, self._rate_hz = totals, 0.0
+        self._frames, self._since_s = 0, now_s  # where the rate was formed last
 
-    def report(self, now_s: float) -> dict[str, Any]:
-        """Figures for the status; the rate is that of the time between reports."""
-        frames, seconds = self._frames - self._last_frames, now_s - self._last_s
+    def report(self, now_s: float, tracks: Tracks | None) -> dict[str, Any]:
+        """Figures for the status, by the tracks of the last frame; the rate is that of the time between reports."""
+        totals, seconds = self._totals, now_s - self._since_s
         if seconds >= MIN_RATE_S:
-            self.rate_hz = frames / seconds
-            self._last_frames, self._last_s = self._frames, now_s
+            self._rate_hz = (totals.frames - self._frames) / seconds
+            self._frames, self._since_s = totals.frames, now_s
+        seen = np.zeros(0, np.int64) if tracks is None else tracks.object_class[tracks.proposal != NONE]
         return {
-            "frames": self._frames,
-            "rate_hz": round(self.rate_hz, 2),
-            "tracks": self.tracks,
-            "visible": self.classes,
-            "proposals": self.proposals,
-            "classifications": self.classifications,
-            "deferred": self.deferred,
+            "frames": totals.frames,
+            "rate_hz": round(self._rate_hz, 2),
+            "tracks": 0 if tracks is None else len(tracks),
+            "visible": dict(zip(CLASS_NAMES, np.bincount(seen, minlength=len(CLASS_NAMES)).tolist(), strict=True)),
+            "proposals": totals.proposals,
+            "classifications": totals.classified,
+            "deferred": totals.deferred,
         }
 
 
-def loop_report(loop: LiveLoop) -> dict[str, Any]:
-    """What the loop knows of itself."""
-    return {
-        **loop.timing.report(),
-        "budget_ms": round(loop.budget_ms, 3),
-        "other_stages_ms": round(loop.rest.ms, 3),
-        "step": loop.ladder.step.name.lower(),
-        "steps_entered": dict(loop.changes),
-        "shed_sweeps": loop.shed,
-        "failures": dict(loop.failures.counts),
-        "reloads": loop.reloads,
-        "refused_reloads": loop.refused_reloads,
-    }
+class Power:
+    """What the windows say; unknown until the first one with a reading, and while the meters fail.
+
+    Attributes:
+        watts: of the last window.
+        kind: measured, integrated, estimated or unavailable.
+        frame_J: energy a frame in it.
+        stages_J: the same of each stage, of idling and of the rest of the process (`attribute`).
+        windows, unread: counts, of all and of those without energy.
+    """
+
+    def __init__(self) -> None:
+        self.watts: float | None = None
+        self.frame_J: float | None = None
+        self.stages_J: dict[str, float] = {}
+        self.kind = "unavailable"
+        self.windows = self.unread = 0
+
+    def add(self, window: dict[str, Any], board: EnergyConfig) -> float | None:
+        """Add a line modt.energy/1; the window's power [W]."""
+        energy_J, frames = window["energy_J"], window["frames"][2]
+        self.windows, self.kind = self.windows + 1, window["kind"]
+        self.unread += energy_J is None
+        self.watts = None if energy_J is None else energy_J / (1e-9 * window["wall_ns"])
+        self.frame_J = None if energy_J is None or not frames else energy_J / frames
+        split = attribute(window, board) if frames else {}
+        self.stages_J = {stage: joules / frames for stage, joules in split.items()}
+        return self.watts
+
+    def report(self) -> dict[str, Any]:
+        """Figures for the status."""
+        return {
+            "watts": self.watts,
+            "kind": self.kind,
+            "frame_J": self.frame_J,
+            "stages_J": {stage: round(joules, 6) for stage, joules in self.stages_J.items()},
+            "windows": self.windows,
+            "unread_windows": self.unread,
+        }
 
 
 def one_line(status: dict[str, Any]) -> str:
@@ -79,3 +105,46 @@ def one_line(status: dict[str, Any]) -> str:
     silent = ", sensor silent" if status["sensor"].get("silent") else ""
     seen = f" ({classes})" if classes else ""
     return f"{counts['rate_hz']:.1f} Hz, {counts['tracks']} tracks{seen}, {watts}{step}{silent}"
+
+
+class Monitor:
+    """Shows the status of a service: to its supervisor, in status.json, and to Prometheus.
+
+    Args:
+        recording: whose thread writes the files.
+        timing: of the frames.
+        metrics: file for Prometheus; None for none.
+    """
+
+    def __init__(self, recording: Recording, timing: Timing, metrics: Path | None) -> None:
+        self._recording, self._timing, self._metrics = recording, timing, metrics
+
+    def report(self, status: Callable[[], dict[str, Any]], supervisor: Supervisor) -> None:
+        """Say what is going on; the files are written off the loop's thread."""
+        present = status()
+        supervisor.status(one_line(present))
+        self._recording.writer.write(lambda: self._write(present))
+
+    def finish(self, status: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """Write the last status; returns it and the lateness for the summary."""
+        last = status()
+        self._recording.writer.write(lambda: self._write(last))
+        return {"status": last, "lateness": self._timing.late_or_later()}
+
+    def _write(self, status: dict[str, Any]) -> None:
+        self._recording.state(json.dumps(status, indent=1) + "\n")
+        if self._metrics is not None:
+            from modt.app.prometheus import write_metrics
+
+            write_metrics(self._metrics, status)
+
+
+class NoMonitor:
+    """Nobody watches a replay."""
+
+    def report(self, status: Callable[[], dict[str, Any]], supervisor: Supervisor) -> None:
+        """No effect."""
+
+    def finish(self, status: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+        """No effect."""
+        return {}

@@ -29,9 +29,6 @@ class NoSupervisor:
     def reloading(self) -> None:
         """No effect."""
 
-    def frame_done(self) -> None:
-        """No effect."""
-
     def close(self) -> None:
         """No effect."""
 
@@ -75,10 +72,6 @@ class Systemd:
         """Report the begin of a reload, which `ready` ends."""
         self._ready = False
         self._send(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
-
-    def frame_done(self) -> None:
-        """Report that a frame is done: that the service is ready and alive."""
-        self.alive()
 
     def close(self) -> None:
         """Report that the service ends."""

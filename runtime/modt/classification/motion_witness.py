@@ -1,7 +1,7 @@
 """The witness of a track's motion: P(how far it went | class, how long it is), an expert beside network and box.
 
 It is a state, not a view: it replaces itself in every frame and is never multiplied twice. How far a track went is
-measured as far as both of its ends moved (`modt.tracking.motion`): where a changing part of a wall is seen, one does.
+measured as far as both of its ends moved (`modt.tracking.track_table`): where a changing part of a wall is seen, one does.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ def cells(moved_m: Float64, observed_s: Float64, length_m: Float64) -> tuple[Int
 
 
 def log_likelihood(moved_m: Float64, observed_s: Float64, length_m: Float64) -> Float64:
-    """(R, 4) log P(motion | class) over that of background; arguments as of `cells`."""
+    """(R, 4) log P(motion | class) over that of background, 0 of a class without a table; arguments as of `cells`."""
     length, cell = cells(moved_m, observed_s, length_m)
     out = np.zeros((len(cell), N_CLASSES))
-    out[:, 1 : 1 + LOG_LIKELIHOOD_RATIO.shape[1]] = LOG_LIKELIHOOD_RATIO[length, :, cell]  # of other classes nothing
+    out[:, 1 : 1 + LOG_LIKELIHOOD_RATIO.shape[1]] = LOG_LIKELIHOOD_RATIO[length, :, cell]
     return out

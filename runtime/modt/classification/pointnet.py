@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.special import softmax
 
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"  # read at its import; else it writes into ~/.cache and looks up a host
 import onnxruntime as ort
@@ -24,7 +23,7 @@ from modt import assets
 from modt.classes import N_CLASSES
 from modt.classification import box_classifier, reflectance_classifier
 from modt.classification.crops import canonical, gather, ground_z_m
-from modt.classification.pool import log_pool
+from modt.classification.pool import log_pool, softmax
 from modt.classification.prior import BoxScores, with_background
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
@@ -243,8 +242,7 @@ class PointNet:
             return network
         boxes, reflectance = self.box_scores.of(proposals).take(which, axis=1)
         weights = self.box_scores.weights
-        probability: Float64 = softmax(log_pool(network, boxes, reflectance, self._log_frequency, weights), axis=1)
-        return probability
+        return softmax(log_pool(network, boxes, reflectance, self._log_frequency, weights))
 
     def facts(self) -> dict[str, str]:
         """File and hash of the model, for the record of a run."""

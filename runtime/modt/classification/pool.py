@@ -88,6 +88,13 @@ def log_pool(
     return score
 
 
+def softmax(log_probability: Float64) -> Float64:
+    """(R, 4) probabilities whose logarithms are given up to a constant a row."""
+    likelihood = np.exp(log_probability - log_probability.max(axis=1, keepdims=True))
+    probability: Float64 = likelihood / likelihood.sum(axis=1, keepdims=True)
+    return probability
+
+
 def fraction(content: Mapping[str, Any], key: str) -> float:
     """Number from 0 to 1 under a key.
 

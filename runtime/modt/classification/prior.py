@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from scipy.special import softmax
 
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.box_classifier import BoxClassifier, NoBoxClassifier, is_bound, proposal_features
-from modt.classification.pool import PoolWeights
+from modt.classification.pool import PoolWeights, softmax
 from modt.classification.reflectance_classifier import NoReflectanceClassifier, ReflectanceClassifier
 from modt.config import SensorConfig
 from modt.types import Bool, Float64, Proposals
@@ -108,8 +107,7 @@ class BoxPrior:
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) of each proposal of a frame."""
-        probability: Float64 = softmax(self._scores.of(proposals).sum(axis=0), axis=1)
-        return probability
+        return softmax(self._scores.of(proposals).sum(axis=0))
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) rows of priors (M, 4) that give the objects together at least this probability."""

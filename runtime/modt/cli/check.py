@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     # NumPy is imported from here on, after the process is pinned.
     from modt import profile
     from modt.app import checks, kernel_choice, metering
-    from modt.app.live_source import open_source
+    from modt.app.inputs import live_source
     from modt.classification.pointnet import PointNet
 
     config = profile.load(arguments.profile)
@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         checks.clock(),
     ]
     if arguments.source is not None:
-        found += checks.sensor(lambda: open_source(arguments.source, cores))
+        found += checks.sensor(lambda: live_source(arguments.source, cores)[0])
     for finding in found:
         print(finding)
     return int(any(finding.level == checks.FAIL for finding in found))

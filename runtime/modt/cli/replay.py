@@ -43,25 +43,27 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.app.inputs import Request
-    from modt.app.replay_session import Session
+    from modt.app.session import replay
     from modt.app.supervisor import supervisor_of
     from modt.cli.progress import progress
     from modt.reporting.summary import summary_text
+    from modt.schemes import open_sink
 
     supervisor = supervisor_of(os.environ)
-    session = Session(Request.of(arguments), arguments.out, pinned, command=["modt", *sys.argv[1:]])
-    show = not arguments.quiet
+    sinks = {address: open_sink(address) for address in dict.fromkeys(arguments.sink)}
+    session = replay(Request.of(arguments), sinks, arguments.out, pinned, ["modt", *sys.argv[1:]])
+    info, directory, show = session.stages.info, session.recording.directory, not arguments.quiet
     if show:
-        for note in session.notes:
+        for note in (*info.notes, *info.pose_notes):
             print(f"modt: {note}", file=sys.stderr)
-    with progress(session.stream.info.n_frames, shown=show and sys.stderr.isatty()) as tick:
-        summary = session.run(tick, supervisor)
+    with progress(info.n_frames, shown=show and sys.stderr.isatty()) as tick:
+        summary = session.run(supervisor, tick)
     if show:
         print(summary_text(summary))
-        path = session.directory.path
-        print(f"  results in {path}; to look at them: modt view {path}")
+        kept = f"; those before are kept in {directory.before}" if directory.before else ""
+        print(f"  results in {directory.path}; to look at them: modt view {directory.path}{kept}")
     stopped_by = session.stop.signal
     if stopped_by is not None:
         frames_done = f"after {summary['frames']} frames"
-        print(f"modt: stopped by {stopped_by} {frames_done}: {session.directory.path} is whole", file=sys.stderr)
+        print(f"modt: stopped by {stopped_by} {frames_done}: {directory.path} is whole", file=sys.stderr)
     return INTERRUPTED if stopped_by == "SIGINT" else 0

@@ -42,10 +42,8 @@ def run(arguments: argparse.Namespace) -> int:
     pinned = host.pin_to_core(arguments.core)
     # NumPy is imported from here on, after the process is pinned.
     from modt.app.containment import OncePerSecond
-    from modt.app.inputs import Request
-    from modt.app.live_loop import NamedSink
-    from modt.app.live_session import LiveSession
-    from modt.app.live_source import open_source, recorded_path
+    from modt.app.inputs import Request, live_source
+    from modt.app.session import service
     from modt.app.status import one_line
     from modt.app.supervisor import supervisor_of
     from modt.schemes import open_sink
@@ -55,17 +53,17 @@ def run(arguments: argparse.Namespace) -> int:
     for what in lacking:
         log.warning("%s", what)
     with host.elsewhere(cores):
-        source = open_source(arguments.source, cores)
+        source, path = live_source(arguments.source, cores)
         addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
-        sinks = [NamedSink(address, open_sink(address)) for address in dict.fromkeys(addresses)]
+        sinks = {address: open_sink(address) for address in dict.fromkeys(addresses)}
         command = ["modt", *sys.argv[1:]]
-        request = replace(Request.of(arguments), path=recorded_path(arguments.source))
+        request = replace(Request.of(arguments), path=path)
         out, metrics = arguments.out, arguments.metrics
-        session = LiveSession(request, source, sinks, out, metrics, pinned, cores, command, lacking)
+        session = service(request, source, sinks, out, metrics, pinned, command, lacking)
     for handler in logging.getLogger().handlers:
         handler.addFilter(OncePerSecond())
-    status = session.run(supervisor)
-    counts, recording = status["counts"], status["recording"]
+    status = session.run(supervisor)["status"]
+    counts, recording = status["counts"], session.recording.health()
     records = f"records in {out}" if recording["parts"] else f"nothing is recorded: {recording['failing']}"
     print(f"modt: {counts['frames']} frames; {one_line(status)}; {records}", file=sys.stderr)
     return INTERRUPTED if session.stop.signal == "SIGINT" else 0

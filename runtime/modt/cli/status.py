@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app.status import STALE_S
     from modt.app.status_text import status_text
     from modt.sinks.records import records_of
-    from modt.sinks.service_directory import STATUS
+    from modt.sinks.run_directory import STATUS
 
     path, now_s = arguments.directory / STATUS, time.time()
     status = read(path)

@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: there is no status at the start.
     """
     from modt.app.status_text import status_text
-    from modt.sinks.service_directory import STATUS
+    from modt.sinks.run_directory import STATUS
 
     path = arguments.directory / STATUS
     text = status_text(read(path), time.time())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from modt.types import Bool, Float32, Float64, Int
 
@@ -46,8 +47,40 @@ def yaw_of(T: Float64) -> float:
 
 def quaternion_of(T: Float64) -> Float64:
     """(4,) rotation of a rigid transform as a quaternion x, y, z, w."""
-    quaternion: Float64 = Rotation.from_matrix(T[:3, :3]).as_quat()
-    return quaternion
+    R, diagonal = T[:3, :3], T.diagonal()[:3]
+    trace = diagonal.sum()
+    i = int(diagonal.argmax())
+    j, k = (i + 1) % 3, (i + 2) % 3
+    quaternion = np.empty(4)
+    if diagonal[i] > trace:
+        quaternion[[i, j, k]] = 1 - trace + 2 * R[i, i], R[j, i] + R[i, j], R[k, i] + R[i, k]
+        quaternion[3] = R[k, j] - R[j, k]
+    else:
+        quaternion[:] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1 + trace
+    return quaternion / np.linalg.norm(quaternion)
+
+
+def rotation_of(quaternion: Float64) -> Float64:
+    """(3, 3) rotation by a quaternion x, y, z, w of any length."""
+    x, y, z, w = (quaternion / np.linalg.norm(quaternion)).tolist()
+    return np.array(
+        [
+            [x * x - y * y - z * z + w * w, 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), y * y - x * x - z * z + w * w, 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), z * z - x * x - y * y + w * w],
+        ]
+    )
+
+
+def turn_between(a: Float64, b: Float64, share: float) -> Float64:
+    """(3, 3) rotation of the (4, 4) transform a, turned on towards that of b by a share of the angle between them."""
+    *axis, cosine = quaternion_of(inverse(a) @ b).tolist()
+    sine = math.copysign(math.hypot(*axis), cosine)
+    half_rad = math.atan2(abs(sine), abs(cosine))
+    along = math.sin(share * half_rad) / sine if sine else 0.0
+    turn = np.array([*(along * component for component in axis), math.cos(share * half_rad)])
+    R: Float64 = a[:3, :3] @ rotation_of(turn)
+    return R
 
 
 def transform(T: Float64, xyz: Float64) -> Float64:

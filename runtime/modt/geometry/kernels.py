@@ -8,7 +8,7 @@ import numpy as np
 
 from modt.geometry.boxes import upright_boxes
 from modt.geometry.kdop import PairWeights, Shapes, certain_pairs, kdop_ends, overlapping_pairs, pair_costs
-from modt.types import Float32, Float64, Int, copy_runs
+from modt.types import Bool, Float32, Float64, Int, copy_runs
 
 
 class GeometryKernels(Protocol):
@@ -47,9 +47,16 @@ class GeometryKernels(Protocol):
     def certain_pairs(self, rows: Int, columns: Int, cost: Float64, limit: float) -> tuple[Int, Int]:
         """Pairs that a least-cost assignment keeps for certain, and those that it must decide among."""
 
+    def least_cost_assignment(self, cost: Float64) -> Bool:
+        """(R, C) pairs of the assignment of least cost, one in each row or one in each column.
+
+        Raises:
+            ValueError: every assignment has an infinite cost.
+        """
+
 
 class NumpyGeometryKernels:
-    """The passes in NumPy: the reference."""
+    """The passes in NumPy and SciPy: the reference."""
 
     upright_boxes = staticmethod(upright_boxes)
     kdop_ends = staticmethod(kdop_ends)
@@ -62,6 +69,14 @@ class NumpyGeometryKernels:
         """(V, G) sum of the values of each group, given (V, K) in their order."""
         total: Float64 = np.add.reduceat(values, offsets[:-1], axis=1, dtype=np.float64)
         return total
+
+    def least_cost_assignment(self, cost: Float64) -> Bool:
+        """(R, C) pairs of the assignment of least cost, one in each row or one in each column."""
+        from scipy.optimize import linear_sum_assignment  # large, and the compiled kernels do without
+
+        chosen = np.zeros(cost.shape, np.bool_)
+        chosen[linear_sum_assignment(cost)] = True
+        return chosen
 
 
 NUMPY_GEOMETRY = NumpyGeometryKernels()

@@ -9,7 +9,7 @@ import numpy as np
 
 from modt.geometry.kdop import HALF_ROOT, PAD_M, PairWeights, Shapes
 from modt.native.library import FLOAT64, INT64, Signatures, address, at, declare, pointers
-from modt.types import Float32, Float64, Int
+from modt.types import Bool, Float32, Float64, Int
 
 _D, _L, _P = ctypes.c_double, ctypes.c_int64, ctypes.c_void_p
 _SIGNATURES: Signatures = {
@@ -19,6 +19,7 @@ _SIGNATURES: Signatures = {
     "modt_copy_runs": (None, (_P, _P, _P, _L, _P)),
     "modt_overlapping_pairs": (_L, (_P, _L, _P, _L, _P, _L, _P, _P)),
     "modt_pair_costs": (None, (_P, _P, _P, _D, _P, _P, _L, _P, _D, _D, _P, _P, _P)),
+    "modt_least_cost_assignment": (ctypes.c_int, (_P, _L, _L, _P)),
     "modt_certain_pairs": (None, (_P, _P, _L, _D, _P, _P, _P, _P)),
 }
 _PAIRS_EACH = 8
@@ -108,6 +109,20 @@ class NativeGeometryKernels:
             address(index), at(cost, FLOAT64), n, limit, address(sizes), *map(address, scratch), address(state)
         )
         return (state == 1).nonzero()[0], (state == 2).nonzero()[0]
+
+    def least_cost_assignment(self, cost: Float64) -> Bool:
+        """(R, C) pairs of the assignment of least cost, one in each row or one in each column."""
+        chosen = np.zeros(cost.shape, np.bool_)
+        wide, pairs = (cost, chosen) if cost.shape[0] <= cost.shape[1] else (cost.T, chosen.T)
+        n, k = wide.shape
+        column_of = np.empty(n, np.int64)
+        potentials, distance, (row_of, before, remaining) = np.empty(n), np.empty((2, k)), np.empty((3, k), np.int64)
+        scratch = pointers(potentials, distance, column_of, row_of, before, remaining)
+        dense = np.ascontiguousarray(wide)
+        if not self._library.modt_least_cost_assignment(at(dense, FLOAT64), n, k, address(scratch)):
+            raise ValueError("no assignment has a finite cost")
+        pairs[np.arange(n), column_of] = True
+        return chosen
 
     @staticmethod
     def _shapes(shapes: Shapes) -> array[int]:

@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from modt.geometry import quaternion_of, se3
+from modt.geometry import quaternion_of, rotation_of, se3
 from modt.ros2.cdr import CdrReader, CdrWriter, MessageError
 from modt.types import Float64
 
@@ -54,7 +53,7 @@ def read_pose(cdr: CdrReader) -> Float64:
         raise MessageError("non_finite", "the pose is not finite")
     if not 0.9 < math.hypot(*numbers[3:]) < 1.1:
         raise MessageError("malformed", "the quaternion is no rotation")
-    return se3(Rotation.from_quat(numbers[3:]).as_matrix(), numbers[:3])
+    return se3(rotation_of(np.array(numbers[3:])), numbers[:3])
 
 
 def write_odometry(stamp_s: float, frame_id: str, child_frame_id: str, T_odom_child: Float64) -> bytes:

@@ -6,8 +6,6 @@ from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from modt.segmentation.grids import Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
@@ -50,6 +48,9 @@ def connect(grid: SqrtRangeGrid, cells: Cells, max_gap_m: Float32, use: Bool) ->
     Neighbours with a vertical gap below (C,) max_gap_m are connected. Components are numbered in the order of their
     first cells.
     """
+    from scipy.sparse import csr_array  # large, and the compiled kernels do without
+    from scipy.sparse.csgraph import connected_components
+
     rows = slice(None) if use.all() else np.flatnonzero(use)
     low, high, gap_m = cells.low[rows], cells.high[rows], max_gap_m[rows]
     one, other = grid.neighbour_pairs(grid.flat_index(cells.row[rows], cells.column[rows]))

@@ -12,12 +12,41 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from modt import assets, profile
 from modt.config import SensorConfig
 from modt.geometry.beams import Beams, BeamTable, EvenBeams
 from modt.types import Float32, Float64, Int
+
+_GAUSSIAN_REACH = 4.0
+"""Half width of a Gaussian, in standard deviations. Rows that are filtered go on mirrored beyond their ends."""
+
+
+def gaussian(values: Float64, deviation: float) -> Float64:
+    """Mean weighted by a Gaussian of this standard deviation."""
+    reach = int(_GAUSSIAN_REACH * deviation + 0.5)
+    weights = np.exp(-0.5 / (deviation * deviation) * np.arange(-reach, reach + 1) ** 2)
+    weights /= weights.sum()
+    padded, n = np.pad(values, reach, "symmetric"), len(values)
+    smooth: Float64 = values * weights[reach]
+    for k in range(reach):
+        smooth += (padded[k : k + n] + padded[2 * reach - k : 2 * reach - k + n]) * weights[k]
+    return smooth
+
+
+def running_mean(values: Float64, width: int) -> Float64:
+    """Mean of windows of a width, of which an even one begins one value earlier."""
+    padded = np.pad(values, (width // 2, (width - 1) // 2), "symmetric")
+    first = padded[:width].cumsum()[-1:]
+    mean: Float64 = np.concatenate([first, padded[width:] - padded[:-width]]).cumsum() / width
+    return mean
+
+
+def running_median(values: Int, width: int) -> Int:
+    """Median of windows of an odd width."""
+    windows = sliding_window_view(np.pad(values, width // 2, "symmetric"), width)
+    return np.sort(windows, axis=1)[:, width // 2]
 
 
 def prominent_peaks(count: Float64) -> tuple[Int, Float64]:
@@ -131,11 +160,11 @@ class _Rings:
 
 
 def _histogram(bins: Int, weight: Float32) -> Float64:
-    return np.asarray(gaussian_filter1d(np.bincount(bins, weight, N_BINS), SMOOTH_BINS))
+    return gaussian(np.bincount(bins, weight, N_BINS).astype(np.float64), SMOOTH_BINS)
 
 
 def _mean(count: Float64) -> Float64:
-    return np.asarray(uniform_filter1d(uniform_filter1d(count, WINDOW_BINS), WINDOW_BINS))
+    return running_mean(running_mean(count, WINDOW_BINS), WINDOW_BINS)
 
 
 def _peaks(count: Float64) -> Int:
@@ -149,7 +178,7 @@ def _peaks(count: Float64) -> Int:
     peaks, mass = peaks[kept], mass[kept]
     while len(peaks) > 3:  # a gap far narrower than those around is within a blurred beam
         gap = np.diff(peaks)
-        usual = median_filter(gap, GAPS_AROUND)
+        usual = running_median(gap, GAPS_AROUND)
         narrowest = int(np.argmin(gap / usual))
         if gap[narrowest] >= MIN_GAP * usual[narrowest]:
             break
@@ -179,7 +208,7 @@ def _azimuth_step_deg(sweeps: Sequence[Float32], rings: _Rings) -> float:
     bins = (step[(step > 0.03) & (step < 5.0)] * 100).astype(np.int64)
     if not len(bins):
         return 5.0
-    mode = int(np.argmax(gaussian_filter1d(np.bincount(bins).astype(np.float64), 1.0))) / 100
+    mode = int(np.argmax(gaussian(np.bincount(bins).astype(np.float64), 1.0))) / 100
     near = step[np.abs(step - mode - 0.005) < 0.3 * mode + 0.01]
     return float(np.mean(near))
 

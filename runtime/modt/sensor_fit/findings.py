@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from modt.config import ProfileConfig, SegmentationConfig
+from modt.config import ProfileConfig, SegmentationConfig, SensorConfig
+from modt.geometry.field_of_view import BlindSectors
 from modt.placement import Mount
 from modt.sensor_fit.beams import BeamPattern, nearest_profile, tangents
-from modt.sensor_fit.mount import ground_height_m
+from modt.sensor_fit.tilt import find_floor
 from modt.types import Float32
 
 
@@ -128,6 +129,18 @@ def _beam_findings(pattern: BeamPattern) -> Iterator[Finding]:
         table = tuple(np.round(found[::-1], 2).tolist())
         yield Finding("sensor", "elevations_deg", table, f"{said}; a beam that met nothing is not among them", sure)
     yield Finding("sensor", "azimuth_step_deg", step_deg, "most frequent step along a beam")
+
+
+def ground_height_m(sweeps: Sequence[Float32], sensor: SensorConfig) -> float | None:
+    """Height above the floor, median over level sweeps of (N, 4) points [m]; None where none shows one."""
+    sectors = BlindSectors(sensor.blind_sectors_deg or (), sensor.blind_range_m)
+    heights_m = []
+    for points in sweeps:
+        kept = points[(np.hypot(points[:, 0], points[:, 1]) > sensor.min_range_m) & ~sectors.contain(points)]
+        floor = find_floor(kept)
+        if floor is not None and floor.up[2] > 0:
+            heights_m.append(floor.depth_m)
+    return float(np.median(heights_m)) if heights_m else None
 
 
 def level(recording: Recording, config: ProfileConfig) -> Recording:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
+from modt.errors import ModtError
 from modt.sinks.output import Health, LedgerSink, Reporting, Writer
 
 log = logging.getLogger(__name__)
@@ -25,14 +26,15 @@ RETRY_S = 1.0
 class Background(Generic[T]):
     """Writes in a thread of its own, in order; where no room is left, the oldest item that waits gives way.
 
-    A failure of the writer is logged once, until it writes again; the item is lost and counted, and after a pause the
-    next one is tried.
+    A failure of the writer is logged once, until it writes again, with a traceback where it is none of the system;
+    the item is lost and counted, and after a pause the next one is tried.
 
     Args:
         name: for messages.
         writer: used by the thread alone from now on.
         depth: items that may wait.
         retry_s: pause after a failure.
+        close_s: time limit of `close`.
         clock: [s].
     """
 
@@ -43,10 +45,11 @@ class Background(Generic[T]):
         depth: int,
         *,
         retry_s: float = RETRY_S,
+        close_s: float = CLOSE_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name, self._writer, self._depth = name, writer, depth
-        self._retry_s, self._clock = retry_s, clock
+        self._retry_s, self._close_s, self._clock = retry_s, close_s, clock
         self._jobs: deque[Callable[[], None]] = deque()
         self._changed = threading.Condition()
         self._end_s: float | None = None
@@ -78,17 +81,17 @@ class Background(Generic[T]):
         }
 
     def close(self) -> None:
-        """Write what waits and close the writer, within CLOSE_S; what is left is dropped."""
+        """Write what waits and close the writer, in time; what is left is dropped."""
         with self._changed:
             if self._end_s is None:
-                self._end_s = self._clock() + CLOSE_S / 2
+                self._end_s = self._clock() + self._close_s / 2
             self._changed.notify()
-        self._thread.join(CLOSE_S)
+        self._thread.join(self._close_s)
         with self._changed:
             self._dropped += len(self._jobs)
             self._jobs.clear()
         if self._thread.is_alive():
-            log.warning("%s: does not end within %g s and is left alone", self.name, CLOSE_S)
+            log.warning("%s: does not end within %g s and is left alone", self.name, self._close_s)
 
     def _put(self, job: Callable[[], None]) -> None:
         with self._changed:
@@ -123,11 +126,17 @@ class Background(Generic[T]):
 
     def _fail(self, error: Exception) -> None:
         self._failed += 1
+        known = isinstance(error, (ModtError, OSError))
+        what = f"{error}" if known else f"{type(error).__name__}: {error}"
         if self._state == "ok":
             log.warning(
-                "%s: %s; tried again every %g s, what cannot be written is counted", self.name, error, self._retry_s
+                "%s: %s; tried again every %g s, what cannot be written is counted",
+                self.name,
+                what,
+                self._retry_s,
+                exc_info=None if known else error,
             )
-        self._state = str(error)
+        self._state = what
         with self._changed:
             self._changed.wait_for(lambda: self._end_s is not None, self._retry_s)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
+from modt.placement import Mount
 from modt.sinks.output import Health, LineFile, writing
 from modt.types import NONE, Cut, Float64, FrameResult, Int
 
@@ -48,13 +49,14 @@ class KittiResults:
             return
         boxes = result.proposals.box[tracks.proposal[rows]]
         truncated = (result.proposals.cut[tracks.proposal[rows]] & Cut.SIDE > 0).astype(np.int64)
-        T = self._camera.T_camera_sensor
+        camera = Mount(result.frame.R_level_sensor).camera(self._camera)
+        T = camera.T_camera_sensor
         bottom = transform(T, boxes[:, :3] - np.array([0, 0, 0.5]) * boxes[:, 5:6])
         ahead = np.stack([np.cos(boxes[:, 6]), np.sin(boxes[:, 6]), np.zeros(len(boxes))], axis=1) @ T[:3, :3].T
         ry = np.arctan2(-ahead[:, 2], ahead[:, 0])
         alpha = wrap(ry - np.arctan2(bottom[:, 0], bottom[:, 2]))
         score = tracks.posterior[rows, class_[rows]]
-        image_box = self._image_boxes(boxes)
+        image_box = _image_boxes(boxes, camera)
         columns = (tracks.id[rows], class_[rows], truncated, alpha, image_box, boxes[:, 3:6], bottom, ry, score)
         text = "".join(
             f"{result.frame.index} {id_} {KITTI_TYPES[c]} {cut} -1 {a:.4f} "
@@ -72,19 +74,20 @@ class KittiResults:
         """Close the file."""
         self._lines.close()
 
-    def _image_boxes(self, boxes: Float64) -> Float64:
-        """(n, 4) left, top, right, bottom [pixel]; -1 for boxes behind the camera."""
-        z = boxes[:, 2, None] + np.array([-0.5, 0.5]) * boxes[:, 5, None]
-        xyz = np.dstack([corners(boxes).repeat(2, axis=1), np.tile(z, 4)])
-        P = self._camera.P_image_sensor
-        uvw = xyz @ P[:, :3].T + P[:, 3]
-        out = np.full((len(boxes), 4), -1.0)
-        ahead = (uvw[..., 2] > 0.1).all(axis=1)
-        uv = uvw[ahead, :, :2] / uvw[ahead, :, 2:]
-        limit = np.array([self._camera.width_px, self._camera.height_px]) - 1
-        out[ahead, :2] = np.clip(uv.min(axis=1), 0, limit)
-        out[ahead, 2:] = np.clip(uv.max(axis=1), 0, limit)
-        return out
+
+def _image_boxes(boxes: Float64, camera: Camera) -> Float64:
+    """(n, 4) left, top, right, bottom [pixel]; -1 for boxes behind the camera."""
+    z = boxes[:, 2, None] + np.array([-0.5, 0.5]) * boxes[:, 5, None]
+    xyz = np.dstack([corners(boxes).repeat(2, axis=1), np.tile(z, 4)])
+    P = camera.P_image_sensor
+    uvw = xyz @ P[:, :3].T + P[:, 3]
+    out = np.full((len(boxes), 4), -1.0)
+    ahead = (uvw[..., 2] > 0.1).all(axis=1)
+    uv = uvw[ahead, :, :2] / uvw[ahead, :, 2:]
+    limit = np.array([camera.width_px, camera.height_px]) - 1
+    out[ahead, :2] = np.clip(uv.min(axis=1), 0, limit)
+    out[ahead, 2:] = np.clip(uv.max(axis=1), 0, limit)
+    return out
 
 
 def box_lines(

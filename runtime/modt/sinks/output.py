@@ -40,9 +40,6 @@ class Sink(Writer[FrameResult], Reporting, Protocol):
     """Takes the results of frames."""
 
 
-LineSink = Writer[dict[str, Any]]
-
-
 @runtime_checkable
 class LedgerSink(Protocol):
     """What a sink is besides, if it also takes the lines of the ledger (`modt.ledger/1`, `modt.energy/1`)."""
@@ -146,27 +143,6 @@ class LineFile(Generic[T]):
         """Close the file."""
         with writing(self.path):
             self._file.close()
-
-
-class LedgerLines:
-    """The ledger of a run, of which some sinks take the lines too."""
-
-    def __init__(self, lines: LineSink, sinks: Iterable[Sink]) -> None:
-        self._lines, self._takers = lines, [sink for sink in sinks if isinstance(sink, LedgerSink)]
-
-    def write(self, record: dict[str, Any], /) -> None:
-        """Write a line, and hand it on.
-
-        Raises:
-            ModtError: it cannot be written.
-        """
-        self._lines.write(record)
-        for taker in self._takers:
-            taker.ledger(record)
-
-    def close(self) -> None:
-        """Close the ledger."""
-        self._lines.close()
 
 
 def close_together(sinks: Iterable[Sink]) -> None:

@@ -1,21 +1,24 @@
-"""Records of a service: written by a thread of their own, in parts of limited size."""
+"""Records of a run: of a service written by a thread of their own, in parts of limited size."""
 
 from __future__ import annotations
 
 import logging
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from modt.config import RecordingConfig
 from modt.errors import ModtError
-from modt.sinks.job_thread import JobThread
-from modt.sinks.output import LineFile
+from modt.geometry import Camera
+from modt.sinks.kitti import KittiResults
+from modt.sinks.output import Health, LineFile, Writer
 from modt.sinks.records import line
-from modt.sinks.run_directory import LEDGER, RUN, TRACKS
-from modt.sinks.service_directory import ServiceDirectory
+from modt.sinks.run_directory import LEDGER, RUN, STATUS, TRACKS, RunDirectory
 from modt.sinks.tracks import frame_line
 from modt.types import FrameResult
+
+if TYPE_CHECKING:
+    from modt.sinks.background import Background
 
 log = logging.getLogger(__name__)
 
@@ -26,6 +29,26 @@ RESERVED_BYTES = 20_000
 """Of a part, for run.yaml, status.json and summary.json."""
 RETRY_S = 2.0
 """Between attempts to write again after a failure."""
+JOBS = 128
+"""Jobs that wait for the disk at most."""
+CLOSE_S = 1.0
+"""Time limit for the last jobs of a service [s]; half of it is reserved for draining the queue."""
+Job = Callable[[], None]
+
+
+class AtOnce:
+    """Runs jobs where they are handed over."""
+
+    def write(self, job: Job, /) -> None:
+        """Run it."""
+        job()
+
+    def health(self) -> Health:
+        """None is dropped."""
+        return {"dropped": 0}
+
+    def close(self) -> None:
+        """No effect."""
 
 
 class Recording:
@@ -34,27 +57,30 @@ class Recording:
     Args:
         directory: where they go.
         config: what is kept.
-        writer: the thread that writes; `write` and `ledger` are called by the loop, all else by that thread.
+        writer: runs what writes, in a thread; `write`, `ledger`, `start` and `follow` are for the loop, the rest for
+            that thread.
         describe: text of run.yaml for a new part.
     """
 
     def __init__(
         self,
-        directory: ServiceDirectory,
+        directory: RunDirectory,
         config: RecordingConfig,
-        writer: JobThread,
+        writer: Background[Job] | AtOnce,
         describe: Callable[[], str],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.directory, self.config = directory, config
         self.lines = self.lost = self.pauses = self.parts = 0
-        self._refused = 0  # lines, counted by the loop; all others by the writing thread
         self.cause: str | None = None  # why nothing can be written now
-        self._writer, self._describe, self._clock = writer, describe, clock
+        self.writer, self._describe, self._clock = writer, describe, clock
         self._files: dict[str, LineFile[str]] = {}
         self._begun, self._bytes, self._retry_s = False, 0, float("-inf")
         self._synced, self._named = 0, 0  # lines, and files, that outlast a power cut
-        writer.submit(self._begin)
+
+    def start(self) -> None:
+        """Begin the first part."""
+        self.writer.write(self._begin)
 
     def write(self, result: FrameResult) -> None:
         """Hand over the line of a frame."""
@@ -69,13 +95,13 @@ class Recording:
     def follow(self, config: RecordingConfig) -> None:
         """Keep what another profile says, and describe it."""
         self.config = config
-        self._writer.submit(self._redescribe)
+        self.writer.write(self._redescribe)
 
     def health(self) -> dict[str, Any]:
         """Counts for status and summary."""
         counts = {
             "lines": self.lines,
-            "lost_lines": self.lost + self._refused,
+            "lost_lines": self.lost + int(self.writer.health()["dropped"]),
             "pauses": self.pauses,
             "parts": self.parts,
         }
@@ -84,8 +110,14 @@ class Recording:
     def close(self) -> None:
         """No effect: `finish` ends the files on their own thread."""
 
+    def state(self, status: str) -> None:
+        """Write status.json, and have the lines so far outlast a power cut; once a second."""
+        self.sync()
+        if self.cause is None and self._begun:
+            self._attempt(lambda: self.directory.write(STATUS, status))
+
     def sync(self) -> None:
-        """Have the lines so far outlast a power cut; once a second."""
+        """Have the lines so far outlast a power cut."""
         if self.cause is None and self._synced != self.lines and self._attempt(self._sync):
             self._synced = self.lines
 
@@ -97,8 +129,7 @@ class Recording:
             file.close()
 
     def _submit(self, name: str, text: str) -> None:
-        if not self._writer.submit(lambda: self._append(name, text)):
-            self._refused += 1
+        self.writer.write(lambda: self._append(name, text))
 
     def _append(self, name: str, text: str) -> None:
         if self.cause is not None and self._clock() < self._retry_s:
@@ -149,4 +180,57 @@ class Recording:
         if self.cause is not None:
             log.warning("%s: recording again; %d lines are lost", self.directory.path, self.lost)
             self.cause = None
+        return True
+
+
+class WholeRecording(Recording):
+    """The records of a replay: all of them, in one part, written where they are handed over; a failure ends the run.
+
+    Args:
+        directory, describe: as of Recording.
+        sequence, camera: of the KITTI results.
+        labels: whether point labels are written.
+    """
+
+    def __init__(
+        self,
+        directory: RunDirectory,
+        describe: Callable[[], str],
+        sequence: int,
+        camera: Camera | None,
+        *,
+        labels: bool,
+    ) -> None:
+        super().__init__(directory, RecordingConfig(disk_mb=1e7), AtOnce(), describe)  # more than a disk has
+        self._sequence, self._camera, self._labels = sequence, camera, labels
+        self._more: list[Writer[FrameResult]] = []
+
+    def start(self) -> None:
+        """Begin the files."""
+        super().start()
+        path = self.directory.path
+        self._more.append(KittiResults(path / "kitti" / f"{self._sequence:04d}.txt", self._camera))
+        if self._labels:
+            from modt.sinks.labels import PointLabels
+
+            self._more.append(PointLabels(path / "labels"))
+
+    def write(self, result: FrameResult) -> None:
+        """Write a frame."""
+        super().write(result)
+        for writer in self._more:
+            writer.write(result)
+
+    def follow(self, config: RecordingConfig) -> None:
+        """Describe another profile; what is kept stays the same."""
+        super().follow(self.config)
+
+    def finish(self) -> None:
+        """Close the files."""
+        super().finish()
+        for writer in self._more:
+            writer.close()
+
+    def _attempt(self, action: Callable[[], None]) -> bool:
+        action()
         return True

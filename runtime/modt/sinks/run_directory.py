@@ -1,59 +1,139 @@
-"""The directory of a run."""
+"""The directory of a run: DIR holds the present part of its records, DIR~1, DIR~2 … hold earlier ones."""
 
 from __future__ import annotations
 
-import itertools
-import json
+import fcntl
+import os
+import re
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
-from modt.errors import MisuseError
-from modt.sinks.output import LineFile, replace_file, writing
-from modt.sinks.records import line
-from modt.sinks.tracks import frame_line
-from modt.types import FrameResult
+from modt.errors import MisuseError, ModtError
+from modt.sinks.output import replace_file, sync_folder, writing
 
-RUN, TRACKS, LEDGER, SUMMARY = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json"
+RUN, TRACKS, LEDGER, SUMMARY, STATUS = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"
+MARK = "service: true"
+"""Line of run.yaml in the directories of a service: no other directory is ever deleted."""
+_KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) for form in ("{}", ".{}.part")}
 
 
 class RunDirectory:
-    """Creates DIR; an earlier run at that path is renamed.
+    """Every part is a whole run; a half-made one, which a failed start has left, is made anew.
 
     Attributes:
         path: the directory.
-        kept: new path of the earlier run, None if there was none.
+        before: new path of the part before, None if there was none.
 
     Raises:
-        MisuseError: the path is a file, or a directory that is no run.
-        ModtError: it cannot be written.
+        MisuseError: the path is a file, or a directory that holds other files.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.kept: Path | None = None
+        self.before: Path | None = None
         if path.exists() and not path.is_dir():
             raise MisuseError(path, "is a file", "give a directory as --out")
-        with writing(path):
-            if (path / TRACKS).exists():
-                names = (path.with_name(f"{path.name}~{n}") for n in itertools.count(1))
-                self.kept = next(name for name in names if not name.exists())
-                path.rename(self.kept)
-            elif path.is_dir() and any(path.iterdir()):
-                raise MisuseError(path, "holds files but no run", "give an empty or a new directory")
-            path.mkdir(parents=True, exist_ok=True)
+        foreign = sorted({p.name for p in path.iterdir()} - _KNOWN) if path.is_dir() else []
+        if foreign and not (path / TRACKS).exists():
+            raise MisuseError(path, f"holds {foreign[0]}, which is no record", "give an empty or a new directory")
 
-    def describe(self, text: str) -> None:
-        """Write run.yaml, the configuration of the run."""
-        replace_file(self.path / RUN, text)
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """Keep other runs out until the process ends; where no lock can be written, none is kept out.
 
-    def tracks(self) -> LineFile[FrameResult]:
-        """A new tracks.jsonl."""
-        return LineFile(self.path / TRACKS, frame_line)
+        Raises:
+            ModtError: another run is in.
+        """
+        with ExitStack() as stack:
+            try:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                lock = os.open(
+                    self.path.with_name(f".{self.path.name}.lock"), os.O_RDONLY | os.O_CREAT | os.O_NOFOLLOW
+                )
+                stack.callback(os.close, lock)
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                remedy = "end it, or give another --out"
+                raise ModtError(self.path, "another run of modt records into it", remedy) from None
+            except OSError:  # said when the recording begins
+                pass
+            yield
 
-    def ledger(self) -> LineFile[dict[str, Any]]:
-        """A new ledger.jsonl."""
-        return LineFile(self.path / LEDGER, line)
+    def begin(self, description: str, limit_bytes: float) -> None:
+        """Keep the part before under the next name, delete the oldest ones beyond a limit, and begin a new part.
 
-    def summarise(self, summary: dict[str, Any]) -> None:
-        """Write summary.json."""
-        replace_file(self.path / SUMMARY, json.dumps(summary, indent=2) + "\n")
+        Raises:
+            ModtError: the disk is full, or cannot be written.
+        """
+        with writing(self.path):
+            self._keep()
+            self._trim(limit_bytes)
+            self.path.mkdir(parents=True, exist_ok=True)
+        self.write(RUN, description, lasting=True)
+
+    def write(self, name: str, text: str, *, lasting: bool = False) -> None:
+        """Write a file of the present part atomically; a lasting one is never found empty after a power cut.
+
+        Raises:
+            ModtError: it cannot be written.
+        """
+        replace_file(self.path / name, text, lasting=lasting)
+
+    def sync(self) -> None:
+        """Have the names of the present part and its files outlast a power cut.
+
+        Raises:
+            ModtError: they may not.
+        """
+        with writing(self.path):
+            sync_folder(self.path)
+            sync_folder(self.path.parent)
+
+    def kept(self) -> list[Path]:
+        """Earlier parts, the oldest first."""
+        return [path for _, path in sorted(self._numbered()) if _is_ours(path)]
+
+    def _numbered(self) -> Iterator[tuple[int, Path]]:
+        for path in self.path.parent.glob("*~*"):
+            match = re.fullmatch(re.escape(self.path.name) + r"~(\d+)", path.name)
+            if match:
+                yield int(match[1]), path
+
+    def _keep(self) -> None:
+        if not self.path.is_dir():
+            return
+        if any((self.path / name).is_file() for name in (TRACKS, LEDGER)):
+            (self.path / STATUS).unlink(missing_ok=True)
+            number = 1 + max((n for n, _ in self._numbered()), default=0)
+            self.before = self.path.rename(self.path.with_name(f"{self.path.name}~{number}"))
+        else:
+            _remove_known(self.path)
+
+    def _trim(self, limit_bytes: float) -> None:
+        parts = [(path, _size(path)) for path in self.kept()]
+        excess = sum(size for _, size in parts) - limit_bytes
+        for path, size in parts:
+            if excess <= 0:
+                return
+            _remove_known(path)
+            with suppress(OSError):  # holds files of someone else
+                path.rmdir()
+            excess -= size
+
+
+def _is_ours(path: Path) -> bool:
+    try:
+        return MARK in (path / RUN).read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return False
+
+
+def _size(path: Path) -> int:
+    return sum(file.stat().st_size for file in path.iterdir() if file.name in _KNOWN)
+
+
+def _remove_known(path: Path) -> None:
+    for name in _KNOWN - {RUN}:
+        (path / name).unlink(missing_ok=True)
+    (path / RUN).unlink(missing_ok=True)  # the last one: what is left half deleted is still known as ours

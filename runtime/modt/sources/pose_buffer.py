@@ -6,10 +6,9 @@ import math
 from collections import deque
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from modt.config import OdometryConfig
-from modt.geometry import se3
+from modt.geometry import se3, turn_between
 from modt.types import Float64
 
 _LEVER_M = 5.0
@@ -119,9 +118,7 @@ def _turn_rad(a: Float64, b: Float64) -> float:
 
 def interpolate(a: Float64, b: Float64, share: float) -> Float64:
     """(4, 4) pose at a share of the motion from a to b, at constant velocity and turn rate."""
-    turn = Rotation.from_matrix(a[:3, :3].T @ b[:3, :3]).as_rotvec()
-    R = a[:3, :3] @ Rotation.from_rotvec(share * turn).as_matrix()
-    return se3(R, a[:3, 3] + share * (b[:3, 3] - a[:3, 3]))
+    return se3(turn_between(a, b, share), a[:3, 3] + share * (b[:3, 3] - a[:3, 3]))
 
 
 _MIN_VOTES = 5

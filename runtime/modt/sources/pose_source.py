@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
-from modt.sources.stream import Faults, Stream, StreamInfo
+from modt.sources.stream import StreamInfo
 from modt.types import Frame
 
 
@@ -84,20 +83,3 @@ class PoseFile(PoseSource):
         if frame >= len(self._poses):
             cause = f"{len(self._poses)} poses, too few for frame {frame}"
             raise MisuseError(self.name, cause, "give a line for every frame from 0 on, or fewer --frames")
-
-
-class PosedStream:
-    """A stream with the poses of a source."""
-
-    def __init__(self, stream: Stream, odometry: PoseSource) -> None:
-        self._stream, self.odometry = stream, odometry
-        self.info: StreamInfo = odometry.of_stream(stream.info)
-        self.faults: Faults = stream.faults
-
-    def __iter__(self) -> Iterator[Frame]:
-        """The frames with their poses."""
-        return (self.odometry.place(frame) for frame in self._stream)
-
-    def between(self, first: int, last: int | None) -> Self:
-        """The frames with first <= index < last."""
-        return type(self)(self._stream.between(first, last), self.odometry)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import chain
 from typing import Protocol, Self
 
 from modt.geometry import Camera
@@ -91,25 +90,3 @@ class Stream(Protocol):
 
     def between(self, first: int, last: int | None) -> Self:
         """The stream of the frames with first <= index < last."""
-
-
-class PeekedStream:
-    """A stream that has read its first frame, with which the first pass through it begins."""
-
-    def __init__(self, stream: Stream) -> None:
-        self._stream, self._rest = stream, iter(stream)
-        self.info: StreamInfo = stream.info
-        self.faults: Faults = stream.faults
-        self.first: Frame | None = next(self._rest, None)
-        self._begun = self.first is None
-
-    def __iter__(self) -> Iterator[Frame]:
-        """The frames."""
-        if self._begun or self.first is None:
-            return iter(self._stream)
-        self._begun = True
-        return chain([self.first], self._rest)
-
-    def between(self, first: int, last: int | None) -> Self:
-        """The frames with first <= index < last."""
-        return type(self)(self._stream.between(first, last))

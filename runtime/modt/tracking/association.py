@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Observations
@@ -79,7 +78,7 @@ class Association(Protocol):
 def assign(rows: Int, columns: Int, cost: Float64, limit: float, kernels: GeometryKernels = NUMPY_GEOMETRY) -> Int:
     """Indices, ascending, of the candidate pairs that a least-cost assignment keeps.
 
-    Most pairs are certain; the Hungarian algorithm decides among the others.
+    Most pairs are certain; `least_cost_assignment` decides among the others.
 
     Args:
         rows: (K,) first index of each candidate pair.
@@ -95,9 +94,9 @@ def assign(rows: Int, columns: Int, cost: Float64, limit: float, kernels: Geomet
         return certain
     i, n = _compact(rows[contested])
     j, k = _compact(columns[contested])
-    matrix, chosen = np.full((n, k), limit), np.zeros((n, k), np.bool_)
+    matrix = np.full((n, k), limit)
     matrix[i, j] = cost[contested]
-    chosen[linear_sum_assignment(matrix)] = True
+    chosen = kernels.least_cost_assignment(matrix)
     pairs: Int = np.concatenate([certain, contested[chosen[i, j]]])
     pairs.sort()
     return pairs

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from modt.geometry.kdop import DIRECTIONS
+from modt.geometry.kdop import DIRECTIONS, widths
 from modt.types import Bool, Float64, Int, Tracks, column
+
+LAG_S = 1.5
+"""Time constant of the place that a displacement is measured from."""
 
 
 @dataclass(slots=True)
@@ -36,3 +40,19 @@ class TrackTable(Tracks):
         """(8, R) k-DOPs of all that was observed of the rows, where the filter expects them now."""
         kdop: Float64 = (self.envelope.take(rows, axis=0) + self.x.take(rows, axis=0)[:, :2] @ DIRECTIONS).T.copy()
         return kdop
+
+    def observe_motion(self, rows: Int, dt_s: float) -> None:
+        """Write displacement, time of observation and length of the rows, seen dt_s after the frame before.
+
+        The place that a track comes from follows its k-DOP with a lag: at a constant speed v the displacement tends
+        to v * LAG_S. Along each axis it is that of the end that moved less, and nothing where the ends moved apart:
+        a changing view moves one of them alone.
+        """
+        lagged = self.lagged_kdop.take(rows, axis=0)
+        shift = self.kdop.take(rows, axis=0) - lagged
+        ahead, behind = shift[:, :4], -shift[:, 4:]
+        together = np.where(ahead * behind > 0, np.minimum(np.abs(ahead), np.abs(behind)), 0.0)
+        self.moved_m[rows] = together.max(axis=1, initial=0.0)
+        self.observed_s[rows] += dt_s
+        self.length_m[rows] = widths(self.envelope.take(rows, axis=0).T).max(axis=0, initial=0.0)
+        self.lagged_kdop[rows] = lagged + (1.0 - math.exp(-dt_s / LAG_S)) * shift

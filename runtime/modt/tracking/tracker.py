@@ -17,7 +17,6 @@ from modt.tracking.fragments import NoReunion, Reunion
 from modt.tracking.kalman import HEADING, SPEED, components_first, standstill_of, tracks_first
 from modt.tracking.kdop_association import KdopAssociation
 from modt.tracking.merging import CarMerging
-from modt.tracking.motion import observe_motion
 from modt.tracking.regrouping import Associated, Regrouping
 from modt.tracking.splitting import ExpectedSplitting
 from modt.tracking.states import Event, StateMachine
@@ -133,7 +132,7 @@ class Tracker:
             frame = regrouping.regroup(self._tracks, frame, located.placement)
         known = self._tracks.box.take(frame.matches.rows, axis=0)
         self._update(frame.matches, frame.observations)
-        observe_motion(self._tracks, frame.matches.rows, dt_s)
+        self._tracks.observe_motion(frame.matches.rows, dt_s)
         self._keep_top(frame, known)
         self._observe_rest(frame.matches.rows)
         self._coast(frame.matches.rows)
@@ -304,7 +303,7 @@ class Tracker:
         t.age[new] = t.hits[new] = 1
         t.envelope[new] = t.mean_kdop[new] = self._record(new, proposals, observations, position)
         t.lagged_kdop[new] = t.kdop[new]
-        observe_motion(t, new, 0.0)
+        t.observe_motion(new, 0.0)
 
 
 def _oversized(object_class: Int, kdop: Float64) -> Int:

@@ -62,6 +62,7 @@ def track(id_, proposal, named):
         "state": "tracked",
         "class": "car" if named else "background",
         "posterior": [0.1, 0.7, 0.1, 0.1] if named else [0.25] * 4,
+        "witness": [0.0] * 4,
         "viewed": named,
         "final": named,
         "proposal": proposal,

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from modt.sources.live.live_stream import LiveStream, Received
-from modt.sources.live.sweep_reader import Reception, StreamEndedError, Sweep
+from modt.sources.live.live_stream import LiveStream
+from modt.sources.live.sweep_reader import Received, Reception, StreamEndedError, Sweep
 from modt.sources.stream import StreamInfo
 
 INFO = StreamInfo("sensor", "test", 0, None, 0.1, None, False)

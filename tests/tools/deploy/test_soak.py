@@ -24,7 +24,7 @@ def test_a_fault_makes_sweeps_that_a_sensor_could_send_and_leaves_its_own_alone(
 
 def session(lost):
     recording = SimpleNamespace(health=lambda: {"lost_lines": lost})
-    return SimpleNamespace(loop=SimpleNamespace(timing=Timing()), recording=recording)
+    return SimpleNamespace(deadlines=Timing(), recording=recording)
 
 
 def witness(full_from=0.0, missed_at=(), growth=0.0, leaks=0.0):

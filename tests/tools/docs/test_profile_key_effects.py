@@ -24,7 +24,7 @@ import yaml
 from modt import profile
 from modt.app import assembly, inputs, kernel_choice
 from modt.app.ladder import Ladder
-from modt.app.live_stages import within
+from modt.app.stages import within
 from modt.classification import pointnet
 from modt.config import ProfileConfig
 from modt.config.profile import Key, keys, value_of
@@ -33,8 +33,8 @@ from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
 from modt.segmentation.ground import HeightEstimator
-from modt.sinks.recording import Recording
-from modt.sinks.service_directory import MARK, ServiceDirectory
+from modt.sinks.recording import AtOnce, Recording
+from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sources.pose_socket import PoseSocket
 from modt.types import Frame
 from modt_desk.reporting.run_report import run_tree
@@ -254,9 +254,8 @@ def live(config: ProfileConfig, _folder: Path) -> str:
 
 def recorded(config: ProfileConfig, folder: Path) -> str:
     """Which records are kept, and how many bytes of them."""
-    background = mock.Mock(submit=lambda job: job() or True)
     folder.mkdir(parents=True, exist_ok=True)
-    recording = Recording(ServiceDirectory(folder / "run"), config.recording, background, lambda: f"{MARK}\n")
+    recording = Recording(RunDirectory(folder / "run"), config.recording, AtOnce(), lambda: f"{MARK}\n")
     for k in range(2):
         recording.ledger({"frame": k, "filler": "x" * 1_000_000})
         recording.write(result(k, [5], {0: 1}))

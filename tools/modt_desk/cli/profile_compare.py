@@ -38,14 +38,14 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.energy.meters.meter import Conditions, Kind
     from modt_desk.comparison.compare_report import Basis, compare_tree
     from modt_desk.comparison.compare_view import compare_document, compare_plots
-    from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, observe
+    from modt_desk.comparison.mode_runs import MODES, VARIED, Comparison, identity, observe
     from modt_desk.comparison.prediction_report import against, observed_tree, read_prediction
     from modt_desk.reporting.page import document_page, save
     from modt_desk.reporting.quantity import to_json
 
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)
-    asked = {**inputs.identity(request, stream), "fov": request.fov, "asked": list(request.frames)}
+    asked = {**identity(request, stream.info), "fov": request.fov, "asked": list(request.frames)}
     prediction = None if arguments.against is None else read_prediction(arguments.against, asked)
     loaded = choose(request.profile, next(iter(stream), None), stream.info).config
     board, info = loaded.energy, stream.info
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError(info.name, "no usable frame", "give a stream that modt replay can work on")
     basis = Basis(board, meters[0].facts, info.period_s)
     about: dict[str, Any] = {
-        **inputs.identity(request, stream),
+        **identity(request, stream.info),
         "frames": frames,
         "fov": request.fov,
         "repeat": arguments.repeat,

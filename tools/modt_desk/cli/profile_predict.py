@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app import inputs
     from modt.app.chosen_profile import choose
     from modt.sinks.output import writing
-    from modt_desk.comparison.mode_runs import observe
+    from modt_desk.comparison.mode_runs import identity, observe
     from modt_desk.comparison.prediction import forecast
     from modt_desk.comparison.prediction_report import prediction_document, prediction_tree, read_calibration
     from modt_desk.reporting.quantity import to_json
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> int:
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)
     info = stream.info
-    itself = inputs.identity(request, stream)
+    itself = identity(request, info)
     calibration = [read_calibration(path, itself, request.fov) for path in arguments.calibration]
     loaded = choose(request.profile, next(iter(stream), None), info).config
     share = 3 if arguments.observe == "third" and info.n_frames is not None else 1

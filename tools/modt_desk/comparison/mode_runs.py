@@ -12,6 +12,7 @@ from modt.classification.scheduler import padded_size
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger, NullLedger
 from modt.energy.meters.meter import Meter
+from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Budget, Frame, Int
 from modt_desk.comparison.comparison import ModeRun, RecordingFusion, Repetition, interleave
 from modt_desk.comparison.prediction import OBSERVED
@@ -56,7 +57,7 @@ class Comparison:
     def _mode_run(self, name: str) -> ModeRun:
         mode = assembly.MODES[BASELINE if name == VARIED else name]
         ledger = Ledger()
-        fov = inputs.field_of_view(self.request, inputs.stream(self.request))
+        fov = inputs.field_of_view(self.request, inputs.stream(self.request).info)
         pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
         budget, window = mode.budget(self.profile), self.profile.energy.windows
         return ModeRun(
@@ -65,6 +66,12 @@ class Comparison:
             budget=varied_load if name == VARIED else lambda _frame: budget,
             windows=metering.windows(self.meters, self.core, window) if self.meters else None,
         )
+
+
+def identity(request: inputs.Request, info: StreamInfo) -> dict[str, str | None]:
+    """Name and place of a stream: names of drives repeat."""
+    path = None if request.path is None else str(request.path.resolve())
+    return {"stream": info.name, "path": path}
 
 
 def observe(request: inputs.Request, profile: ProfileConfig, frames: int | None) -> Int:
@@ -79,7 +86,7 @@ def observe(request: inputs.Request, profile: ProfileConfig, frames: int | None)
 
 def _tracked(request: inputs.Request, profile: ProfileConfig, frames: int | None, mode: str) -> Int:
     """(F, 6) prediction.OBSERVED, and the tracks that ask for the first time."""
-    fov = inputs.field_of_view(request, inputs.stream(request))
+    fov = inputs.field_of_view(request, inputs.stream(request).info)
     pipeline = assembly.pipeline(assembly.MODES[mode], profile, fov, NullLedger())
     fusion = RecordingFusion(pipeline.fusion)
     pipeline, size, rows = replace(pipeline, fusion=fusion), padded_size(profile.classification), []

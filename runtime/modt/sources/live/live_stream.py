@@ -11,7 +11,7 @@ from typing import Any
 
 from modt import host
 from modt.errors import ModtError, ScanError
-from modt.sources.live.sweep_reader import StreamEndedError, Sweep, SweepReader
+from modt.sources.live.sweep_reader import Received, StreamEndedError, Sweep, SweepReader
 from modt.sources.packets.packet_decoder import DeviceClock
 from modt.sources.scan_file import sanitised
 from modt.sources.stream import MAX_STAMP_S, Fault, Faults, StreamInfo, unit_of
@@ -40,14 +40,6 @@ class Arrival:
     sweep: Sweep
     flaws: tuple[str, ...]
     usable: bool
-    arrived_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Received:
-    """A frame, and when its sweep was complete and checked, on the clock of the stream [s]."""
-
-    frame: Frame
     arrived_s: float
 
 

@@ -6,7 +6,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from modt.types import Float32
+from modt.types import Float32, Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A frame, and when its sweep was complete and checked, on the clock of the stream [s]."""
+
+    frame: Frame
+    arrived_s: float
 
 
 class StreamEndedError(Exception):

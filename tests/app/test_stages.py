@@ -10,15 +10,13 @@ import pytest
 from modt import profile
 from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.inputs import Request
-from modt.app.live_stages import LiveStages, within
+from modt.app.stages import SensorWatch, Stages, within
+from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED, Frame
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
-
-class Source:
-    info = SyntheticStream("street", "vlp-16", 2.0, 0).info
-    profile = None
+INFO = SyntheticStream("street", "vlp-16", 2.0, 0).info
 
 
 @cache
@@ -27,7 +25,7 @@ def frames():
 
 
 def stages_of(**request):
-    return LiveStages(Request(**{"profile": ("vlp-16",), **request}), Source())
+    return Stages(Request(**{"profile": ("vlp-16",), **request}), INFO, Ledger(), SensorWatch())
 
 
 CALLS = ("segmenter.segment", "odometry.locate", "tracker.follow", "fusion.asks", "scheduler.select")
@@ -66,18 +64,18 @@ def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after):
     undisturbed = stages_of()
     for frame in frames():
         whole[frame.index] = set(undisturbed.step(frame, UNLIMITED, reduced=False).tracks.id.tolist())
-        parts = stages.parts
+        pipeline = stages.pipeline
         if frame.index in (8, 9):
-            stages.parts = dataclasses.replace(parts, pipeline=broken(parts.pipeline, call, after))
+            stages.pipeline = broken(pipeline, call, after)
         try:
             result = stages.step(frame, UNLIMITED, reduced=False)
         except RuntimeError:
             failures += 1
-            stages.parts = parts
+            stages.pipeline = pipeline
             stages.recover(anew=False)
             continue
         finally:
-            stages.parts = parts
+            stages.pipeline = pipeline
         tracks = result.tracks
         ids[frame.index] = set(tracks.id.tolist())
         assert len(ids[frame.index]) == len(tracks)
@@ -133,38 +131,48 @@ def test_a_reload_takes_the_new_profile_and_keeps_the_tracks(tmp_path):
 def test_a_reload_keeps_the_tilt_that_the_first_sweep_showed():
     tilted = SyntheticStream("yard", "vlp-16", 0.2, 3, mount_deg=(0.0, 12.0))
     stages = stages_of()
-    results = [stages.step(frame, UNLIMITED, reduced=False) for frame in tilted]
-    pitch_deg = stages.parts.config.sensor.pitch_deg
+    first, second = tilted
+    stages.recognise(first)
+    results = [stages.step(frame, stages.budget, reduced=False) for frame in (first, second)]
+    pitch_deg = stages.config.sensor.pitch_deg
     assert pitch_deg == pytest.approx(12.5, abs=1.0)
     assert results[0].frame.R_level_sensor is not None
     stages.reload()
-    assert stages.parts.config.sensor.pitch_deg == pitch_deg
+    assert stages.config.sensor.pitch_deg == pitch_deg
 
 
 def test_without_a_profile_the_first_sweep_decides(caplog):
     stages = stages_of(profile=None)
-    stages.step(frames()[0], UNLIMITED, reduced=False)
-    assert stages.parts.name == "as found"
-    assert stages.parts.config.sensor != profile.load().sensor
+    stages.recognise(frames()[0])
+    assert stages.chosen.name == "as found"
+    assert stages.config.sensor != profile.load().sensor
 
 
 def test_a_profile_that_fits_keeps_its_stages():
     stages = stages_of()
-    made = stages.parts.pipeline
-    stages.step(frames()[0], UNLIMITED, reduced=False)
-    assert stages.parts.pipeline is made
+    made = stages.pipeline
+    stages.recognise(frames()[0])
+    assert stages.pipeline is made
+
+
+def test_a_reload_keeps_what_the_first_sweep_has_shown():
+    stages = stages_of(profile=None)
+    stages.recognise(frames()[0])
+    sensor, made = stages.config.sensor, stages.pipeline
+    stages.reload()
+    assert stages.config.sensor == sensor
+    assert stages.pipeline is not made
 
 
 def test_a_profile_that_the_source_names_is_the_base_of_what_is_found():
-    stages = LiveStages(Request(), Source())
-    stages._stream = type("Named", (Source,), {"profile": "vlp-16"})()
-    stages.step(frames()[0], UNLIMITED, reduced=False)
-    assert stages.parts.config.sensor.elevation_step_deg == profile.load("vlp-16").sensor.elevation_step_deg
+    stages = stages_of(profile=())
+    stages.recognise(frames()[0], "vlp-16")
+    assert stages.config.sensor.elevation_step_deg == profile.load("vlp-16").sensor.elevation_step_deg
 
 
 def test_a_reduced_frame_holds_what_is_near():
     stages, frame = stages_of(), frames()[0]
-    reach_m = stages.parts.config.loop.range_share * stages.parts.config.sensor.max_range_m
+    reach_m = stages.config.loop.range_share * stages.config.sensor.max_range_m
     result = stages.step(frame, UNLIMITED, reduced=True)
     distance_m = np.hypot(*result.frame.points[:, :2].T)
     assert distance_m.max() <= reach_m
@@ -184,15 +192,17 @@ def test_failures_are_counted_by_kind_and_fatal_only_in_a_row(caplog):
 
 def test_another_sensor_is_noticed_and_followed(caplog):
     stages, before = stages_of(profile=None), next(iter(SyntheticStream("street", "hdl-64e", 0.1, 0)))
-    stages.step(dataclasses.replace(before, T_world_sensor=None), UNLIMITED, reduced=False)
-    assert stages.parts.name == "hdl-64e"
+    stages.recognise(before)
+    stages.watch(before)
+    assert stages.chosen.name == "hdl-64e"
     for frame in frames():
-        stages.step(dataclasses.replace(frame, stamp_s=frame.stamp_s + 0.1), UNLIMITED, reduced=False)
+        stages.step(frame, UNLIMITED, reduced=False)
+        stages.watch(frame)
         if stages.looking is not None:
             stages.looking.join()
     assert stages.misfits == 1
-    assert stages.parts.name == "as found"
-    assert stages.parts.config.sensor.elevation_step_deg > 1.0 or stages.parts.config.sensor.elevations_deg
+    assert stages.chosen.name == "as found"
+    assert stages.config.sensor.elevation_step_deg > 1.0 or stages.config.sensor.elevations_deg
 
 
 def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatch):
@@ -205,11 +215,11 @@ def test_sensors_that_alternate_are_looked_at_by_one_thread_at_a_time(monkeypatc
     monkeypatch.setattr(stages, "_look_again", look)
     for k in range(100):
         few = frames()[0].points[:: 8 if k // 10 % 2 else 1]
-        stages.step(Frame(k, 0.1 * k, few), UNLIMITED, reduced=False)
+        stages.watch(Frame(k, 0.1 * k, few))
     assert len(looks) == 1
     may_end.set()
     stages.looking.join()
-    stages.step(Frame(100, 10.0, few), UNLIMITED, reduced=False)
+    stages.watch(Frame(100, 10.0, few))
     stages.looking.join()
     assert looks[1:] == [100]  # what it could not look at meanwhile
 
@@ -218,5 +228,5 @@ def test_fewer_returns_of_the_same_sensor_change_nothing():
     stages = stages_of()
     for k, frame in enumerate(frames()):
         some = frame.points if k < 3 else frame.points[frame.points[:, 0] > 0]
-        stages.step(dataclasses.replace(frame, points=some), UNLIMITED, reduced=False)
+        stages.watch(dataclasses.replace(frame, points=some))
     assert stages.misfits == 0

@@ -6,13 +6,12 @@ import signal
 import numpy as np
 import pytest
 
-from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, OncePerSecond
-from modt.app.ladder import Ladder, Step
-from modt.app.live_loop import WAIT_S, LiveLoop, NamedSink
-from modt.app.loop import Stop
+from modt.app.containment import MAX_IN_A_ROW, RENEW_AFTER, Containment, OncePerSecond
+from modt.app.deadlines import Deadlines
+from modt.app.ladder import Step
+from modt.app.loop import WAIT_S, Loop, Stop
 from modt.errors import MisuseError, ModtError
-from modt.sources.live.live_stream import Received
-from modt.sources.live.sweep_reader import StreamEndedError
+from modt.sources.live.sweep_reader import Received, StreamEndedError
 from modt.types import Budget, Frame
 from tests.results import result
 
@@ -31,7 +30,7 @@ class Sensor:
     """A sweep every 0.1 s until an end; the newest one is taken, as from a LiveStream."""
 
     def __init__(self, time, seconds, silent=(0.0, 0.0)):
-        self.time, self.end = time, 100.0 + seconds
+        self.time, self.end, self.profile = time, 100.0 + seconds, "vlp-16"
         self.silent, self.taken, self.dropped = silent, 0, 0
 
     def take(self, timeout_s):
@@ -53,10 +52,11 @@ class Sensor:
 
 
 class Stages:
-    period_s, budget = 0.1, Budget(16, None)
+    budget = Budget(16, None)
 
     def __init__(self, time, work_s):
-        self.time, self.work_s = time, work_s
+        self.time, self.work_s, self.ledger = time, work_s, self
+        self.recognised, self.watched = [], []
         self.steps, self.recovered, self.loads = [], [], 0
         self.invalid = None
 
@@ -65,8 +65,14 @@ class Stages:
         self.time.now += self.work_s(self.time.now - 100.0)
         return result(frame.index, [3], {0: 1})
 
-    def run_sink(self, stage, sink, r):
-        sink.write(r)
+    def recognise(self, frame, named):
+        self.recognised.append((frame.index, named))
+
+    def watch(self, frame):
+        self.watched.append(frame.index)
+
+    def run(self, stage, write, r):
+        write(r)
 
     def close_frame(self, index):
         return {"frame": index, "stages": {"segmentation": {"wall_ns": 20_000_000}}}
@@ -111,29 +117,33 @@ def loop_of(seconds, work=lambda t: 0.02, sinks=(), stages=None, silent=(0.0, 0.
     time = Time()
     sensor, stages = Sensor(time, seconds, silent), (stages or Stages)(time, work)
     told, reports, seen = Told(time), [], []
-    loop = LiveLoop(
+    loop = Loop(
         sensor,
         stages,
-        [NamedSink(f"sink {k}", sink) for k, sink in enumerate(sinks)],
+        {f"sink {k}": sink for k, sink in enumerate(sinks)},
         lambda r, line: seen.append(r.frame.index),
-        lambda: reports.append(time.now),
-        Ladder(),
+        lambda supervisor: reports.append(time.now),
+        Deadlines(0.1, time),
+        Containment(),
         stop or Stop(),
-        told,
         time,
     )
+    run = loop.run
+    loop.run, loop.deadlines, loop.failures = lambda: run(told), loop._deadlines, loop._failures
     return loop, sensor, stages, told, reports, seen
 
 
 def test_every_sweep_in_time_goes_through():
     sink = Kept()
-    loop, sensor, _, told, reports, seen = loop_of(10.0, sinks=[sink])
+    loop, sensor, stages, told, reports, seen = loop_of(10.0, sinks=[sink])
     loop.run()
     assert len(seen) == 100
     assert sink.indices == seen
-    assert loop.timing.missed == sensor.dropped == loop.shed == 0
-    assert loop.timing.report()["lateness_ms"]["max"] == 0.0
-    assert loop.timing.report()["latency_ms"]["max"] == pytest.approx(20.0)
+    assert loop.deadlines.timing.missed == sensor.dropped == loop.deadlines.shed == 0
+    assert loop.deadlines.report()["lateness_ms"]["max"] == 0.0
+    assert stages.recognised == [(1, "vlp-16")]
+    assert stages.watched == seen
+    assert loop.deadlines.timing.report()["latency_ms"]["max"] == pytest.approx(20.0)
     assert told.said == ["ready"]
     assert len(reports) in (10, 11)
 
@@ -159,7 +169,7 @@ def hog(begin, end, work_s):
 def test_under_load_the_loop_sheds_and_is_back_within_a_second(caplog):
     loop, _, stages, _, _, _ = loop_of(10.0, hog(2.0, 5.0, 0.15))
     changed = []
-    loop.ladder.frame, real = (lambda now, share: note(real(now, share), now)), loop.ladder.frame
+    loop.deadlines.ladder.frame, real = (lambda now, share: note(real(now, share), now)), loop.deadlines.ladder.frame
 
     def note(change, now):
         if change is not None:
@@ -172,8 +182,8 @@ def test_under_load_the_loop_sheds_and_is_back_within_a_second(caplog):
     last, step = changed[-1]
     assert step is Step.ALL
     assert last < 5.0 + 0.15 + 1.01
-    assert loop.shed > 0
-    assert loop.changes["dropped"] == 1
+    assert loop.deadlines.shed > 0
+    assert loop.deadlines.changes["dropped"] == 1
     assert any(reduced for _, _, reduced in stages.steps)
     assert not stages.steps[-1][2]
     assert "every second sweep is left out" in caplog.text
@@ -183,16 +193,16 @@ def test_under_load_the_loop_sheds_and_is_back_within_a_second(caplog):
 def test_a_slow_loop_takes_the_newest_sweep_and_counts_what_it_misses():
     loop, sensor, _, _, _, seen = loop_of(20.0, lambda t: 0.15)
     loop.run()
-    assert len(seen) + sensor.dropped + loop.shed == 200
-    assert loop.timing.missed == len(seen) - 1  # all but the first one, which warms up
+    assert len(seen) + sensor.dropped + loop.deadlines.shed == 200
+    assert loop.deadlines.timing.missed == len(seen) - 1  # all but the first one, which warms up
 
 
 def test_after_a_long_first_frame_the_loop_begins_afresh():
     loop, sensor, stages, *_ = loop_of(3.0, lambda t: 0.25 if t < 0.2 else 0.02)
     loop.run()
     assert [index for index, *_ in stages.steps[:3]] == [1, 4, 5]
-    assert sensor.dropped == loop.shed == 1
-    assert loop.timing.report()["lateness_ms"]["max"] == 0.0
+    assert sensor.dropped == loop.deadlines.shed == 1
+    assert loop.deadlines.timing.report()["lateness_ms"]["max"] == 0.0
 
 
 class Failing(Stages):
@@ -288,7 +298,7 @@ def test_a_reload_is_between_two_frames_and_an_invalid_one_is_refused(caplog):
     assert len(seen) == 20
     assert told.said == ["ready", "reloading", "ready"]
     stages.invalid = None
-    loop._reload()
+    loop._reload(told)
     assert (loop.reloads, stages.loads) == (1, 1)
 
 

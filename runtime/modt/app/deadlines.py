@@ -1,0 +1,121 @@
+"""Deadlines of a live source: every frame within a period of its sweep, with less where the time does not suffice."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from modt.app.ladder import GIVEN_UP, Change, Ladder, Step, budget_at
+from modt.app.timing import RestCost, Timing
+from modt.types import Budget
+
+log = logging.getLogger(__name__)
+
+
+class Deadlines:
+    """Which sweeps are processed, and what their frames may spend; times are of one monotonic clock [s].
+
+    The first frame warms up: its deadline is a period after its start, and sweeps that arrive before its end are left
+    out.
+
+    Args:
+        period_s: of the sensor.
+
+    Attributes:
+        ladder, timing, rest: what is known of the frames so far.
+        changes: number of times that each step of the ladder was entered.
+        shed: sweeps left out by the last step, or that arrived during the first frame.
+        budget_ms: time for classification in the last frame.
+    """
+
+    def __init__(self, period_s: float, clock: Callable[[], float] = time.monotonic) -> None:
+        self.ladder, self.timing, self.rest = Ladder(), Timing(), RestCost()
+        self.changes: Counter[str] = Counter()
+        self.shed = 0
+        self.budget_ms = 0.0
+        self._period_s, self._clock = period_s, clock
+        self._start_s = 0.0  # of the present frame
+        self._fresh_s: float | None = None  # end of the first frame
+        self._shed_last = False
+
+    @property
+    def reduced(self) -> bool:
+        """Whether frames are processed without what is far."""
+        return self.ladder.step >= Step.REDUCED
+
+    def admit(self, arrived_s: float) -> bool:
+        """Whether a sweep is processed."""
+        self._shed_last = self.ladder.step is Step.DROPPED and not self._shed_last
+        shed = self._shed_last or (self._fresh_s is not None and arrived_s < self._fresh_s)
+        self.shed += shed
+        return not shed
+
+    def budget(self, whole: Budget, arrived_s: float, frame: int) -> Budget:
+        """What a frame that starts now may spend, of the whole budget of its profile."""
+        self._start_s = self._clock()
+        deadline_s = self._period_s + (self._start_s if self._fresh_s is None else arrived_s)
+        left_ms = max(1e3 * (deadline_s - self._start_s) - self.rest.ms, 0.0)
+        budget = budget_at(self.ladder.step, whole, left_ms, frame)
+        self.budget_ms = min(ms for ms in (left_ms, budget.cpu_ms, budget.mean_ms) if ms is not None)
+        return budget
+
+    def finish(self, arrived_s: float, line: dict[str, Any]) -> None:
+        """Judge the frame that ends now, by its ledger line."""
+        self.rest.add(line)
+        now_s = self._clock()
+        if self._fresh_s is None:
+            self._fresh_s = now_s
+            return
+        share = self.timing.add(arrived_s, self._start_s, now_s, self._period_s)
+        self._changed(self.ladder.frame(now_s, share))
+
+    def power(self, watts: float, limit_W: float | None) -> None:
+        """Judge the power of a window of the meters."""
+        self.ladder.power_W = limit_W
+        self._changed(self.ladder.power(self._clock(), watts))
+
+    def report(self) -> dict[str, Any]:
+        """Figures for the status."""
+        return {
+            **self.timing.report(),
+            "budget_ms": round(self.budget_ms, 3),
+            "other_stages_ms": round(self.rest.ms, 3),
+            "step": self.ladder.step.name.lower(),
+            "steps_entered": dict(self.changes),
+            "shed_sweeps": self.shed,
+        }
+
+    def _changed(self, change: Change | None) -> None:
+        if change is not None:
+            self.changes[change.after.name.lower()] += 1
+            log.warning("load: %s (%s)", GIVEN_UP[change.after], change.event.value)
+
+
+class NoDeadlines:
+    """Every frame of a replay is processed, and may spend the budget of its profile.
+
+    Attributes:
+        report: of its pace.
+    """
+
+    reduced = False
+
+    def __init__(self, report: Callable[[], dict[str, Any]]) -> None:
+        self.report = report
+
+    def admit(self, arrived_s: float) -> bool:
+        """True."""
+        return True
+
+    def budget(self, whole: Budget, arrived_s: float, frame: int) -> Budget:
+        """The whole budget."""
+        return whole
+
+    def finish(self, arrived_s: float, line: dict[str, Any]) -> None:
+        """No effect."""
+
+    def power(self, watts: float, limit_W: float | None) -> None:
+        """No effect."""

@@ -1,0 +1,263 @@
+"""One run: a service over a live source, or a replay, which is a run without deadlines."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from modt import host, profile
+from modt.app import inputs, metering
+from modt.app.containment import Containment
+from modt.app.deadlines import Deadlines, NoDeadlines
+from modt.app.loop import Loop, Stop
+from modt.app.playback import FixedPeriod, FullSpeed, Playback
+from modt.app.stages import NoWatch, SensorWatch, Stages
+from modt.app.status import SCHEMA, Counts, Monitor, NoMonitor, Power
+from modt.app.supervisor import Supervisor
+from modt.classes import CLASS_NAMES
+from modt.energy.ledger import Ledger
+from modt.energy.meters.meter import Kind, Meter
+from modt.reporting.summary import Summary
+from modt.sinks.output import LedgerSink, Sink, close_together
+from modt.sinks.recording import CLOSE_S, JOBS, AtOnce, Recording, WholeRecording
+from modt.sinks.run_directory import SUMMARY, RunDirectory
+from modt.types import FrameResult, Tracks
+
+if TYPE_CHECKING:
+    from modt.sources.live.live_stream import LiveStream
+
+log = logging.getLogger(__name__)
+
+Tick = Callable[[FrameResult], None]
+"""Called after every frame."""
+
+
+class Session:
+    """A run, put together by `replay` or `service`.
+
+    Attributes:
+        source, stages, recording, sinks, deadlines, failures, stop: its parts.
+        power: what the windows of the meters say.
+    """
+
+    def __init__(
+        self,
+        source: LiveStream | Playback,
+        stages: Stages,
+        recording: Recording,
+        sinks: Mapping[str, Sink],
+        deadlines: Deadlines | NoDeadlines,
+        failures: Containment,
+        monitor: Monitor | NoMonitor,
+        stop: Stop,
+        totals: Summary,
+        meters: Sequence[Meter],
+        core: int | None,
+        lacking: Sequence[str] = (),
+    ) -> None:
+        self.source, self.stages, self.recording, self.sinks = source, stages, recording, sinks
+        self.deadlines, self.failures, self.stop = deadlines, failures, stop
+        self._monitor, self._totals, self._core, self._lacking = monitor, totals, core, list(lacking)
+        outputs = {**sinks, "recording": recording}
+        self.loop = Loop(
+            source,
+            stages,
+            outputs,
+            self._observe,
+            lambda supervisor: monitor.report(self.status, supervisor),
+            deadlines,
+            failures,
+            stop,
+        )
+        self._ledgers = [sink for sink in outputs.values() if isinstance(sink, LedgerSink)]
+        self._followed = stages.chosen
+        self.power, self.summary = Power(), dict[str, Any]()
+        self._windows = metering.windows(meters, core, stages.config.energy.windows)
+        self._began_s = time.monotonic()
+        self._counts = Counts(totals, self._began_s)
+        self._without_reflectance = 0
+        self._tracks: Tracks | None = None  # of the last frame
+        self._tick: Tick = lambda result: None
+
+    def run(self, supervisor: Supervisor, tick: Tick | None = None) -> dict[str, Any]:
+        """Until a signal or the end of the source; returns the summary, as written.
+
+        Raises:
+            ModtError: a failure that is not contained, or another run that records into the same directory.
+        """
+        self._tick = tick or self._tick
+        with self.recording.directory.locked(), ExitStack() as stack:
+            self.recording.start()
+            stack.callback(self._finish)
+            stack.callback(close_together, self.sinks.values())
+            for part in (self.stages.odometry, self.source, supervisor):
+                stack.callback(part.close)
+            stack.callback(lambda: self._ledger(self._windows.close()))
+            stack.enter_context(self.stop.on_signals())
+            self.source.start()
+            self.loop.run(supervisor)
+        return self.summary
+
+    def status(self) -> dict[str, Any]:
+        """The document modt.status/1."""
+        now_s, info = time.monotonic(), self.stages.info
+        loop = {
+            "failures": dict(self.failures.counts),
+            "reloads": self.loop.reloads,
+            "refused_reloads": self.loop.refused_reloads,
+        }
+        return {
+            "schema": SCHEMA,
+            "time_s": time.time(),
+            "pid": os.getpid(),
+            "up_s": round(now_s - self._began_s, 3),
+            "source": info.name,
+            "mode": self.stages.request.mode,
+            "profile": self.stages.chosen.name,
+            "period_s": info.period_s,
+            "counts": self._counts.report(now_s, self._tracks),
+            "loop": self.deadlines.report() | loop,
+            "power": self.power.report() | {"limit_W": self.stages.config.loop.power_W},
+            "sensor": self.source.health()
+            | {"faults": self.source.faults.count, "misfits": self.stages.misfits}
+            | {"frames_without_reflectance": self._without_reflectance},
+            "odometry": self.stages.odometry.report(),
+            "sinks": self._sinks_health(),
+            "recording": self.recording.health(),
+            "host": {"core": self._core, "resident_mb": round(host.resident_mb(), 1), "lacking": self._lacking},
+        }
+
+    def _observe(self, result: FrameResult, line: dict[str, Any]) -> None:
+        if self.stages.chosen is not self._followed:
+            self._followed = self.stages.chosen
+            self.recording.follow(self._followed.config.recording)
+        config = self._followed.config
+        self._tracks = result.tracks
+        self._totals.add_result(result)
+        self._totals.add_ledger(line)
+        self._ledger(line)
+        window = self._windows.add(line)
+        if window is not None:
+            self._ledger(window)
+            watts = self.power.add(window, config.energy)
+            if watts is not None:
+                self.deadlines.power(watts, config.loop.power_W)
+        misses = config.sensor.reflectance != "none" and result.proposals.reflectance is None
+        self._without_reflectance += misses and len(result.proposals) > 0
+        self._tick(result)
+
+    def _ledger(self, line: dict[str, Any]) -> None:
+        for sink in self._ledgers:
+            sink.ledger(line)
+
+    def _sinks_health(self) -> dict[str, Any]:
+        return {address: sink.health() for address, sink in self.sinks.items()}
+
+    def _finish(self) -> None:
+        """Write what waits, and the summary."""
+        elapsed_s, frames, stages = time.monotonic() - self._began_s, self._totals.frames, self.stages
+        faults = self.source.faults
+        self.summary = self._totals.result() | {
+            "run": {
+                "stream": stages.info.name,
+                "mode": stages.request.mode,
+                "fov": stages.request.fov,
+                "profile": stages.chosen.name,
+                **stages.pipeline.segmenter.facts(),
+                "elapsed_s": elapsed_s,
+                "frames_per_s": frames / elapsed_s,
+                "real_time_factor": frames * stages.info.period_s / elapsed_s,
+                "stopped_by": self.stop.signal,
+                **self.deadlines.report(),
+            },
+            "odometry": stages.odometry.report(),
+            "class_frequency": dict(zip(CLASS_NAMES, stages.pipeline.decision.frequency.tolist(), strict=True)),
+            "host": host.usage(self._core),
+            "sinks": self._sinks_health(),
+            "faults": {
+                "count": faults.count,
+                "skipped": faults.skipped,
+                "first": next((f"{f.subject}: {f.cause}" for f in faults.first), None),
+                "frames_without_reflectance": self._without_reflectance,
+            },
+        }
+        directory, writer = self.recording.directory, self.recording.writer
+        writer.write(self.recording.finish)
+        self.summary |= self._monitor.finish(self.status)
+        text = json.dumps(self.summary, indent=2) + "\n"
+        writer.write(lambda: directory.write(SUMMARY, text) if self.recording.parts else None)
+        writer.close()
+
+
+def replay(
+    request: inputs.Request, sinks: Mapping[str, Sink], out: Path | None, core: int | None, command: Sequence[str]
+) -> Session:
+    """A replay of a recording, by default into a directory named after stream and mode; arguments as of `service`.
+
+    Raises:
+        MisuseError: an invalid request.
+    """
+    stop, ledger = Stop(), Ledger()
+    pace = FullSpeed() if request.rate_hz is None else FixedPeriod(1.0 / request.rate_hz, sleep=stop.sleep)
+    source = Playback(inputs.stream(request), pace, ledger)
+    stages = Stages(request, source.info, ledger, NoWatch())
+    name = re.sub(r"[^\w.]+", "-", source.info.name)
+    recording = WholeRecording(
+        RunDirectory(out or Path("runs") / f"{name}-{request.mode}"),
+        lambda: profile.to_yaml(stages.facts(core, command)),
+        source.info.sequence,
+        source.info.camera,
+        labels=request.labels,
+    )
+    meters = metering.discovery(stages.config.energy).best.meters
+    deadlines, failures, monitor = NoDeadlines(pace.report), Containment(contains=False), NoMonitor()
+    return Session(source, stages, recording, sinks, deadlines, failures, monitor, stop, Summary(), meters, core)
+
+
+def service(
+    request: inputs.Request,
+    source: LiveStream,
+    sinks: Mapping[str, Sink],
+    out: Path,
+    metrics: Path | None,
+    core: int | None,
+    command: Sequence[str],
+    lacking: Sequence[str] = (),
+) -> Session:
+    """A service over a live source; the threads that write begin on the cores that this one is allowed.
+
+    Args:
+        request: what is asked for.
+        source: open, not started.
+        sinks: of the results, by their addresses.
+        out: run directory.
+        metrics: file for Prometheus; None for none.
+        core: of the loop; None leaves it where it is.
+        command: for the record.
+        lacking: what the loop has to do without, for the status.
+
+    Raises:
+        MisuseError: an invalid request.
+    """
+    from modt.sinks.background import Background
+
+    stages = Stages(request, source.info, Ledger(), SensorWatch())
+    meter = metering.discovery(stages.config.energy).best
+    if stages.config.loop.power_W is not None and meter.facts is not None and meter.facts.kind is Kind.ESTIMATED:
+        log.warning("loop.power_W is kept by the %s: an estimate, as no meter can be read", meter.name)
+
+    def describe() -> str:
+        return profile.to_yaml(stages.facts(core, command) | {"service": True})
+
+    writer = Background("recording", AtOnce(), JOBS, close_s=CLOSE_S)
+    recording = Recording(RunDirectory(out), stages.config.recording, writer, describe)
+    deadlines = Deadlines(source.info.period_s)
+    kinds = deadlines, Containment(), Monitor(recording, deadlines.timing, metrics), Stop(reload=True)
+    return Session(source, stages, recording, sinks, *kinds, Summary(0), meter.meters, core, lacking)

@@ -1,0 +1,219 @@
+"""The stages of a run: those of its profile, exchanged between two frames by a reload or for another sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from threading import Thread
+from typing import Any
+
+import numpy as np
+
+from modt import host, profile
+from modt.app import assembly, inputs
+from modt.app.chosen_profile import ChosenProfile, choose
+from modt.config import ProfileConfig
+from modt.energy.ledger import Ledger
+from modt.odometry.odometry import Odometry
+from modt.pipeline import Pipeline
+from modt.placement import Mount
+from modt.sensor_fit.recognition import recognise
+from modt.sources.pose_source import PoseSource
+from modt.sources.stream import StreamInfo
+from modt.tracking.track_table import TrackTable
+from modt.tracking.tracker import Tracker
+from modt.types import Budget, Float32, Frame, FrameResult
+
+SWEEPS = 10
+"""In a row, of another size than before, after which the sensor is looked at again."""
+RATIO = 2.0
+"""Of the numbers of returns of two sweeps that are of another size."""
+
+
+class NoWatch:
+    """The sensor of a recording is that of its first sweep."""
+
+    def unlike(self, points: Float32) -> bool:
+        """False."""
+        return False
+
+
+class SensorWatch:
+    """Compares each sweep with those before."""
+
+    def __init__(self) -> None:
+        self._usual: float | None = None
+        self._in_a_row = 0
+
+    def unlike(self, points: Float32) -> bool:
+        """Whether this is the last of SWEEPS sweeps in a row of another size; from now on that is the usual one."""
+        returns = max(int(np.count_nonzero(points[:, 0])), 1)
+        if self._usual is None:
+            self._usual = returns
+        if max(returns / self._usual, self._usual / returns) < RATIO:
+            self._usual += 0.01 * (returns - self._usual)
+            self._in_a_row = 0
+            return False
+        self._in_a_row += 1
+        if self._in_a_row < SWEEPS:
+            return False
+        self._usual, self._in_a_row = returns, 0
+        return True
+
+
+class Stages:
+    """Stages of the profile that was asked for, else of that which the source names, corrected by the first sweep.
+
+    Args:
+        request: what is asked for.
+        info: of the source, before its first frame.
+        ledger: of the run.
+        watch: notices sweeps of another sensor.
+
+    Attributes:
+        chosen: the present profile.
+        pipeline: its stages.
+        odometry: source of the poses.
+        looking: thread that compares a sweep with the profile; None before the first one.
+        misfits: number of times that sweeps were found to be of another sensor than before.
+
+    Raises:
+        MisuseError: an invalid request.
+    """
+
+    def __init__(
+        self, request: inputs.Request, info: StreamInfo, ledger: Ledger, watch: SensorWatch | NoWatch
+    ) -> None:
+        self.request, self.ledger, self._info, self._watch = request, ledger, info, watch
+        self._mode = assembly.MODES[request.mode]
+        self._first: Frame | None = None  # shows what the sensor is
+        self.misfits = 0
+        self._unlike = False  # sweeps of another size wait to be looked at
+        self.looking: Thread | None = None
+        self._found: list[ChosenProfile] = []  # by the thread that looks again
+        self.chosen = self._choose()
+        self.pipeline = self._made(self.chosen.config)
+        self.odometry: PoseSource = inputs.odometry(request, info, self.config.odometry)
+        self._good: tuple[TrackTable, int] = TrackTable.blank(), 0  # tracks and next id after the last good frame
+
+    @property
+    def info(self) -> StreamInfo:
+        """Properties of the source with its poses."""
+        return self.odometry.of_stream(self._info)
+
+    @property
+    def config(self) -> ProfileConfig:
+        """The present profile."""
+        return self.chosen.config
+
+    @property
+    def budget(self) -> Budget:
+        """What a frame may spend, by mode and profile."""
+        return self._mode.budget(self.config)
+
+    def recognise(self, first: Frame, named: str | None = None) -> None:
+        """Take the profile that a sweep shows, or `named`, that of the sensor by its messages."""
+        self._first, self._info = first, replace(self._info, profile=named or self._info.profile)
+        chosen = self._choose()
+        if chosen.config == self.config:
+            self.chosen = chosen
+        else:
+            self._use(chosen)
+
+    def step(self, frame: Frame, budget: Budget, *, reduced: bool) -> FrameResult:
+        """One frame; reduced: without what is far."""
+        frame = self.odometry.place(frame)
+        if reduced:
+            config = self.config
+            frame = replace(frame, points=within(frame.points, config.loop.range_share * config.sensor.max_range_m))
+        result = self.pipeline.step(frame, budget)
+        if isinstance(self.pipeline.tracker, Tracker) and isinstance(result.tracks, TrackTable):
+            self._good = result.tracks, self.pipeline.tracker.next_id
+        return result
+
+    def watch(self, frame: Frame) -> None:
+        """Between two frames: follow a sensor that has changed. One thread at a time compares its sweep, for long."""
+        self._unlike |= self._watch.unlike(frame.points)
+        if self._found:
+            self.misfits += 1
+            self._use(self._found.pop())
+        elif self._unlike and not (self.looking and self.looking.is_alive()):
+            self._unlike = False
+            self.looking = Thread(target=self._look_again, args=(frame,), name="recognition", daemon=True)
+            self.looking.start()
+
+    def recover(self, *, anew: bool) -> None:
+        """Hold the tracks of the last good frame; anew: in stages without a past, and no tracks."""
+        tracks, next_id = self._good
+        if anew:
+            tracks, self.pipeline = TrackTable.blank(), self._made(self.config)
+        if isinstance(self.pipeline.tracker, Tracker):
+            self.pipeline.tracker.restore(tracks, next_id)
+
+    def reload(self) -> None:
+        """Take the profile as it is on disk now; tracks go on.
+
+        Raises:
+            ModtError: it is not valid; nothing has changed.
+        """
+        self._use(self._choose())
+
+    def facts(self, core: int | None, command: Sequence[str]) -> dict[str, Any]:
+        """Content of run.yaml."""
+        request, info, chosen = self.request, self.info, self.chosen
+        return {
+            "schema": "modt.run/1",
+            "command": list(command),
+            "stream": {
+                "name": info.name,
+                "layout": info.layout,
+                "path": str(request.path.resolve()) if request.path else None,
+                "frames": info.n_frames,
+                "poses": info.has_poses,
+                "odometry": self.odometry.report()["source"],
+                "notes": [*info.notes, *info.pose_notes],
+            },
+            "mode": request.mode,
+            "fov": request.fov,
+            "core": core,
+            "versions": host.versions(),
+            "segmentation": self.pipeline.segmenter.facts(),
+            "model": self.pipeline.classifier.facts(),
+            "host": host.description(),
+            "recognition": {
+                "used": chosen.sensor,
+                "differences": list(chosen.recognition.differences),
+                "nearest": chosen.recognition.nearest,
+            },
+            "profiles": list(chosen.names),
+            "profile": profile.dump(chosen.config),
+        }
+
+    def _look_again(self, frame: Frame) -> None:
+        """Sweeps have changed: whether they still are of the sensor of the profile in use."""
+        if recognise(frame.points, self.config).differences:
+            self._first = frame
+            self._found.append(self._choose())
+
+    def _choose(self) -> ChosenProfile:
+        return choose(self.request.profile, self._first, self._info)
+
+    def _made(self, config: ProfileConfig) -> Pipeline:
+        mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
+        fov = inputs.field_of_view(self.request, self._info, mount)
+        return assembly.pipeline(self._mode, config, fov, self.ledger)
+
+    def _use(self, chosen: ChosenProfile) -> None:
+        """Go on with the stages of another profile."""
+        old, new = self.pipeline, self._made(chosen.config)
+        if isinstance(old.tracker, Tracker) and isinstance(new.tracker, Tracker):
+            new.tracker.adopt(old.tracker)
+        if isinstance(old.odometry, Odometry) and isinstance(new.odometry, Odometry):
+            new.odometry.adopt(old.odometry)
+        self.chosen, self.pipeline = chosen, new
+        host.release_freed_pages()
+
+
+def within(points: Float32, range_m: float) -> Float32:
+    """The points (N, 4) within a range of the sensor."""
+    return points[np.square(points[:, 0]) + np.square(points[:, 1]) <= range_m**2]
