@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from modt.sensor_fit.fit import Recording, fit
 
 from modt import profile
 from modt.app.chosen_profile import choose
+from modt.sensor_fit.findings import Recording
 from modt.sensor_fit.recognition import recognise
 from modt.sensor_fit.tilt import MIN_TILT_DEG, find_floor
+from modt_desk.sensor_fit.fit import fit
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.sensor_fit.recordings import recording
 
