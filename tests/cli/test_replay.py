@@ -267,6 +267,13 @@ def test_a_directory_into_which_another_run_records_is_left_alone(tmp_path):
     assert not (tmp_path / "run").exists()
 
 
+def test_a_sink_that_is_named_twice_is_opened_once(tmp_path):
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        sink = f"view://127.0.0.1:{free.getsockname()[1]}"
+    done = modt("replay", "--frames", "0:2", "--sink", sink, "--sink", sink, "--out", "run", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_place_that_cannot_be_written_is_one_line(tmp_path):
     done = modt("replay", "--frames", "0:2", "--out", "/proc/modt", cwd=tmp_path)
     assert done.returncode == 1

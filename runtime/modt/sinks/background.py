@@ -26,8 +26,8 @@ RETRY_S = 1.0
 class Background(Generic[T]):
     """Writes in a thread of its own, in order; where no room is left, the oldest item that waits gives way.
 
-    A failure of the writer is logged once, until it writes again, with a traceback where it is none of the system;
-    the item is lost and counted, and after a pause the next one is tried.
+    A failure of the writer is logged once, until it writes again, with a traceback if it is none of the system; the
+    item is lost and counted, and after a pause the next one is tried.
 
     Args:
         name: for messages.
