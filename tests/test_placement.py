@@ -59,8 +59,8 @@ def test_a_tilted_sensor_gives_the_tracks_of_a_level_one():
     """Turning the sweeps of a level sensor, and stating it, changes nothing but the last digits."""
     results = []
     for text, mount in (
-        ("extends: vlp-16", LEVEL),
-        ("sensor: {roll_deg: 10, pitch_deg: -5}\nextends: vlp-16", TILTED),
+        ("sensor: {elevation_span_deg: null}\nextends: vlp-16", LEVEL),
+        ("sensor: {roll_deg: 10, pitch_deg: -5, elevation_span_deg: null}\nextends: vlp-16", TILTED),
     ):
         profile, mode = parse(text, "test"), assembly.MODES["accurate"]
         pipeline = assembly.pipeline(mode, profile, FieldOfView(), NullLedger())

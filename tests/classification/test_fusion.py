@@ -248,3 +248,13 @@ def test_lost_tracks_keep_their_posterior_and_ask_for_nothing() -> None:
     tracks.proposal[:], tracks.age[:] = NONE, 100
     assert not fusion.asks(tracks, proposals, YES).any()
     np.testing.assert_array_equal(tracks.posterior, before)
+
+
+def test_background_is_as_certain_as_an_object_where_nobody_looks_again() -> None:
+    certain = []
+    for make in (FirstViews, FurtherViews):
+        proposals, tracks = scene((50,))
+        fusion = make(CONFIG, FixedPrior(FREQUENCY.tolist()))
+        fusion.asks(tracks, proposals, YES)
+        certain.append(bool(fusion.fuse(tracks, proposals, ROW, np.array([[0.97, 0.02, 0.005, 0.005]]))[0]))
+    assert certain == [False, True]

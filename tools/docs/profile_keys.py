@@ -39,7 +39,6 @@ CONDITIONS = {
     "fusion.prior": "a model that states no frequency",
     "fusion.rule": "--mode accurate, efficient",
     "fusion.object_threshold": "--mode accurate, efficient",
-    "fusion.background_threshold": "--mode accurate, efficient",
     "fusion.min_object_probability": "--mode accurate, efficient",
     "fusion.first_view_min_hits": "--mode efficient",
     "fusion.start_frame": "--mode accurate, rule: product",

@@ -70,12 +70,13 @@ class Certainty:
     posterior under equal class frequencies.
 
     Args:
-        config: frequencies and thresholds.
+        config: frequencies, and the threshold of objects.
+        background_threshold: that of background.
     """
 
-    def __init__(self, config: FusionConfig) -> None:
+    def __init__(self, config: FusionConfig, background_threshold: float) -> None:
         self._log_frequency = log_frequency_of(config)
-        self._object, self._background = config.object_threshold, config.background_threshold
+        self._object, self._background = config.object_threshold, background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
         """(R,) of posteriors (R, 4)."""
@@ -106,11 +107,14 @@ class FusedTracks:
     Args:
         config: frequencies, conditions of a view, thresholds of certainty.
         prior: of a proposal before its view; the class frequency by default.
+        background_threshold: at which background is certain; by default that of mode accurate.
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
+    def __init__(
+        self, config: FusionConfig, prior: Prior | None = None, background_threshold: float | None = None
+    ) -> None:
         self.config, self.prior = config, prior or FrequencyPrior(config.prior)
-        self.certain = Certainty(config)
+        self.certain = Certainty(config, background_threshold or config.background_threshold)
         self._log_frequency = log_frequency_of(config)
 
     def observe(self, tracks: Tracks, proposals: Proposals) -> None:
@@ -158,8 +162,11 @@ class FirstViews(FusedTracks):
 
     First views are often far and partial (Fig. 11), so it waits for a box that is probably an object's, and for a
     minimum number of observations, since spurious proposals do not last. A track that is uncertain is classified
-    again once it shows clearly more points.
+    again once it shows clearly more points. Background is as final as an object here, and as certain.
     """
+
+    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
+        super().__init__(config, prior, config.object_threshold)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""

@@ -39,7 +39,7 @@ class KeyViews(AnyView):
     def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
         super().__init__(config)
         self._point_change, self._start_frame = np.array(config.point_change), config.start_frame
-        self._certain = Certainty(config)
+        self._certain = Certainty(config, config.background_threshold)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first or an independent view."""

@@ -72,12 +72,12 @@ class DecisionConfig(StageConfig):
 class FusionConfig(StageConfig):
     """Views, boxes and motion fused to a class, and final classes (section V-C, Figs. 10 and 11).
 
-    first_view_min_hits: mode efficient; start_frame, point_change: rule product.
+    background_threshold: mode accurate; first_view_min_hits: mode efficient; start_frame, point_change: rule product.
     """
 
     rule: str = choice("mean", ("mean", "product"), "of fusing views; product: Equation 6, of the paper")
     prior: tuple[float, ...] = per_class("prior", 0.0, 0.33, "frequency that a model assumes which states none")
-    object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which an object's class is final")
+    object_threshold: float = number(0.9, 0.25, 1.0, "", "posterior at which a class is final")
     background_threshold: float = number(0.5, 0.25, 1.0, "", "posterior under equal frequencies; final background")
     min_object_probability: float = number(0.1, 0.0, 1.0, "", "by box and motion, to be classified")
     first_view_min_hits: int = number(2, 1, 1000, "frames", "with a proposal, to be classified")
