@@ -28,7 +28,8 @@ def report(sensors: Mapping[str, Evaluation]) -> str:
 
 def _lines(name: str, e: Evaluation) -> Iterator[str]:
     drives = "1 drive" if e.drives == 1 else f"{e.drives} drives"
-    yield f"{name}: {drives}, {e.frames} frames, {e.proposals} proposals, beta {_percent(e.beta)} %, judged {_sector(e)}"
+    size = f"{drives}, {e.frames} frames, {e.proposals} proposals"
+    yield f"{name}: {size}, beta {_percent(e.beta)} %, judged {_sector(e)}"
     yield f"  Truth: {_completeness(e)}."
     bands, whole = e.ranges.values(), e.ranges[ALL]
     rows = []
@@ -70,7 +71,11 @@ def _sector(e: Evaluation) -> str:
 
 def _completeness(e: Evaluation) -> str:
     """How complete the labels are believed to be."""
-    labels = "labels are taken for complete" if e.complete else "KITTI's labels leave out road users"
+    labels = (
+        "labels are taken for complete"
+        if e.complete
+        else "labels of KITTI, unlike simulated ones, leave out road users"
+    )
     if e.further_objects:
         return f"{labels}; --further adds {e.further_objects}, in {e.further_labels} labels"
     return labels if e.complete else f"{labels}, and tracks on those count as false; --further FILE adds them"
