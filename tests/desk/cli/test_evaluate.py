@@ -8,6 +8,7 @@ import pytest
 from tests.cli.commands import modt
 from tests.viewer.chromium import LOADED, WIDE
 
+COLUMNS = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
 DAY = "2020_01_01/2020_01_01_drive_0000_sync"
 
 
@@ -57,6 +58,37 @@ def test_report_and_what_else_counts(drives, tmp_path):
     assert called[0] < called[1]
 
 
+def test_the_sector_is_that_of_the_truth(tmp_path):
+    """A drive that is annotated on all sides is judged all round, and the report says so."""
+    lines = []
+    for name, options in (("ahead", ()), ("round", ("--all-around",))):
+        simulated = ("simulate", "--sensor", "vlp-16", "--seconds", "0.3", "--seed", "5", *options, "--out", name)
+        assert modt(*simulated, cwd=tmp_path).returncode == 0
+        drive, out = f"{name}/{DAY}", f"run-{name}"
+        replay = ("replay", drive, "--profile", "vlp-16", "--fov", "full", "--labels", "--quiet", "--out", out)
+        assert modt(*replay, cwd=tmp_path).returncode == 0
+        lines.append(modt("evaluate", out, drive, cwd=tmp_path).stdout.split("\n"))
+    assert lines[0][0].endswith("judged within 40 degrees of straight ahead")
+    assert lines[1][0].endswith("judged all round")
+    chosen = modt("evaluate", out, drive, "--sector", "60", cwd=tmp_path).stdout
+    assert "judged within 60 degrees of straight ahead" in chosen.split("\n")[0]
+
+
+def test_further_objects_are_added(drives, tmp_path):
+    (tmp_path / "more.csv").write_text(
+        f"{COLUMNS}\n0,1,Pedestrian,9,0,-1.7,1,1,2,0\n1,1,Pedestrian,9,0,-1.7,1,1,2,0\n"
+    )
+    done = modt("evaluate", *drives["vlp-16"], "--further", "more.csv", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "--further adds 1, in 2 labels" in done.stdout.split("\n")[1]
+    bare = modt("evaluate", *drives["vlp-16"], cwd=tmp_path).stdout.split("\n")[1]
+    assert "leave out road users, and tracks on those count as false" in bare
+    done = modt("evaluate", *drives["vlp-16"], "--further", "more.csv", "--json", cwd=tmp_path)
+    found = json.loads(done.stdout)["sensors"]["vlp-16"]
+    assert (found["further_objects"], found["further_labels"], found["complete"]) == (1, 2, False)
+    assert found["sectors_deg"] == [40]
+
+
 def test_the_page_has_the_figures_and_their_plots(drives, tmp_path, chromium):
     done = modt("evaluate", *drives["vlp-16"], "--html", "page.html", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -79,6 +111,8 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):
     (empty / "tracks.jsonl").write_text("")
     longer = shutil.copytree(run, tmp_path / "longer")
     (longer / "tracks.jsonl").write_text("".join(lines) + lines[-1].replace('"frame":4', '"frame":9'))
+    broken = tmp_path / "broken.csv"
+    broken.write_text(f"{COLUMNS}\n0,1,Tree,9,0,-1.7,1,1,2,0\n")
     for arguments, message in (
         ((bare, truth), "modt replay --labels"),
         ((cut, truth), "000003.label: cannot be read"),
@@ -89,6 +123,9 @@ def test_misuse_is_one_line_with_the_remedy(drives, tmp_path):
         ((run,), "are no pairs"),
         ((tmp_path, truth), "describes no run"),
         ((run, tmp_path), "holds no labels that are recognised"),
+        ((run, truth, "--further", broken), "broken.csv:2: 'Tree' is no type of an object"),
+        ((run, truth, run, truth, "--further", broken), "is the table of one drive"),
+        (("--experiment", "all", "--further", broken), "takes no further objects"),
         ((run, truth, "--sector", "0"), "is no half sector"),
     ):
         done = modt("evaluate", *arguments, cwd=tmp_path)

@@ -3,7 +3,7 @@ import pytest
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.types import NONE
-from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
+from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import Role
 from modt_desk.evaluation.truth_files import open_truth
 from tests.sources import layouts
@@ -33,6 +33,15 @@ def test_raw_drive(tmp_path):
     assert second.box[0] == pytest.approx([10, 8, -0.95, 4, 2, 1.5, 0.5])
     assert truth.frames[3].role.tolist() == [Role.COUNTED]
     assert open_truth(drive, paper=True).frames[3].role.tolist() == [Role.IGNORED]
+
+
+@pytest.mark.parametrize(("x", "rules"), [(-1, KITTI_RULES), (-9, KITTI_ALL_ROUND_RULES)])
+def test_the_sector_follows_tracklets_behind_the_sensor(tmp_path, x, rules):
+    drive = tracklets(layouts.raw_drive(tmp_path), ("Car", 0, [8]), ("Car", 0, [3]))
+    path = drive / "tracklet_labels.xml"
+    path.write_text(path.read_text().replace("<tx>10<", f"<tx>{x}<", 1))
+    assert open_truth(drive).rules == rules
+    assert (rules.sector_deg, rules.complete) == ((180, True) if x == -9 else (40, False))
 
 
 def test_parked_cars_before_and_after_their_tracklets(tmp_path):

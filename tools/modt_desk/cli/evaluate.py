@@ -23,7 +23,10 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--classes", choices=("all", "paper"), default="all", help=vans)
     what = f"judge what is ignored: {', '.join(IGNORABLE)}; may be repeated"
     p.add_argument("--count", action="append", choices=IGNORABLE, default=[], metavar="WHAT", help=what)
-    p.add_argument("--sector", type=float, metavar="DEG", help="half the labelled sector (KITTI: 40; cuboids: 180)")
+    sector = "half the labelled sector (default: 40; 180 where labels are all round)"
+    p.add_argument("--sector", type=float, metavar="DEG", help=sector)
+    further = "table of objects that the labels of the one drive leave out (docs/evaluation.md)"
+    p.add_argument("--further", type=Path, metavar="FILE", help=further)
     experiments.add_options(p)
     p.set_defaults(run=run)
 
@@ -35,6 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: a run or its labels cannot be used, or do not belong together.
     """
     if arguments.experiment:
+        if arguments.further:
+            raise MisuseError("--experiment", "takes no further objects", "leave --further out, or --experiment")
         if arguments.pairs:
             raise MisuseError("--experiment", "takes no runs", "leave RUN TRUTH out, or --experiment")
         return experiments.run(arguments)
@@ -42,8 +47,10 @@ def run(arguments: argparse.Namespace) -> int:
     from dataclasses import asdict, replace
 
     from modt_desk.evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
+    from modt_desk.evaluation.further_objects import with_further
     from modt_desk.evaluation.report import report
     from modt_desk.evaluation.run_record import RunRecord
+    from modt_desk.evaluation.truth import KITTI_TYPES, PAPER_TYPES
     from modt_desk.evaluation.truth_files import open_truth
 
     paths: list[Path] = arguments.pairs
@@ -51,10 +58,15 @@ def run(arguments: argparse.Namespace) -> int:
         raise MisuseError("RUN TRUTH", f"{len(paths)} paths are no pairs", "give each run followed by its labels")
     if arguments.sector is not None and not 0 < arguments.sector <= 180:
         raise MisuseError("--sector", f"{arguments.sector:g} is no half sector", "give more than 0 and at most 180")
+    if arguments.further is not None and len(paths) > 2:
+        raise MisuseError("--further", "is the table of one drive", "judge that drive alone")
+    paper = arguments.classes == "paper"
     by_sensor: dict[str, list[DriveRows]] = {}
     for drive, (path, labels) in enumerate(zip(paths[::2], paths[1::2], strict=True)):
         record = RunRecord.open(path)
-        truth = open_truth(labels, record.stream, paper=arguments.classes == "paper")
+        truth = open_truth(labels, record.stream, paper=paper)
+        if arguments.further is not None:
+            truth = with_further(truth, arguments.further, PAPER_TYPES if paper else KITTI_TYPES)
         sector_deg = truth.rules.sector_deg if arguments.sector is None else arguments.sector
         ignored = truth.rules.ignored - set(arguments.count)
         rules = replace(truth.rules, sector_deg=sector_deg, ignored=ignored)

@@ -9,7 +9,7 @@ import numpy as np
 from modt.classes import CLASS_NAMES, N_CLASSES
 from modt.types import Bool, Float64, Int
 from modt_desk.evaluation.rows import Outcome, Rows, ratio
-from modt_desk.evaluation.truth import Role
+from modt_desk.evaluation.truth import CLASSIFIED
 
 BINS = 15
 """Of confidence, equally wide."""
@@ -25,6 +25,7 @@ class ClassScore:
     curve: tuple[tuple[float, float, float], ...]  # threshold, precision, recall at each new twentieth
     called: int  # proposals that the program says are of the class
     precision: float | None  # share of them that lie on an object of the class
+    objects_called: float | None  # share of the objects that have a proposal that is said to be of the class
     segmentable: int  # objects of the class that are judged for segmentation
     recall: float | None  # share of them that are found and said to be of the class
     recall_of_found: float | None  # of those that are found, share said to be of the class
@@ -36,9 +37,10 @@ def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
     judged, called = proposals[proposals["to_classify"]], proposals[proposals["to_call"]]
     scores = {}
     for c, name in enumerate(CLASS_NAMES[1:], 1):
-        of_class = objects[(objects["class"] == c) & (objects["role"] == Role.COUNTED)]
+        of_class = objects[(objects["class"] == c) & np.isin(objects["role"], CLASSIFIED)]
         wanted = of_class[of_class["to_segment"]]
-        n, correct = int(of_class["to_classify"].sum()), int((wanted["said"] == c).sum())
+        counted = of_class[of_class["to_classify"]]
+        n, correct = len(counted), int((wanted["said"] == c).sum())
         said = called["said"] == c
         score, hit = judged["posterior"][:, c], judged["label"] == c
         curve = precision_recall(score, hit, n)
@@ -48,6 +50,7 @@ def class_scores(objects: Rows, proposals: Rows) -> dict[str, ClassScore]:
             curve=_sampled(*curve) if n else (),
             called=int(said.sum()),
             precision=ratio(int((said & (called["owner"] == c)).sum()), int(said.sum())),
+            objects_called=ratio(int((counted["called"] == c).sum()), n),
             segmentable=len(wanted),
             recall=ratio(correct, len(wanted)),
             recall_of_found=ratio(correct, int((wanted["outcome"] == Outcome.FOUND).sum())),

@@ -17,6 +17,7 @@ from modt_desk.evaluation.rows import Association, Rows, ratio
 from modt_desk.evaluation.rules import KITTI_RULES, Rules
 from modt_desk.evaluation.segmentation_score import SegmentationScore, segmentation
 from modt_desk.evaluation.track_score import TrackScore, track_metrics, track_scores
+from modt_desk.evaluation.truth import Role
 
 SCHEMA = "modt.evaluation/1"
 ALL = "all"
@@ -28,6 +29,7 @@ RANGES_M = {ALL: (0.0, float("inf")), "0-20": (0.0, 20.0), "20-40": (20.0, 40.0)
 class DriveRows:
     """What became of the frames of one drive: how many, both tables, and by class the associations frame by frame."""
 
+    rules: Rules
     frames: int
     n_proposals: int
     classified: int
@@ -49,6 +51,10 @@ class Evaluation:
     """Scores of some drives; tracks and metrics are empty and None where labels have no identities."""
 
     drives: int
+    sectors_deg: tuple[float, ...]  # half the sectors in which the drives are judged, each once, in order
+    complete: bool  # whether the labels of all drives are taken for complete
+    further_objects: int  # objects added beside the labels
+    further_labels: int  # their frames, summed over the objects
     frames: int
     proposals: int
     beta: float | None  # proposals classified over all
@@ -82,7 +88,7 @@ def collect(frames: Iterable[JudgedFrame], rules: Rules, drive: int = 0) -> Driv
         raise ValueError("no frames")
     objects, proposals, associations = zip(*judged, strict=True)
     tables = np.concatenate(objects), np.concatenate(proposals)
-    return DriveRows(len(judged), n_proposals, classified, *tables, tuple(zip(*associations, strict=True)))
+    return DriveRows(rules, len(judged), n_proposals, classified, *tables, tuple(zip(*associations, strict=True)))
 
 
 def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
@@ -90,9 +96,14 @@ def evaluation(drives: Sequence[DriveRows]) -> Evaluation:
     objects = np.concatenate([drive.objects for drive in drives])
     proposals = np.concatenate([drive.proposals for drive in drives])
     n_proposals, judged = sum(drive.n_proposals for drive in drives), proposals[proposals["to_classify"]]
+    further = objects[objects["role"] == Role.FURTHER]
     on_objects = judged[judged["label"] > 0]
     return Evaluation(
         drives=len(drives),
+        sectors_deg=tuple(sorted({drive.rules.sector_deg for drive in drives})),
+        complete=all(drive.rules.complete for drive in drives),
+        further_objects=len(set(further[["drive", "id"]].tolist())),
+        further_labels=len(further),
         frames=sum(drive.frames for drive in drives),
         proposals=n_proposals,
         beta=ratio(sum(drive.classified for drive in drives), n_proposals),

@@ -13,7 +13,7 @@ from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.overlap import ObjectPoints, Overlap, in_box_frame, inside
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Association, Outcome, Rows, table
 from modt_desk.evaluation.rules import Rules
-from modt_desk.evaluation.truth import Role
+from modt_desk.evaluation.truth import CLASSIFIED, LABELLED, Role
 
 PARKED_PAD_M = 0.4
 """A proposal is of a parked car if it lies in its box or up to this beyond."""
@@ -31,16 +31,18 @@ def judge(
     row[frame.of_track] = np.arange(len(frame.track))
     track, said = (np.append(column, NONE)[row] for column in (frame.track, frame.said))
     objects = _objects(frame, overlap, rules)
-    proposals = _proposals(frame, overlap, objects, rules)
+    pairs = overlap.iou > 0.5 if rules.by_iou else overlap.most_of_object & overlap.most_of_proposal
+    proposals = _proposals(frame, overlap, objects, pairs, rules)
     objects["drive"] = proposals["drive"] = drive
     objects["frame"] = proposals["frame"] = frame.index
     objects["said"] = np.where(objects["outcome"] == Outcome.FOUND, said[overlap.best], NONE)
+    objects["called"] = np.where(pairs, said[overlap.best], NONE)
     objects["track"] = np.where(overlap.most > 0, track[overlap.best], NONE)
     proposals["track"], proposals["said"] = track, said
     proposals["posterior"] = np.append(frame.posterior, np.zeros((1, N_CLASSES)), axis=0)[row]
     associations = []
     for c in range(1, len(CLASS_NAMES)):
-        i = np.flatnonzero(objects["to_classify"] & (objects["class"] == c))
+        i = np.flatnonzero(objects["to_classify"] & objects["to_follow"] & (objects["class"] == c))
         k = np.flatnonzero(proposals["to_associate"] & (said == c))
         shared = overlap.shared[np.ix_(i, k)]
         union = overlap.count[i, None] + overlap.size[k] - shared
@@ -61,8 +63,9 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
         return found
 
     in_view, in_sector = most(frame.fov.contains(shown)), most(_in_sector(shown, rules))
-    wanted = (truth.role != Role.IGNORED) & (range_m <= rules.max_range_m)
-    to_follow = wanted & (truth.object_class > 0) & (overlap.count >= rules.min_points_followed)
+    near = range_m <= rules.max_range_m
+    wanted = np.isin(truth.role, LABELLED) & near
+    of_class = (truth.object_class > 0) & _has_points(frame, overlap, rules)
     whole = cut_counts | (in_view & in_sector)
     return table(
         OBJECT,
@@ -71,10 +74,17 @@ def _objects(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Rows:
         range_m=range_m,
         in_view=in_view,
         to_segment=wanted & (overlap.count >= rules.min_points) & (in_view | cut_counts),
-        to_classify=to_follow & whole & (truth.role == Role.COUNTED),
-        to_follow=to_follow,
+        to_classify=of_class & whole & near & np.isin(truth.role, CLASSIFIED),
+        to_follow=of_class & wanted,
         outcome=_outcome(overlap),
     )
+
+
+def _has_points(frame: JudgedFrame, overlap: Overlap, rules: Rules) -> Bool:
+    """(n,) whether each object has the points to be judged for its class."""
+    further = frame.truth.role == Role.FURTHER
+    enough: Bool = overlap.count >= np.where(further, rules.min_points_further, rules.min_points_followed)
+    return enough
 
 
 def _outcome(overlap: Overlap) -> Int:
@@ -88,7 +98,8 @@ def _outcome(overlap: Overlap) -> Int:
     return np.select([*conditions.values()], [*map(int, conditions)], int(Outcome.PARTIAL))
 
 
-def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules) -> Rows:
+def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool, rules: Rules) -> Rows:
+    """The rows of all proposals; pairs: (n,) whether the best proposal of each object stands for it."""
     truth, size, best = frame.truth, overlap.size, overlap.best
     members = np.flatnonzero(frame.proposal >= 0)
     of, points = frame.proposal[members], frame.points[members]
@@ -99,7 +110,6 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules
         return found
 
     # The object that a proposal stands for, and the one in whose box it lies.
-    pairs = overlap.iou > 0.5 if rules.by_iou else overlap.most_of_object & overlap.most_of_proposal
     matched = objects["to_classify"] & pairs
     label, owner = np.zeros((2, len(size)), np.int64)
     label[best[matched]] = truth.object_class[matched]
@@ -114,8 +124,9 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules
     # On an object that is not judged for its class; where nothing is known.
     excused = (truth.object_class > 0) & ~objects["to_classify"] & (objects["range_m"] <= rules.max_range_m)
     if "few" not in rules.ignored:
-        excused &= (overlap.count >= rules.min_points_followed) | (truth.role != Role.COUNTED)
-    neutral = role != Role.COUNTED
+        excused &= _has_points(frame, overlap, rules) | ~np.isin(truth.role, CLASSIFIED)
+    neutral, further = ~np.isin(role, CLASSIFIED), role == Role.FURTHER
+    further[best[matched & (truth.role == Role.FURTHER)]] = True
     neutral[best[excused & overlap.most_of_proposal]] = True
     unknown = np.zeros(len(size), np.bool_)
     if "parked" in rules.ignored:
@@ -134,7 +145,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, rules: Rules
         owner=owner,
         to_classify=judged & ~((unknown | neutral) & no_object),
         to_call=to_call,
-        to_associate=to_call & ~(neutral & no_object),
+        to_associate=to_call & ~(neutral & no_object) & ~further,
     )
 
 

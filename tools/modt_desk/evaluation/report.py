@@ -10,6 +10,7 @@ from modt_desk.evaluation.evaluation import ALL, Evaluation
 CLASS_TABLES = (
     ("average precision [%] by range [m]", "average_precision", "objects"),
     ("precision of the classes that tracks were given [%]", "precision", "called"),
+    ("objects that are called what they are [%]", "objects_called", "objects"),
     ("recall with the right class [%]", "recall", "segmentable"),
 )
 """Title, figure and the count that it is a share of."""
@@ -27,7 +28,9 @@ def report(sensors: Mapping[str, Evaluation]) -> str:
 
 def _lines(name: str, e: Evaluation) -> Iterator[str]:
     drives = "1 drive" if e.drives == 1 else f"{e.drives} drives"
-    yield f"{name}: {drives}, {e.frames} frames, {e.proposals} proposals, beta {_percent(e.beta)} %"
+    size = f"{drives}, {e.frames} frames, {e.proposals} proposals"
+    yield f"{name}: {size}, beta {_percent(e.beta)} %, judged {_sector(e)}"
+    yield f"  Truth: {_completeness(e)}."
     bands, whole = e.ranges.values(), e.ranges[ALL]
     rows = []
     for kind, s in whole.segmentation.items():
@@ -58,6 +61,24 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
             yield from _table("metrics [%], and counts", [*METRICS, *EVENTS], rows)
         elif e.metrics is None:
             yield f"\n  {', '.join(METRICS)}, {' and '.join(EVENTS)} need trackeval: pip install '.[evaluate]'"
+
+
+def _sector(e: Evaluation) -> str:
+    """The sectors in which proposals are judged, in words."""
+    sectors = ("all round" if half >= 180 else f"within {half:g} degrees of straight ahead" for half in e.sectors_deg)
+    return " or ".join(sectors)
+
+
+def _completeness(e: Evaluation) -> str:
+    """How complete the labels are believed to be."""
+    labels = (
+        "labels are taken for complete"
+        if e.complete
+        else "labels of KITTI, unlike simulated ones, leave out road users"
+    )
+    if e.further_objects:
+        return f"{labels}; --further adds {e.further_objects}, in {e.further_labels} labels"
+    return labels if e.complete else f"{labels}, and tracks on those count as false; --further FILE adds them"
 
 
 def _table(title: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:

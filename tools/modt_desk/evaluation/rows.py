@@ -42,6 +42,7 @@ OBJECT = np.dtype(
         ("to_follow", bool),  # judged for life
         ("outcome", int),
         ("said", int),  # class of the proposal that found it, NONE where none did
+        ("called", int),  # class of the proposal that stands for it, NONE where none does
         ("track", int),  # that owns its best proposal, NONE where none does
     ]
 )

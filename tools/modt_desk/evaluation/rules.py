@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 IGNORABLE = ("cut", "few", "parked", "dontcare")
 """Objects cut by the view or of few points; proposals on parked cars outside their labels or in DontCare regions."""
@@ -18,13 +18,19 @@ class Rules:
 
     min_points: int = 20  # of an object that must be segmented
     min_points_followed: int = 10  # of an object that must be followed, and of one for average precision
+    min_points_further: int = 8  # of an object beside the labels, for average precision
     by_iou: bool = False
     sector_deg: float = 40.0  # half the sector about x in which proposals are judged: where everything is labelled
     max_range_m: float = float("inf")  # of objects and proposals that are judged
     ignored: frozenset[str] = frozenset(IGNORABLE)  # what counts neither for nor against
+    complete: bool = False  # whether every road user in the sector is believed to be labelled
 
 
 KITTI_RULES = Rules()
-"""Labels cover what the left colour camera sees."""
-CUBOID_RULES = Rules(min_points_followed=20, by_iou=True, sector_deg=180.0, max_range_m=60.0)
+"""Labels cover what the left colour camera sees, and leave out road users."""
+KITTI_ALL_ROUND_RULES = replace(KITTI_RULES, sector_deg=180.0, complete=True)
+"""Labels in KITTI's layout that lie behind the sensor, too."""
+CUBOID_RULES = Rules(
+    min_points_followed=20, min_points_further=20, by_iou=True, sector_deg=180.0, max_range_m=60.0, complete=True
+)
 """Labels all round."""

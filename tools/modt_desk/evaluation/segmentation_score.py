@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt_desk.evaluation.rows import Outcome, Rows, kinds, ratio
-from modt_desk.evaluation.truth import Role
+from modt_desk.evaluation.truth import LABELLED
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ def segmentation(objects: Rows) -> dict[str, SegmentationScore]:
     for name, which in kinds(objects).items():
         judged = objects["outcome"][which & objects["to_segment"]]
         found, merged, split, partial, missed = np.bincount(judged, minlength=len(Outcome)).tolist()
-        cut = int((which & ~objects["in_view"] & (objects["role"] != Role.IGNORED)).sum())
+        cut = int((which & ~objects["in_view"] & np.isin(objects["role"], LABELLED)).sum())
         if len(judged) or cut:
             recall = ratio(found, len(judged))
             scores[name] = SegmentationScore(len(judged), recall, merged, split, partial, missed, cut)

@@ -12,7 +12,7 @@ import numpy as np
 
 from modt.types import NONE, Int
 from modt_desk.evaluation.rows import Association, Rows, kinds, ratio
-from modt_desk.evaluation.truth import Role
+from modt_desk.evaluation.truth import LABELLED
 
 SIMILARITY_THRESHOLD = 0.25
 """Similarity from which CLEAR and Identity count a match."""
@@ -56,7 +56,7 @@ class TrackScore:
 
 def track_scores(objects: Rows, proposals: Rows) -> dict[str, TrackScore]:
     """Scores of all objects, of each class and of each labelled type; empty where no object has an identity."""
-    rows = objects[(objects["class"] > 0) & (objects["role"] != Role.IGNORED) & (objects["id"] != NONE)]
+    rows = objects[(objects["class"] > 0) & np.isin(objects["role"], LABELLED) & (objects["id"] != NONE)]
     first: dict[tuple[int, int], int] = {}
     for drive, track, frame in proposals[["drive", "track", "frame"]].tolist():
         first[drive, track] = min(frame, first.get((drive, track), frame))

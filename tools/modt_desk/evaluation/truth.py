@@ -29,6 +29,14 @@ class Role(IntEnum):
     """To be segmented and followed; its class is free: neither an object for average precision nor a false one."""
     IGNORED = 2
     """Neither to be found nor wrong when found."""
+    FURTHER = 3
+    """Added beside the labels: counted for its class alone, neither to be segmented nor followed."""
+
+
+CLASSIFIED = (Role.COUNTED, Role.FURTHER)
+"""Roles of objects that are judged for their class."""
+LABELLED = (Role.COUNTED, Role.NEUTRAL)
+"""Roles of objects that are to be segmented and followed."""
 
 
 Types = Mapping[str, tuple[ObjectClass, Role]]

@@ -20,7 +20,7 @@ from modt.sources.recognise import open_scans
 from modt.sources.scan_stream import ScanStream
 from modt.types import NONE
 from modt_desk.evaluation.kitti_labels import DONT_CARE, MAX_ID, Label, read_labels, read_tracklets
-from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
+from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import (
     KITTI_TYPES,
     PANDASET_TYPES,
@@ -105,7 +105,13 @@ def _followed(labels: list[Label], types: Types, scans: ScanStream | None, camer
     end = max([*by_frame, *(scan.index for scan in recorded)], default=NONE) + 1
     none = np.zeros((0, 7))
     frames = {f: _frame(types, by_frame[f], camera, parked=parked.get(f, none)) for f in range(end)}
-    return Truth(frames, scans, KITTI_RULES)
+    return Truth(frames, scans, KITTI_ALL_ROUND_RULES if any(map(_behind, labels)) else KITTI_RULES)
+
+
+def _behind(label: Label) -> bool:
+    """Whether the whole box is behind the sensor, where KITTI labels nothing."""
+    x, _, _, length, width, *_ = label.box.tolist()
+    return bool(label.type_ != DONT_CARE and x + np.hypot(length, width) / 2 < 0)
 
 
 def _object_frame(path: Path, types: Types) -> FrameTruth:

@@ -1,0 +1,152 @@
+"""Objects that the labels leave out."""
+
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.classes import ObjectClass
+from modt.errors import MisuseError
+from modt.types import NONE
+from modt_desk.evaluation.evaluation import collect, evaluation, score
+from modt_desk.evaluation.further_objects import COLUMNS, with_further
+from modt_desk.evaluation.matching import judge
+from modt_desk.evaluation.report import report
+from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
+from modt_desk.evaluation.truth import KITTI_TYPES, PAPER_TYPES, Role, Truth
+from tests.desk.evaluation.scenes import blob, cars, frame
+
+HEAD = ",".join(COLUMNS) + "\n"
+CAR_AT_20 = "0,5,Car,20,0,-1.7,4,2,1.5,0\n"
+
+
+def further(folder, text, *, truth=None, types=KITTI_TYPES):
+    """The truth of a frame, by default a car 10 m ahead, with the objects of a table."""
+    path = folder / "further.csv"
+    path.write_text(HEAD + text)
+    return with_further(Truth({0: truth or cars(10.0)}, None, KITTI_RULES), path, types).frames[0]
+
+
+def test_a_row_is_a_box_on_its_foot_in_the_sensor_frame(tmp_path):
+    found = further(tmp_path, "0,5,Pedestrian,7,-6.5,-1.7,0.8,0.6,2,0.5\n")
+    assert (found.type_, found.id.tolist()) == (("Car", "Pedestrian"), [0, 5])
+    assert found.object_class.tolist() == [ObjectClass.CAR, ObjectClass.PEDESTRIAN]
+    assert found.role.tolist() == [Role.COUNTED, Role.FURTHER]
+    assert found.box[1] == pytest.approx([7, -6.5, -0.7, 0.8, 0.6, 2, 0.5])
+    moved = np.eye(4)
+    moved[:3, 3] = 100, 0, 3
+    placed = further(tmp_path, CAR_AT_20, truth=cars(10.0, T_box_sensor=moved))
+    assert placed.box[1] == pytest.approx([120, 0, 2.05, 4, 2, 1.5, 0])
+
+
+def test_types_are_those_of_the_labels(tmp_path):
+    van = CAR_AT_20.replace("Car", "Van")
+    assert further(tmp_path, van).role.tolist() == [Role.COUNTED, Role.FURTHER]
+    assert further(tmp_path, van, types=PAPER_TYPES).role.tolist() == [Role.COUNTED, Role.IGNORED]
+
+
+def test_further_objects_count_for_their_class_alone(tmp_path):
+    blobs = [(blob(40, 10), 0), (blob(40, 20), 1)]
+    tracks = [(7, 0, "car"), (8, 1, "car")]
+    bare, more = (score([frame(truth, blobs, tracks)]) for truth in (cars(10.0), further(tmp_path, CAR_AT_20)))
+    before, after = (found.ranges["all"].classification["car"] for found in (bare, more))
+    assert (before.objects, before.precision, before.average_precision) == (1, 0.5, 1)
+    assert (after.objects, after.precision, after.average_precision, after.objects_called) == (2, 1, 1, 1)
+    assert more.ranges["all"].segmentation == bare.ranges["all"].segmentation
+    assert after.segmentable == before.segmentable == 1
+    assert more.tracks == bare.tracks
+    assert (more.further_objects, more.further_labels, bare.further_objects) == (1, 1, 0)
+
+
+def test_further_objects_are_neither_for_nor_against_in_the_metrics_of_tracks(tmp_path):
+    blobs = [(blob(40, 10), 0), (blob(40, 20), 1)]
+    scene = frame(further(tmp_path, CAR_AT_20), blobs, [(7, 0, "car"), (8, 1, "car")])
+    association = judge(scene, KITTI_RULES)[2][0]
+    assert (association.truth.tolist(), association.track.tolist()) == ([0], [7])
+
+
+@pytest.mark.parametrize(("n", "rules", "counts"), [(7, KITTI_RULES, 0), (8, KITTI_RULES, 1), (19, CUBOID_RULES, 0)])
+def test_least_points_of_a_further_object(tmp_path, n, rules, counts):
+    scene = frame(further(tmp_path, CAR_AT_20), [(blob(n, 20), 0)], [(7, 0, "pedestrian")])
+    objects, proposals, _ = judge(scene, rules)
+    assert objects["to_classify"].tolist() == [False, bool(counts)]
+    assert proposals["to_classify"].tolist() == [bool(counts)]  # on an object with too few points, not a false one
+
+
+def test_an_object_that_is_not_called_what_it_is(tmp_path):
+    truth = further(tmp_path, CAR_AT_20 + "0,6,Car,30,0,-1.7,4,2,1.5,0\n")
+    scene = frame(
+        truth, [(blob(40, 10), 0), (blob(40, 20), 1), (blob(40, 30), NONE)], [(7, 0, "car"), (8, 1, "cyclist")]
+    )
+    assert judge(scene, KITTI_RULES)[0]["called"].tolist() == [ObjectClass.CAR, ObjectClass.CYCLIST, NONE]
+    assert score([scene]).ranges["all"].classification["car"].objects_called == pytest.approx(1 / 3)
+
+
+def test_parked_cars_count_neither_for_nor_against(tmp_path):
+    truth = further(tmp_path, CAR_AT_20.replace("Car", "IgnoredCar"))
+    assert (len(truth.id), len(truth.parked)) == (1, 1)
+    blobs = [(blob(40, 10), 0), (blob(40, 20), 1)]
+    for said in ("car", "pedestrian"):
+        found = score([frame(truth, blobs, [(7, 0, "car"), (8, 1, said)])]).ranges["all"].classification
+        assert (found["car"].called, found["car"].objects, found["car"].precision) == (1, 1, 1)
+        assert found["pedestrian"].called == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (HEAD + "0,5,Car,20,0,-1.7,4,2,1.5\n", r"further\.csv:2: no object; write frame"),
+        (HEAD + CAR_AT_20 + "0,6,Car,x,0,-1.7,4,2,1.5,0\n", r"further\.csv:3: no object"),
+        (HEAD + "0,5,Car,nan,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: no object"),
+        (HEAD + "0,5,Car,20,0,-1.7,4,0,1.5,0\n", r"further\.csv:2: no object"),
+        (HEAD + "-1,5,Car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: no object"),
+        (HEAD + "0,5,car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: 'car' is no type of an object; write one of Car"),
+        (HEAD + "1,5,Car,20,0,-1.7,4,2,1.5,0\n", r"further\.csv:2: frame 1 is not in the truth, which has 1 frames"),
+        (HEAD + 2 * CAR_AT_20, r"further\.csv:3: object 5 is in frame 0 twice"),
+        (HEAD.replace("yaw", "turn") + CAR_AT_20, r"further\.csv:1: has no column yaw; begin with the line frame"),
+        ("", r"further\.csv:1: has no column frame, object"),
+        (HEAD, r"further\.csv: holds no objects"),
+        ("\udcff", r"further\.csv: cannot be read"),
+        (None, r"further\.csv: cannot be read"),
+    ],
+)
+def test_broken_tables(tmp_path, text, message):
+    path = tmp_path / "further.csv"
+    if text is not None:
+        path.write_bytes(text.encode(errors="surrogateescape"))
+    with pytest.raises(MisuseError, match=message) as error:
+        with_further(Truth({0: cars(10.0)}, None, KITTI_RULES), path, KITTI_TYPES)
+    assert "\n" not in str(error.value)
+
+
+@given(st.binary(max_size=80))
+def test_any_bytes_are_a_table_or_misuse(tmp_path_factory, data):
+    path = tmp_path_factory.getbasetemp() / "any.csv"
+    path.write_bytes(HEAD.encode() + CAR_AT_20.encode() + data)
+    with suppress(MisuseError):
+        with_further(Truth({0: cars(10.0)}, None, KITTI_RULES), path, KITTI_TYPES)
+
+
+def test_the_report_says_what_is_judged_and_how_complete_the_labels_are(tmp_path):
+    def lines(*drives):
+        rows = [collect([frame(truth, [], [])], rules, k) for k, (truth, rules) in enumerate(drives)]
+        return report({"x": evaluation(rows)}).split("\n")
+
+    known, added = (cars(10.0), KITTI_RULES), (further(tmp_path, CAR_AT_20), KITTI_RULES)
+    first, second, *_ = lines(known)
+    assert first.endswith("judged within 40 degrees of straight ahead")
+    assert (
+        "labels of KITTI, unlike simulated ones, leave out road users, and tracks on those count as false" in second
+    )
+    assert (
+        "labels of KITTI, unlike simulated ones, leave out road users; --further adds 1, in 1 labels"
+        in lines(added)[1]
+    )
+    first, second, *_ = lines((cars(10.0), CUBOID_RULES))
+    assert first.endswith("judged all round")
+    assert "labels are taken for complete" in second
+    first, second, *_ = lines(known, (cars(10.0), CUBOID_RULES))
+    assert first.endswith("judged within 40 degrees of straight ahead or all round")
+    assert "leave out road users" in second
