@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,4 +84,4 @@ def open_address(text: str, schemes: Mapping[str, Scheme], *arguments: object) -
     try:
         return scheme.opener(address, *arguments)
     except ModuleNotFoundError as error:
-        raise MisuseError(text, f"needs {error.name}", f"pip install 'modt[{scheme.extra}]'") from None
+        raise MisuseError(text, f"needs {error.name}", install(scheme.extra)) from None
