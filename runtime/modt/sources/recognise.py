@@ -59,7 +59,7 @@ def _refuse_foreign(path: Path) -> None:
     """Raise MisuseError for a file that is not read, or a folder that holds such files alone."""
     files = [p for p in (path.iterdir() if path.is_dir() else [path]) if not p.name.startswith(".")]
     suffixes = {p.suffix.lower() for p in files}
-    if len(suffixes) == 1 and (known := FOREIGN.get(*suffixes)):
+    if len(suffixes) == 1 and (known := FOREIGN.get(suffixes.pop())):
         cause, remedy = known
         raise MisuseError(path, cause if path.is_file() else f"each file in it {cause}", remedy)
 
