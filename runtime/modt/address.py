@@ -32,6 +32,13 @@ class Address:
         """Value of an option."""
         return self.options.get(name, default)
 
+    def choice(self, name: str, *values: str) -> str:
+        """Value of an option, by default the first of `values`; MisuseError for none of them."""
+        if (value := self.option(name, values[0])) not in values:
+            forms = " or ".join(f"{name}={known}" for known in values)
+            raise MisuseError(self.text, f"{name} {value!r} is unknown", f"write {forms}")
+        return value
+
 
 @dataclass(frozen=True, slots=True)
 class Scheme:

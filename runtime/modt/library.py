@@ -87,11 +87,7 @@ class TrackedObjects:
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
     def to_pandas(self) -> Any:
-        """A pandas.DataFrame of the columns of as_dicts.
-
-        Raises:
-            MisuseError: pandas is not installed.
-        """
+        """A pandas.DataFrame of the columns of as_dicts; MisuseError where pandas is not installed."""
         try:
             pandas = import_module("pandas")
         except ModuleNotFoundError as error:
