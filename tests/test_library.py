@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -25,6 +26,12 @@ def test_importing_the_package_loads_nothing_heavy():
     code = "import modt, sys; print(modt.__version__, 'numpy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == [modt.__version__, "False"]
+
+
+def test_the_package_lists_its_public_names_before_they_are_used():
+    code = "import modt; print(set(modt.__all__) <= set(dir(modt)), 'Pipeline' in dir(modt))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True"]
 
 
 @pytest.mark.parametrize("mode", assembly.MODES)
@@ -79,6 +86,44 @@ def test_rows_are_arrays_with_names_and_dictionaries(frames):
     assert rows[0]["box_sensor"] == found.box_sensor[0].tolist()
     assert found.take(np.array([1])).as_dicts() == rows[1:2]
     np.testing.assert_array_equal(found.take(np.array([1])).T_world_sensor, np.eye(4))
+
+
+def test_a_row_is_had_by_its_index_and_by_iteration(frames):
+    found = modt.Pipeline.from_profile("vlp-16").step(frames[0].points, frames[0].stamp_s)
+    rows = found.as_dicts()
+    assert [str(row) for row in found] == list(map(str, rows))  # by text: NaN is not itself
+    assert (str(found[0]), str(found[np.int64(-1)])) == (str(rows[0]), str(rows[-1]))
+    for beyond in (len(rows), -len(rows) - 1):
+        with pytest.raises(IndexError):
+            found[beyond]
+
+
+def test_the_text_of_results_is_one_short_line(frames):
+    found = modt.Pipeline.from_profile("vlp-16").step(frames[0].points, frames[0].stamp_s)
+    assert repr(found).startswith(f"<{len(found)} tracked objects: ")
+    assert f"{np.count_nonzero(found.visible)} visible" in repr(found)
+    nothing = found.take(np.zeros(0, np.int64))
+    assert repr(nothing) == "<0 tracked objects: none; 0 visible>"
+    assert all(len(repr(result)) < 120 and "\n" not in repr(result) for result in (found, nothing))
+
+
+def test_pandas_has_the_columns_of_the_dictionaries_though_there_are_no_rows(frames, monkeypatch):
+    def frame(rows, columns):
+        return rows, columns
+
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=frame))
+    found = modt.Pipeline.from_profile("vlp-16").step(frames[0].points, frames[0].stamp_s)
+    rows, columns = found.to_pandas()
+    assert columns == list(found.as_dicts()[0])
+    assert str(rows) == str(found.as_dicts())
+    assert found.take(np.zeros(0, np.int64)).to_pandas() == ([], columns)
+
+
+def test_pandas_is_named_where_it_is_missing(frames, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    found = modt.Pipeline.from_profile("vlp-16").step(frames[0].points, frames[0].stamp_s)
+    with pytest.raises(MisuseError, match="needs pandas; pip install pandas"):
+        found.to_pandas()
 
 
 def test_points_without_reflectance_and_without_returns_are_taken(frames):

@@ -12,10 +12,14 @@ import yaml
 from packaging.requirements import Requirement
 
 import modt
+from modt.errors import install
 
 ROOT = Path(__file__).resolve().parents[1]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 YAML = [*sorted((ROOT / ".github").rglob("*.yml")), ROOT / ".pre-commit-config.yaml", ROOT / "CITATION.cff"]
+
+FOLDERS, TEXTS = ("docs", "runtime", "tools", "systemd"), {".md", ".py", ".conf", ".service", ".yaml", ".txt"}
+CLONE = "in a clone of modt"
 
 
 def commands(target: str) -> set[str]:
@@ -87,3 +91,17 @@ def test_changelog_begins_with_this_version():
     heading = re.search(r"^## \[(.+)\] - (unreleased|\d{4}-\d\d-\d\d)$", text, re.MULTILINE)
     assert heading
     assert heading[1] == modt.__version__
+
+
+def test_no_text_installs_modt_from_an_index_where_nobody_has_published_it():
+    files = [p for p in chain(ROOT.glob("*.md"), *(ROOT.joinpath(f).rglob("*") for f in FOLDERS)) if p.is_file()]
+    named = re.compile(r"pip install [^\n]*?(?<![\w/.-])modt(?![\w/.-])")
+    said = {p for p in files if p.suffix in TEXTS and named.search(p.read_text(encoding="utf-8").replace(CLONE, ""))}
+    assert said == set()
+
+
+def test_the_remedy_for_a_missing_extra_names_one_that_exists():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    code = "".join(p.read_text() for f in ("runtime", "tools") for p in (ROOT / f).rglob("*.py"))
+    assert set(re.findall(r"\binstall\([\"'](\w+)[\"']\)", code)) <= set(extras)
+    assert install("view") == "pip install '.[view]' in a clone of modt, or 'FILE.whl[view]' of its wheel"

@@ -15,6 +15,10 @@ __version__ = "0.1.0"
 __all__ = ["CLASS_NAMES", "Pipeline", "TrackedObjects", "__version__"]
 
 
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
 def __getattr__(name: str) -> Any:
     if name not in __all__:
         raise AttributeError(f"module 'modt' has no attribute {name!r}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +31,13 @@ class Address:
     def option(self, name: str, default: str = "") -> str:
         """Value of an option."""
         return self.options.get(name, default)
+
+    def choice(self, name: str, *values: str) -> str:
+        """Value of an option, by default the first of `values`; MisuseError for none of them."""
+        if (value := self.option(name, values[0])) not in values:
+            forms = " or ".join(f"{name}={known}" for known in values)
+            raise MisuseError(self.text, f"{name} {value!r} is unknown", f"write {forms}")
+        return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,4 +91,4 @@ def open_address(text: str, schemes: Mapping[str, Scheme], *arguments: object) -
     try:
         return scheme.opener(address, *arguments)
     except ModuleNotFoundError as error:
-        raise MisuseError(text, f"needs {error.name}", f"pip install 'modt[{scheme.extra}]'") from None
+        raise MisuseError(text, f"needs {error.name}", install(scheme.extra)) from None

@@ -31,3 +31,8 @@ class MisuseError(ModtError):
 
 class ScanError(ModtError):
     """A scan that cannot be used; the stream continues without it."""
+
+
+def install(extra: str) -> str:
+    """Remedy for a missing extra, from a clone of modt or from the file of its wheel."""
+    return f"pip install '.[{extra}]' in a clone of modt, or 'FILE.whl[{extra}]' of its wheel"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from importlib import import_module
 from typing import Any, Self
 
 import numpy as np
@@ -62,6 +63,15 @@ class TrackedObjects:
     def __len__(self) -> int:
         return len(self.id)
 
+    def __getitem__(self, row: int) -> dict[str, Any]:
+        """One row, as of as_dicts; also what iteration yields."""
+        return self.take(np.array([range(len(self))[row]])).as_dicts()[0]
+
+    def __repr__(self) -> str:
+        counts = np.bincount(self.object_class, minlength=len(CLASS_NAMES)).tolist()
+        named = ", ".join(f"{n} {name}" for n, name in zip(counts, CLASS_NAMES, strict=True) if n)
+        return f"<{len(self)} tracked objects: {named or 'none'}; {np.count_nonzero(self.visible)} visible>"
+
     def take(self, rows: Int | Bool) -> Self:
         """The rows given, by index or mask."""
         return replace(self, **{name: column[rows] for name, column in self._columns().items()})
@@ -75,6 +85,14 @@ class TrackedObjects:
         columns = {name: column.tolist() for name, column in self._columns().items()}
         columns["object_class"] = [CLASS_NAMES[c] for c in self.object_class.tolist()]
         return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def to_pandas(self) -> Any:
+        """A pandas.DataFrame of the columns of as_dicts; MisuseError where pandas is not installed."""
+        try:
+            pandas = import_module("pandas")
+        except ModuleNotFoundError as error:
+            raise MisuseError("to_pandas", f"needs {error.name}", "pip install pandas") from None
+        return pandas.DataFrame(self.as_dicts(), columns=[*self._columns()])
 
     def _columns(self) -> dict[str, Any]:
         """The fields with a row a track."""

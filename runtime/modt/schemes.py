@@ -148,6 +148,7 @@ SENSORS = {
         "ros2",
     ),
 }
+_DETECTIONS = frozenset({"domain", "frame_id", "world_frame_id", "tracks"})
 SINKS = {
     "stdout": Scheme("stdout://", _stdout),
     "file": Scheme("file:///PATH", _file),
@@ -156,7 +157,7 @@ SINKS = {
     "mcap": Scheme("mcap:///PATH", _mcap, frozenset({"points", "max_mb"}), "foxglove"),
     "foxglove": Scheme("foxglove://[HOST][:PORT]", _foxglove, frozenset({"points"}), "foxglove"),
     "view": Scheme("view://[HOST][:PORT]", _view),
-    "ros2": Scheme("ros2:///PREFIX", _detections, frozenset({"domain", "frame_id", "world_frame_id"}), "ros2"),
+    "ros2": Scheme("ros2:///PREFIX", _detections, _DETECTIONS, "ros2"),
 }
 POSES = {
     "udp": Scheme("udp://HOST:PORT", _pose_socket),

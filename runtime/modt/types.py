@@ -47,6 +47,7 @@ class Frame:
             stamp, compensated or by a sensor that does not turn.
         steady_s: the time by a clock that nobody sets, where the one of the stamps may be [s]; None: the stamp.
         R_level_sensor: (3, 3) rotation by which points and pose of a tilted sensor have been turned level.
+        frame_id: name of the frame of the points in the messages they came in; "" where those name none.
     """
 
     index: int
@@ -57,6 +58,7 @@ class Frame:
     turn_s: float = 0.0
     steady_s: float | None = None
     R_level_sensor: Float64 | None = None
+    frame_id: str = ""
 
     @property
     def time_s(self) -> float:

@@ -55,11 +55,11 @@ def write(folder, content):
 
 
 class Terminal:
-    """A terminal of 24 rows of 60, in which the command runs."""
+    """A terminal, by default of 24 rows of 60, in which the command runs."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, rows=24, columns=60):
         self.side, self.far = pty.openpty()
-        fcntl.ioctl(self.far, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
+        fcntl.ioctl(self.far, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
         self.mode = termios.tcgetattr(self.far)
         # A session's first terminal that it opens is its own: Ctrl-C in it reaches the command.
         opened = ["sh", "-c", 'exec "$@" <"$0" >"$0" 2>&1', os.ttyname(self.far)]
@@ -139,6 +139,19 @@ def test_ctrl_c_and_sigterm_leave_the_terminal_as_it_was(terminal, tmp_path):
         assert end_of(other) == (143, True)
     finally:
         other.close()
+
+
+@pytest.mark.parametrize("size", [(0, 0), (24, 0), (0, 60), (1, 1)])
+def test_a_terminal_of_any_size_shows_a_page(tmp_path, size):
+    write(tmp_path, status())
+    terminal = Terminal(tmp_path, *size)
+    try:
+        page = terminal.read_until("\x1b[J")
+        assert size == (1, 1) or "q ends" in page
+        terminal.type("q")
+        assert end_of(terminal) == (0, True)
+    finally:
+        terminal.close()
 
 
 def test_without_a_terminal_it_is_printed_once(tmp_path):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -29,16 +31,22 @@ TOPICS = (
 )
 
 
-def detections(frame):
-    return messages.decode(ros2_detections.encode(frame, "velodyne"), "vision_msgs/msg/Detection3DArray")
+def detections(frame, background=False):
+    return messages.decode(ros2_detections.encode(frame, "velodyne", background), "vision_msgs/msg/Detection3DArray")
 
 
 def markers(frame):
     return messages.decode(ros2_markers.encode(frame, "velodyne"), "visualization_msgs/msg/MarkerArray").markers
 
 
+def test_objects_alone_are_detections_unless_all_tracks_are_asked_for():
+    said = {found.id: found.results[0].hypothesis.class_id for found in detections(FRAMES[1], True).detections}
+    assert said == {"1": "car", "12": "pedestrian", "1234567": "background"}
+    assert [found.id for found in detections(FRAMES[1]).detections] == ["1", "12"]
+
+
 def test_every_track_that_is_seen_is_a_detection_with_its_id_and_posterior():
-    message = detections(FRAMES[1])
+    message = detections(FRAMES[1], background=True)
     assert (message.header.frame_id, message.header.stamp.sec, message.header.stamp.nanosec) == (
         "velodyne",
         0,
@@ -62,7 +70,7 @@ def test_the_class_that_is_said_comes_first_though_another_is_more_probable():
 def test_a_detection_has_the_box_in_the_frame_of_the_sensor():
     frame = result(1, [5], {0: 7})
     frame.proposals.box[0] = [10.0, -2.0, -1.0, 4.0, 1.8, 1.5, 0.5]
-    (found,) = detections(frame).detections
+    (found,) = detections(frame, background=True).detections
     at, turned, size = found.bbox.center.position, found.bbox.center.orientation, found.bbox.size
     assert (at.x, at.y, at.z, size.x, size.y, size.z) == (10.0, -2.0, -1.0, 4.0, 1.8, 1.5)
     np.testing.assert_allclose([turned.x, turned.y, turned.z, turned.w], [0, 0, np.sin(0.25), np.cos(0.25)])
@@ -121,12 +129,43 @@ def test_a_frame_is_published_to_whom_has_subscribed(loopback):
     sink.write(FRAMES[0])
 
 
-def test_without_the_name_of_a_world_tf_is_left_alone(loopback):
+@pytest.mark.parametrize("option", ["", "&world_frame_id="])
+def test_without_the_name_of_a_world_tf_is_left_alone(loopback, option):
     from modt.sinks.ros2 import open_ros2
 
-    sink = open_ros2(parse_address(f"ros2:///robot?domain={NEAR}&world_frame_id=", SINKS))
+    sink = open_ros2(parse_address(f"ros2:///robot?domain={NEAR}{option}", SINKS))
     assert len(sink._topics) == len(TOPICS) - 1
     sink.close()
+
+
+@pytest.mark.parametrize(
+    ("option", "received", "expected"),
+    [
+        ("", "os_sensor", "os_sensor"),
+        ("", "", "lidar"),
+        ("&frame_id=velodyne", "os_sensor", "velodyne"),
+    ],
+)
+def test_results_are_in_the_frame_of_the_cloud_unless_the_address_names_another(loopback, option, received, expected):
+    from modt.sinks.ros2 import open_ros2
+
+    frame = dataclasses.replace(FRAMES[1], frame=dataclasses.replace(FRAMES[1].frame, frame_id=received))
+    for tracks, background in (("", False), ("&tracks=objects", False), ("&tracks=all", True)):
+        sink = open_ros2(parse_address(f"ros2:///robot?domain={NEAR}{option}{tracks}&world_frame_id=map", SINKS))
+        assert [encode(frame) for _, encode in sink._topics] == [
+            ros2_detections.encode(frame, expected, background),
+            ros2_markers.encode(frame, expected),
+            ros2_transform.encode(frame, expected, "map"),
+        ]
+        sink.close()
+
+
+def test_tracks_of_an_unknown_kind_are_refused():
+    pytest.importorskip("cyclonedds")
+    from modt.sinks.ros2 import open_ros2
+
+    with pytest.raises(MisuseError, match="tracks 'some' is unknown; write tracks=objects or tracks=all"):
+        open_ros2(parse_address("ros2:///robot?tracks=some", SINKS))
 
 
 def test_a_domain_that_is_none_is_refused():

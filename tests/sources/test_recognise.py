@@ -312,6 +312,39 @@ def test_a_raw_drive_without_scans_is_refused(tmp_path):
         open_stream(drive)
 
 
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("a.bag", r"is a recording of ROS 1; convert it: .*rosbags-convert"),
+        ("a.LAS", r"is a LAS file; convert it: pdal translate"),
+        ("a.laz", r"is a LAS file; convert it: pdal translate"),
+        ("a.npy", r"is an array of NumPy; convert it: numpy.load"),
+    ],
+)
+def test_a_known_file_that_is_not_read_is_one_line_with_its_conversion(tmp_path, name, cause):
+    path = tmp_path / "drive" / name
+    path.parent.mkdir()
+    path.write_bytes(b"x")
+    for given in (path, path.parent):
+        with pytest.raises(MisuseError, match=cause) as refused:
+            open_stream(given)
+        assert "\n" not in str(refused.value)
+    (path.parent / "000000.bin").write_bytes(np.ones((9, 4), np.float32).tobytes())
+    assert open_stream(path.parent).info.n_frames == 1
+
+
+def test_the_conversion_of_an_array_is_one_that_is_read(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    np.save("a.npy", np.arange(50.0).reshape(10, 5))
+    with pytest.raises(MisuseError) as refused:
+        open_stream(tmp_path / "a.npy")
+    (tmp_path / "scans").mkdir()
+    code = refused.value.remedy.removeprefix("convert it: ").split(", columns")[0].replace("FILE", "'a.npy'")
+    exec(code, {"numpy": np})
+    (frame,) = open_stream(tmp_path / "scans")
+    assert frame.points[1, :3].tolist() == [5.0, 6.0, 7.0]
+
+
 @pytest.mark.kitti
 def test_a_real_drive(drive_0005):
     stream = open_stream(drive_0005)

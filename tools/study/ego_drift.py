@@ -166,7 +166,7 @@ def main() -> None:
     arguments = options.parse_args()
     kiss = has_kiss_icp() and not arguments.no_kiss
     if not kiss:
-        print("without KISS-ICP" + ("" if arguments.no_kiss else ": not installed; pip install 'modt[kiss]'"))
+        print("without KISS-ICP" + ("" if arguments.no_kiss else ": not installed; pip install '.[kiss]'"))
     magnitudes: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for drive in arguments.drives:
         print(drive)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 
 from modt import __version__
-from modt.errors import ModtError
+from modt.errors import MisuseError, ModtError
 
 INTERRUPTED = 130
 """Exit status after Ctrl-C, as in shells: 128 + SIGINT."""
@@ -19,15 +19,18 @@ def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Seq
     """Run a subcommand; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted.
 
     `commands` holds the module of each. Only that of the command given is imported; its add_parser sets `run` to a
-    function of the parsed arguments that returns the status.
+    function of the parsed arguments that returns the status. Without a command the help is printed, which is misuse.
     """
+    words = sys.argv[1:] if argv is None else argv
     top = argparse.ArgumentParser(prog=name, description=description)
     top.add_argument("--version", action="version", version=f"modt {__version__}")
     choice = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    given = next(iter(sys.argv[1:] if argv is None else argv), "")
+    given = next(iter(words), "")
     for module in [commands[given]] if given in commands else commands.values():
         import_module(module).add_parser(choice)
-    arguments = top.parse_args(argv)
+    if not words:
+        return show_help(top)
+    arguments = top.parse_args(words)
     logging.basicConfig(level=logging.WARNING, format="modt: %(message)s", stream=sys.stderr)
     try:
         return int(arguments.run(arguments))
@@ -40,3 +43,9 @@ def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Seq
     except KeyboardInterrupt:
         print("modt: interrupted; start it again", file=sys.stderr)
         return INTERRUPTED
+
+
+def show_help(parser: argparse.ArgumentParser) -> int:
+    """Print the help in place of a command that is missing; returns the exit status."""
+    parser.print_help()
+    return MisuseError.exit_status

@@ -16,6 +16,12 @@ MODES = ("conventional", "efficient", "accurate")
 CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
 
 
+def add_examples(p: Parser, *examples: str) -> None:
+    """Lines at the end of the help."""
+    p.formatter_class = argparse.RawDescriptionHelpFormatter
+    p.epilog = "\n  ".join(["examples:", *examples])
+
+
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
     """Stream, frames, profile and core."""
     stream = (

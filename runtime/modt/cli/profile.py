@@ -15,11 +15,12 @@ COMMANDS = {
     "regimes": "modt_desk.cli.profile_regimes",
 }
 """Module of each command."""
+WHAT = "Account for the energy of modt. Profiles of sensors and boards are another command's: modt profile."
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; returns the exit status: 0 success, 1 failure, 2 misuse, 130 interrupted."""
-    return dispatch("modt-profile", "Account for the energy of modt.", COMMANDS, argv)
+    return dispatch("modt-profile", WHAT, COMMANDS, argv)
 
 
 if __name__ == "__main__":

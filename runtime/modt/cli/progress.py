@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from modt.errors import install
+
 if TYPE_CHECKING:  # NumPy is imported once the process is pinned
     from modt.types import FrameResult
 
@@ -29,7 +31,7 @@ def bar(total: int | None, unit: str, *, shown: bool) -> Iterator[Callable[[str]
     try:
         from tqdm import tqdm
     except ImportError:
-        print("modt: no progress bar; pip install 'modt[progress]' to see one", file=sys.stderr)
+        print(f"modt: no progress bar; {install('progress')}", file=sys.stderr)
         yield lambda words: None
         return
     tqdm.monitor_interval = 0  # its monitor would be a second thread

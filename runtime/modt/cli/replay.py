@@ -30,6 +30,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_sink_option(p)
     p.add_argument("--labels", action="store_true", help="write point labels in SemanticKITTI's encoding")
     p.add_argument("--quiet", action="store_true", help="no progress, no summary")
+    options.add_examples(
+        p,
+        "modt replay                                        the built-in street",
+        "modt replay DRIVE --frames 0:50 --out runs/a       part of a recording",
+        "modt replay a.pcap --profile vlp-16 --sink -       packets of a Velodyne, tracks to standard output",
+    )
     p.set_defaults(run=run)
 
 

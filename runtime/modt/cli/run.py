@@ -33,6 +33,13 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--odometry", default="recording", metavar="SOURCE", help=odometry)
     p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
     p.add_argument("--metrics", type=Path, metavar="FILE", help="file of metrics for Prometheus")
+    options.add_examples(
+        p,
+        "modt run velodyne://                               a Velodyne that sends to port 2368 of this machine",
+        "modt run 'ouster://?metadata=os1.json' --view      an Ouster, shown to a browser on this machine",
+        "modt run ros2:///points --odometry ros2:///odom    topics of ROS 2",
+        "modt run 'DRIVE?loop=yes' --sink foxglove://       a recording as if it were live",
+    )
     p.set_defaults(run=run)
 
 

@@ -18,6 +18,8 @@ ENTER, LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
 HOME, END_OF_LINE, BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
 INDENT = 14 * " "
 """Of what continues a line: where its figures begin."""
+UNKNOWN = 80, 24
+"""Columns and rows of a terminal that states none, as serial lines and containers do."""
 BOLD, PLAIN = "\x1b[1m", "\x1b[0m"
 
 
@@ -30,10 +32,9 @@ class Screen:
     def show(self, lines: Sequence[str]) -> None:
         """Replace the page; the first line is bold, long ones are broken, what has no room below is cut off."""
         size = os.get_terminal_size(self._page.fileno())
-        rows = [
-            row for line in lines for row in wrap(printable(line), size.columns, subsequent_indent=INDENT) or [""]
-        ]
-        shown = f"{END_OF_LINE}{PLAIN}\r\n".join(rows[: size.lines])
+        columns, n_rows = size.columns or UNKNOWN[0], size.lines or UNKNOWN[1]
+        rows = [row for line in lines for row in wrap(printable(line), columns, subsequent_indent=INDENT) or [""]]
+        shown = f"{END_OF_LINE}{PLAIN}\r\n".join(rows[:n_rows])
         self._page.write(f"{HOME}{BOLD}{shown}{END_OF_LINE}{PLAIN}{BELOW}")
         self._page.flush()
 

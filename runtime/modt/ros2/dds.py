@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
-from modt.errors import MisuseError, ModtError
+from modt.errors import MisuseError, ModtError, install
 
 try:
     from cyclonedds.core import DDSException, ReadCondition, WaitSet
@@ -27,7 +27,7 @@ try:
 
     from modt.ros2.message_types import message_type
 except ImportError:
-    raise MisuseError("ROS 2", "needs Cyclone DDS", "pip install 'modt[ros2]', or build cyclonedds") from None
+    raise MisuseError("ROS 2", "needs Cyclone DDS", f"{install('ros2')}, or build cyclonedds") from None
 
 log = logging.getLogger(__name__)
 T = TypeVar("T")

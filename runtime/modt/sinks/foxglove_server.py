@@ -6,7 +6,7 @@ import foxglove
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sinks.scene import Scene, points_wanted
+from modt.sinks.scene import Scene
 
 BACKLOG = 16
 """Messages that may wait for a client; a slow one misses the oldest."""
@@ -37,7 +37,8 @@ def open_foxglove(address: Address) -> FoxgloveServer:
     """
     try:
         port = PORT if address.port is None else address.port
-        return FoxgloveServer(address.host or "127.0.0.1", port, points=points_wanted(address))
+        points = address.choice("points", "all", "none") == "all"
+        return FoxgloveServer(address.host or "127.0.0.1", port, points=points)
     except RuntimeError as error:
         remedy = "give a host of this machine and a free port"
         raise MisuseError(address.text, f"cannot be bound ({error})", remedy) from None

@@ -16,7 +16,7 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sinks.output import writing
-from modt.sinks.scene import Scene, points_wanted
+from modt.sinks.scene import Scene
 from modt.types import FrameResult
 
 FLUSH_S = 1.0
@@ -146,4 +146,4 @@ def open_mcap(address: Address) -> McapFile:
         max_bytes = 0.0
     if not max_bytes > 0:
         raise MisuseError(address.text, "max_mb is no size", "write max_mb=MEGABYTES")
-    return McapFile(Path(address.path), points=points_wanted(address), max_bytes=max_bytes)
+    return McapFile(Path(address.path), points=address.choice("points", "all", "none") == "all", max_bytes=max_bytes)

@@ -11,8 +11,8 @@ from modt.sinks import ros2_detections, ros2_markers, ros2_transform
 from modt.sinks.output import Health
 from modt.types import FrameResult
 
-PREFIX, FRAME_ID, WORLD_FRAME_ID = "modt", "lidar", "world"
-"""Names that an address overrules."""
+PREFIX, FRAME_ID = "modt", "lidar"
+"""Names where the address and, of the frame, the input state none."""
 Topic = tuple[Publication, Callable[[FrameResult], bytes]]
 """Where messages go, and what makes them of a frame."""
 
@@ -40,30 +40,32 @@ class Ros2Sink:
 
 
 def open_ros2(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink:
-    """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME.
+    """The sink of ros2:///PREFIX?domain=N&frame_id=NAME&world_frame_id=NAME&tracks=objects|all.
 
-    It publishes on PREFIX/detections, PREFIX/markers and /tf. An empty world_frame_id leaves /tf alone, as a robot
-    needs it whose tree of frames has the sensor's already: a frame has one parent.
+    It publishes on PREFIX/detections and PREFIX/markers, in the frame of the input cloud. With a world_frame_id it
+    publishes on /tf too; a robot whose tree of frames has the sensor's already gives none: a frame has one parent.
 
     Args:
         address: of the sink.
         cores: for Cyclone's threads, None: where the caller runs.
 
     Raises:
-        MisuseError: Cyclone DDS is not installed, or no number of a domain.
+        MisuseError: Cyclone DDS is not installed, no number of a domain, or other tracks.
         ModtError: the domain cannot be joined.
     """
     prefix = name_of(address) or PREFIX
+    background = address.choice("tracks", "objects", "all") == "all"
     joined = participant(domain_of(address), cores)
-    frame_id, world = address.option("frame_id", FRAME_ID), address.option("world_frame_id", WORLD_FRAME_ID)
+    named, world = address.option("frame_id"), address.option("world_frame_id")
 
-    def topic(name: str, kind: str, encode: Callable[..., bytes], *frames: str) -> Topic:
-        return Publication(joined, name, kind), lambda result: encode(result, *frames)
+    def topic(name: str, kind: str, encode: Callable[..., bytes], *more: object) -> Topic:
+        publication = Publication(joined, name, kind)
+        return publication, lambda result: encode(result, named or result.frame.frame_id or FRAME_ID, *more)
 
     topics = [
-        topic(f"{prefix}/detections", ros2_detections.TYPE, ros2_detections.encode, frame_id),
-        topic(f"{prefix}/markers", ros2_markers.TYPE, ros2_markers.encode, frame_id),
+        topic(f"{prefix}/detections", ros2_detections.TYPE, ros2_detections.encode, background),
+        topic(f"{prefix}/markers", ros2_markers.TYPE, ros2_markers.encode),
     ]
     if world:
-        topics.append(topic(ros2_transform.TOPIC, ros2_transform.TYPE, ros2_transform.encode, frame_id, world))
+        topics.append(topic(ros2_transform.TOPIC, ros2_transform.TYPE, ros2_transform.encode, world))
     return Ros2Sink(topics)

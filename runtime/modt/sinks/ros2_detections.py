@@ -7,21 +7,20 @@ from itertools import chain
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from modt.classes import CLASS_NAMES
+from modt.classes import CLASS_NAMES, ObjectClass
 from modt.ros2.cdr import CdrWriter, header_fields, text_fields
-from modt.types import NONE, Float64, FrameResult
+from modt.types import NONE, Float64, FrameResult, Int
 
 TYPE = "vision_msgs/Detection3DArray"
 UNKNOWN_COVARIANCE = f"{8 * 36}x"
 
 
-def encode(result: FrameResult, frame_id: str) -> bytes:
-    """Every track with a proposal, the background too: its box in the frame of the sensor, and its posterior.
+def encode(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
+    """Every object with a proposal, on request the background too: its box in the frame of the sensor, and posterior.
 
-    The first hypothesis is the class that is said.
+    The first hypothesis is the reported class.
     """
-    tracks, stamp_s = result.tracks, result.frame.stamp_s
-    rows = np.flatnonzero(tracks.proposal != NONE)
+    tracks, stamp_s, rows = result.tracks, result.frame.stamp_s, seen(result, background)
     boxes, R_level_sensor = result.proposals.box[tracks.proposal[rows]], result.frame.R_level_sensor
     posterior, said = tracks.posterior[rows], tracks.object_class[rows]
     header, header_values = header_fields(stamp_s, frame_id)
@@ -35,6 +34,12 @@ def encode(result: FrameResult, frame_id: str) -> bytes:
         cdr.record(fields, *header_values, len(results), *chain.from_iterable(results), *pose, *size)
         cdr.text(str(track))
     return cdr.message()
+
+
+def seen(result: FrameResult, background: bool = False) -> Int:
+    """Rows of the tracks with a proposal that are objects, or with `background` of all."""
+    tracks = result.tracks
+    return np.flatnonzero((tracks.proposal != NONE) & (background | (tracks.object_class != ObjectClass.BACKGROUND)))
 
 
 def _kind(header: tuple[str, ...], said: int) -> tuple[tuple[str, ...], list[tuple[int, tuple[float | bytes, ...]]]]:

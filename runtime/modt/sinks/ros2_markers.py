@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
+from modt.classes import CLASS_NAMES, CLASSES
 from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
-from modt.sinks.ros2_detections import box_poses, in_sensor_frame
-from modt.types import NONE, FrameResult
+from modt.sinks.ros2_detections import box_poses, in_sensor_frame, seen
+from modt.types import FrameResult
 
 TYPE = "visualization_msgs/MarkerArray"
 CUBE, TEXT = 1, 9
@@ -38,8 +38,7 @@ COLOURS = tuple(_rgba(spec.colour) for spec in CLASSES.values())
 
 def encode(result: FrameResult, frame_id: str) -> bytes:
     """A cube and a label for every track with a proposal that is said to be an object; those before are deleted."""
-    tracks = result.tracks
-    rows = np.flatnonzero((tracks.proposal != NONE) & (tracks.object_class != ObjectClass.BACKGROUND))
+    tracks, rows = result.tracks, seen(result)
     boxes = result.proposals.box[tracks.proposal[rows]]
     header = header_fields(result.frame.stamp_s, frame_id)
     cdr = CdrWriter()

@@ -29,11 +29,9 @@ from foxglove.messages import (
     Vector3,
 )
 
-from modt.address import Address
 from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
 from modt.energy import ledger, windows
 from modt.energy.attribution import usable
-from modt.errors import MisuseError
 from modt.geometry import quaternion_of, yaw_of
 from modt.types import NONE, FrameResult
 
@@ -52,18 +50,6 @@ _FIELDS = [
     for k, name in enumerate(("x", "y", "z", "reflectance"))
 ]
 _WHITE = Color(r=1.0, g=1.0, b=1.0, a=1.0)
-
-
-def points_wanted(address: Address) -> bool:
-    """Whether the points of the frames are asked for (`points=all`, the default) or not (`points=none`).
-
-    Raises:
-        MisuseError: another value.
-    """
-    wanted = address.option("points", "all")
-    if wanted not in ("all", "none"):
-        raise MisuseError(address.text, f"points={wanted} is unknown", "write points=all or points=none")
-    return wanted == "all"
 
 
 def _colour(class_: ObjectClass, alpha: float) -> Color:

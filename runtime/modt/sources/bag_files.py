@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 from urllib.parse import quote
 
-from modt.errors import MisuseError, ModtError
+from modt.errors import MisuseError, ModtError, install
 
 REMEDY = "give a recording by rosbag2 (.db3 or .mcap) that was closed"
 ZSTD = ".zstd"
@@ -129,7 +129,7 @@ class BagFile(ABC):
         except ModtError:
             raise
         except ImportError as error:
-            raise MisuseError(self.path, f"needs the library {error.name}", "pip install 'modt[ros2]'") from None
+            raise MisuseError(self.path, f"needs the library {error.name}", install("ros2")) from None
         except Exception as error:
             raise ModtError(self.path, f"cannot be read ({str(error) or type(error).__name__})", REMEDY) from None
 

@@ -16,6 +16,15 @@ CAPTURES = frozenset({".pcap", ".cap"})
 """Suffixes of PCAP files."""
 BAGS = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 """Suffixes of the files of ROS 2 recordings."""
+_LAS = ("is a LAS file", "convert it: pdal translate FILE scans/000000.ply, one file a sweep, and give scans")
+_ARRAY = "numpy.load(FILE)[:, :4].astype('f4').tofile('scans/000000.bin'), columns x, y, z, reflectance"
+FOREIGN = {
+    ".bag": ("is a recording of ROS 1", "convert it: pip install rosbags, then rosbags-convert"),
+    ".las": _LAS,
+    ".laz": _LAS,
+    ".npy": ("is an array of NumPy", f"convert it: {_ARRAY}"),
+}
+"""Cause and remedy by the suffix of well-known files that are not read."""
 MAX_LISTED = 5
 """Greatest number of candidates in an error message."""
 
@@ -46,6 +55,15 @@ def open_stream(path: Path, period_s: float = PERIOD_S, capture: Mapping[str, st
     return open_scans(path, period_s)
 
 
+def _refuse_foreign(path: Path) -> None:
+    """Raise MisuseError for a file that is not read, or a folder that holds such files alone."""
+    files = [p for p in (path.iterdir() if path.is_dir() else [path]) if not p.name.startswith(".")]
+    suffixes = {p.suffix.lower() for p in files}
+    if len(suffixes) == 1 and (known := FOREIGN.get(suffixes.pop())):
+        cause, remedy = known
+        raise MisuseError(path, cause if path.is_file() else f"each file in it {cause}", remedy)
+
+
 def _only(path: Path, capture: Mapping[str, str], known: Collection[str]) -> None:
     unknown = sorted(set(capture) - set(known))
     if unknown:
@@ -61,8 +79,7 @@ def open_scans(path: Path, period_s: float = PERIOD_S) -> ScanStream:
     """
     if not path.exists():
         raise MisuseError(path, "no such file or directory", REMEDY)
-    if path.suffix == ".bag":
-        raise MisuseError(path, "is a recording of ROS 1", "convert it: pip install rosbags, then rosbags-convert")
+    _refuse_foreign(path)
     path = path.resolve()
     stream = _stream(path, period_s)
     if stream is not None:

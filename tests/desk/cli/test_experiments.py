@@ -45,7 +45,7 @@ def test_without_the_extra_there_are_no_charts(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("modt_desk.cli.experiments.find_spec", lambda name: None)
     words = ["evaluate", "--experiment", "budget", "--simulated", "1", "--seconds", "0.2", "--out", str(tmp_path)]
     assert main(words) == 0
-    assert "modt[view]" in capsys.readouterr().err
+    assert ".[view]" in capsys.readouterr().err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["results.csv", "results.md"]
 
 

@@ -158,7 +158,7 @@ def test_parquet_is_the_table_of_csv(recorded, tmp_path):
 def test_parquet_names_the_extra_that_it_needs(recorded, tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     assert export(recorded[0], "--parquet", tmp_path / "a.parquet") == 2
-    assert "pip install 'modt[parquet]'" in capsys.readouterr().err
+    assert "pip install '.[parquet]'" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

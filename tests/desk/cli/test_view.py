@@ -230,7 +230,7 @@ def test_what_a_picture_or_a_film_needs_is_named(run, tmp_path):
     for more in (["--frame", 9], ["--out", tmp_path / "view.png"]):
         done = modt("view", run, *more, cwd=tmp_path, env=without)
         assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-        assert "needs matplotlib; pip install 'modt[view]'" in done.stderr
+        assert "needs matplotlib; pip install '.[view]'" in done.stderr
     pytest.importorskip("matplotlib")
     without = {**environment(), "PATH": str(tmp_path)}
     done = modt("view", run, "--out", tmp_path / "view.mp4", cwd=tmp_path, env=without)

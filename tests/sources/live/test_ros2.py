@@ -38,7 +38,7 @@ def cloud(stamp_s=5.0, frame_id="lidar", n=10):
 def test_messages_become_sweeps_and_the_frame_is_reported(caplog):
     caplog.set_level("INFO")
     reader = PointCloudReader(Scripted([cloud(5.0), cloud(5.1)], [cloud(5.2)]), "/points")
-    assert [sweep.stamp_s for sweep in reader.read(0.0)] == [5.0, 5.1]
+    assert [(sweep.stamp_s, sweep.frame_id) for sweep in reader.read(0.0)] == [(5.0, "lidar"), (5.1, "lidar")]
     assert [len(sweep.points) for sweep in reader.read(0.0)] == [10]
     assert reader.reception.frame_id == "lidar"
     assert caplog.text.count("points are in the frame 'lidar'") == 1
@@ -106,10 +106,10 @@ def test_sweeps_over_loopback_are_frames(live):
     sent = dds.Publication(dds.participant(FAR), "points", point_cloud2.TYPE)
     until(lambda: sent.receivers and live.reader._subscription.senders)
     points = np.random.default_rng(0).uniform(0, 1, (100_000, 4)).astype(np.float32)
-    sent.write(write_cloud(1000.5, "lidar", points))
+    sent.write(write_cloud(1000.5, "os_sensor", points))
     received = live.take(20.0)
     np.testing.assert_array_equal(received.frame.points, points)
-    assert received.frame.stamp_s == 1000.5
+    assert (received.frame.stamp_s, received.frame.frame_id) == (1000.5, "os_sensor")
     assert live.health()["lost_messages"] == 0
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from modt.cli.options import add_examples
 from modt.errors import MisuseError
 from modt_desk.cli import experiments
 from modt_desk.evaluation.rules import IGNORABLE
@@ -28,6 +29,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     further = "table of objects that the labels of the one drive leave out (docs/evaluation.md)"
     p.add_argument("--further", type=Path, metavar="FILE", help=further)
     experiments.add_options(p)
+    add_examples(
+        p,
+        "modt evaluate RUN DRIVE                            a run against the labels of its drive",
+        "modt evaluate RUN1 DRIVE1 RUN2 DRIVE2 --json       several together, as JSON",
+        "modt evaluate --experiment all --kitti ROOT        the paper's tables and figures",
+    )
     p.set_defaults(run=run)
 
 

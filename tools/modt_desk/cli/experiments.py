@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from modt import host
 from modt.cli import options
 from modt.cli.progress import bar
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 
 if TYPE_CHECKING:  # NumPy is imported once the process is pinned
     from modt.config import EnergyConfig
@@ -85,7 +85,7 @@ def run(arguments: argparse.Namespace) -> int:
             for experiment in experiments:
                 draw(out, experiment, [row for row in rows if row.experiment == experiment.name])
         else:
-            print("modt: no charts; pip install 'modt[view]' to have them", file=sys.stderr)
+            print(f"modt: no charts; {install('view')}", file=sys.stderr)
     print(f"{len(rows)} figures: {out / 'results.md'}, {out / 'results.csv'}")
     return 0
 

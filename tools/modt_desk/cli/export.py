@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from modt.cli import options
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 
 if TYPE_CHECKING:
     from modt.sources.stream import Stream
@@ -137,7 +137,7 @@ def _mcap(export: Export, target: Path) -> None:
     try:
         from modt.sinks.mcap_file import McapFile
     except ModuleNotFoundError as error:
-        raise MisuseError("--mcap", f"needs {error.name}", "pip install 'modt[foxglove]'") from None
+        raise MisuseError("--mcap", f"needs {error.name}", install("foxglove")) from None
     results = _with_points(export) if export.points else export.results()
     lines = export.run.ledger_lines()
     with closing(McapFile(target, points=export.points)) as file:
@@ -195,7 +195,7 @@ def _parquet(export: Export, target: Path) -> None:
     try:
         from pyarrow import csv, parquet
     except ModuleNotFoundError as error:
-        raise MisuseError("--parquet", f"needs {error.name}", "pip install 'modt[parquet]'") from None
+        raise MisuseError("--parquet", f"needs {error.name}", install("parquet")) from None
     from modt.sinks.output import writing
 
     text = target.with_suffix(".csv")

@@ -37,6 +37,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     truth = "labels to compare with, as for modt evaluate (default: those that lie with its source)"
     p.add_argument("--truth", type=Path, metavar="TRUTH", help=truth)
     p.add_argument("--out", type=Path, metavar="FILE", help=out)
+    options.add_examples(
+        p,
+        "modt view RUN                                      a page that plays the run",
+        "modt view RUN --frame 20 --out frame.png           one frame",
+        "modt view RUN --track 40                           how the class of a track was decided",
+    )
     p.set_defaults(run=run)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,7 +48,7 @@ class View:
         try:
             from modt_desk.viewer.picture import draw, new_figure
         except ModuleNotFoundError as error:
-            raise MisuseError(self.out, f"needs {error.name}", "pip install 'modt[view]'") from None
+            raise MisuseError(self.out, f"needs {error.name}", install("view")) from None
         figure, numbers = new_figure(width), self.run.numbers[self.at :][:n]
         cells = self.cells(numbers, sys.maxsize)
         for at in range(self.at, self.at + len(numbers)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from modt.classes import CLASS_NAMES
+from modt.errors import install
 from modt_desk.evaluation.evaluation import ALL, Evaluation
 
 CLASS_TABLES = (
@@ -60,7 +61,7 @@ def _lines(name: str, e: Evaluation) -> Iterator[str]:
         if rows:
             yield from _table("metrics [%], and counts", [*METRICS, *EVENTS], rows)
         elif e.metrics is None:
-            yield f"\n  {', '.join(METRICS)}, {' and '.join(EVENTS)} need trackeval: pip install '.[evaluate]'"
+            yield f"\n  {', '.join(METRICS)}, {' and '.join(EVENTS)} need trackeval: {install('evaluate')}"
 
 
 def _sector(e: Evaluation) -> str:

@@ -175,7 +175,8 @@ class LiveStream:
         used = arrival.usable and not doubt
         if flaws:
             self._fault(index, "; ".join(flaws), skipped=not used)
-        frame = Frame(index, sweep.stamp_s, sweep.points, turn_s=sweep.turn_s, steady_s=self._steady_s)
+        turn_s, steady_s, frame_id = sweep.turn_s, self._steady_s, sweep.frame_id
+        frame = Frame(index, sweep.stamp_s, sweep.points, turn_s=turn_s, steady_s=steady_s, frame_id=frame_id)
         return Received(frame, arrived_s) if used else None
 
     def _doubt(self, stamp_s: float, arrived_s: float) -> str:

@@ -7,7 +7,6 @@ from collections import deque
 from statistics import fmean
 
 from modt.address import Address
-from modt.errors import MisuseError
 from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
@@ -57,7 +56,6 @@ DEPTH = 5
 """Sweeps kept until they are read, as of ROS 2's QoS for sensors."""
 FOREIGN_FRAMES = frozenset({"map", "odom", "world", "earth", "base_link", "base_footprint"})
 """Conventional names of frames that are no sensor's (REP 105)."""
-RELIABILITIES = {"best_effort": False, "reliable": True}
 
 
 class PointCloudReader:
@@ -106,7 +104,7 @@ class PointCloudReader:
             remedy = ", not in the sensor's: subscribe to what its driver publishes" if foreign else ""
             level = logging.WARNING if foreign else logging.INFO
             log.log(level, "%s: points are in the frame %r%s", self._name, cloud.frame_id, remedy)
-        return Sweep(cloud.ahead_s or message.sent_s, cloud.points, cloud.turn_s)
+        return Sweep(cloud.ahead_s or message.sent_s, cloud.points, cloud.turn_s, frame_id=cloud.frame_id)
 
 
 def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
@@ -117,12 +115,8 @@ def open_ros2(address: Address, cores: frozenset[int] | None) -> LiveStream:
         ModtError: the domain cannot be joined.
     """
     topic = topic_of(address)
-    reliability = address.option("reliability", "best_effort")
-    if reliability not in RELIABILITIES:
-        remedy = f"use one of {', '.join(RELIABILITIES)}"
-        raise MisuseError(address.text, f"reliability {reliability!r} is unknown", remedy)
+    reliable = address.choice("reliability", "best_effort", "reliable") == "reliable"
     joined = participant(domain_of(address), cores)
-    reliable = RELIABILITIES[reliability]
     subscription = Subscription(joined, topic, TYPE, depth=DEPTH, reliable=reliable)
     info = StreamInfo(f"/{topic}", "ros2", 0, None, PERIOD_S, None, has_poses=False)
     return LiveStream(info, PointCloudReader(subscription, info.name), cores=cores)

@@ -26,7 +26,7 @@ class Sweep:
     """One turn of a sensor.
 
     Attributes:
-        stamp_s, points, turn_s: as in modt.types.Frame; points may hold values that are not finite.
+        stamp_s, points, turn_s, frame_id: as in modt.types.Frame; points may hold values that are not finite.
         complete: no message of the turn is known to be missing.
         index: of the frame in the recording that it comes from; None: count them.
     """
@@ -36,6 +36,7 @@ class Sweep:
     turn_s: float = 0.0
     complete: bool = True
     index: int | None = None
+    frame_id: str = ""
 
 
 @dataclass(slots=True)

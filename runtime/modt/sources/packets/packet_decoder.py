@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any, Protocol, Self
 
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 from modt.sources.live.sweep_reader import Reception, Sweep
 
 MAX_DRIFT = 1e-4
@@ -103,7 +103,7 @@ def extra(module: str, name: str) -> Any:
     try:
         return import_module(module)
     except ImportError as error:
-        raise MisuseError(f"extra [{name}]", f"not installed ({error})", f"pip install 'modt[{name}]'") from None
+        raise MisuseError(f"extra [{name}]", f"not installed ({error})", install(name)) from None
 
 
 def one_line(error: Exception) -> str:
