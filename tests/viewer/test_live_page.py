@@ -20,7 +20,7 @@ from tests import results
 
 from . import pages
 
-WAIT_S = 10.0
+WAIT_S = 60.0
 
 
 def ledger(frame):
