@@ -9,6 +9,8 @@ from modt import profile as profiles
 
 from .commands import modt
 
+pytestmark = pytest.mark.command
+
 MODULE = "modt.cli.profile"
 
 

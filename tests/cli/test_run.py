@@ -20,6 +20,8 @@ from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 from .commands import environment, modt
 
+pytestmark = pytest.mark.command
+
 DEADLINE_S = 60.0
 
 

@@ -16,6 +16,8 @@ import pytest
 
 from .commands import environment, modt
 
+pytestmark = pytest.mark.command
+
 DEADLINE_S = 60.0
 
 
