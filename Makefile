@@ -1,12 +1,12 @@
 # Two commands, each does its own set-up on a machine that has Python 3.11 or later and make:
 #   make replay   the whole method on the embedded stream
 #   make test     every check
-# For those who change it: `make check` (the checks short of the tests), `make format`, `make hooks` (checks at each commit).
+# For those who change it: `make quick` (the quick tests, a minute on two cores), `make check` (the checks short of the tests), `make format`, `make hooks` (checks at each commit).
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 
-.PHONY: replay test check format hooks clean
+.PHONY: replay test quick quick-one quick-other check format hooks clean
 
 replay: $(VENV)/.run
 	$(BIN)/modt replay --out runs/embedded
@@ -15,6 +15,19 @@ replay: $(VENV)/.run
 
 test: check
 	$(BIN)/python -m pytest
+
+# Tests by their markers (pyproject.toml), in two halves at a time. Tests that exchange ROS 2 messages stand in one of them.
+QUICK := $(BIN)/python -m pytest -p no:cacheprovider -m "not slow and not command and not install and not kitti"
+ONE   := tests/classification tests/desk tests/segmentation
+
+quick: $(VENV)/.test
+	$(MAKE) --no-print-directory --jobs=2 --output-sync=target quick-one quick-other
+
+quick-one: $(VENV)/.test
+	$(QUICK) $(ONE)
+
+quick-other: $(VENV)/.test
+	$(QUICK) tests $(ONE:%=--ignore=%)
 
 check: $(VENV)/.test
 	$(BIN)/ruff check .

@@ -14,6 +14,8 @@ import pytest
 
 from tests.cli.commands import environment, modt
 
+pytestmark = pytest.mark.command
+
 ROOT = Path(__file__).resolve().parents[1]
 IMPORT = r"^\s*(import|from) onnxruntime"
 VARIABLE = "ORT_DISABLE_TELEMETRY"

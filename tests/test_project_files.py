@@ -31,6 +31,20 @@ def commands(target: str) -> set[str]:
     return {line.strip() for line in rule[2].splitlines()}.union(*map(commands, needed))
 
 
+def test_make_quick_runs_every_test_once_that_none_of_its_markers_leaves_out():
+    text = (ROOT / "Makefile").read_text()
+    registered = {line.partition(":")[0] for line in pytest_options()["markers"]}
+    assert set(re.findall(r"not (\w+)", text)) == registered
+    folders = re.search(r"^ONE +:= (.*)$", text, re.MULTILINE)[1].split()
+    assert all((ROOT / folder).is_dir() for folder in folders)
+    assert commands("quick-one") == {"$(QUICK) $(ONE)"}
+    assert commands("quick-other") == {"$(QUICK) tests $(ONE:%=--ignore=%)"}
+
+
+def pytest_options():
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+
+
 def parsed(path: Path):
     return yaml.safe_load(path.read_text())
 

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +25,14 @@ raise SystemExit(main())
 """
 
 
-def loaded(*arguments: object, cwd: Path, seconds: float | None = None) -> list[str]:
-    """Modules of the project, and of SciPy, that a command has loaded at its end, or when it is stopped."""
+def loaded(*arguments: object, cwd: Path, until: Path | None = None) -> list[str]:
+    """Modules of the project, and of SciPy, that a command has loaded at its end, or when a file stops it."""
     command = [sys.executable, "-c", LOADED, *map(str, arguments)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(), cwd=cwd) as running:
-        try:
-            running.wait(seconds)
-        except subprocess.TimeoutExpired:
+        if until is not None:
+            ends_s = time.monotonic() + 60.0
+            while not until.exists() and running.poll() is None and time.monotonic() < ends_s:
+                time.sleep(0.05)
             running.send_signal(signal.SIGTERM)
         printed, _ = running.communicate(timeout=60)
     assert running.returncode == 0
@@ -51,10 +53,11 @@ def a_folder_of_scans(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arguments", "seconds"), [(("run", "velodyne://127.0.0.1:0"), 8.0), (("replay", "scans", "--quiet"), None)]
+    ("arguments", "until"),
+    [(("run", "velodyne://127.0.0.1:0"), "out/status.json"), (("replay", "scans", "--quiet"), None)],
 )
-def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, seconds, scans, tmp_path):
-    modules = loaded(*arguments, "--core", "none", "--out", "out", cwd=tmp_path, seconds=seconds)
+def test_a_robot_loads_what_it_uses_and_nothing_of_the_desk(arguments, until, scans, tmp_path):
+    modules = loaded(*arguments, "--core", "none", "--out", "out", cwd=tmp_path, until=until and tmp_path / until)
     assert "modt.pipeline" in modules
     assert [name for name in modules if name.startswith("modt_desk")] == []
     assert len(modules) <= MAX_MODULES

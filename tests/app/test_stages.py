@@ -56,14 +56,19 @@ def broken(pipeline, call, after):
     return dataclasses.replace(pipeline, **{stage: Broken(getattr(pipeline, stage), method, after)})
 
 
+@cache
+def undisturbed():
+    """Numbers of the tracks of each frame where nothing fails."""
+    stages = stages_of()
+    return {f.index: set(stages.step(f, UNLIMITED, reduced=False).tracks.id.tolist()) for f in frames()}
+
+
 @pytest.mark.parametrize("after", [False, True], ids=["before its work", "after it"])
 @pytest.mark.parametrize("call", CALLS)
 def test_a_failure_of_any_stage_costs_its_frame_and_no_track(call, after):
     stages, failures = stages_of(), 0
-    ids, whole = {}, {}
-    undisturbed = stages_of()
+    ids, whole = {}, undisturbed()
     for frame in frames():
-        whole[frame.index] = set(undisturbed.step(frame, UNLIMITED, reduced=False).tracks.id.tolist())
         pipeline = stages.pipeline
         if frame.index in (8, 9):
             stages.pipeline = broken(pipeline, call, after)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -110,12 +112,23 @@ def test_no_tracks() -> None:
     assert len(chosen.rows) == chosen.deferred == 0
 
 
+@cache
+def dozen(number: int) -> Proposals:
+    """A dozen proposals of some sizes."""
+    rng = np.random.default_rng([12, number])
+    return blobs(rng.integers(5, 300, 12).tolist(), rng)[1]
+
+
+SCENES = 400
+"""Different frames; longer drives repeat them."""
+
+
 def frames(cost: LinearCost, budget_ms: float, n: int, seed: int = 0, slow: float = 1.0) -> tuple[Float64, Int]:
     """(n,) CPU time and calls of frames in which a dozen proposals ask, on a machine of some noise."""
     rng, scheduler = np.random.default_rng(seed), Scheduler(CONFIG.worth, cost)
     times, calls = np.zeros(n), np.zeros(n, np.int64)
     for k in range(n):
-        _, proposals = blobs(rng.integers(5, 300, 12).tolist(), rng)
+        proposals = dozen((100 * seed + k) % SCENES)
         chosen = scheduler.select(new_tracks(proposals), proposals, np.ones(12, np.bool_), Budget(cpu_ms=budget_ms))
         calls[k], points = len(chosen.rows), proposals.count[chosen.rows]
         if calls[k]:
@@ -154,7 +167,7 @@ def paid_ms(mean_ms: float, n: int, period_s: float = 0.1, ask: float = 1.0, cpu
     times = np.zeros(n)
     tracks = new_tracks(blobs([20] * 12, rng)[1])
     for k in range(n):
-        _, proposals = blobs(rng.integers(5, 300, 12).tolist(), rng)
+        proposals = dozen(k % SCENES)
         asks = np.full(12, rng.random() < ask)
         rows = scheduler.select(tracks, proposals, asks, Budget(cpu_ms=cpu_ms, mean_ms=mean_ms)).rows
         if len(rows):

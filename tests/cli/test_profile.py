@@ -9,6 +9,8 @@ from modt import profile as profiles
 
 from .commands import modt
 
+pytestmark = pytest.mark.command
+
 MODULE = "modt.cli.profile"
 
 
@@ -39,27 +41,34 @@ def test_report_of_a_replay(tmp_path):
     assert tree["gross_J"]["value"] > 0
 
 
-def test_compare_runs_every_mode(tmp_path):
-    done = modt_profile("compare", "--frames", "0:4", "--repeat", 1, "--json", "--html", "page.html", cwd=tmp_path)
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory):
+    """Folder in which the modes were compared: other.json and page.html."""
+    folder = tmp_path_factory.mktemp("compared")
+    done = modt_profile("compare", "--frames", "0:8", "--repeat", 1, "--json", "--html", "page.html", cwd=folder)
     assert done.returncode == 0, done.stderr
-    tree = json.loads(done.stdout)
+    (folder / "other.json").write_text(done.stdout)
+    return folder
+
+
+def test_compare_runs_every_mode(compared):
+    tree = json.loads((compared / "other.json").read_text())
     assert set(tree["modes"]) == {"conventional", "efficient", "accurate"}
     assert tree["modes"]["conventional"]["beta"]["value"] == 1.0
     for saving in tree["savings"].values():
         changes = sum(t["change"]["value"] for t in saving["terms"])
         assert saving["gamma_short"]["value"] + changes == pytest.approx(saving["gamma_measured_cpu"]["value"])
-    page = (tmp_path / "page.html").read_text()
+    page = (compared / "page.html").read_text()
     assert len(re.findall("<svg", page)) == 8
 
 
-def test_a_prediction_is_compared_with_what_is_measured(tmp_path):
-    other = modt_profile("compare", "--frames", "0:8", "--repeat", 1, "--json", cwd=tmp_path)
-    assert other.returncode == 0, other.stderr
-    (tmp_path / "other.json").write_text(other.stdout)
+def test_a_prediction_is_compared_with_what_is_measured(compared, tmp_path):
+    other = (compared / "other.json").read_text()
+    (tmp_path / "other.json").write_text(other)
     itself = modt_profile("predict", "--calibration", "other.json", cwd=tmp_path)
     assert itself.returncode == 2
     assert "of another stream" in itself.stderr
-    calibration = json.loads(other.stdout) | {"stream": "elsewhere"}
+    calibration = json.loads(other) | {"stream": "elsewhere"}
     (tmp_path / "other.json").write_text(json.dumps(calibration))
     arguments = ("--frames", "6:12", "--calibration", "other.json", "--observe", "all", "--out", "blind.json")
     done = modt_profile("predict", *arguments, cwd=tmp_path)

@@ -11,6 +11,8 @@ from modt_desk.simulation.synthetic_stream import SyntheticStream
 
 from .commands import modt
 
+pytestmark = pytest.mark.command
+
 
 def test_what_is_shown_can_be_used(tmp_path):
     done = modt("profile", "show", "vlp-16", "raspberry-pi-5", cwd=tmp_path)

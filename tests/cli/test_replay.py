@@ -22,6 +22,8 @@ from tests.sources import layouts
 
 from .commands import begin, environment, modt
 
+pytestmark = pytest.mark.command
+
 MODES = ("conventional", "efficient", "accurate")
 FRAMES = 6
 

@@ -9,6 +9,8 @@ from tools.send.pcap_writer import write_capture
 
 from .commands import modt
 
+pytestmark = pytest.mark.command
+
 pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
 
 

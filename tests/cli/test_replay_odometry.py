@@ -20,6 +20,8 @@ from tests.sources import layouts
 
 from .commands import modt
 
+pytestmark = pytest.mark.command
+
 FRAMES = 10
 
 

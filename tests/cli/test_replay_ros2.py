@@ -19,6 +19,8 @@ from tests.sources.bags import BEGAN_S, CLOUD, ODOMETRY, write_mcap
 
 from .commands import modt
 
+pytestmark = pytest.mark.command
+
 FRAMES = 5
 
 

@@ -16,7 +16,9 @@ import pytest
 
 from .commands import environment, modt
 
-DEADLINE_S = 20.0
+pytestmark = pytest.mark.command
+
+DEADLINE_S = 60.0
 
 
 def status(rate_hz=9.96, **power):

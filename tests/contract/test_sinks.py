@@ -110,7 +110,7 @@ def test_nobody_who_reads_and_the_lines_of_the_ledger_hold_nothing_up(kind, tmp_
 
         user = threading.Thread(target=use, daemon=True)
         user.start()
-        user.join(20)
+        user.join(60)
         assert not user.is_alive()
 
 

@@ -80,6 +80,7 @@ def test_noiseless_windows_give_the_coefficients_back(tmp_path: Path) -> None:
     assert (result.windows, result.dropped) == (39, 1)  # nothing is known of a counter's power in the first one
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: Path) -> None:
     hits = dict.fromkeys(TRUE, 0)
     wraps = lost = 0

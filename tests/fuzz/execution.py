@@ -1,4 +1,4 @@
-"""One input read, within a time and a memory."""
+"""One input read, within a CPU time and a memory."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-DEADLINE_S = 10.0
+CPU_TIME_S = 10.0
+"""Limit for one input, of all threads of the process; a busy machine does not shorten it."""
+HANG_S = 120.0
+"""Wall time after which an input counts as hanging, without CPU time."""
 MEMORY_BYTES = 1 << 30
 """Beyond what the process has when the reading begins."""
 
@@ -40,7 +43,8 @@ class Finding:
 
 def execute(call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Exception], ...]) -> Finding | None:
     """Read an input; None where it was read or refused."""
-    signal.setitimer(signal.ITIMER_REAL, DEADLINE_S)
+    signal.setitimer(signal.ITIMER_PROF, CPU_TIME_S)
+    signal.setitimer(signal.ITIMER_REAL, HANG_S)
     try:
         call(raw)
     except refusals:
@@ -52,20 +56,22 @@ def execute(call: Callable[[bytes], object], raw: bytes, refusals: tuple[type[Ex
         said = f"{type(error).__name__}: {error}"[:200]
         return Finding(said, place, raw, "".join(traceback.format_exception(error))[-4000:])
     finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
         signal.setitimer(signal.ITIMER_REAL, 0)
     return None
 
 
 @contextmanager
 def limits() -> Iterator[None]:
-    """The deadline and the memory limit; warnings are errors."""
+    """The limits of CPU time, wall time and memory; warnings are errors."""
 
-    def late(_: int, __: FrameType | None) -> None:
-        raise DeadlineError(f"longer than {DEADLINE_S:g} s")
+    def late(number: int, _: FrameType | None) -> None:
+        limit = f"{CPU_TIME_S:g} s of CPU time" if number == signal.SIGPROF else f"{HANG_S:g} s"
+        raise DeadlineError(f"longer than {limit}")
 
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    handler = signal.signal(signal.SIGALRM, late)
+    handlers = {number: signal.signal(number, late) for number in (signal.SIGPROF, signal.SIGALRM)}
     try:
         resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY_BYTES, hard))
         with warnings.catch_warnings():
@@ -73,4 +79,5 @@ def limits() -> Iterator[None]:
             yield
     finally:
         resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-        signal.signal(signal.SIGALRM, handler)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)

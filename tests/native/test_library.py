@@ -28,6 +28,7 @@ def test_instructions_of_a_processor():
     assert library.instructions("") == BASELINE
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="one set of instructions elsewhere")
 def test_the_library_fits_the_processor(compiled, tmp_path):
     for text, kind in ((MODERN, X86_64_V3), ("flags : sse2\n", BASELINE)):

@@ -16,7 +16,7 @@ LOOPBACK = (
     "<Discovery><ExternalDomainId>203</ExternalDomainId><ParticipantIndex>auto</ParticipantIndex>"
     '<Peers><Peer address="127.0.0.1"/></Peers></Discovery></Domain></CycloneDDS>'
 )
-DEADLINE_S = 20.0
+DEADLINE_S = 60.0
 
 
 @pytest.fixture

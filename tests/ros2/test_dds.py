@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -34,9 +35,9 @@ def test_a_message_arrives_byte_for_byte_with_the_time_of_its_sending():
     points = np.random.default_rng(0).uniform(0, 1, (5000, 4)).astype(np.float32)
     raw = write_cloud(12.5, "lidar", points)
     assert sent.write(raw)
-    (message,) = received.take(10.0)
+    (message,) = received.take(60.0)
     assert message.data == raw
-    assert message.sent_s == pytest.approx(time.time(), abs=20)
+    assert message.sent_s == pytest.approx(time.time(), abs=60)
     np.testing.assert_array_equal(read_cloud(message.data).points, points)
 
 
@@ -81,8 +82,8 @@ def test_the_threads_of_a_domain_run_where_they_are_told():
     before = threads()
     joined = dds.participant(NEAR - 1, frozenset(allowed[:1]))
     begun = threads() - before
-    until(lambda: {"recv", "tev"} <= {(Path("/proc/self/task") / t / "comm").read_text().strip() for t in begun})
-    assert {frozenset(os.sched_getaffinity(int(thread))) for thread in begun} == {frozenset(allowed[:1])}
+    until(lambda: {"recv", "tev"} <= {name for name, _ in alive(begun)})
+    assert {cores for _, cores in alive(begun)} == {frozenset(allowed[:1])}
     assert sorted(os.sched_getaffinity(0)) == allowed
     assert dds.participant(NEAR - 1) is joined
 
@@ -111,3 +112,13 @@ def test_a_small_socket_buffer_is_warned_of(monkeypatch, tmp_path, caplog):
 
 def threads() -> set[str]:
     return set(os.listdir("/proc/self/task"))
+
+
+def alive(begun: set[str]) -> list[tuple[str, frozenset[int]]]:
+    """Names and cores of those threads that have not ended, as the one that joins a domain does."""
+    found = []
+    for thread in begun:
+        with suppress(FileNotFoundError, ProcessLookupError):
+            name = (Path("/proc/self/task") / thread / "comm").read_text().strip()
+            found.append((name, frozenset(os.sched_getaffinity(int(thread)))))
+    return found

@@ -89,6 +89,7 @@ def street(seed, n):
     return points
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000), n=st.integers(0, 3000), front=st.booleans())
 @settings(max_examples=80, deadline=None)
 def test_random_sweeps(kernels, seed, n, front):

@@ -71,6 +71,7 @@ def test_few_points_fit_any_profile():
     assert recognise(points, profile.load()).differences == ()
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), st.integers(0, 20_000), st.floats(1e-3, 200.0), st.floats(1e-3, 200.0))
 @settings(max_examples=30)
 def test_any_cloud_is_recognised_or_not_but_no_error(seed, n, reach_m, rise_m):

@@ -8,7 +8,7 @@ from hypothesis import Phase, settings
 pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
 from tests.sequences.live_machine import LiveSequences
 
-TestLiveSequences = LiveSequences.TestCase
+TestLiveSequences = pytest.mark.slow(LiveSequences.TestCase)
 TestLiveSequences.settings = settings(
     max_examples=15, stateful_step_count=12, phases=(Phase.generate,), derandomize=True
 )

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import Phase, settings
 
 from modt.types import UNLIMITED, Frame
 from tests.sequences.machine import Sequences
 from tests.sequences.promises import Run, config
 
-TestSequences = Sequences.TestCase
+TestSequences = pytest.mark.slow(Sequences.TestCase)
 TestSequences.settings = settings(max_examples=40, stateful_step_count=15, phases=(Phase.generate,))
 
 

@@ -9,7 +9,7 @@ from modt.errors import ModtError
 from modt.sinks.background import Background
 from modt.sinks.output import LedgerSink
 
-LIMIT_S = 10.0
+LIMIT_S = 60.0
 
 
 class Slow:

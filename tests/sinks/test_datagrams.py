@@ -22,7 +22,7 @@ def many(n):
 def receiver(request, tmp_path):
     family = socket.AF_INET if request.param == "udp" else socket.AF_UNIX
     with socket.socket(family, socket.SOCK_DGRAM) as bound:
-        bound.settimeout(10.0)
+        bound.settimeout(60.0)
         if request.param == "udp":
             bound.bind(("127.0.0.1", 0))
             yield bound, f"udp://127.0.0.1:{bound.getsockname()[1]}"
@@ -96,7 +96,7 @@ def test_a_receiver_that_comes_leaves_and_comes_back(tmp_path, caplog):
         if there:
             with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as bound:
                 bound.bind(str(path))
-                bound.settimeout(10.0)
+                bound.settimeout(60.0)
                 sink.write(FRAME)
                 assert bound.recv(1 << 17).decode() == frame_line(FRAME)
             assert sink.health()["state"] == "ok"

@@ -6,7 +6,7 @@ from modt.sinks.output import close_together, replace_file
 
 
 def test_sinks_that_hang_are_closed_together():
-    meeting = threading.Barrier(3, timeout=10.0)
+    meeting = threading.Barrier(3, timeout=60.0)
 
     class Hanging:
         def close(self):

@@ -60,6 +60,7 @@ def test_the_profile_says_what_is_kept(tmp_path, keep):
     assert {p.name for p in (tmp_path / "run").iterdir()} == {"run.yaml", *KEPT[keep]}
 
 
+@pytest.mark.slow
 def test_all_parts_together_stay_within_the_limit_and_the_newest_lines_are_there(tmp_path):
     for start in range(2):  # over a restart as well
         recording = made(tmp_path, disk_mb=1.0)

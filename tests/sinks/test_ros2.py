@@ -120,10 +120,10 @@ def test_a_frame_is_published_to_whom_has_subscribed(loopback):
     until(lambda: all(publication.receivers for publication, _ in sink._topics))
     until(lambda: all(subscription.senders for subscription in seen.values()))
     sink.write(FRAMES[1])
-    assert [m.data for m in seen[ros2_detections.TYPE].take(20.0)] == [ros2_detections.encode(FRAMES[1], "velodyne")]
-    assert [m.data for m in seen[ros2_markers.TYPE].take(20.0)] == [ros2_markers.encode(FRAMES[1], "velodyne")]
+    assert [m.data for m in seen[ros2_detections.TYPE].take(60.0)] == [ros2_detections.encode(FRAMES[1], "velodyne")]
+    assert [m.data for m in seen[ros2_markers.TYPE].take(60.0)] == [ros2_markers.encode(FRAMES[1], "velodyne")]
     transform = ros2_transform.encode(FRAMES[1], "velodyne", "map")
-    assert [m.data for m in seen[ros2_transform.TYPE].take(20.0)] == [transform]
+    assert [m.data for m in seen[ros2_transform.TYPE].take(60.0)] == [transform]
     assert sink.health() == {"unsent": 0}
     sink.close()
     sink.write(FRAMES[0])

@@ -180,7 +180,7 @@ def test_a_recording_may_be_read_by_another_thread_than_began(write, tmp_path):
     rest = [next(frames)]
     reader = threading.Thread(target=lambda: rest.extend(frames))
     reader.start()
-    reader.join(20.0)
+    reader.join(60.0)
     assert [frame.index for frame in rest] == [0, 1, 2, 3]
 
 

@@ -202,6 +202,7 @@ def test_silence_of_the_sender_is_no_lie(robot):
     assert sum(robot.odometry.refused.values()) == 0
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(
     seed=st.integers(0, 2**32 - 1),

@@ -127,6 +127,7 @@ def test_another_scene_after_a_gap_inherits_nothing(posed):
     assert abs(len(after[-1]) - len(before)) < 0.1 * len(before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("posed", [True, False])
 def test_every_other_sweep_missing_keeps_the_tracks(posed):
     whole, halved = pipeline(), pipeline()

@@ -75,14 +75,15 @@ class Certainty:
     """
 
     def __init__(self, config: FusionConfig, background_threshold: float) -> None:
-        self._log_frequency = log_frequency_of(config)
+        self._frequency = np.exp(log_frequency_of(config))
         self._object, self._background = config.object_threshold, background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
         """(R,) of posteriors (R, 4)."""
         objects: Bool = posterior[:, 1:].max(axis=1, initial=0.0) >= self._object
-        evidence = from_log_weights(_log(posterior) - self._log_frequency)[:, 0]
-        return objects | (evidence >= self._background)
+        evidence = posterior / self._frequency
+        background: Bool = evidence[:, ObjectClass.BACKGROUND] >= self._background * evidence.sum(axis=1)
+        return objects | background
 
 
 class EveryFrame:
@@ -153,7 +154,7 @@ class FusedTracks:
         known = self._log_frequency + weight * tracks.evidence.take(rows, axis=0)
         known += BOX_WEIGHT * tracks.box_evidence.take(rows, axis=0) + tracks.witness.take(rows, axis=0)
         posterior = (1.0 - MISMATCH_PROBABILITY) * from_log_weights(known)
-        posterior += MISMATCH_PROBABILITY * normalise(tracks.prior.take(rows, axis=0))
+        posterior += MISMATCH_PROBABILITY * tracks.prior.take(rows, axis=0)
         tracks.posterior[rows] = np.where(tracks.inherited[rows, None], _BACKGROUND, posterior)
 
 
@@ -199,7 +200,9 @@ class FurtherViews(FusedTracks):
 
 def _expected(tracks: Tracks) -> Float64:
     """(M, 4) P(class | box, motion)."""
-    return normalise(tracks.prior * np.exp(tracks.witness))
+    weighed = tracks.prior * np.exp(tracks.witness)
+    expected: Float64 = weighed / weighed.sum(axis=1, keepdims=True)
+    return expected
 
 
 def _log(probability: Float64) -> Float64:

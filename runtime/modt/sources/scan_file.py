@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
     """
     try:
         with path.open("rb") as file:
-            raw = file.read(MAX_BYTES + 1)
+            raw = file.read(min(os.fstat(file.fileno()).st_size, MAX_BYTES) + 1)  # a buffer of what there is
     except OSError as error:
         raise ScanError(path, f"cannot be read ({error.strerror})", "the frame is skipped") from None
     if not raw:

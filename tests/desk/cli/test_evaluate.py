@@ -8,6 +8,8 @@ import pytest
 from tests.cli.commands import modt
 from tests.viewer.chromium import LOADED, WIDE
 
+pytestmark = pytest.mark.command
+
 COLUMNS = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
 DAY = "2020_01_01/2020_01_01_drive_0000_sync"
 

@@ -7,6 +7,8 @@ import pytest
 from modt.cli.main import main
 from modt_desk.experiments.catalogue.budget import BUDGETS, CONVENTIONAL
 
+pytestmark = pytest.mark.command
+
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):

@@ -7,6 +7,8 @@ from modt import profile
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import modt
 
+pytestmark = pytest.mark.command
+
 
 @pytest.fixture(scope="module", name="scans")
 def scans_of_a_puck(tmp_path_factory):

@@ -19,6 +19,8 @@ from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.viewer.chromium import LOADED, WIDE
 from tests.viewer.pages import Page
 
+pytestmark = pytest.mark.command
+
 FRAMES = 12
 
 

@@ -46,6 +46,7 @@ def agree(frames):
     assert (tracks.discontinuities, tracks.mis_associations) == expected[2:]
 
 
+@pytest.mark.slow
 def test_a_synthetic_drive():
     stream = SyntheticStream("street", "vlp-16", 1.5, seed=3)
     truths = {}

@@ -29,6 +29,7 @@ def test_a_segmented_drive_keeps_the_points_that_matter():
         assert len(made.frame.points) < len(frame.points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hdl-64e", "paper"])
 def test_a_replay_of_the_points_that_matter_is_judged_as_the_whole_sweeps_are(name):
     config = load(name)

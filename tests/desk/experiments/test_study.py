@@ -24,6 +24,7 @@ def test_drives_and_profiles_have_tasks_of_their_own():
     assert len(study.tasks()) == 4 * len(Study(study.experiments, study.drives[:1], [()], {}).tasks())
 
 
+@pytest.mark.slow
 def test_a_drive_is_segmented_once_for_each_profile():
     _segmented.cache_clear()
     done = []

@@ -1,6 +1,7 @@
 """Profiles from recordings: the keys besides the beams."""
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,10 +19,17 @@ from tests.sensor_fit.recordings import recording, with_mast, with_scale
 PROFILES = [path.stem for path in sorted(assets.folder("profiles").glob("*.yaml"))]
 
 
+@cache
+def fitted(name, scene="street"):
+    """Profile and findings of a recording as it is."""
+    config, findings = fit(recording(name, scene))
+    return config, tuple(findings)
+
+
 @pytest.mark.parametrize("scene", ["street", "hall"])
 @pytest.mark.parametrize("name", ["vlp-16", "hdl-64e", "pandar64", "mid-360"])
 def test_the_height_is_found(name, scene):
-    config, _ = fit(recording(name, scene))
+    config, _ = fitted(name, scene)
     assert config.sensor.height_m == pytest.approx(sensor(name).height_m, abs=0.1)
 
 
@@ -41,7 +49,7 @@ def test_a_mast_of_the_robot_is_a_blind_sector():
     assert first == pytest.approx(145, abs=3)
     assert last == pytest.approx(155, abs=3)
     assert 1.9 < config.sensor.blind_range_m < 2.3
-    assert fit(recording("vlp-16", "street"))[0].sensor.blind_sectors_deg is None
+    assert fitted("vlp-16")[0].sensor.blind_sectors_deg is None
 
 
 def test_a_recording_that_stands_still_does_not_tell_the_robot_from_what_is_around_it():
@@ -53,7 +61,7 @@ def test_a_recording_that_stands_still_does_not_tell_the_robot_from_what_is_arou
 
 @pytest.mark.parametrize(("name", "scale"), [("hdl-64e", "hdl-64e"), ("vlp-16", "none")])
 def test_the_scale_of_the_reflectance_is_found(name, scale):
-    assert fit(recording(name))[0].sensor.reflectance == scale
+    assert fitted(name)[0].sensor.reflectance == scale
 
 
 @pytest.mark.parametrize(("name", "scale"), [("pandar64", "pandar64"), ("vlp-16", "none")])

@@ -59,6 +59,7 @@ def test_a_plane_is_met_where_geometry_says(slope):
     assert np.all(np.isinf(distance[expected < 0]))
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(
     lift=st.floats(0.0, 3.0),

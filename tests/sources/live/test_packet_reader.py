@@ -7,7 +7,6 @@ import threading
 import time
 from contextlib import suppress
 
-import numpy as np
 import pytest
 
 from modt.errors import MisuseError
@@ -40,8 +39,8 @@ def to(port):
 
 
 def now():
-    """A time within some seconds of the present one."""
-    return pytest.approx(time.time(), abs=5.0)
+    """A time within a minute of the present one."""
+    return pytest.approx(time.time(), abs=60.0)
 
 
 class EchoDecoder:
@@ -63,7 +62,7 @@ def test_a_group_is_joined_and_what_is_none_is_refused(port):
     reader = PacketReader(bound_socket("sensor", port, "239.7.7.7"), EchoDecoder())
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(b"packet", ("239.7.7.7", port))
-    assert reader.read(5.0) == [(now(), b"packet")]
+    assert reader.read(60.0) == [(now(), b"packet")]
     reader.close()
     for group in ("10.0.0.1", "nowhere"):
         with pytest.raises(MisuseError, match=f"group {group} cannot be joined"):
@@ -73,7 +72,7 @@ def test_a_group_is_joined_and_what_is_none_is_refused(port):
 def test_what_is_received_from_the_sensor_is_decoded_at_once(port, to):
     reader = PacketReader(bound_socket("sensor", port), EchoDecoder(), "127.0.0.1")
     to.send(b"packet")
-    assert reader.read(5.0) == [(now(), b"packet")]
+    assert reader.read(60.0) == [(now(), b"packet")]
     assert reader.read(0.0) == []
     reader.close()
     assert (reader.reception.messages, reader.reception.refused) == (1, {})
@@ -81,15 +80,16 @@ def test_what_is_received_from_the_sensor_is_decoded_at_once(port, to):
 
 def test_packets_are_as_of_when_the_kernel_received_them(port, to):
     reader = PacketReader(bound_socket("sensor", port), EchoDecoder())
-    for _ in range(20):  # the kernel begins to take times a little after it was asked to
-        to.send(b"packet")
+    for _ in range(100):  # the kernel begins to take times a little after it was asked to
         sent_s = time.time()
-        time.sleep(0.3)
-        ((received_s, _),) = reader.read(5.0)
-        if received_s - sent_s < 0.2:
+        to.send(b"packet")
+        time.sleep(0.05)
+        read_s = time.time()
+        ((received_s, _),) = reader.read(60.0)
+        if received_s < read_s:
             break
     reader.close()
-    assert abs(received_s - sent_s) < 0.2
+    assert sent_s <= received_s < read_s
 
 
 def test_packets_that_waited_for_a_stopped_process_are_discarded(port, to, caplog):
@@ -99,7 +99,7 @@ def test_packets_that_waited_for_a_stopped_process_are_discarded(port, to, caplo
     assert reader.read(0.2) == []
     later_s[0] = 0.0
     to.send(b"new")
-    assert [payload for _, payload in reader.read(5.0)] == [b"new"]
+    assert [payload for _, payload in reader.read(60.0)] == [b"new"]
     reader.close()
     assert sum(reader.reception.refused.values()) == 1
     assert "packet refused: late: this process was stopped" in caplog.text
@@ -122,7 +122,7 @@ def test_a_packet_that_the_decoder_fails_at_costs_itself(port, to, caplog):
     live.start()
     for payload in (b"first", b"poison", b"poison", b"last"):
         to.send(payload)
-    until_s = time.monotonic() + 10
+    until_s = time.monotonic() + 60
     while len(got) < 2 and time.monotonic() < until_s:
         time.sleep(0.01)
     live.close()
@@ -152,7 +152,7 @@ def test_closing_ends_a_read(port):
     thread.start()
     while not ended.wait(0.05) and reader._socket.fileno() >= 0:
         reader.close()
-    assert ended.wait(5.0)
+    assert ended.wait(60.0)
     thread.join()
 
 
@@ -172,22 +172,38 @@ def test_what_cannot_be_bound_or_found_is_refused(port):
         address_of("sensor", "nowhere.invalid")
 
 
-def received(address, timed, to):
-    """Sweeps taken from a live stream while a sensor sends."""
-    live = open_sensor(address)
-    live.start()
-    sender = threading.Thread(target=send, args=(timed, to))
-    sender.start()
-    frames, until_s = [], time.monotonic() + 30
-    while (sender.is_alive() or live.health()["messages"] < len(timed)) and time.monotonic() < until_s:
-        taken = live.take(0.5)
-        if taken is not None:
+def received(address, timed, to, n):
+    """The first n sweeps of a live stream, its packets with the times of their reception, and the closed stream.
+
+    Each packet is sent when the one before has been received, and nothing counts as late on a busy machine.
+    """
+    live, arrived, frames = open_sensor(address), [], []
+    live._clock = live.reader._clock = lambda: 0.0
+    decode = live.reader.decoder.decode
+
+    def noted(received_s, payload, reception):
+        arrived.append((received_s, payload))
+        return decode(received_s, payload, reception)
+
+    def take(timeout_s):
+        if (taken := live.take(timeout_s)) is not None:
             frames.append(taken.frame)
-    while (taken := live.take(0.3)) is not None:
-        frames.append(taken.frame)
-    sender.join()
+
+    def one_by_one():
+        until_s = time.monotonic() + 120
+        for k, packet in enumerate(timed, 1):
+            yield packet
+            while live.health()["messages"] < k and time.monotonic() < until_s:
+                time.sleep(0.0002)
+            take(0.0)
+
+    live.reader.decoder.decode = noted
+    live.start()
+    send(one_by_one(), to)
+    for _ in range(n - len(frames)):
+        take(60.0)
     live.close()
-    return frames, live
+    return frames, arrived, live
 
 
 def test_sweeps_over_loopback_are_those_of_the_file(port, to, tmp_path):
@@ -195,11 +211,15 @@ def test_sweeps_over_loopback_are_those_of_the_file(port, to, tmp_path):
     timed = packets()
     write_capture(tmp_path / "drive.pcap", timed, port)
     began_s = timed[0][0]
-    frames, live = received(f"velodyne://127.0.0.1:{port}", [(at_s - began_s, p) for at_s, p in timed], to)
     file = list(open_capture(tmp_path / "drive.pcap", {}))
+    timed = [(at_s - began_s, payload) for at_s, payload in timed]
+    frames, arrived, live = received(f"velodyne://127.0.0.1:{port}", timed, to, len(file))
     assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in file]
-    assert np.diff([f.stamp_s for f in frames]) == pytest.approx(np.diff([f.stamp_s for f in file]), abs=0.02)
-    assert abs(frames[-1].stamp_s - time.time()) < 30
+    decoder, sweeps = VelodyneDecoder("alone"), []
+    for received_s, payload in arrived:
+        sweeps += decoder.decode(received_s, payload, Reception())
+    assert [f.stamp_s for f in frames[: len(sweeps)]] == [s.stamp_s for s in sweeps[: len(frames)]]
+    assert frames[-1].stamp_s == now()
     assert live.reader.profile == "vlp-16"
     health = live.health()
     assert (health["messages"], health["lost_messages"], health["refused_messages"]) == (len(timed), 0, {})
@@ -212,8 +232,9 @@ def test_an_ouster_over_loopback_is_that_of_the_file(port, to, kitti_root):
     metadata = kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10.json"
     stream = open_capture(kitti_root / "ouster" / "OS-1-128_v2.3.0_1024x10_lb_n3.pcap", {"metadata": str(metadata)})
     timed = [(0.0016 * k, d.payload) for k, d in enumerate(stream.capture)]
-    frames, live = received(f"ouster://127.0.0.1:{port}?metadata={metadata}", timed, to)
-    assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in stream]
+    file = list(stream)
+    frames, _, live = received(f"ouster://127.0.0.1:{port}?metadata={metadata}", timed, to, len(file))
+    assert [f.points.tobytes() for f in frames] == [f.points.tobytes() for f in file]
     assert live.info.profile == "os1-128"
     assert live.reader.reception.lost == 0
 
