@@ -96,6 +96,8 @@ def test_a_row_is_had_by_its_index_and_by_iteration(frames):
     for beyond in (len(rows), -len(rows) - 1):
         with pytest.raises(IndexError):
             found[beyond]
+    with pytest.raises(TypeError):
+        found[0:2]  # several rows: take
 
 
 def test_the_text_of_results_is_one_short_line(frames):

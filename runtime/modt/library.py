@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
+from operator import index
 from typing import Any, Self
 
 import numpy as np
@@ -65,7 +66,7 @@ class TrackedObjects:
 
     def __getitem__(self, row: int) -> dict[str, Any]:
         """One row, as of as_dicts; also what iteration yields."""
-        return self.take(np.array([range(len(self))[row]])).as_dicts()[0]
+        return self.take(np.array([range(len(self))[index(row)]])).as_dicts()[0]
 
     def __repr__(self) -> str:
         counts = np.bincount(self.object_class, minlength=len(CLASS_NAMES)).tolist()
