@@ -2,11 +2,13 @@
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -104,6 +106,20 @@ def test_a_recording_runs_to_its_end_with_every_sweep_recorded(scans, tmp_path):
     exported = modt("export", tmp_path / "run", "--mcap", tmp_path / "run.mcap", cwd=tmp_path)
     assert exported.returncode == 0, exported.stderr
     assert (tmp_path / "run.mcap").stat().st_size > 15 * 100_000  # with the points
+
+
+def test_a_reload_before_it_is_ready_does_not_end_it(scans, start):
+    service = start(f"{scans}?loop=yes", "--profile", "vlp-16")
+    status = Path(f"/proc/{service.process.pid}/status")
+    hup, ignored = 1 << (signal.SIGHUP - 1), False
+    while not ignored:
+        ignored, handled = (
+            bool(int(mask, 16) & hup) for mask in re.findall(r"Sig(?:Ign|Cgt):\t(\w+)", status.read_text())
+        )
+        assert not handled
+    service.process.send_signal(signal.SIGHUP)
+    service.hear("READY=1")
+    assert service.end()[0] == 0
 
 
 def test_what_systemd_is_told_and_a_reload(scans, start, tmp_path):
