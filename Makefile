@@ -18,7 +18,7 @@ test: check
 
 # Tests by their markers (pyproject.toml), in two halves at a time. Tests that exchange ROS 2 messages stand in one of them.
 QUICK := $(BIN)/python -m pytest -p no:cacheprovider -m "not slow and not command and not install and not kitti"
-ONE   := tests/classification tests/desk tests/segmentation
+ONE   := tests/app tests/classification tests/desk tests/segmentation tests/sensor_fit
 
 quick: $(VENV)/.test
 	$(MAKE) --no-print-directory --jobs=2 --output-sync=target quick-one quick-other

@@ -195,6 +195,7 @@ def test_failures_are_counted_by_kind_and_fatal_only_in_a_row(caplog):
     assert len(caplog.records) == 1
 
 
+@pytest.mark.slow
 def test_another_sensor_is_noticed_and_followed(caplog):
     stages, before = stages_of(profile=None), next(iter(SyntheticStream("street", "hdl-64e", 0.1, 0)))
     stages.recognise(before)

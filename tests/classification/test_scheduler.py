@@ -137,6 +137,7 @@ def frames(cost: LinearCost, budget_ms: float, n: int, seed: int = 0, slow: floa
     return times, calls
 
 
+@pytest.mark.slow
 @given(call=st.floats(0.01, 1.0), point=st.floats(1e-4, 1e-2), frame=st.floats(0.0, 1.0), seed=st.integers(0, 100))
 def test_cost_model_converges(call: float, point: float, frame: float, seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -152,6 +152,7 @@ def sampled(random: np.random.Generator, power_W: np.ndarray) -> Iterator[float 
         rest -= 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [Kind.MEASURED, Kind.INTEGRATED])
 def test_no_joule_is_invented_and_none_is_lost_unmarked(kind: Kind) -> None:
     """Over 1,000 random meters: each interval with energy has the true one, each other a cause, and most have it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import struct
 import tracemalloc
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -36,9 +37,9 @@ def made(folder: Path, maker: str, seed: int) -> Path:
     return path
 
 
-def findings(folder: Path, maker: str, n: int) -> list[str]:
+def findings(folder: Path, maker: str, seeds: Iterable[int]) -> list[str]:
     found = []
-    for seed in range(n):
+    for seed in seeds:
         path = made(folder, maker, seed)
         if path.stat().st_size <= 2 * hostile.MOST_BYTES:
             with limits():
@@ -51,13 +52,13 @@ def findings(folder: Path, maker: str, n: int) -> list[str]:
 
 @pytest.mark.parametrize("maker", hostile.MAKERS)
 def test_a_hostile_recording_is_read_or_refused(maker: str, tmp_path: Path) -> None:
-    assert findings(tmp_path, maker, FEW) == []
+    assert findings(tmp_path, maker, range(FEW)) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("maker", hostile.MAKERS)
 def test_many_hostile_recordings_are_read_or_refused(maker: str, tmp_path: Path) -> None:
-    assert findings(tmp_path, maker, MANY) == []
+    assert findings(tmp_path, maker, range(FEW, MANY)) == []
 
 
 @pytest.mark.parametrize("schema", range(len(hostile.SCHEMAS)))

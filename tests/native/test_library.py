@@ -37,6 +37,7 @@ def test_the_library_fits_the_processor(compiled, tmp_path):
     assert library.load(compiled, tmp_path / "missing")[1] == BASELINE
 
 
+@pytest.mark.slow
 def test_a_library_of_other_sources_is_refused(compiled, tmp_path, monkeypatch):
     monkeypatch.setattr(build, "source_hash", lambda: "of a later version")
     with pytest.raises(library.NotAvailableError, match="compiled from other sources; install modt again"):

@@ -60,6 +60,7 @@ def test_only_tracks_alive_are_held():
     assert lives.totals(foreground_only=False) == (50, 50)
 
 
+@pytest.mark.slow
 def test_memory_is_bounded_in_a_long_run():
     summary, held = Summary(), []
     for frame in range(3 * MAX_EXACT):

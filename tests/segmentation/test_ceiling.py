@@ -53,6 +53,7 @@ def found_of(scene, sensor, height_m, config):
     return people, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sensor", "height_m"), [("vlp-16", 0.8), ("os1-64", 0.5), ("mid-360", 0.3)])
 def test_people_under_a_low_ceiling_are_found_by_the_profile_of_the_sensor(sensor, height_m):
     config = load(sensor).segmentation

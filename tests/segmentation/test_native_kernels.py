@@ -97,6 +97,7 @@ def test_random_sweeps(kernels, seed, n, front):
     both(kernels, street(seed, n), sensor, FRONT if front else None)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000), share=st.floats(0, 1))
 @settings(max_examples=80, deadline=None)
 def test_hostile_sweeps(kernels, seed, share):

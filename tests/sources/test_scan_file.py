@@ -102,6 +102,7 @@ def test_an_invalid_scan_is_refused_with_its_cause(tmp_path, content, cause):
     assert str(path) in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_file_that_no_sweep_fills_is_refused_unread(tmp_path):
     path = tmp_path / "0.bin"
     with path.open("wb") as file:

@@ -115,6 +115,7 @@ def sweeps(seed, seconds=1.0, start_s=0.0, posed=True):
         yield dataclasses.replace(frame, stamp_s=start_s + frame.stamp_s, T_world_sensor=pose)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("posed", [True, False])
 def test_another_scene_after_a_gap_inherits_nothing(posed):
     pipe = pipeline()

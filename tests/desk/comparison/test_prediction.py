@@ -120,6 +120,7 @@ def test_it_misses_where_tracking_costs_twice_as_much() -> None:
     assert not covers(predicted(), measured(dear)).any()
 
 
+@pytest.mark.slow
 def test_the_first_third_stands_for_the_whole() -> None:
     """All tracks of the first frame are new: the rate of the others is what goes on."""
     third, whole = predicted(share=1 / 3), predicted(share=1.0)

@@ -74,6 +74,7 @@ def test_drives_are_pooled_and_their_identities_kept_apart():
     assert found.metrics["car"]["HOTA"] == pytest.approx(1)
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from([None, 1, 2, 3]), min_size=1, max_size=12))
 def test_life_agrees_with_the_definition(history):
     found = tracked(history, ["-"] * len(history))

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from modt.profile import load
 from modt_desk.experiments.catalogue.figures import ObjectLives
@@ -10,6 +11,7 @@ from tests.desk.experiments.drives import short_drives
 DRIVE = short_drives(1, frames=6)[0]
 
 
+@pytest.mark.slow
 def test_the_ideal_tracker_never_breaks_a_life_that_it_follows():
     ideal = NetworkReplay(load("hdl-64e"), ideal=True).judged(DRIVE)
     found = ideal.objects[ideal.objects["outcome"] == 0]

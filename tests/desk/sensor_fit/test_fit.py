@@ -26,6 +26,7 @@ def fitted(name, scene="street"):
     return config, tuple(findings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["street", "hall"])
 @pytest.mark.parametrize("name", ["vlp-16", "hdl-64e", "pandar64", "mid-360"])
 def test_the_height_is_found(name, scene):
@@ -33,6 +34,7 @@ def test_the_height_is_found(name, scene):
     assert config.sensor.height_m == pytest.approx(sensor(name).height_m, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_period_is_the_median_step_of_the_stamps():
     recorded = recording("vlp-16")
     stamps_s = np.cumsum(np.random.default_rng(0).normal(0.1, 0.002, 30)).tolist()
@@ -43,6 +45,7 @@ def test_the_period_is_the_median_step_of_the_stamps():
     assert any("period_s" in doubt for doubt in doubts(findings))
 
 
+@pytest.mark.slow
 def test_a_mast_of_the_robot_is_a_blind_sector():
     config, _ = fit(with_mast(recording("vlp-16", "street"), 150.0, 1.9))
     first, last = config.sensor.blind_sectors_deg
@@ -59,11 +62,13 @@ def test_a_recording_that_stands_still_does_not_tell_the_robot_from_what_is_arou
     assert any("min_range_m" in doubt and "stands still" in doubt for doubt in doubts(findings))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "scale"), [("hdl-64e", "hdl-64e"), ("vlp-16", "none")])
 def test_the_scale_of_the_reflectance_is_found(name, scale):
     assert fitted(name)[0].sensor.reflectance == scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "scale"), [("pandar64", "pandar64"), ("vlp-16", "none")])
 def test_a_scale_of_several_sensors_counts_with_the_beams_that_are_known(name, scale):
     config, findings = fit(with_scale(recording(name), "pandar64"))
@@ -77,6 +82,7 @@ def test_every_scale_that_models_may_learn_can_be_found():
     assert tuple(SCALES) == REFLECTANCE_SCALES
 
 
+@pytest.mark.slow
 def test_reflectance_that_is_not_recorded_has_no_scale():
     swept = [np.column_stack([p[:, :3], np.full(len(p), -1, np.float32)]) for p in recording("hdl-64e").sweeps]
     config, findings = fit(Recording(swept, recording("hdl-64e").stamps_s))

@@ -63,6 +63,7 @@ def test_a_sweep_turns_clockwise_once_from_the_seam():
         assert np.diff(bearing).max() < 0.05
 
 
+@pytest.mark.slow
 def test_an_hdl_64e_is_told_by_its_blocks_and_has_the_calibration_given(calibration, caplog):
     sweeps, _ = sweeps_of(packets("hdl-64e", 4), calibration=calibration)
     assert [s.complete for s in sweeps] == [True, True]
@@ -346,6 +347,7 @@ def test_points_are_those_of_another_decoder(kitti_root, name, median_m, n_sweep
     assert np.quantile(distance, 0.9) < 5 * median_m
 
 
+@pytest.mark.slow
 def test_another_model_is_adopted_once_the_one_before_is_silent(caplog):
     other = packets("hdl-64e", 2)[:20]
     later = [(at_s + 5.0, payload) for at_s, payload in packets("vlp-16", 20)]

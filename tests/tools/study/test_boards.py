@@ -24,6 +24,7 @@ def test_times_are_scaled_by_the_ratings():
     assert len(cells) == 5 + len(BOARDS)
 
 
+@pytest.mark.slow
 def test_work_is_counted():
     work = work_of("vlp-16", "efficient", [600], 1.3)
     assert work.points > 5000

@@ -46,6 +46,7 @@ def test_crops_cut_near_lie_between_the_beams_and_keep_their_places_above_the_gr
     assert ((flags & Cut.TOP) > 0)[top_m < 1.79].all()
 
 
+@pytest.mark.slow
 def test_near_crops_are_built_with_their_labels_and_flags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "near.npz"
     monkeypatch.setattr(sys, "argv", ["build_near_crops", str(path), "--worlds", "12"])
