@@ -82,7 +82,7 @@ def test_further_objects_are_added(drives, tmp_path):
     )
     done = modt("evaluate", *drives["vlp-16"], "--further", "more.csv", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "--further adds 1, in 2 labels" in done.stdout.split("\n")[1]
+    assert "--further adds 1 of them, in 2 labels" in done.stdout.split("\n")[1]
     bare = modt("evaluate", *drives["vlp-16"], cwd=tmp_path).stdout.split("\n")[1]
     assert "leave out road users, and tracks on those count as false" in bare
     done = modt("evaluate", *drives["vlp-16"], "--further", "more.csv", "--json", cwd=tmp_path)

@@ -141,7 +141,7 @@ def test_the_report_says_what_is_judged_and_how_complete_the_labels_are(tmp_path
         "labels of KITTI, unlike simulated ones, leave out road users, and tracks on those count as false" in second
     )
     assert (
-        "labels of KITTI, unlike simulated ones, leave out road users; --further adds 1, in 1 labels"
+        "labels of KITTI, unlike simulated ones, leave out road users; --further adds 1 of them, in 1 labels"
         in lines(added)[1]
     )
     first, second, *_ = lines((cars(10.0), CUBOID_RULES))

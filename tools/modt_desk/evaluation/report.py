@@ -21,6 +21,9 @@ METRICS = ("HOTA", "DetA", "AssA", "MOTA", "IDF1")
 EVENTS = ("id_switches", "fragmentations")
 LEGEND = "  Rows car, pedestrian, cyclist: classes (vans as cars, unless --classes paper); others: types of labels."
 
+COMPLETE = "labels are taken for complete"
+INCOMPLETE = "labels of KITTI, unlike simulated ones, leave out road users"
+
 
 def report(sensors: Mapping[str, Evaluation]) -> str:
     """The evaluation of each sensor, one after the other."""
@@ -72,13 +75,10 @@ def _sector(e: Evaluation) -> str:
 
 def _completeness(e: Evaluation) -> str:
     """How complete the labels are believed to be."""
-    labels = (
-        "labels are taken for complete"
-        if e.complete
-        else "labels of KITTI, unlike simulated ones, leave out road users"
-    )
+    labels = COMPLETE if e.complete else INCOMPLETE
     if e.further_objects:
-        return f"{labels}; --further adds {e.further_objects}, in {e.further_labels} labels"
+        what = f"{e.further_objects} objects" if e.complete else f"{e.further_objects} of them"
+        return f"{labels}; --further adds {what}, in {e.further_labels} labels"
     return labels if e.complete else f"{labels}, and tracks on those count as false; --further FILE adds them"
 
 
