@@ -47,3 +47,16 @@ def result(
 
 CAR = [0.1, 0.7, 0.1, 0.1]
 PEDESTRIAN = [0.1, 0.1, 0.7, 0.1]
+
+
+class Kept:
+    """A sink that keeps the indices of the frames it is given."""
+
+    def __init__(self):
+        self.indices = []
+
+    def write(self, r):
+        self.indices.append(r.frame.index)
+
+    def close(self):
+        pass

@@ -13,7 +13,7 @@ from modt.app.loop import WAIT_S, Loop, Stop
 from modt.errors import MisuseError, ModtError
 from modt.sources.live.sweep_reader import Received, StreamEndedError
 from modt.types import Budget, Frame
-from tests.results import result
+from tests.results import Kept, result
 
 POINTS = np.zeros((1, 4), np.float32)
 
@@ -100,17 +100,6 @@ class Told:
 
     def alive(self):
         self.pings.append(self.time.now)
-
-
-class Kept:
-    def __init__(self):
-        self.indices = []
-
-    def write(self, r):
-        self.indices.append(r.frame.index)
-
-    def close(self):
-        pass
 
 
 def loop_of(seconds, work=lambda t: 0.02, sinks=(), stages=None, silent=(0.0, 0.0), stop=None):

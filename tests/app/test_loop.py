@@ -20,7 +20,7 @@ from modt.energy.ledger import NullLedger
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Budget, Frame
-from tests.results import result
+from tests.results import Kept, result
 
 
 class Time:
@@ -102,17 +102,6 @@ class Stages:
         return result(frame.index, [3], {0: 1})
 
     def watch(self, frame):
-        pass
-
-
-class Kept:
-    def __init__(self):
-        self.indices = []
-
-    def write(self, r):
-        self.indices.append(r.frame.index)
-
-    def close(self):
         pass
 
 

@@ -134,7 +134,7 @@ class Selection:
 class Scheduler:
     """Greedy selection by worth.
 
-    A call is worth more for an uncertain posterior, a view that differs from the last key view, and a near and whole
+    A call is worth more for an uncertain posterior, a view that differs from the last one, and a near and whole
     object; and more with each frame of waiting: every call that fits into the budget is made eventually.
 
     Args:
@@ -175,8 +175,8 @@ class Scheduler:
         config, proposal_rows = self._config, tracks.proposal[rows]
         posterior = np.maximum(tracks.posterior[rows], 1e-12)
         uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / np.log(N_CLASSES)
-        count, points_at_key_view = proposals.count[proposal_rows], tracks.key_points[rows]
-        novelty = np.minimum(np.abs(count - points_at_key_view) / np.maximum(points_at_key_view, 1), 1.0)
+        count, last_points = proposals.count[proposal_rows], tracks.key_points[rows]
+        novelty = np.minimum(np.abs(count - last_points) / np.maximum(last_points, 1), 1.0)
         nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / config.range_scale_m)
         value: Float64 = (
             config.uncertainty_weight * uncertainty

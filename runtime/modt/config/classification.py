@@ -27,7 +27,7 @@ class CallWorthConfig(StageConfig):
 
     uncertainty_weight: float = number(0.4, 0.0, 1.0, "", "of the normalised entropy of the posterior")
     nearness_weight: float = number(0.3, 0.0, 1.0, "", "of exp(-distance / range_scale_m)")
-    novelty_weight: float = number(0.3, 0.0, 1.0, "", "of the relative change of points since the last key view")
+    novelty_weight: float = number(0.3, 0.0, 1.0, "", "of the relative change of points since the last view")
     range_scale_m: float = number(30.0, 1.0, 1000.0, "m", "distance at which nearness is 1/e")
     waiting_weight: float = number(0.1, 0.001, 10.0, "", "added per frame of waiting, so that every call is made")
 
