@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.config import EnergyConfig, WindowConfig
+from modt.config import EnergyConfig
 from modt.energy.attribution import (
     CLASS,
     REGRESSORS,
@@ -32,9 +32,7 @@ CALIBRATED = EnergyConfig(idle_W=3.0, seg_J=0.1, class_J=0.01, point_J=1e-3)
 def drive(machine: SimulatedMachine, windows: int, noise: float, faults: bool) -> list[dict[str, Any]]:
     random = machine.random
     ledger = machine.ledger()
-    recorder = Windows(
-        find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys), WindowConfig()
-    )
+    recorder = Windows(find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys))
     lines = []
     for _ in range(windows):
         if faults and not machine.zone.is_dir():
@@ -161,7 +159,7 @@ def test_too_few_windows_are_refused() -> None:
 def test_unit_energy_of_bursts_is_the_true_one(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path, idle_W=3.0)
     ledger = machine.ledger()
-    recorder = Windows(find_powercap(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path), WindowConfig())
+    recorder = Windows(find_powercap(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
     lines = []
     for _ in range(5):
         for _ in range(50):

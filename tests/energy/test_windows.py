@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modt.config import WindowConfig
 from modt.energy.ledger import Ledger
 from modt.energy.meters.discovery import find_hwmon, find_powercap
 from modt.energy.meters.meter import Conditions, model_meter
@@ -21,7 +20,7 @@ def machine(tmp_path: Path) -> SimulatedMachine:
 
 def fresh(machine: SimulatedMachine) -> Windows:
     meters = find_powercap(machine.sys)[0].meters
-    return Windows(meters, machine.clocks, Conditions(0, machine.sys), WindowConfig())
+    return Windows(meters, machine.clocks, Conditions(0, machine.sys))
 
 
 def windows_of(machine: SimulatedMachine) -> Windows:
@@ -148,7 +147,7 @@ def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path)
     rail = write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="ina226", power1_input=4_000_000, in1_input=5000,
                        curr1_input=800)  # fmt: skip
-    windows = Windows(find_hwmon(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path), WindowConfig())
+    windows = Windows(find_hwmon(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
     ledger = machine.ledger()
     (rail / "power1_input").write_text("6000000\n")
     line = second(machine, ledger, windows)
@@ -159,7 +158,7 @@ def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
 
 
 def test_without_a_meter_energy_is_unavailable(machine: SimulatedMachine) -> None:
-    windows = Windows((), machine.clocks, Conditions(0, machine.sys), WindowConfig())
+    windows = Windows((), machine.clocks, Conditions(0, machine.sys))
     line = second(machine, machine.ledger(), windows)
     assert (line["energy_J"], line["kind"]) == (None, "unavailable")
 
@@ -199,7 +198,7 @@ def test_the_first_window_of_a_counter_is_short(machine: SimulatedMachine) -> No
 def test_a_window_is_as_reliable_as_its_least_reliable_meter(machine: SimulatedMachine) -> None:
     counter = find_powercap(machine.sys)[0].meters[0]
     model = model_meter(3.0, 7.0, machine.clocks.monotonic_ns, machine.clocks.process_ns)
-    windows = Windows((counter, model), machine.clocks, Conditions(0, machine.sys), WindowConfig())
+    windows = Windows((counter, model), machine.clocks, Conditions(0, machine.sys))
     for _ in range(2):
         machine.wait(1.0)
         line = windows.close()

@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 
 from modt.app import metering
-from modt.config import EnergyConfig, WindowConfig
+from modt.config import EnergyConfig
 from modt.energy.meters import discovery
 from modt.energy.meters.meter import Candidate, Facts, Kind, Scope, file_meter, probe
 
@@ -32,7 +32,7 @@ def test_the_meter_is_found_and_windows_have_its_energy(tmp_path, monkeypatch):
     monkeypatch.setattr(discovery, "FINDERS", (lambda _sys: find_coulomb_counters(tmp_path),))
     found = metering.discovery(EnergyConfig())
     assert found.best.name == "coulomb counter"
-    windows = metering.windows(found.choose("coulomb").meters, None, WindowConfig())
+    windows = metering.windows(found.choose("coulomb").meters, None)
     for reading_mJ in (1004, 1008):
         time.sleep(0.05)
         counter.write_text(str(reading_mJ))

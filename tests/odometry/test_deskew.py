@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.config import RegistrationConfig
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.observations import observe
 from modt.odometry.odometry import SweepSkew, delays, skews_alike
@@ -122,7 +121,7 @@ def test_registration_needs_the_shares_of_a_skewed_sweep(known, least_deg, most_
     predicted = true @ se3(rotation_zyx(0, 0, 0.01), np.array([0.2, 0.0, 0.0]))
     step = skew.step(PlanarMotion.between(before, predicted, PERIOD_S), predicted)
     share = skew.share(PERIOD_S) if known else 1.0
-    registration = Registration(RegistrationConfig())
+    registration = Registration()
     found = registration.correct(landmarks, observe(proposals, predicted).moved(step), share) @ predicted
     assert least_deg <= abs(np.rad2deg(yaw_of(inverse(true) @ found))) < most_deg
 

@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from modt.config import LandmarkConfig, RegistrationConfig
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
 from modt.observations import observe
-from modt.odometry.registration import Fit, LandmarkMap, Landmarks, Registration
+from modt.odometry.registration import ESTABLISHED_FRAMES, REACH_M, Fit, LandmarkMap, Landmarks, Registration
 from tests.odometry.odometry_scenes import constant_turn_pose, static_tracks, street
 from tests.tracking.tracking_scenes import Follower, box, frame_of
 
@@ -192,7 +191,7 @@ OFFSET = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.02, 
 def test_correct_brings_observations_onto_their_landmarks(offset, seed):
     world = street(seed, 60)
     T = se3(rotation_zyx(0, 0, offset[2]), np.array([*offset[:2], 0.0]))
-    correction = Registration(RegistrationConfig()).correct(landmarks_of(world), observed(world, T))
+    correction = Registration().correct(landmarks_of(world), observed(world, T))
     np.testing.assert_allclose(correction @ T, np.eye(4), atol=0.01)
 
 
@@ -204,7 +203,7 @@ def test_ends_that_come_into_view_do_not_bias_the_motion(offset, seed):
     T = se3(rotation_zyx(0, 0, offset[2]), np.array([*offset[:2], 0.0]))
     grown, ahead = observed(world, T), rng.random((4, 60)) < 0.5
     kdop = grown.kdop + np.concatenate([ahead, ~ahead]) * rng.exponential(0.3, (8, 60))
-    correction = Registration(RegistrationConfig()).correct(landmarks_of(world), replace(grown, kdop=kdop))
+    correction = Registration().correct(landmarks_of(world), replace(grown, kdop=kdop))
     np.testing.assert_allclose(correction @ T, np.eye(4), atol=0.06)
 
 
@@ -212,31 +211,30 @@ def test_ends_that_come_into_view_do_not_bias_the_motion(offset, seed):
 def test_too_few_landmarks_give_no_correction(n):
     world = street(n=30)
     T = se3(np.eye(3), np.array([0.3, 0.0, 0.0]))
-    correction = Registration(RegistrationConfig()).correct(landmarks_of(world[:n]), observed(world, T))
+    correction = Registration().correct(landmarks_of(world[:n]), observed(world, T))
     np.testing.assert_array_equal(correction, np.eye(4))
 
 
 def test_a_correction_beyond_the_reach_is_refused():
-    config, world = RegistrationConfig(reach_m=0.5), street(n=60)
-    T = se3(np.eye(3), np.array([0.45, 0.45, 0.0]))  # within reach along each axis, beyond it as a distance
-    refused = Registration(config).correct(landmarks_of(world), observed(world, T))
+    world, diagonal = street(n=60), np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
+    T = se3(np.eye(3), 1.2 * REACH_M * diagonal)  # within reach along each axis, beyond it as a distance
+    refused = Registration().correct(landmarks_of(world), observed(world, T))
     np.testing.assert_array_equal(refused, np.eye(4))
-    accepted = Registration(replace(config, reach_m=1.0)).correct(landmarks_of(world), observed(world, T))
+    T = se3(np.eye(3), 0.8 * REACH_M * diagonal)
+    accepted = Registration().correct(landmarks_of(world), observed(world, T))
     np.testing.assert_allclose(accepted @ T, np.eye(4), atol=0.02)
 
 
 @pytest.mark.parametrize(
-    ("options", "near_share", "found_m"),
+    ("near_share", "found_m"),
     [
-        ({}, 1.0, 0.0),  # the pairs near the prediction agree
-        ({}, 0.2, -1.5),  # few of them agree: the farther motion has more inliers
-        ({"inlier_ratio": 0.0}, 0.2, -1.5),  # enough of them, but far fewer than a frame ago
-        ({"inlier_ratio": 0.0, "inlier_drop": 0.0}, 0.2, 0.0),  # no search is asked for
+        (1.0, 0.0),  # the pairs near the prediction agree
+        (0.2, -1.5),  # few of them agree: the farther motion has more inliers
     ],
 )
-def test_pairs_are_sought_farther_away_where_few_agree_nearby(options, near_share, found_m):
+def test_pairs_are_sought_farther_away_where_few_agree_nearby(near_share, found_m):
     world = street(n=60)
-    registration = Registration(RegistrationConfig(**options))
+    registration = Registration()
     registration.correct(landmarks_of(world), observed(world))  # the motion is known from here on
     moved = world.copy()
     moved[round(near_share * len(world)) :, 0] += 1.5
@@ -252,7 +250,7 @@ def test_a_fit_needs_three_inliers_and_more_than_its_share():
 
 def test_a_landmark_is_the_mean_since_its_object_rests():
     rng = np.random.default_rng(3)
-    landmark_map, place, seen = LandmarkMap(LandmarkConfig()), rng.uniform(5, 20, (3, 8)), []
+    landmark_map, place, seen = LandmarkMap(), rng.uniform(5, 20, (3, 8)), []
     for _ in range(9):
         kdop = place + rng.normal(0, 0.01, (3, 8))
         seen.append(kdop)
@@ -268,7 +266,7 @@ def test_a_landmark_is_the_mean_since_its_object_rests():
 
 
 def test_an_object_that_moves_is_no_established_landmark():
-    landmark_map, kdop = LandmarkMap(LandmarkConfig()), np.full((1, 8), 7.0)
+    landmark_map, kdop = LandmarkMap(), np.full((1, 8), 7.0)
     for _ in range(5):
         landmarks = landmark_map.update(static_tracks(kdop))
     assert landmarks.established.all()
@@ -278,12 +276,12 @@ def test_an_object_that_moves_is_no_established_landmark():
     np.testing.assert_array_equal(landmarks.kdop.T, kdop)
     for frames in (1, 2, 3):  # at rest again: the mean restarts
         landmarks = landmark_map.update(static_tracks(kdop))
-        assert landmarks.established.all() == (frames >= LandmarkConfig().min_frames)
+        assert landmarks.established.all() == (frames >= ESTABLISHED_FRAMES)
     np.testing.assert_allclose(landmarks.kdop.T, kdop)
 
 
 def test_landmarks_follow_their_ids_through_births_and_deaths():
-    landmark_map, kdop = LandmarkMap(LandmarkConfig()), np.arange(24.0).reshape(3, 8)
+    landmark_map, kdop = LandmarkMap(), np.arange(24.0).reshape(3, 8)
     for _ in range(4):
         landmark_map.update(static_tracks(kdop, ids=[2, 5, 7]))
     others = np.concatenate([kdop[1:], np.full((1, 8), 50.0)])
@@ -293,7 +291,7 @@ def test_landmarks_follow_their_ids_through_births_and_deaths():
 
 
 def test_only_candidates_are_landmarks_and_clear_forgets_them():
-    landmark_map, kdop = LandmarkMap(LandmarkConfig()), np.arange(16.0).reshape(2, 8)
+    landmark_map, kdop = LandmarkMap(), np.arange(16.0).reshape(2, 8)
     for _ in range(4):
         landmarks = landmark_map.update(static_tracks(kdop, candidate=[True, False]))
     assert len(landmarks) == 1

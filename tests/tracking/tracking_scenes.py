@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from modt.classes import N_CLASSES, ObjectClass
-from modt.config import OdometryConfig, TrackingConfig
+from modt.config import TrackingConfig
 from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS
 from modt.observations import observe
@@ -24,7 +24,7 @@ class Follower:
     """Odometry and tracker in a row, with what the last frame gave."""
 
     def __init__(self, config=None, machine=EFFICIENT, **parts):
-        self.odometry = Odometry(OdometryConfig())
+        self.odometry = Odometry()
         self.tracker = Tracker(config or TrackingConfig(), machine, **parts)
         self.proposals = self.wants_class = self.T_world_sensor = None
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from modt.classes import ObjectClass
-from modt.config import OdometryConfig, TrackingConfig
+from modt.config import TrackingConfig
 from modt.geometry import inverse, se3, transform_boxes
 from modt.odometry.odometry import Odometry
 from modt.tracking.states import EFFICIENT
@@ -62,7 +62,7 @@ def frames(n: int, count: int, alive: float, seed: int = 0) -> list[tuple[Frame,
 
 def stages_ms(scene: list[tuple[Frame, Proposals]]) -> tuple[float, float, float]:
     """Median CPU time per frame of odometry and of tracking [ms], and mean number of tracks."""
-    odometry, tracker = Odometry(OdometryConfig()), Tracker(TrackingConfig(), EFFICIENT)
+    odometry, tracker = Odometry(), Tracker(TrackingConfig(), EFFICIENT)
     times_ns, alive = [], []
     for frame, proposals in scene:
         began_ns = time.thread_time_ns()

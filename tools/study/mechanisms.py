@@ -1,4 +1,4 @@
-"""The mechanisms of segmentation, odometry, tracking and fusion that can be switched off.
+"""The mechanisms of segmentation, tracking and fusion that can be switched off.
 
 A switch is a change of the configuration.
 """
@@ -39,7 +39,6 @@ _GROUND, _CLUSTERS, _PERSONS, _CARS = (
     f"segmentation.{name}" for name in ("ground", "clusters", "person_splitting", "car_merging")
 )
 _KDOP, _FILTER = "tracking.kdop", "tracking.filter"
-_REGISTRATION, _LANDMARKS = "odometry.registration", "odometry.landmarks"
 
 MECHANISMS: dict[str, tuple[str, Switch]] = {
     "ground flanks": ("a surface is lowered to the median beside it", values(_GROUND, flank_m=100.0)),
@@ -81,12 +80,6 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
         values("scheduler.worth", uncertainty_weight=0.0, nearness_weight=0.0, novelty_weight=0.0),
     ),
     "reflectance": ("evidence, hdl-64e only", values("sensor", reflectance="none")),
-    "landmarks": ("mean k-DOPs (no poses)", values(_LANDMARKS, min_frames=1000)),
-    "young landmarks": ("say less (no poses)", values(_REGISTRATION, young_sigma_m=0.0)),
-    "ends by range": ("say less (no poses)", values(_REGISTRATION, end_sigma_per_m=0.0)),
-    "wider search": ("with few inliers (no poses)", values(_REGISTRATION, inlier_ratio=0.0, inlier_drop=0.0)),
-    "inlier drop": ("the same, since the last frame (no poses)", values(_REGISTRATION, inlier_drop=0.0)),
-    "turns at the outset": ("tried (no poses)", values(_REGISTRATION, initial_turn_rad=0.0)),
 }
 """What each is, and its switch."""
 PAIRS = (

@@ -147,7 +147,7 @@ def stages(
     prior = make_prior(network.box_scores, fusion.prior)
     return Pipeline(
         segmenter=segmenter,
-        odometry=Odometry(profile.odometry, kernels),
+        odometry=Odometry(kernels),
         tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
         fusion=mode.fusion(fusion, prior),
         scheduler=Scheduler(profile.scheduler.worth, cost, profile.sensor.period_s),

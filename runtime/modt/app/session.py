@@ -79,7 +79,7 @@ class Session:
         self._ledgers = [sink for sink in outputs.values() if isinstance(sink, LedgerSink)]
         self._followed = stages.chosen
         self.power, self.summary = Power(), dict[str, Any]()
-        self._windows = metering.windows(meters, core, stages.config.energy.windows)
+        self._windows = metering.windows(meters, core)
         self._began_s = time.monotonic()
         self._counts = Counts(totals, self._began_s)
         self._without_reflectance = 0

@@ -9,8 +9,8 @@ from modt.config.classification import (
     FusionConfig,
     SchedulerConfig,
 )
-from modt.config.odometry import LandmarkConfig, OdometryConfig, RegistrationConfig
-from modt.config.profile import EnergyConfig, LoopConfig, ProfileConfig, RecordingConfig, SensorConfig, WindowConfig
+from modt.config.odometry import OdometryConfig
+from modt.config.profile import EnergyConfig, LoopConfig, ProfileConfig, RecordingConfig, SensorConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.tracking import (
     BackgroundMapConfig,
@@ -34,14 +34,12 @@ __all__ = [
     "FragmentConfig",
     "FusionConfig",
     "KdopAssociationConfig",
-    "LandmarkConfig",
     "LoopConfig",
     "MergeConfig",
     "OdometryConfig",
     "PaperAssociationConfig",
     "ProfileConfig",
     "RecordingConfig",
-    "RegistrationConfig",
     "SchedulerConfig",
     "SegmentationConfig",
     "SensorConfig",
@@ -49,5 +47,4 @@ __all__ = [
     "StageConfig",
     "TrackingConfig",
     "ValueRangeError",
-    "WindowConfig",
 ]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 from modt.classes import PERSON_M
-from modt.config.base import StageConfig, ValueRangeError, choice, mechanism, number, numbers
+from modt.config.base import StageConfig, ValueRangeError, choice, number, numbers
 from modt.config.classification import ClassificationConfig, DecisionConfig, FusionConfig, SchedulerConfig
 from modt.config.odometry import OdometryConfig
 from modt.config.segmentation import SegmentationConfig
@@ -81,15 +81,6 @@ class SensorConfig(StageConfig):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class WindowConfig(StageConfig):
-    """Windows between readings of the meters."""
-
-    min_s: float = number(1.0, 0.001, 1e9, "s", "shortest window; RAPL steps in ms, INA chips and batteries average")
-    suspend_s: float = number(0.2, 0.001, 60.0, "s", "lead of the boot clock that counts as suspension")
-    clock_step_s: float = number(0.5, 0.001, 3600.0, "s", "step of the calendar clock that is marked")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class EnergyConfig(StageConfig):
     """Power of the board where it is not measured, and the coefficients of its calibration.
 
@@ -104,7 +95,6 @@ class EnergyConfig(StageConfig):
     seg_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one segmentation")
     class_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one classification")
     point_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one point classified")
-    windows: WindowConfig = mechanism(WindowConfig)
 
     @property
     def active_W(self) -> float:

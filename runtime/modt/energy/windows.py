@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from modt.config import WindowConfig
 from modt.energy.ledger import Clock, Line
 from modt.energy.meters.meter import Conditions, Kind, Measurand, Meter, MeterLostError, worst
 from modt.energy.readings import History, judge
@@ -25,6 +24,12 @@ class Clocks:
     process_ns: Clock = time.process_time_ns  # CPU time of all threads
 
 
+MIN_S = 1.0
+"""Shortest window [s]: RAPL steps in milliseconds, INA chips and batteries average over longer times."""
+SUSPEND_S = 0.2
+"""Lead of the boot clock over the monotonic one [s] from which a window is marked suspended and has no energy."""
+CLOCK_STEP_S = 0.5
+"""Step of the calendar clock that is marked [s]."""
 PRIMING_S = 0.05
 """Length of the first window of a counter [s], which has no energy: there is no power yet to judge it by."""
 
@@ -49,13 +54,11 @@ class EnergyAccumulator:
 class Windows:
     """Sums the lines of the ledger, and closes a window over them when enough time has passed."""
 
-    def __init__(self, meters: Sequence[Meter], clocks: Clocks, conditions: Conditions, config: WindowConfig) -> None:
+    def __init__(self, meters: Sequence[Meter], clocks: Clocks, conditions: Conditions, min_s: float = MIN_S) -> None:
         self._accumulators = [EnergyAccumulator(meter) for meter in meters]
-        self._clocks, self._conditions, self._config = clocks, conditions, config
+        self._clocks, self._conditions, self._min_s = clocks, conditions, min_s
         self._index = 0
-        self._least_s = (
-            min(PRIMING_S, config.min_s) if any(m.facts.kind is Kind.MEASURED for m in meters) else config.min_s
-        )
+        self._least_s = min(PRIMING_S, min_s) if any(m.facts.kind is Kind.MEASURED for m in meters) else min_s
         for accumulator in self._accumulators:
             accumulator.advance(0.0)
         self._open()
@@ -81,10 +84,10 @@ class Windows:
         wall_ns = clocks.monotonic_ns() - self._start_ns
         suspended_ns = clocks.boot_ns() - self._boot0_ns - wall_ns
         stepped_ns = clocks.calendar_ns() - self._calendar0_ns - wall_ns - max(suspended_ns, 0)
-        suspended = suspended_ns > 1e9 * self._config.suspend_s
+        suspended = suspended_ns > 1e9 * SUSPEND_S
         if suspended:
             marks.append("suspended")
-        if abs(stepped_ns) > 1e9 * self._config.clock_step_s:
+        if abs(stepped_ns) > 1e9 * CLOCK_STEP_S:
             marks.append("clock-step")
         seconds = 1e-9 * (wall_ns + max(suspended_ns, 0))
         readings: list[dict[str, Any]] = []
@@ -117,7 +120,7 @@ class Windows:
             "conditions": self._conditions.read(),
             "marks": sorted(set(marks)),
         }
-        self._index, self._least_s = self._index + 1, self._config.min_s
+        self._index, self._least_s = self._index + 1, self._min_s
         self._open()
         return line
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.config import OdometryConfig
 from modt.geometry import inverse, se3
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
 from modt.observations import Located, Observations, StaticTracks, observe
@@ -80,14 +79,13 @@ class Odometry:
     """Places sweeps by their poses, or, where a sweep has none, by registration against stationary tracks.
 
     Args:
-        config: of the registration and its landmarks.
         kernels: passes over points and pairs.
     """
 
-    def __init__(self, config: OdometryConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
         self._kernels = kernels
-        self._registration = Registration(config.registration, kernels)
-        self._landmarks = LandmarkMap(config.landmarks)
+        self._registration = Registration(kernels)
+        self._landmarks = LandmarkMap()
         self._time_s: float | None = None
         self._before = self._last = Placement(np.eye(4))
         self._T_world_odometry: Float64 | None = None

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modt.config import LandmarkConfig, RegistrationConfig
 from modt.geometry import rotation_zyx, se3
 from modt.geometry.kdop import DIRECTIONS, centres, shape_similarity, shift_between
 from modt.geometry.kernels import NUMPY_GEOMETRY, GeometryKernels
@@ -33,17 +32,21 @@ class Landmarks:
         return len(self.established)
 
 
+ESTABLISHED_FRAMES = 3
+"""Frames at rest from which the mean is the landmark's position."""
+MIN_GAIN = 0.03
+"""Least weight of a new view in the mean: a landmark follows a drift of the poses within about 33 frames."""
+MAX_JUMP_M = 0.2
+"""Distance of an end of a k-DOP from its mean beyond which that mean restarts [m]: another part is in view."""
+
+
 class LandmarkMap:
     """Mean k-DOPs of stationary tracks, by track id; kept only while no poses are given.
 
     A landmark lies where it was seen on average, not where it was seen last: the error of one frame is not handed on.
-
-    Args:
-        config: when a mean is established and how fast it follows.
     """
 
-    def __init__(self, config: LandmarkConfig) -> None:
-        self.config = config
+    def __init__(self) -> None:
         self.clear()
 
     def clear(self) -> None:
@@ -60,17 +63,39 @@ class LandmarkMap:
         frames[known], mean[known] = self._frames[before], self._mean.take(before, axis=0)
         rows = tracks.observed.nonzero()[0]
         frames[rows] = np.where(tracks.stationary[rows], frames[rows] + 1, 0)
-        gain = np.maximum(1.0 / np.maximum(frames[rows], 1), self.config.min_gain)[:, None]
+        gain = np.maximum(1.0 / np.maximum(frames[rows], 1), MIN_GAIN)[:, None]
         off = tracks.kdop.take(rows, axis=0) - mean.take(rows, axis=0)
-        mean[rows] += np.where(np.abs(off) < self.config.max_jump_m, gain, 1.0) * off
+        mean[rows] += np.where(np.abs(off) < MAX_JUMP_M, gain, 1.0) * off
         self._id, self._frames, self._mean = tracks.id, frames, mean
         candidates = tracks.candidate.nonzero()[0]
-        established = (tracks.stationary & (frames >= self.config.min_frames))[candidates]
+        established = (tracks.stationary & (frames >= ESTABLISHED_FRAMES))[candidates]
         kdop = tracks.predicted_kdop.take(candidates, axis=1)
         kdop[:, established] = mean[candidates[established]].T
         return Landmarks(kdop, established)
 
 
+REACH_M = 2.5
+"""Greatest correction of a pose, and greatest error of the first prediction [m]. A larger one is refused."""
+GATE_M = 0.8
+"""Greatest error of a prediction once the motion is known [m]. Farther landmarks are no candidates."""
+MAX_TURN_RAD = 0.2
+"""Greatest turn of a correction [rad]. A larger one is refused."""
+VOTE_CELL_M = 0.25
+"""Side of a cell of the vote on the first displacement [m]."""
+MAX_SIZE_DIFFERENCE = 0.5
+"""Sum of differences of log sizes beyond which a pair has no vote on the first displacement."""
+END_SIGMA_M, END_SIGMA_PER_M = 0.02, 0.0007
+"""Scale of the error of an end of a k-DOP at range 0 [m], and its growth per metre of range."""
+YOUNG_SIGMA_M = 0.07
+"""Further error of a landmark without an established mean [m]; lowers its weight in the fit."""
+INLIER_M = 0.2
+"""Distance to its landmark within which an observation agrees with a motion [m]."""
+MIN_AGREEMENT = 0.3
+"""Share of inliers above which the motion is known and the next search is a near one."""
+INLIER_RATIO, INLIER_DROP = 0.75, 0.5
+"""Shares of inliers, among the pairs and relative to the last frame, below which pairs are sought farther away."""
+INITIAL_TURN_RAD = 0.05
+"""Step between the seven turns that are tried while no motion is known [rad]."""
 _SCALES = (8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0)
 """Factors to the scale of the errors in the iterations of a fit: coarse to fine, against local minima."""
 _MATCH_ROUNDS = 4
@@ -102,12 +127,11 @@ class Registration:
     """Corrects a predicted pose by stationary objects.
 
     Args:
-        config: reach, scales of the errors and thresholds of support.
         kernels: passes over pairs.
     """
 
-    def __init__(self, config: RegistrationConfig, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
-        self.config, self._kernels = config, kernels
+    def __init__(self, kernels: GeometryKernels = NUMPY_GEOMETRY) -> None:
+        self._kernels = kernels
         self._initialised = self._motion_known = False
         self._inliers = 0
 
@@ -124,26 +148,25 @@ class Registration:
         Returns:
             (4, 4) motion of the pose; identity where nothing supports another.
         """
-        config = self.config
         jacobian = _jacobian(observations) * motion_share
         rest = np.zeros(3)
         fit = None
         if self._motion_known:
-            fit = self._solve(landmarks, observations, jacobian, rest, config.gate_m, _SCALES, match_rounds=1)
-        enough = config.inlier_drop * self._inliers
-        if fit is None or not fit.supported(config.inlier_ratio) or fit.inliers < enough:  # look farther
+            fit = self._solve(landmarks, observations, jacobian, rest, GATE_M, _SCALES, match_rounds=1)
+        enough = INLIER_DROP * self._inliers
+        if fit is None or not fit.supported(INLIER_RATIO) or fit.inliers < enough:  # look farther
             wide_fit = self._search(landmarks, observations, jacobian, rest)
-            if self._initialised and wide_fit is not None and not wide_fit.supported(config.min_agreement):
+            if self._initialised and wide_fit is not None and not wide_fit.supported(MIN_AGREEMENT):
                 retry = self._search(landmarks, observations, jacobian, wide_fit.motion)
                 wide_fit = retry if retry is not None and retry.inliers > wide_fit.inliers else wide_fit
             if fit is None or (wide_fit is not None and wide_fit.inliers > fit.inliers):
                 fit = wide_fit
         self._inliers = 0 if fit is None else fit.inliers
-        self._motion_known = fit is not None and fit.supported(config.min_agreement)
+        self._motion_known = fit is not None and fit.supported(MIN_AGREEMENT)
         self._initialised |= self._motion_known
         if fit is None:
             return np.eye(4)
-        if np.hypot(*fit.motion[:2]) > config.reach_m or abs(fit.motion[2]) > config.max_turn_rad:
+        if np.hypot(*fit.motion[:2]) > REACH_M or abs(fit.motion[2]) > MAX_TURN_RAD:
             self._motion_known = False
             return np.eye(4)
         return _turn_about_sensor(fit.motion, observations.sensor_xy)
@@ -153,11 +176,10 @@ class Registration:
     ) -> Fit | None:
         """Best supported motion near another one, or near several turns while none is known."""
         initial = not self._initialised
-        step = self.config.initial_turn_rad
-        starts = [[0.0, 0.0, k * step] for k in (0, 1, -1, 2, -2, 3, -3)] if initial else [motion]
-        reach_m, scales = self.config.reach_m, _SCALES[:_MATCH_ROUNDS]
+        starts = [[0.0, 0.0, k * INITIAL_TURN_RAD] for k in (0, 1, -1, 2, -2, 3, -3)] if initial else [motion]
+        scales = _SCALES[:_MATCH_ROUNDS]
         fits = (
-            self._solve(landmarks, observations, jacobian, np.asarray(start), reach_m, scales, _MATCH_ROUNDS)
+            self._solve(landmarks, observations, jacobian, np.asarray(start), REACH_M, scales, _MATCH_ROUNDS)
             for start in starts
         )
         return max((fit for fit in fits if fit is not None), key=lambda fit: fit.inliers, default=None)
@@ -173,7 +195,6 @@ class Registration:
         match_rounds: int,
     ) -> Fit | None:
         """Motion fitted to pairs within reach of a first one, matched anew in each round."""
-        config = self.config
         near = observations.kdop + np.tensordot(motion, jacobian, 1)
         i, j = self._pairs(landmarks.kdop, near, reach_m)
         if len(i) < _MIN_LANDMARKS:
@@ -181,11 +202,11 @@ class Registration:
         if not self._initialised:
             a, b = landmarks.kdop[:, i], near[:, j]
             shift, (size, _) = shift_between(a, b), shape_similarity(a, b)
-            vote = _vote(shift[size < config.max_size_difference], config.reach_m, config.vote_cell_m)
+            vote = _vote(shift[size < MAX_SIZE_DIFFERENCE])
             motion = motion + np.append(-vote, 0.0)
         a, b, jacobian = landmarks.kdop.take(i, axis=1), observations.kdop.take(j, axis=1), jacobian.take(j, axis=2)
-        outward_shift, young = b - a, np.where(landmarks.established, 0.0, config.young_sigma_m)
-        sigma = config.end_sigma_m + config.end_sigma_per_m * observations.range_m[j]
+        outward_shift, young = b - a, np.where(landmarks.established, 0.0, YOUNG_SIGMA_M)
+        sigma = END_SIGMA_M + END_SIGMA_PER_M * observations.range_m[j]
         variance = young[i] ** 2 + sigma**2
         for _ in range(match_rounds):
             moved = b + np.tensordot(motion, jacobian, 1)
@@ -197,7 +218,7 @@ class Registration:
             )
         a, b, jacobian = a.take(best, axis=1), b.take(best, axis=1), jacobian.take(best, axis=2)
         shift = shift_between(a, b + np.tensordot(motion, jacobian, 1))
-        inliers = int((np.hypot(shift[:, 0], shift[:, 1]) < config.inlier_m).sum())
+        inliers = int((np.hypot(shift[:, 0], shift[:, 1]) < INLIER_M).sum())
         return Fit(motion, inliers, len(best))
 
     def _pairs(self, a: Float64, b: Float64, reach: float) -> tuple[Int, Int]:
@@ -215,16 +236,16 @@ def _jacobian(observations: Observations) -> Float64:
     return jacobian
 
 
-def _vote(shift: Float64, reach_m: float, cell_m: float) -> Float64:
+def _vote(shift: Float64) -> Float64:
     """(2,) displacement that most pairs agree on, in whole cells; zero where there are no pairs."""
     if not len(shift):
         return np.zeros(2)
-    side = int(2 * reach_m / cell_m) + 3
-    cell = np.clip(np.rint(shift / cell_m).astype(np.int64) + side // 2, 1, side - 2)
+    side = int(2 * REACH_M / VOTE_CELL_M) + 3
+    cell = np.clip(np.rint(shift / VOTE_CELL_M).astype(np.int64) + side // 2, 1, side - 2)
     counts = np.bincount(cell[:, 0] * side + cell[:, 1], minlength=side * side).reshape(side, side)
     around = np.sum([np.roll(counts, (a, b), (0, 1)) for a in (-1, 0, 1) for b in (-1, 0, 1)], axis=0)
     row, column = divmod(int(np.argmax(around)), side)
-    return np.array([row - side // 2, column - side // 2]) * cell_m
+    return np.array([row - side // 2, column - side // 2]) * VOTE_CELL_M
 
 
 def _mutual(i: Int, j: Int, cost: Float64) -> Int:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modt.config import EnergyConfig, WindowConfig
+from modt.config import EnergyConfig
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions, Facts, Kind, Scope
 from modt.energy.windows import Clocks, Windows
@@ -74,7 +74,7 @@ class Steps:
 def mode_run(name, metered):
     board = Board()
     ledger = Ledger(lambda: board.now_ns, lambda: board.cpu_ns)
-    windows = Windows([board], board.clocks(), Conditions(), WindowConfig(min_s=0.1)) if metered else None
+    windows = Windows([board], board.clocks(), Conditions(), min_s=0.1) if metered else None
     for _ in range(2 if windows else 0):  # its power is known
         board.work(100)
         windows.close()

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from modt.config import WindowConfig
 from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions, model_meter
 from modt.energy.windows import Clocks, Windows
@@ -107,7 +106,7 @@ def test_meters_are_read_at_the_ends_of_turns():
         mode_run(
             name,
             [],
-            windows=Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), WindowConfig(min_s=1e9)),
+            windows=Windows([model_meter(1.0, 2.0, tick, tick)], clocks, Conditions(), min_s=1e9),
         )
         for name in "ab"
     ]

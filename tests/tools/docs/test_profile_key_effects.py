@@ -29,8 +29,6 @@ from modt.classification import pointnet
 from modt.config import ProfileConfig
 from modt.config.profile import Key, keys, value_of
 from modt.energy.ledger import Ledger
-from modt.energy.meters.meter import Conditions
-from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
 from modt.segmentation.ground import HeightEstimator
 from modt.sinks.recording import AtOnce, Recording
@@ -159,20 +157,6 @@ def one_mJ(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "scheduler.energy_mJ_per_frame", 1.0))
 
 
-def unposed(config: ProfileConfig, _folder: Path) -> str:
-    return replay(tuple(dataclasses.replace(f, T_world_sensor=None) for f in frames(3, 1.0)), config)
-
-
-def turning(config: ProfileConfig, _folder: Path) -> str:
-    """A sensor that turns from the start, and a second sweep that fits nothing."""
-    turns = [0.15 * k if k != 1 else 2.0 for k in range(10)]
-    stream = [dataclasses.replace(f, points=f.points.copy(), T_world_sensor=None) for f in frames(3, 1.0)]
-    for frame, turn in zip(stream, turns, strict=True):
-        c, s = np.cos(turn), np.sin(turn)
-        frame.points[:, :2] = frame.points[:, :2] @ np.array([[c, s], [-s, c]], np.float32)
-    return replay(tuple(stream), config)
-
-
 def pose_socket(config: ProfileConfig, _folder: Path) -> str:
     """Poses with a gap, a flood, a leap, a pose of the future, and noise faster than the sensor."""
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -227,21 +211,6 @@ def far_blind(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "sensor.blind_range_m", 20.0))
 
 
-def windows(config: ProfileConfig, _folder: Path) -> str:
-    """Windows of a machine that sleeps, and whose calendar is set, for half a second each."""
-    now = {"wall": 0, "asleep": 0, "calendar": 0}
-    clocks = Clocks(
-        lambda: now["wall"], lambda: now["wall"] + now["asleep"], lambda: now["wall"] + now["calendar"], lambda: 0
-    )
-    found, lines = Windows((), clocks, Conditions(0), config.energy.windows), []
-    for k in range(40):
-        now["wall"] += 300_000_000
-        now["asleep"] += 150_000_000 * (k == 10) + 300_000_000 * (k == 20)
-        now["calendar"] += (150_000_000 * (k == 10) + 300_000_000 * (k == 20)) + 400_000_000 * (k == 30)
-        lines.append(found.add({"frame": k, "stages": {}, "overhead_ns": 0, "marks": []}))
-    return str([line and (line["frames"], line["marks"]) for line in lines])
-
-
 def live(config: ProfileConfig, _folder: Path) -> str:
     """The ladder of a board whose windows are of 1 and 3 W, and what it leaves of a sweep."""
     ladder, said = Ladder(config.loop.power_W), []
@@ -289,8 +258,6 @@ SCENARIOS: dict[str, Scenario] = {
     "a model that states no frequency": model_without_frequency,
     "scheduler.cpu_ms_per_frame or energy_mJ_per_frame": two_ms,
     "--odometry udp://, unix://": pose_socket,
-    "frames without a pose": unposed,
-    "the first frames without a pose": turning,
     "figures of energy": report_of_a_run,
     "figures of energy; scheduler.energy_mJ_per_frame": report_of_a_run,
     "none: kept in run.yaml": described,
@@ -314,8 +281,6 @@ RARE: dict[str, Scenario] = {
     "tracking.merge.": long_street,
     "scheduler.cost.": noisy_clock,
     "tracking.background_map.": long_street,
-    "odometry.registration.max_turn_rad": turning,
-    "energy.windows.": windows,
     "decision.hysteresis": long_street,
     "energy.busy_W": report_without_meter,
 }

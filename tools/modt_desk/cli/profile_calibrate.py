@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -43,7 +44,6 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app.chosen_profile import choose
     from modt.classification.pointnet import PointNet
     from modt.classification.scheduler import padded_size
-    from modt.config import WindowConfig
     from modt.energy.attribution import FitError
     from modt.energy.ledger import Ledger
     from modt.geometry import FieldOfView
@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     meter, ledger, limits = meters[0].facts, Ledger(), loaded.classification
     network = PointNet(limits, loaded.sensor)
     segmenter = assembly.segmenter(loaded, FieldOfView(), kernel_choice.choose(loaded.segmentation.kernels))
-    windows = metering.windows(meters, pinned, WindowConfig(min_s=1e9))
+    windows = metering.windows(meters, pinned, min_s=math.inf)
     workload = Workload(scans, segmenter.segment, network.classify, padded_size(limits), ledger, windows)
     try:
         found = workload.calibrate(arguments.windows, arguments.window_s, arguments.burst_s, np.random.default_rng(0))

@@ -59,12 +59,12 @@ class Comparison:
         ledger = Ledger()
         fov = inputs.field_of_view(self.request, inputs.stream(self.request).info)
         pipeline = assembly.pipeline(mode, self.profile, fov, ledger)
-        budget, window = mode.budget(self.profile), self.profile.energy.windows
+        budget = mode.budget(self.profile)
         return ModeRun(
             pipeline=pipeline,
             ledger=ledger,
             budget=varied_load if name == VARIED else lambda _frame: budget,
-            windows=metering.windows(self.meters, self.core, window) if self.meters else None,
+            windows=metering.windows(self.meters, self.core) if self.meters else None,
         )
 
 

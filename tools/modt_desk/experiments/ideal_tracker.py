@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from modt.config import OdometryConfig, ProfileConfig, TrackingConfig
+from modt.config import ProfileConfig, TrackingConfig
 from modt.observations import Located, StaticTracks, observe
 from modt.odometry.odometry import Odometry
 from modt.placement import Placement
@@ -24,11 +24,9 @@ from modt_desk.experiments.segmented import SegmentedDrive, SegmentedFrame, with
 
 
 @lru_cache(maxsize=2)
-def _ideal_tracks(
-    drive: SegmentedDrive, tracking: TrackingConfig, odometry: OdometryConfig, period_s: float
-) -> tuple[Int, ...]:
+def _ideal_tracks(drive: SegmentedDrive, tracking: TrackingConfig, period_s: float) -> tuple[Int, ...]:
     """(P,) row of the ideal track of each proposal, by frame; kept for the next settings of a sweep."""
-    return tuple(_tracks(drive, Tracker(tracking, ACCURATE, regroupings=(), period_s=period_s), Odometry(odometry)))
+    return tuple(_tracks(drive, Tracker(tracking, ACCURATE, regroupings=(), period_s=period_s), Odometry()))
 
 
 def _tracks(drive: SegmentedDrive, tracker: Tracker, odometry: Odometry) -> Iterator[Int]:
@@ -72,7 +70,7 @@ class IdealTracking:
     state_names = ("followed",)
 
     def __init__(self, drive: SegmentedDrive, config: ProfileConfig, range_m: float = np.inf) -> None:
-        rows = _ideal_tracks(drive, config.tracking, config.odometry, config.sensor.period_s)
+        rows = _ideal_tracks(drive, config.tracking, config.sensor.period_s)
         self._frames, self._range_m = zip(drive.frames, rows, strict=True), range_m
         self._tracks = Tracks.blank(1 + max((int(row.max(initial=-1)) for row in rows), default=-1))
         self._tracks.id[:] = np.arange(len(self._tracks))
