@@ -248,3 +248,14 @@ class EnergySums:
         self.error2_J2 += window["resolution_J"] ** 2
         self.parts_J.update(attribute(window, self._board))
         self._cpu_ns.update({stage: row["cpu_ns"] for stage, row in window["stages"].items()})
+
+
+def run_energy(windows: Iterable[Line], frames: Iterable[Line], board: EnergyConfig) -> EnergySums:
+    """Energy of a run: of its windows where a meter was read, else of its frames by the power model."""
+    sums = EnergySums(board)
+    for window in windows:
+        sums.add_window(window)
+    if not sums.count:
+        for line in frames:
+            sums.add_frame(line)
+    return sums

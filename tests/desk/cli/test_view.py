@@ -14,6 +14,8 @@ from modt.classes import CLASS_NAMES
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.recognise import open_scans
 from modt.viewer.look import LIGHT
+from modt_desk.reporting.run_report import run_tree
+from modt_desk.viewer.recorded_run import RecordedRun
 from tests.cli.commands import environment, modt
 from tests.sources.bags import BEGAN_S, CLOUD, write_mcap
 from tests.viewer.chromium import LOADED, WIDE
@@ -46,6 +48,16 @@ def moved(run):
 @pytest.fixture(scope="module")
 def records(run):
     return [json.loads(line) for line in (run / "tracks.jsonl").read_text().splitlines()]
+
+
+def test_a_call_costs_in_the_view_what_the_report_attributes_to_it(run):
+    copy = shutil.copytree(run, run.with_name("metered"))
+    lines = [json.loads(line) for line in (copy / "ledger.jsonl").read_text().splitlines()]
+    metered = [x | {"energy_J": 3 * x["energy_J"], "kind": "measured"} if "energy_J" in x else x for x in lines]
+    (copy / "ledger.jsonl").write_text("".join(json.dumps(line) + "\n" for line in metered))
+    spent_mJ = sum(f["call_mJ"] * f["classifications"] for f in RecordedRun.read(copy).frames if "call_mJ" in f)
+    reported = run_tree(copy)["parts_J"]["classification"].value * FRAMES
+    assert spent_mJ == pytest.approx(1e3 * reported)
 
 
 def test_the_page_holds_the_run(run, records):

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from modt.config import EnergyConfig
-from modt.energy.attribution import EnergySums, usable_windows
+from modt.energy.attribution import EnergySums, run_energy, usable_windows
 from modt.energy.meters.meter import Facts, Kind, worst
 from modt.pipeline import CLASSIFICATION, ODOMETRY, SEGMENTATION, STAGES, TRACKING
 from modt.reporting.histogram import Histogram
 from modt.types import Float64
 from modt_desk.comparison import gamma
-from modt_desk.comparison.comparison import COUNTS, ModeRun, Repetition, total
+from modt_desk.comparison.comparison import COUNTS, Repetition, total
 from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
 from modt_desk.reporting.reconciliation import reconciliation_tree
@@ -46,10 +46,17 @@ def compare_tree(
     passes = {name: [repetition[name] for repetition in repetitions] for name in (*modes, varied)}
     runs = {mode: gamma.RunCosts.median(passes[mode]) for mode in modes}
     windows = {mode: [line for run in passes[mode] for line in run.energy_lines] for mode in modes}
-    attributed = {name: _attributed(runs_of, basis.board) for name, runs_of in passes.items()}
+    attributed = {
+        name: run_energy(
+            (window for run in runs_of for window in run.energy_lines),
+            (line for run in runs_of for line in run.lines),
+            basis.board,
+        )
+        for name, runs_of in passes.items()
+    }
     load_varied_run = gamma.RunCosts.median(passes[varied])
     baseline = runs[modes[0]]
-    energy = {mode: _energy(run, windows[mode], basis, random) for mode, run in runs.items()}
+    energy = {mode: _energy(run, windows[mode], attributed[mode], basis, random) for mode, run in runs.items()}
     savings = {
         mode: _saving(
             gamma.estimate_gamma(baseline, runs[mode], load_varied_run, random), energy[modes[0]], energy[mode]
@@ -73,19 +80,12 @@ def compare_tree(
     }
 
 
-def _attributed(runs: Sequence[ModeRun], board: EnergyConfig) -> EnergySums:
-    """Energy of a mode by stage: of the windows where a meter was read, else of the frames by the model."""
-    metered, modelled = EnergySums(board), EnergySums(board)
-    for run in runs:
-        for window in run.energy_lines:
-            metered.add_window(window)
-        for line in run.lines:
-            modelled.add_frame(line)
-    return metered if metered.count else modelled
-
-
 def _energy(
-    run: gamma.RunCosts, windows: list[dict[str, Any]], basis: Basis, random: np.random.Generator
+    run: gamma.RunCosts,
+    windows: list[dict[str, Any]],
+    attributed: EnergySums,
+    basis: Basis,
+    random: np.random.Generator,
 ) -> dict[str, Quantity]:
     """Energy a frame with and without idling [J]: of the meter where it was read, else of the model."""
     good = usable_windows(windows)
@@ -100,7 +100,7 @@ def _energy(
 
         kind = worst(Kind(line["kind"]) for line in good)
         return {"net_J": per_frame(net_J, Kind.ESTIMATED), "gross_J": per_frame(gross_J, kind)}
-    net_J = basis.board.active_W * run.cost.sum(axis=1)
+    net_J = run.cost @ np.array([attributed.watts(stage) for stage in STAGES])
     gross_J = net_J + basis.board.idle_W * basis.period_s
     return {key: gamma.mean(J, "J", Kind.ESTIMATED, random) for key, J in (("net_J", net_J), ("gross_J", gross_J))}
 

@@ -6,7 +6,9 @@ The run may still be going on.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +17,9 @@ import numpy as np
 from modt import profile
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, EnergyConfig, ProfileConfig
-from modt.energy.attribution import EnergySums
+from modt.energy.attribution import EnergySums, run_energy
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
+from modt.energy.ledger import Line
 from modt.energy.meters.meter import Kind
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
@@ -49,18 +52,14 @@ def run_tree(run: Path) -> dict[str, Any]:
     facts = _facts(run)
     limits, mode = facts["profile"]["classification"], facts["mode"]
     board = EnergyConfig(**{key: facts["profile"]["energy"][key] for key in _BOARD})
-    metered, modelled = EnergySums(board), EnergySums(board)
-    for window in read_records(run / LEDGER, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}):
-        metered.add_window(window)
     sums = FrameSums(padded_size(ClassificationConfig(**{key: limits[key] for key in _LIMITS})))
-    lines = read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})
-    for line, record in zip(lines, read_records(run / TRACKS, FRAME_SCHEMA), strict=False):
+    for line, record in zip(_frames(run), read_records(run / TRACKS, FRAME_SCHEMA), strict=False):
         sums.add(line, record)
-        modelled.add_frame(line)
     sums.finish()
     if not sums.series.count:
         raise MisuseError(run, "no whole frame is recorded", "wait for the first, or give another run")
-    used = metered if metered.count else modelled
+    windows = read_records(run / LEDGER, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA})
+    used = run_energy(windows, islice(_frames(run), sums.series.count), board)
     saved, e1_s = _saved(mode, sums, used)
     return {
         "schema": SCHEMA,
@@ -71,24 +70,28 @@ def run_tree(run: Path) -> dict[str, Any]:
         "frames": sums.series.count,
         "ended": (run / SUMMARY).is_file(),
         "board": board.board,
-        "conditions": {**metered.conditions, "core": facts.get("core")},
+        "conditions": {**used.conditions, "core": facts.get("core")},
         "test": (
             "Energy is assumed power times CPU time: this tests the counting, not the physics."
             if used.kind is Kind.ESTIMATED
             else "Energy is the meter's; its split over the stages is estimated."
         ),
         **_energy(used, board.idle_W),
-        "dropped_windows": metered.dropped,
+        "dropped_windows": used.dropped,
         "cpu": _times(sums),
         "ledger": _ledger(sums),
         "saved": saved,
-        "marks": sorted(sums.marks | metered.marks),
+        "marks": sorted(sums.marks | used.marks),
         "series": _series(sums, e1_s)
         | {
             "stage_W": used.stage_watts(STAGES),
             "budget": None if mode == _CONVENTIONAL else facts["profile"]["scheduler"]["calls_per_frame"],
         },
     }
+
+
+def _frames(run: Path) -> Iterator[Line]:
+    return read_records(run / LEDGER, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})
 
 
 def _facts(run: Path) -> dict[str, Any]:

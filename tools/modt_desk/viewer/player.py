@@ -56,7 +56,7 @@ def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: 
 def _content(run: RecordedRun, start: int, step_cm: int | None) -> dict[str, Any]:
     """What the page knows beside the columns."""
     poses = run.poses.round(4).tolist()
-    frames = [_rounded(f | run.call_mJ(f) | {"pose": pose}) for f, pose in zip(run.frames, poses, strict=True)]
+    frames = [_rounded(f | {"pose": pose}) for f, pose in zip(run.frames, poses, strict=True)]
     judged = any("truth" in frame for frame in run.frames)
     return content(look.states(run.states), run.budget, step_cm) | {
         "frames": frames,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from modt import profile
-from modt.config import ProfileConfig
-from modt.energy.attribution import usable
+from modt.config import EnergyConfig, ProfileConfig
+from modt.energy.attribution import run_energy, usable
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
@@ -39,7 +40,8 @@ class RecordedRun:
     Attributes:
         facts: content of run.yaml.
         config: the profile that it ran with.
-        frames: of each frame COUNTS, `cpu_ms` by stage, `energy_mJ` with its `kind` where a window covers it.
+        frames: of each frame COUNTS, `cpu_ms` by stage, `energy_mJ` with its `kind` where a window covers it, and
+            `call_mJ`, the estimated energy of each of its classifications, where energy is attributed to them.
         states: names, in the order of the column `state`.
         tracks: (R, COLUMNS) as `track_rows.COLUMNS`.
         poses: (F, 3) of the sensor in the world: x, y [m], yaw [rad].
@@ -68,7 +70,7 @@ class RecordedRun:
             raise MisuseError(described, f"describes no run ({error})", "give the directory of a run") from None
         states, poses = list[str](), list[Float64]()
         with records_of(run / LEDGER):
-            costs = _costs(run / LEDGER)
+            costs = _costs(run / LEDGER, config.energy)
         frames, rows = list[dict[str, Any]](), list[list[list[float]]]()
         for number, record in enumerate(read_records(run / TRACKS, SCHEMA)):
             try:
@@ -112,12 +114,6 @@ class RecordedRun:
         """Of a live source, which no one can open again."""
         return self.facts["stream"]["path"] is None and bool(self.facts.get("service", False))
 
-    def call_mJ(self, frame: dict[str, Any]) -> dict[str, float]:
-        """`call_mJ` of a frame: estimated energy of each classification in it, by its CPU time."""
-        cpu_ms, calls = frame.get("cpu_ms", {}).get(CLASSIFICATION), frame["classifications"]
-        net_W = self.config.energy.busy_W - self.config.energy.idle_W
-        return {"call_mJ": net_W * cpu_ms / calls} if calls and cpu_ms else {}
-
     def position(self, frame: int) -> int:
         """Index of a frame, by its number.
 
@@ -131,12 +127,18 @@ class RecordedRun:
         return numbers.index(frame)
 
 
-def _costs(ledger: Path) -> dict[int, dict[str, Any]]:
+def _costs(ledger: Path, board: EnergyConfig) -> dict[int, dict[str, Any]]:
     """CPU time and energy by number of frame."""
+    lines = [*read_records(ledger, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA})]
+    windows = [*read_records(ledger, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA})]
+    call_W = run_energy(windows, lines, board).watts(CLASSIFICATION)
     costs: dict[int, dict[str, Any]] = {}
-    for line in read_records(ledger, LEDGER_SCHEMA, ignored={ENERGY_SCHEMA}):
+    for line in lines:
         costs[line["frame"]] = {"cpu_ms": {name: s["cpu_ns"] / 1e6 for name, s in line["stages"].items()}}
-    for window in read_records(ledger, ENERGY_SCHEMA, ignored={LEDGER_SCHEMA}):
+        calls = line["stages"].get(CLASSIFICATION, {"items": 0})
+        if calls["items"] and not math.isnan(call_W):
+            costs[line["frame"]]["call_mJ"] = 1e-6 * call_W * calls["cpu_ns"] / calls["items"]
+    for window in windows:
         first, last, n = window["frames"]
         if n and usable(window):
             energy = {"energy_mJ": 1e3 * window["energy_J"] / n, "kind": window["kind"]}

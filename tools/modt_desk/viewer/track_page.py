@@ -48,7 +48,7 @@ def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32])
     first, last = rows[0], rows[-1]
     number = {int(row["at"]): run.numbers[int(row["at"])] for row in rows}
     classified = [row for row in rows if row["classified"]]
-    spent_mJ = sum(_call_mJ(run, row) for row in classified)
+    spent_mJ = sum(run.frames[int(row["at"])].get("call_mJ", 0.0) for row in classified)
     final = next((row for row in rows if row["final"]), None)
     certain = (
         (f"{number[int(final['at'])]}", "its class is settled") if final else ("never", "its class is not settled")
@@ -58,7 +58,7 @@ def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32])
         ("said at the end", name, f"posterior {100 * last[f'p_{name}']:.1f} %"),
         ("followed", f"{len(rows)} frames", f"{number[int(first['at'])]} to {number[int(last['at'])]}"),
         ("classifications", f"{len(classified)}", f"{sum(r['seen'] > 0 for r in rows)} by tracking by detection"),
-        ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated, by CPU time"),
+        ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated"),
         ("certain from frame", *certain),
     ]
     blocks = [tiles(facts), plots(_plots(run, rows)), *_events(run, rows, sweeps)]
@@ -87,7 +87,9 @@ def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) ->
             name = CLASS_NAMES[int(row["class"])]
             was = "" if before is None else f"; {name} before: {100 * before[f'p_{name}']:.1f} %"
             where = f"{np.hypot(row['x'], row['y']):.0f} m away, {row['l']:.1f} × {row['w']:.1f} × {row['h']:.1f} m"
-            said.append(f"Classified, {row['points']:g} points, {where}, {_call_mJ(run, row):.1f} mJ.")
+            said.append(
+                f"Classified, {row['points']:g} points, {where}, {run.frames[at].get('call_mJ', 0.0):.1f} mJ."
+            )
             said.append(f"Posterior: {posterior}{was}.")
         if before is None or row["state"] != before["state"]:
             state = run.states[int(row["state"])].replace("_", " ")
@@ -99,7 +101,3 @@ def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) ->
             lines = "<br>".join(map(escape, said))
             yield f"<section><h2>Frame {run.numbers[at]}</h2><p>{lines}</p>{pictures}</section>"
         before = row
-
-
-def _call_mJ(run: RecordedRun, row: Row) -> float:
-    return run.call_mJ(run.frames[int(row["at"])]).get("call_mJ", 0.0)
