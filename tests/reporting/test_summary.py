@@ -5,7 +5,7 @@ from array import array
 import pytest
 
 from modt.reporting.histogram import MAX_EXACT
-from modt.reporting.summary import Summary, TrackLives, summary_text
+from modt.reporting.summary import Summary, TrackLives, around, summary_text
 from tests.results import CAR, result
 
 
@@ -23,6 +23,7 @@ FRAMES = [
     result(2, [5, 5], {0: 1, 1: 3}, {1: CAR}, lost=(2,), classified=1),
     result(3, [5], {0: 1}, {1: CAR}),
 ]
+FRAMES[3].proposals.coordinates[:] = [[9.0, 9.0, 4.5, 9.0, 9.0], [0.0, 1.0, 6.0, 2.0, 3.0], [7.0] * 5]
 
 
 def whole():
@@ -82,11 +83,34 @@ def entries(thing):
     return entries(vars(thing)) if hasattr(thing, "__dict__") else 0
 
 
-def test_text_contains_its_figures():
-    text = summary_text(whole())
-    for word in ("proposals", "N_go", "beta", "42.9 %", "segmentation", "classification"):
-        assert word in text
-    assert max(map(len, text.splitlines())) <= 100
+def test_the_text_says_what_is_around_the_robot_before_what_it_cost():
+    lines = summary_text(whole()).splitlines()
+    assert [line.split() for line in lines[3:6]] == [
+        ["car", "1", "nearest", "7.5", "m"],
+        ["pedestrian", "0"],
+        ["cyclist", "0"],
+    ]
+    cost = "\n".join(lines[6:])
+    for figure in ("N_go = 2.3", "beta 42.9 %", "segmentation", "classification"):
+        assert figure in cost
+    assert max(map(len, lines)) <= 100
+
+
+def test_reading_and_writing_are_not_in_the_sum_of_the_stages():
+    summary = Summary()
+    line = ledger_line(0, 3)
+    line["stages"]["source"] = dict(line["stages"]["segmentation"], cpu_ns=40 * 10**6)
+    summary.add_ledger(line)
+    together, source = summary_text(summary.result()).splitlines()[-2:]
+    assert together.split()[:2] == ["together", "4.00"]
+    assert source.split()[:4] == ["source", "1", "2", "40.00"]
+
+
+def test_the_nearest_return_of_each_class_is_of_the_last_frame():
+    proposals = FRAMES[-1].proposals
+    assert around(FRAMES[0]) == {"car": {"count": 1, "nearest_m": 0.0}, "background": {"count": 1, "nearest_m": 0.0}}
+    assert whole()["around"] == {"car": {"count": 1, "nearest_m": 7.5}}
+    assert proposals.coordinates.shape == (3, 5)
 
 
 @pytest.mark.parametrize("missed", [0, 22])

@@ -6,8 +6,10 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable
 from typing import Any
 
-from modt.classes import ObjectClass
-from modt.pipeline import CLASSIFICATION, SEGMENTATION, SOURCE
+import numpy as np
+
+from modt.classes import CLASS_NAMES, OBJECTS, ObjectClass
+from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE
 from modt.reporting.histogram import MAX_EXACT, Histogram
 from modt.types import NONE, FrameResult
 
@@ -54,6 +56,7 @@ class Summary:
     def __init__(self, max_exact: int = MAX_EXACT) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
         self.lives = TrackLives()
+        self._last: FrameResult | None = None
         self._calls: Counter[str] = Counter()
         self._items: Counter[str] = Counter()
         self._times: dict[str, dict[str, Histogram]] = defaultdict(
@@ -62,7 +65,7 @@ class Summary:
 
     def add_result(self, result: FrameResult) -> None:
         """Add the result of a frame."""
-        tracks = result.tracks
+        tracks, self._last = result.tracks, result
         self.frames += 1
         self.proposals += len(result.proposals)
         self.classified += len(result.classified)
@@ -93,6 +96,7 @@ class Summary:
             "classifications_by_tracking_by_detection": self.proposals,
             "deferred": self.deferred,
             "beta": _ratio(self.classified, self.proposals),
+            "around": {} if self._last is None else around(self._last),
             "tracks": self._life(foreground_only=False),
             "foreground_tracks": self._life(foreground_only=True),
             "energy_counts": {"E_seg": self._calls[SEGMENTATION], "E_class": self._items[CLASSIFICATION]},
@@ -115,37 +119,49 @@ def _ratio(a: float, b: float) -> float | None:
     return a / b if b else None
 
 
+def around(result: FrameResult) -> dict[str, dict[str, Any]]:
+    """Tracks with a proposal in a frame: by class their number, and the distance of their nearest return [m]."""
+    tracks, proposals = result.tracks, result.proposals
+    distance_m, found = np.hypot(*proposals.coordinates[:2]), defaultdict[str, list[float]](list)
+    for owner, begin, end in zip(
+        tracks.row_of_proposal(len(proposals)), proposals.offsets[:-1], proposals.offsets[1:], strict=True
+    ):
+        found[CLASS_NAMES[tracks.object_class[owner]]].append(float(distance_m[begin:end].min()))
+    return {name: {"count": len(at), "nearest_m": round(min(at), 2)} for name, at in found.items()}
+
+
 def summary_text(summary: dict[str, Any]) -> str:
-    """Counts, time by stage, and the state of the host."""
-    run = summary.get("run", {})
+    """Objects around the robot, and the cost of finding them: counts, time by stage, and the state of the host."""
+    run, stages, frames = summary.get("run", {}), dict(summary["stages"]), summary["frames"]
     tracks, objects = summary["tracks"], summary["foreground_tracks"]
-    lines = [
-        f"{run.get('stream', 'run')}: {summary['frames']} frames, mode {run.get('mode', '?')}, "
-        f"field of view {run.get('fov', '?')}, profile {run.get('profile', '?')}",
+    title = (
+        f"{run.get('stream', 'run')}: {frames} frames, mode {run.get('mode', '?')}, "
+        f"field of view {run.get('fov', '?')}, profile {run.get('profile', '?')}"
+    )
+    lines = [title, "", "  Around the robot in the last frame: tracks by class, and the nearest return of each class"]
+    for name in (CLASS_NAMES[c] for c in OBJECTS):
+        seen = summary["around"].get(name, {"count": 0, "nearest_m": None})
+        nearest = f"   nearest {seen['nearest_m']:.1f} m" if seen["count"] else ""
+        lines.append(f"  {name:<16}{seen['count']:>6}{nearest}")
+    lines += [
         "",
-        f"  proposals          {summary['proposals']:>9}   {_number(summary['proposals_per_frame'])} a frame",
-        f"  tracks             {tracks['count']:>9}   N_go {_number(tracks['N_go'])} frames",
-        f"    of objects       {objects['count']:>9}   N_go {_number(objects['N_go'])} frames",
-        f"  classifications    {summary['classifications']:>9}   one per proposal and frame would be "
-        f"{summary['classifications_by_tracking_by_detection']} (beta {_percent(summary['beta'])})",
-        f"  deferred           {summary['deferred']:>9}   to a later frame, by the budget of calls a frame",
+        "  Cost of a frame (docs/energy.md)",
+        f"  {'proposals':<16}{_number(summary['proposals_per_frame']):>6}   segments that could be objects",
+        f"  {'classified':<16}{_number(_ratio(summary['classifications'], frames)):>6}   by the network: beta "
+        f"{_percent(summary['beta'])} of them; in mode conventional 100 %",
+        f"  {'deferred':<16}{_number(_ratio(summary['deferred'], frames)):>6}   to a later frame, by the budget",
+        f"  {'tracks':<16}{tracks['count']:>6}   seen in N_go = {_number(tracks['N_go'])} frames each, on average; "
+        f"{objects['count']} of objects, in {_number(objects['N_go'])}",
         "",
-        f"  {'stage':<16}{'calls':>8}{'items':>9}{'cpu ms':>9}{'wall ms':>9}{'p95':>8}{'p99':>8}{'max':>8}   a frame",
+        f"  {'stage':<16}{'calls':>8}{'items':>9}{'cpu ms':>9}{'wall ms':>9}{'p95':>8}{'p99':>8}{'max':>8}",
     ]
-    for name, stage in summary["stages"].items():
-        wall, cpu = stage["wall_ms"], stage["cpu_ms"]
-        lines.append(
-            f"  {name:<16}{stage['calls']:>8}{stage['items']:>9}{cpu['mean']:>9.2f}{wall['mean']:>9.2f}"
-            f"{wall['p95']:>8.2f}{wall['p99']:>8.2f}{wall['max']:>8.2f}"
-        )
-    total_cpu, total_wall = (sum(s[key]["mean"] for s in summary["stages"].values()) for key in ("cpu_ms", "wall_ms"))
-    lines += [f"  {'all':<16}{'':>8}{'':>9}{total_cpu:>9.2f}{total_wall:>9.2f}", ""]
+    outside = {name: stages.pop(name) for name in (SOURCE, SINK) if name in stages}
+    lines += [_stage_line(name, stage) for name, stage in stages.items()]
+    cpu_ms, wall_ms = (sum(stage[key]["mean"] for stage in stages.values()) for key in ("cpu_ms", "wall_ms"))
+    lines.append(f"  {'together':<16}{'':>8}{'':>9}{cpu_ms:>9.2f}{wall_ms:>9.2f}   without reading and writing")
+    lines += [*(_stage_line(name, stage) for name, stage in outside.items()), ""]
     if "frames_per_s" in run:
-        source_ms = summary["stages"].get(SOURCE, {}).get("wall_ms", {}).get("mean", 0.0)
-        lines.append(
-            f"  {run['frames_per_s']:.1f} frames/s, {run['real_time_factor']:.1f} x real time; "
-            f"{total_wall - source_ms:.1f} ms a frame without the source"
-        )
+        lines.append(f"  {run['frames_per_s']:.1f} frames/s in all, {run['real_time_factor']:.1f} x real time")
     if run.get("missed_deadlines"):
         lines.append(
             f"  missed {run['missed_deadlines']} deadlines at {run['rate_hz']:g} frames/s, the latest frame began "
@@ -161,6 +177,14 @@ def summary_text(summary: dict[str, Any]) -> str:
         remedy = "have the driver write it, or set sensor.reflectance to none"
         lines.append(f"  without reflectance: {lacking} frames; {remedy}")
     return "\n".join(lines)
+
+
+def _stage_line(name: str, stage: dict[str, Any]) -> str:
+    wall = stage["wall_ms"]
+    return (
+        f"  {name:<16}{stage['calls']:>8}{stage['items']:>9}{stage['cpu_ms']['mean']:>9.2f}{wall['mean']:>9.2f}"
+        f"{wall['p95']:>8.2f}{wall['p99']:>8.2f}{wall['max']:>8.2f}"
+    )
 
 
 def _host_line(host: dict[str, Any]) -> str:

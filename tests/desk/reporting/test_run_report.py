@@ -10,6 +10,8 @@ from modt import profile
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, ProfileConfig
 from modt.errors import MisuseError
+from modt.pipeline import STAGES
+from modt_desk.reporting.document import TERMS
 from modt_desk.reporting.energy_plots import stage_energy_mJ
 from modt_desk.reporting.page import document_page
 from modt_desk.reporting.quantity import to_json
@@ -242,8 +244,7 @@ def test_what_is_not_measured_is_not_called_so(tmp_path):
     tree = run_tree(write_run(tmp_path / "metered"))
     assert (tree["gross_J"].kind.value, tree["net_J"].kind.value) == ("measured", "estimated")
     estimated = run_tree(write_run(tmp_path / "run", windows=False))
-    said = [run_text(estimated).replace("No mark: measured", ""), *(note for _, _, note in run_plots(estimated))]
-    assert not [line for text in said for line in text.splitlines() if "measured" in line and "E1 is" not in line]
+    assert not [text for text in (run_text(estimated), *(p[2] for p in run_plots(estimated))) if "measured" in text]
 
 
 def test_the_baseline_saves_nothing(tmp_path):
@@ -274,9 +275,19 @@ def test_every_figure_carries_its_kind(run):
     assert all(f.get("kind") in KINDS for f in found), [f for f in found if f.get("kind") not in KINDS]
 
 
-def test_text_has_results_first_and_fits_a_terminal(run):
-    text = run_text(run_tree(run))
-    assert text.splitlines()[3].startswith("  energy a frame: 300 mJ; ")
+def test_text_has_the_energy_of_the_pipeline_first_and_fits_a_terminal(run):
+    tree = run_tree(run)
+    text, pipeline_J = (
+        run_text(tree),
+        sum(tree["parts_J"][stage].value for stage in STAGES if stage in tree["parts_J"]),
+    )
+    assert tree["pipeline_J"].value == pytest.approx(pipeline_J)
+    assert text.splitlines()[3].startswith(
+        f"  energy of the pipeline a frame: {tree['pipeline_J'].scaled(1e3, 'mJ').marked()};"
+    )
+    assert re.search(r"energy of the process a frame: 300 mJ; with source ~\S+ mJ, ", text)
+    assert not re.search(r"[+-]0\.000", text)
+    assert all(f"  {term}" in text for term in TERMS)
     assert max(map(len, text.splitlines())) <= 100
     assert "In brackets: 95 %" in text
 

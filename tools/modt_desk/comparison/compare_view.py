@@ -39,7 +39,7 @@ def _modes(tree: dict[str, Any]) -> Table:
     modes = tree["modes"].values()
     stages = next(iter(modes))["stages"]
     rows = [
-        ["energy", *(m["net_J"].scaled(1e3, "mJ") for m in modes)],
+        ["energy of the pipeline", *(m["net_J"].scaled(1e3, "mJ") for m in modes)],
         [f"  with idling, {tree['basis']}", *(m["gross_J"].scaled(1e3, "mJ") for m in modes)],
         *([f"  {stage}", *(m["stages"][stage]["energy_J"].scaled(1e3, "mJ") for m in modes)] for stage in stages),
         ["cpu time", *(m["cpu_ms"] for m in modes)],

@@ -9,6 +9,15 @@ from dataclasses import dataclass
 from modt_desk.reporting.quantity import LEGEND, Quantity
 
 Cell = str | Quantity
+TERMS = (
+    "E1, E2: energy of a frame, by tracking-by-detection (which classifies every proposal) and by modt",
+    "gamma: E1 / E2, how many times less energy modt takes",
+    "n, N_go: proposals a frame; frames in which a track has a proposal, on average",
+    "a: energy of one classification over that of one segmentation",
+    "beta: proposals classified over all proposals",
+    "docs/energy.md derives gamma from n, N_go and a, and says what meters can tell",
+)
+"""Symbols of the reports, explained at their foot."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +46,7 @@ class Document:
         lines += ["", *(f"  {fact}" for fact in self.about)]
         for table in self.tables:
             lines += ["", *_aligned(table)]
-        return "\n".join([*lines, "", *_wrapped(self.test)])
+        return "\n".join([*lines, "", *_wrapped(self.test), "", *(f"  {term}" for term in TERMS)])
 
 
 def _wrapped(text: str) -> list[str]:

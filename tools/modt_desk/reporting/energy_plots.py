@@ -72,9 +72,10 @@ def gamma_curve(a: Quantity, n: Quantity, runs: dict[str, tuple[Quantity, Quanti
 
 
 def gamma_terms(title: str, saving: dict[str, Any]) -> Table:
-    """Table of the terms from gamma = N_go to the ratio of the runs."""
+    """Table of the terms from gamma = N_go to the ratio of the runs, without those that change nothing."""
     short = ["the short form, gamma = N_go", "", saving["gamma_short"]]
-    rows = [[term["name"], f"~{term['change'].value:+.3f}", term["gamma"]] for term in saving["terms"]]
+    changes = [(term, f"{term['change'].value:+.3f}") for term in saving["terms"]]
+    rows = [[term["name"], f"~{change}", term["gamma"]] for term, change in changes if float(change)]
     return Table([title, "change", "gamma"], [short, *rows])
 
 

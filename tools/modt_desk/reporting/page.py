@@ -8,7 +8,7 @@ from pathlib import Path
 
 from modt.sinks.output import writing
 from modt.viewer.look import COLOURS, THEME
-from modt_desk.reporting.document import Cell, Document, Table
+from modt_desk.reporting.document import TERMS, Cell, Document, Table
 from modt_desk.reporting.quantity import LEGEND
 
 _STYLE = """
@@ -53,7 +53,7 @@ def document_page(document: Document, drawn: Iterable[Plot]) -> str:
         plots(drawn),
         *map(_table, document.tables),
     ]
-    notes = "".join(f'<p class="legend">{escape(note)}</p>' for note in (document.test, LEGEND))
+    notes = "".join(f'<p class="legend">{escape(note)}</p>' for note in (document.test, LEGEND, *TERMS))
     return page(document.title, "; ".join(document.about), [*blocks, notes])
 
 

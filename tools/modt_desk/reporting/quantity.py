@@ -9,7 +9,7 @@ from typing import Any
 from modt.energy.meters.meter import Kind
 
 _MARKS = {Kind.MEASURED: "", Kind.INTEGRATED: "i:", Kind.ESTIMATED: "~"}
-LEGEND = "No mark: measured; ~ estimated; i: integrated from power samples. In brackets: 95 % intervals."
+LEGEND = "~ estimated; i: integrated power; no mark: read or counted. In brackets: 95 % intervals."
 
 
 @dataclass(frozen=True, slots=True)
