@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from modt.app.kernel_choice import choose
-from modt.cli import main, profile, profiles
+from modt.cli import main, profile, profile_group
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.cli.commands import environment
 
@@ -79,8 +79,8 @@ def test_no_frame_loads_scipy(command, tmp_path):
 @pytest.mark.parametrize(
     ("module", "of_the_desk"),
     [
-        (main, {"view", "evaluate", "export", "simulate", "track"}),
-        (profiles, {"fit", "schema"}),
+        (main, {"view", "evaluate", "export", "simulate", "track", "completion"}),
+        (profile_group, {"fit", "schema"}),
         (profile, {"calibrate", "report", "compare", "predict", "regimes"}),
     ],
 )

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 import shlex
-from importlib import import_module
+import subprocess
 
 import pytest
 
+from modt import assets
 from modt.cli import main, profile
 from modt.schemes import SENSORS
+from modt_desk.cli.completion import SHELLS
+from tools.docs.commands import parsers
 
 
 def help_of(program, *arguments, capsys):
@@ -32,7 +34,7 @@ def test_a_bare_command_prints_its_help_and_fails(program, words, capsys):
 
 def test_the_bare_help_names_every_command(capsys):
     main.main([])
-    assert set(re.findall(r"^    (\w+) ", capsys.readouterr().out, re.MULTILINE)) == set(main.COMMANDS)
+    assert set(re.findall(r"^    (\w+)", capsys.readouterr().out, re.MULTILINE)) == set(main.COMMANDS)
 
 
 def test_run_shows_an_address_of_every_sensor_and_a_recording(capsys):
@@ -42,20 +44,56 @@ def test_run_shows_an_address_of_every_sensor_and_a_recording(capsys):
     assert "modt run 'DRIVE?loop=yes'" in shown
 
 
-@pytest.mark.parametrize("command", ["replay", "run", "evaluate", "view"])
-def test_examples_are_lines_that_the_parser_takes(command, capsys):
-    lines = help_of(main.main, command, capsys=capsys).partition("examples:\n")[2].splitlines()
-    assert len(lines) >= 3
-    choice = argparse.ArgumentParser().add_subparsers()
-    import_module(main.COMMANDS[command]).add_parser(choice)
+@pytest.mark.parametrize("parser", [p for _, p in parsers()], ids=lambda parser: parser.prog)
+def test_every_command_has_examples_that_its_parser_takes(parser):
+    lines = parser.format_help().partition("examples:\n")[2].splitlines()
+    assert lines
     for line in lines:
         example, meaning = re.fullmatch(r"  (.*?) {2,}(\S.*)", line).groups()
         assert meaning
-        prog, name, *words = shlex.split(example)
-        assert (prog, name) == ("modt", command)
-        assert vars(choice.choices[command].parse_args(words))
+        words = shlex.split(re.sub(r"\beval\b|\$\(|\)|\||>.*|\bsource\b", "", example), posix=True)
+        words = words[0].split() if len(words) == 1 else words
+        assert " ".join(words).startswith(parser.prog)
+        assert vars(parser.parse_args(words[len(parser.prog.split()) :]))
 
 
 def test_the_two_commands_of_similar_name_point_to_each_other(capsys):
     assert "modt-profile" in help_of(main.main, "profile", capsys=capsys)
     assert "modt profile" in " ".join(help_of(profile.main, capsys=capsys).split())
+
+
+def test_the_profiles_are_listed_with_one_line_each(capsys):
+    assert main.main(["profiles"]) == 0
+    lines = [line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines()]
+    assert [name for name, _ in lines] == sorted(path.stem for path in assets.folder("profiles").glob("*.yaml"))
+    assert dict(lines)["vlp-16"] == "Velodyne VLP-16 at 10 Hz"
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("modt re", {"replay"}),
+        ("modt profile ", {"fit", "show", "schema"}),
+        ("modt replay --mo", {"--mode"}),
+        ("modt replay --mode e", {"efficient"}),
+        ("modt run --profile vlp", {"vlp-16", "vlp-32c"}),
+        ("modt-profile report run --h", {"--help", "--html"}),
+    ],
+)
+def test_a_shell_completes_commands_options_and_values(words, offered, capsys):
+    main.main(["completion", "bash"])
+    script = capsys.readouterr().out
+    typed = words.split(" ")
+    asked = (
+        f"COMP_WORDS=({shlex.join(typed)}); COMP_CWORD={len(typed) - 1}; _modt; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+    )
+    done = subprocess.run(["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True, check=True)
+    assert offered <= set(done.stdout.split())
+    assert all(word.startswith(typed[-1]) for word in done.stdout.split())
+
+
+def test_every_shell_is_told_every_command(capsys):
+    for shell in SHELLS:
+        main.main(["completion", shell])
+        script = capsys.readouterr().out
+        assert all(name in script for name in (*main.COMMANDS, *profile.COMMANDS))

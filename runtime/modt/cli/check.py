@@ -18,6 +18,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_profile_option(p)
     options.add_core_option(p)
     p.add_argument("--out", type=Path, default=OUT, metavar="DIR", help="run directory (default: %(default)s)")
+    options.add_examples(
+        p,
+        "modt check                                this machine, with the default profile",
+        "modt check velodyne:// --profile vlp-16   and whether that sensor sends",
+    )
     p.set_defaults(run=run)
 
 

@@ -20,7 +20,9 @@ COMMANDS = {
     "export": "modt_desk.cli.export",
     "simulate": "modt_desk.cli.simulate",
     "track": "modt_desk.cli.track",
-    "profile": "modt.cli.profiles",
+    "profile": "modt.cli.profile_group",
+    "profiles": "modt.cli.profile_list",
+    "completion": "modt_desk.cli.completion",
 }
 """Module of each command; those of the desk are named here alone."""
 

@@ -20,6 +20,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("meters", help="list the energy meters of this machine")
     options.add_profile_option(p, f"board (default: {profile.DEFAULT})")
     p.add_argument("--json", action="store_true", help="print JSON")
+    options.add_examples(
+        p,
+        "modt-profile meters                            meters, and why others cannot be read",
+        "modt-profile meters --profile raspberry-pi-5   with the power model of that board",
+    )
     p.set_defaults(run=run)
 
 

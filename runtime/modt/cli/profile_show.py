@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from modt import profile
+from modt.cli import options
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
@@ -12,6 +13,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("show", help="print the configuration that profiles come to, and who set each key")
     which = f"name or file; later ones win key by key (default: {profile.DEFAULT})"
     p.add_argument("names", nargs="*", metavar="NAME|FILE", help=which)
+    options.add_examples(
+        p,
+        "modt profile show vlp-16 raspberry-pi-5   a sensor and a board together",
+        "modt profile show my-robot.yaml           a file",
+    )
     p.set_defaults(run=run)
 
 

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from modt.cli import options
 from modt.cli.run import OUT
 from modt.errors import MisuseError
 
@@ -17,6 +18,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("status", help="say what a running modt run is doing")
     add_directory(p)
     p.add_argument("--json", action="store_true", help="print JSON")
+    options.add_examples(
+        p,
+        "modt status                        the service that records into runs/live",
+        "modt status /var/lib/modt --json   all fields of another one",
+    )
     p.set_defaults(run=run)
 
 

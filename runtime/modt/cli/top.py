@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+from modt.cli import options
 from modt.cli.status import add_directory, read
 from modt.errors import MisuseError
 
@@ -19,6 +20,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     """Declare the command and its options."""
     p = commands.add_parser("top", help="show what a running modt run is doing, until q is pressed")
     add_directory(p)
+    options.add_examples(
+        p,
+        "modt top                 the service that records into runs/live",
+        "modt top /var/lib/modt   another one",
+    )
     p.set_defaults(run=run)
 
 

@@ -36,6 +36,12 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     options.add_frames_option(p)
     p.add_argument("--no-points", action="store_true", help="MCAP without points: needs no source")
     options.add_capture_option(p)
+    options.add_examples(
+        p,
+        "modt export RUN --mcap run.mcap    for Foxglove, with the points of the source",
+        "modt export RUN --csv tracks.csv   a table for pandas",
+        "modt export RUN --kitti 0005.txt   results for KITTI's tracking evaluation",
+    )
     p.set_defaults(run=run)
 
 

@@ -27,6 +27,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--windows", type=count, default=60, metavar="N", help="of varied load (default: %(default)s)")
     p.add_argument("--window-s", type=seconds, default=2.0, metavar="S", help="length of each (default: %(default)g)")
     p.add_argument("--burst-s", type=seconds, default=10.0, metavar="S", help="of each burst (default: %(default)g)")
+    options.add_examples(
+        p,
+        "modt-profile calibrate --board 'my board' --out board.yaml   some minutes on an idle machine",
+        "modt-profile calibrate DRIVE --meter VDD_IN                  by another meter and stream",
+    )
     p.set_defaults(run=run)
 
 

@@ -26,6 +26,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--turn", type=count, metavar="N", help=turn)
     against = "measure how far this file of modt-profile predict was off"
     p.add_argument("--against", type=Path, metavar="PREDICTION", help=against)
+    options.add_examples(
+        p,
+        "modt-profile compare DRIVE --frames 0:50         what tracking saves there",
+        "modt-profile compare DRIVE --json > costs.json   for modt-profile predict and regimes",
+    )
     p.set_defaults(run=run)
 
 

@@ -32,6 +32,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     count = options.integer(1, MOST_FRAMES, "a count")
     spread = f"spread evenly over its first {MOST_FRAMES} frames"
     p.add_argument("--sweeps", type=count, default=20, metavar="N", help=f"{spread} (default: %(default)s)")
+    options.add_examples(
+        p,
+        "modt profile fit DRIVE --out my-robot.yaml       beams, range, height and tilt of a sensor",
+        "modt profile fit a.pcap --capture model=VLP-16   of a capture",
+    )
     p.set_defaults(run=run)
 
 

@@ -22,6 +22,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     seen = "frames tracked, without classifying (default: %(default)s)"
     p.add_argument("--observe", choices=("third", "all"), default="third", help=seen)
     p.add_argument("--out", type=Path, metavar="PREDICTION", help="write the JSON for modt-profile compare --against")
+    options.add_examples(
+        p,
+        "modt-profile predict DRIVE --calibration costs.json                    before any mode has run there",
+        "modt-profile predict DRIVE --calibration costs.json --out blind.json   for compare --against",
+    )
     p.set_defaults(run=run)
 
 

@@ -15,6 +15,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     comparisons = "JSON files of modt-profile compare"
     p.add_argument("comparisons", nargs="+", type=Path, metavar="COMPARISON", help=comparisons)
     options.add_report_options(p)
+    options.add_examples(
+        p,
+        "modt-profile regimes a.json b.json              gamma of several comparisons",
+        "modt-profile regimes *.json --html gamma.html   the same as a page",
+    )
     p.set_defaults(run=run)
 
 

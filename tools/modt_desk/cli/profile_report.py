@@ -15,6 +15,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("report", help="report energy and savings of a run, which may still be running")
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")
     options.add_report_options(p)
+    options.add_examples(
+        p,
+        "modt-profile report RUN                      what a run has cost",
+        "modt-profile report RUN --html report.html   the same as a page with plots",
+    )
     p.set_defaults(run=run)
 
 

@@ -6,6 +6,7 @@ import argparse
 import json
 from typing import Any
 
+from modt.cli import options
 from modt.config.profile import Key, keys
 from modt.profile.yaml_text import EXTENDS
 
@@ -16,6 +17,10 @@ FILE = "profile.schema.json"
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command."""
     p = commands.add_parser("schema", help="print the JSON Schema of a profile, for editors")
+    options.add_examples(
+        p,
+        "modt profile schema > profile.schema.json   for the line `# yaml-language-server: $schema=`",
+    )
     p.set_defaults(run=run)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from modt.cli import options
 from modt.errors import MisuseError, ModtError
 
 
@@ -18,6 +19,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--out", type=Path, required=True, metavar="DIR", help="directory of the drive")
     p.add_argument("--all-around", action="store_true", help="annotate objects on all sides, not only in the camera")
     p.add_argument("--distort", action="store_true", help="keep the distortion of scans by the motion of the sensor")
+    options.add_examples(
+        p,
+        "modt simulate --sensor vlp-16 --out sim                              a street, ten seconds",
+        "modt simulate --scene corridor --sensor mid-360 --seed 3 --out sim   indoors",
+    )
     p.set_defaults(run=run)
 
 

@@ -32,6 +32,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--sure", type=confidence, metavar="CONFIDENCE", help=least)
     p.add_argument("--online", action="store_true", help="no look ahead: each frame as the tracker reports it")
     p.add_argument("--quiet", action="store_true", help="no summary")
+    options.add_examples(
+        p,
+        "modt track 0005.txt --out tracks                 boxes of one sequence",
+        "modt track detections --oxts oxts --out tracks   a folder of sequences, with the motion of the car",
+    )
     p.set_defaults(run=run)
 
 

@@ -1,0 +1,103 @@
+"""`modt completion`: a script by which a shell completes commands, options and their values."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from importlib import import_module
+
+from modt import assets
+from modt.cli import main as modt
+from modt.cli import options
+from modt.cli import profile as modt_profile
+
+SHELLS = ("bash", "zsh", "fish")
+
+
+def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Declare the command and its options."""
+    p = commands.add_parser("completion", help="print a script by which a shell completes modt and modt-profile")
+    p.add_argument("shell", choices=SHELLS, help="shell")
+    options.add_examples(
+        p,
+        'eval "$(modt completion bash)"                    in ~/.bashrc',
+        'eval "$(modt completion zsh)"                     in ~/.zshrc, after compinit',
+        "modt completion fish | source                      in config.fish",
+    )
+    p.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the script."""
+    print("\n".join(fish() if arguments.shell == "fish" else bash(arguments.shell)))
+    return 0
+
+
+def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Parser of every command and group of commands by its words, the longest words first."""
+    for prog, commands in (("modt", modt.COMMANDS), ("modt-profile", modt_profile.COMMANDS)):
+        top = argparse.ArgumentParser(prog=prog)
+        choice = top.add_subparsers()
+        for module in commands.values():
+            import_module(module).add_parser(choice)
+        yield from _below(prog, top)
+
+
+def _below(words: str, parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    for name, inner in _commands(parser).items():
+        yield from _below(f"{words} {name}", inner)
+    yield words, parser
+
+
+def _commands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    groups = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    return dict(groups[0].choices) if groups else {}
+
+
+def _values(action: argparse.Action) -> list[str]:
+    """Values of an option that can be listed."""
+    if "--profile" in action.option_strings:
+        return sorted(path.stem for path in assets.folder("profiles").glob("*.yaml"))
+    return [str(choice) for choice in action.choices or ()]
+
+
+def bash(shell: str) -> list[str]:
+    """Lines of the script; zsh runs it by its emulation of bash's completion."""
+    lines = ["autoload -U +X bashcompinit && bashcompinit"] if shell == "zsh" else []
+    lines += [
+        "_modt() {",
+        '  local word="${COMP_WORDS[COMP_CWORD]}" before="${COMP_WORDS[COMP_CWORD-1]}" words=""',
+        '  case "${COMP_WORDS[0]##*/} ${COMP_WORDS[*]:1:COMP_CWORD-1} " in',
+    ]
+    values: dict[str, str] = {}
+    for words, parser in parsers():
+        offered = [*_commands(parser), *(name for action in parser._actions for name in action.option_strings)]
+        lines.append(f'    "{words} "*) words="{" ".join(offered)}" ;;')
+        for action in parser._actions:
+            values.update({name: " ".join(_values(action)) for name in action.option_strings if _values(action)})
+    lines += ["  esac", '  case "$before" in']
+    lines += [f'    {name}) words="{known}" ;;' for name, known in values.items()]
+    lines += [
+        "  esac",
+        '  COMPREPLY=($(compgen -W "$words" -- "$word"))',
+        "}",
+        "complete -o default -F _modt modt modt-profile",
+    ]
+    return lines
+
+
+def fish() -> list[str]:
+    """Lines of the script."""
+    lines = []
+    for words, parser in parsers():
+        prog, *path = words.split()
+        names = _commands(parser)
+        given = [f"__fish_seen_subcommand_from {name}" for name in path]
+        not_yet = [f"not __fish_seen_subcommand_from {' '.join(names)}"] if names else []
+        when = f'-n "{"; and ".join([*given, *not_yet])}" ' if given or not_yet else ""
+        lines += [f"complete -c {prog} {when}-f -a {name}" for name in names]
+        for action in parser._actions:
+            for name in (name for name in action.option_strings if name.startswith("--")):
+                known = f' -x -a "{" ".join(_values(action))}"' if _values(action) else ""
+                lines.append(f"complete -c {prog} {when}-l {name[2:]}{known}")
+    return lines
