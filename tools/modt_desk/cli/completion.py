@@ -17,7 +17,7 @@ SHELLS = ("bash", "zsh", "fish")
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
     p = commands.add_parser("completion", help="print a script by which a shell completes modt and modt-profile")
-    p.add_argument("shell", choices=SHELLS, help="shell")
+    p.add_argument("shell", choices=SHELLS, metavar="|".join(SHELLS), help="shell")
     options.add_examples(
         p,
         'eval "$(modt completion bash)"                    in ~/.bashrc',
