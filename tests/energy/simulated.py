@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from modt.config import EnergyConfig
 from modt.energy.ledger import Ledger
 from modt.energy.windows import Clocks
 
@@ -99,3 +101,20 @@ def write_files(folder: Path, **contents: object) -> Path:
     for name, content in contents.items():
         (folder / name).write_text(f"{content}\n")
     return folder
+
+
+CALIBRATED = EnergyConfig(idle_W=3.0, seg_J=0.1, class_J=0.01, point_J=1e-3)
+
+
+def line_of(energy_J: float | None, frames: int, load: int = 0, **more: Any) -> dict[str, Any]:
+    row = {"calls": frames, "items": 0, "points": 0, "wall_ns": 0, "cpu_ns": 300_000_000}
+    stages = {
+        "segmentation": row,
+        "classification": {**row, "items": load, "points": 9 * load, "cpu_ns": 100_000_000},
+    }
+    base = {"energy_J": energy_J, "wall_ns": 10**9, "process_ns": 500_000_000, "stages": stages, "marks": []}
+    return {**base, "kind": "measured", **more}
+
+
+def window_of(line: dict[str, Any]) -> dict[str, Any]:
+    return line | {"frames": [0, 1, 2], "conditions": {}, "resolution_J": 0.0, "meters": [{"name": "RAPL"}]}

@@ -49,11 +49,11 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app.chosen_profile import choose
     from modt.classification.pointnet import PointNet
     from modt.classification.scheduler import padded_size
-    from modt.energy.attribution import FitError
     from modt.energy.ledger import Ledger
     from modt.geometry import FieldOfView
     from modt.sinks.output import writing
     from modt_desk.comparison.window_fit_calibration import Workload
+    from modt_desk.energy.board_fit import FitError
 
     request = inputs.Request.of(arguments)
     stream = inputs.stream(request)

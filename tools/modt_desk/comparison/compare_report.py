@@ -9,13 +9,14 @@ from typing import Any
 import numpy as np
 
 from modt.config import EnergyConfig
-from modt.energy.attribution import EnergySums, run_energy, usable_windows
 from modt.energy.meters.meter import Facts, Kind, worst
 from modt.pipeline import CLASSIFICATION, ODOMETRY, SEGMENTATION, STAGES, TRACKING
 from modt.reporting.histogram import Histogram
 from modt.types import Float64
 from modt_desk.comparison import gamma
 from modt_desk.comparison.comparison import COUNTS, Repetition, total
+from modt_desk.energy.board_fit import usable_windows
+from modt_desk.energy.run_energy import EnergySums, run_energy
 from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt_desk.reporting.quantity import Quantity, estimate, quantity
 from modt_desk.reporting.reconciliation import reconciliation_tree

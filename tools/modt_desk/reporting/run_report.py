@@ -17,7 +17,6 @@ import numpy as np
 from modt import profile
 from modt.classification.scheduler import padded_size
 from modt.config import ClassificationConfig, EnergyConfig, ProfileConfig
-from modt.energy.attribution import EnergySums, run_energy
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.ledger import Line
 from modt.energy.meters.meter import Kind
@@ -29,6 +28,7 @@ from modt.sinks.run_directory import LEDGER, RUN, SUMMARY, TRACKS
 from modt.sinks.tracks import SCHEMA as FRAME_SCHEMA
 from modt.types import Float64
 from modt_desk.energy.nonnegative import nonnegative_fit
+from modt_desk.energy.run_energy import EnergySums, run_energy
 from modt_desk.energy.savings import OtherCosts, UnitCosts, reconcile
 from modt_desk.reporting import energy_plots, svg
 from modt_desk.reporting.document import Cell, Document, Table

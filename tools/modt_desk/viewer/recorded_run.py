@@ -12,7 +12,7 @@ import numpy as np
 
 from modt import profile
 from modt.config import EnergyConfig, ProfileConfig
-from modt.energy.attribution import run_energy, usable
+from modt.energy.attribution import usable
 from modt.energy.ledger import SCHEMA as LEDGER_SCHEMA
 from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.errors import MisuseError
@@ -24,6 +24,7 @@ from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA, recorded_pose
 from modt.types import Float64, Int
 from modt.viewer.track_rows import planar
+from modt_desk.energy.run_energy import run_energy
 from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
 COUNTS: dict[str, Callable[[Any], Any]] = {

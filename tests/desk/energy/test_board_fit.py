@@ -1,0 +1,144 @@
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modt.energy.attribution import CLASS, SEG
+from modt.energy.meters.discovery import find_powercap
+from modt.energy.meters.meter import Conditions
+from modt.energy.windows import Windows
+from modt_desk.energy.board_fit import Fit, FitError, fit, unit_energy_J
+from tests.energy.simulated import SimulatedMachine, line_of
+
+TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
+NOISE = 0.1
+
+
+def drive(machine: SimulatedMachine, windows: int, noise: float, faults: bool) -> list[dict[str, Any]]:
+    random = machine.random
+    ledger = machine.ledger()
+    recorder = Windows(find_powercap(machine.sys)[0].meters, machine.clocks, Conditions(0, machine.sys))
+    lines = []
+    for _ in range(windows):
+        if faults and not machine.zone.is_dir():
+            machine.appear()
+        elif faults and random.random() < 0.1:
+            machine.vanish()
+        frames, load = int(random.integers(1, 9)), int(random.integers(0, 60))
+        luck = 1 + noise * random.standard_normal()
+        for _ in range(frames):
+            ledger.run("segmentation", machine.work, 0.01, luck * TRUE["seg_J"])
+            items, points = load, load * int(random.integers(20, 400))
+            joules = luck * (TRUE["class_J"] * items + TRUE["point_J"] * points)
+            ledger.run("classification", machine.work, 0.01, joules, items)
+            ledger.count("classification", points=points)
+        seconds = random.uniform(1.0, 2.0)
+        machine.true_J += luck * TRUE["idle_W"] * seconds
+        machine.wait(seconds - 0.02 * frames)
+        line = recorder.add(ledger.close_frame(0))
+        assert line is not None
+        lines.append(line)
+    return lines
+
+
+def covered(result: Fit) -> dict[str, bool]:
+    return {c.name: c.low <= TRUE[c.name] <= c.high for c in result.coefficients}
+
+
+def trial(sys: Path, seed: int, windows: int = 40) -> tuple[Fit, list[dict[str, Any]]]:
+    """A calibration whose counter passes its range on the way."""
+    machine = SimulatedMachine(sys, idle_W=0.0, wrap_uJ=2_500_000_000, step_uJ=61.035, seed=seed)
+    machine.true_J = 2450.0
+    machine.wait(0.0)
+    lines = drive(machine, windows, NOISE, faults=True)
+    return fit(lines, np.random.default_rng(seed)), lines
+
+
+def test_noiseless_windows_give_the_coefficients_back(tmp_path: Path) -> None:
+    machine = SimulatedMachine(tmp_path, idle_W=0.0, wrap_uJ=10_000_000_000)
+    result = fit(drive(machine, 40, noise=0.0, faults=False), np.random.default_rng(0))
+    for coefficient in result.coefficients:
+        assert coefficient.value == pytest.approx(TRUE[coefficient.name], rel=1e-3)
+    assert result.explained > 0.99999
+    assert (result.windows, result.dropped) == (39, 1)  # nothing is known of a counter's power in the first one
+
+
+@pytest.mark.slow
+def test_intervals_cover_the_truth_through_noise_wraps_and_drop_outs(tmp_path: Path) -> None:
+    hits = dict.fromkeys(TRUE, 0)
+    wraps = lost = 0
+    for seed in range(100):
+        result, lines = trial(tmp_path / str(seed), seed)
+        wraps += sum("wrap" in line["marks"] for line in lines)
+        lost += sum("lost" in line["marks"] for line in lines)
+        assert result.windows + result.dropped == len(lines)
+        for c in result.coefficients:
+            hits[c.name] += c.low <= TRUE[c.name] <= c.high
+            assert 0.0 <= c.low <= c.value <= c.high
+    assert min(hits.values()) >= 90
+    assert wraps > 40
+    assert lost > 100
+
+
+def test_interval_is_narrower_than_its_coefficient(tmp_path: Path) -> None:
+    result, _ = trial(tmp_path, seed=1, windows=120)
+    assert result["seg_J"].high - result["seg_J"].low < TRUE["seg_J"]
+    assert result["idle_W"].high - result["idle_W"].low < TRUE["idle_W"]
+
+
+def test_loads_that_vary_together_are_refused() -> None:
+    lines = [line_of(3.0 + n, n, 10 * n) for n in range(1, 20)]
+    with pytest.raises(FitError, match="varied together"):
+        fit(lines, np.random.default_rng(0))
+
+
+def test_work_that_costs_nothing_is_bounded_at_zero() -> None:
+    random = np.random.default_rng(1)
+    bounded = 0
+    for _ in range(20):
+        loads = random.integers(1, 60, (24, 2)).tolist()
+        noisy = [line_of(3.0 + 0.2 * n + 0.05 * random.standard_normal(), n, m) for n, m in loads]
+        for line, points in zip(noisy, random.integers(100, 9000, 24).tolist(), strict=True):
+            line["stages"]["classification"]["points"] = points
+        result = fit(noisy, random)
+        assert all(0.0 <= c.low <= c.value <= c.high for c in result.coefficients)
+        assert result["class_J"].low == 0.0
+        bounded += result["class_J"].value == 0.0
+    assert 0 < bounded < 20
+
+
+def test_readings_that_fall_with_the_load_are_refused() -> None:
+    loads = np.random.default_rng(0).integers(1, 60, (24, 3)).tolist()
+    lines = [line_of(9.0 + 0.2 * n - 0.1 * m, n, m) for n, m, _ in loads]
+    for line, (_, _, points) in zip(lines, loads, strict=True):
+        line["stages"]["classification"]["points"] = points
+    with pytest.raises(FitError, match=r"class_J is -0\.1 .* gives no energy back"):
+        fit(lines, np.random.default_rng(0))
+
+
+def test_load_that_is_missing_is_named() -> None:
+    lines = [line_of(3.0 + n, n) for n in range(1, 20)]
+    with pytest.raises(FitError, match="class_J, point_J"):
+        fit(lines, np.random.default_rng(0))
+
+
+def test_too_few_windows_are_refused() -> None:
+    with pytest.raises(FitError, match="at least 8"):
+        fit([line_of(None, 1), line_of(3.0, 1, marks=["suspended"]), line_of(3.0, 1)], np.random.default_rng(0))
+
+
+def test_unit_energy_of_bursts_is_the_true_one(tmp_path: Path) -> None:
+    machine = SimulatedMachine(tmp_path, idle_W=3.0)
+    ledger = machine.ledger()
+    recorder = Windows(find_powercap(tmp_path)[0].meters, machine.clocks, Conditions(0, tmp_path))
+    lines = []
+    for _ in range(5):
+        for _ in range(50):
+            ledger.run("segmentation", machine.work, 0.02, TRUE["seg_J"])
+        machine.wait(0.0)
+        line = recorder.add(ledger.close_frame(0))
+        assert line is not None
+        lines.append(line)
+    assert unit_energy_J(lines, 3.0, SEG) == pytest.approx(TRUE["seg_J"], rel=1e-3)
+    assert unit_energy_J(lines, 3.0, CLASS) is None

@@ -1,0 +1,118 @@
+"""Coefficients of a board: non-negative least squares over windows of varied load, with bootstrap intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, stats
+
+from modt.energy.attribution import IDLE, REGRESSORS, Regressor, usable
+from modt.energy.ledger import Line
+from modt.types import Float64
+
+_MAX_CONDITION = 1e6
+"""Condition number of the scaled regressors above which they are collinear."""
+_TAILS = (0.025, 0.975)
+"""Quantiles of the intervals at 95 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Coefficient:
+    """A fitted value with its interval at 95 %."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """Result of a fit."""
+
+    coefficients: tuple[Coefficient, ...]  # in the order of the regressors
+    windows: int  # used
+    dropped: int  # not usable
+    residual_J: float  # standard deviation, a window
+    explained: float  # share of the variance, at most 1
+    condition: float  # number of the scaled regressors
+
+    def __getitem__(self, name: str) -> Coefficient:
+        return next(c for c in self.coefficients if c.name == name)
+
+
+class FitError(Exception):
+    """The windows do not determine the coefficients; the message names the load to vary."""
+
+
+def usable_windows(lines: Iterable[Line]) -> list[Line]:
+    """The windows that are usable."""
+    return [line for line in lines if usable(line)]
+
+
+def fit(lines: Sequence[Line], random: np.random.Generator, resamples: int = 1000) -> Fit:
+    """Coefficients of REGRESSORS over "modt.energy/1" lines, each at least 0.
+
+    Raises:
+        FitError: too few windows, collinear regressors, or a coefficient whose whole interval is negative.
+    """
+    good = usable_windows(lines)
+    n, p = len(good), len(REGRESSORS)
+    if n < 2 * p:
+        raise FitError(f"{n} usable windows are too few for {p} coefficients; record at least {2 * p}")
+    X = np.array([[regressor.count(line) for regressor in REGRESSORS] for line in good])
+    y = np.array([line["energy_J"] for line in good])
+    scale = np.linalg.norm(X, axis=0)
+    if not scale.all():
+        missing = ", ".join(r.name for r, s in zip(REGRESSORS, scale, strict=True) if not s)
+        raise FitError(f"nothing was counted for {missing}; vary its load")
+    X /= scale
+    condition = float(np.linalg.cond(X))
+    if condition > _MAX_CONDITION:
+        raise FitError("the counts always varied together; vary rate and classification load independently")
+    free, *_ = np.linalg.lstsq(X, y, rcond=None)
+    spread = _bootstrap(X, y, random, resamples) - free
+    # Resampling few windows underestimates the spread: widen by the ratio of Student's t to the normal quantile.
+    wider = np.sqrt(n / (n - p)) * stats.t.ppf(_TAILS[1], n - p) / stats.norm.ppf(_TAILS[1])
+    margin = wider * np.quantile(spread, _TAILS, axis=0)
+    negative = ", ".join(
+        f"{r.name} is {v:.3g} ({a:.3g} to {b:.3g})"
+        for r, v, a, b in zip(REGRESSORS, free / scale, *((free + margin) / scale), strict=True)
+        if b < 0
+    )
+    if negative:
+        raise FitError(f"{negative}, but work gives no energy back: the readings do not follow the load")
+    value = optimize.nnls(X, y)[0]
+    residual = y - X @ value
+    low, high = np.maximum(value + margin, 0.0)
+    variance = float(np.sum((y - y.mean()) ** 2))
+    return Fit(
+        coefficients=tuple(
+            Coefficient(r.name, float(v / s), float(a / s), float(b / s))
+            for r, v, a, b, s in zip(REGRESSORS, value, low, high, scale, strict=True)
+        ),
+        windows=n,
+        dropped=len(lines) - n,
+        residual_J=float(np.sqrt(residual @ residual / (n - p))),
+        explained=1.0 - float(residual @ residual) / variance if variance else 1.0,
+        condition=condition,
+    )
+
+
+def _bootstrap(X: Float64, y: Float64, random: np.random.Generator, resamples: int) -> Float64:
+    """(resamples, p) solutions over windows drawn with replacement."""
+    n, p = X.shape
+    weight = random.multinomial(n, np.full(n, 1 / n), size=resamples).astype(float)
+    normal = np.einsum("bn,np,nq->bpq", weight, X, X, optimize=True) + 1e-12 * np.eye(p)
+    moment = weight @ (X * y[:, None])
+    solved: Float64 = np.linalg.solve(normal, moment[..., None])[..., 0]
+    return solved
+
+
+def unit_energy_J(lines: Sequence[Line], idle_W: float, work: Regressor) -> float | None:
+    """Median of (energy - idle) / count over windows of that work alone; None without a usable window."""
+    worked = [line for line in usable_windows(lines) if work.count(line) > 0]
+    each = [(line["energy_J"] - idle_W * IDLE.count(line)) / work.count(line) for line in worked]
+    return float(np.median(each)) if each else None

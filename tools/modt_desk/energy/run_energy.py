@@ -1,0 +1,85 @@
+"""The energy of a run, summed over its windows or modelled frames."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any
+
+from modt.config import EnergyConfig
+from modt.energy.attribution import attribute, usable
+from modt.energy.ledger import Line
+from modt.energy.meters.meter import Kind, model_J, model_name, worst
+
+
+def modelled(line: Line, board: EnergyConfig) -> Line:
+    """A frame's ledger line as a window of one frame, with the energy of the power model."""
+    return line | {
+        "frames": [line["frame"], line["frame"], 1],
+        "process_ns": line["cpu_ns"],
+        "energy_J": model_J(board.idle_W, board.busy_W, line["wall_ns"], line["cpu_ns"]),
+        "kind": Kind.ESTIMATED.value,
+        "resolution_J": 0.0,
+        "meters": [{"name": model_name(board.idle_W, board.busy_W)}],
+    }
+
+
+class EnergySums:
+    """Energy of windows or of modelled frames, summed."""
+
+    def __init__(self, board: EnergyConfig) -> None:
+        self._board = board
+        self.count = self.frames = self.wall_ns = self.dropped = 0
+        self.gross_J = self.error2_J2 = 0.0
+        self.parts_J: Counter[str] = Counter()
+        self._cpu_ns: Counter[str] = Counter()  # of the stages
+        self.kind, self.meter = Kind.ESTIMATED, ""
+        self.conditions: dict[str, Any] = {}  # of the last window
+        self.marks: set[str] = set()
+
+    def add_window(self, window: Line) -> None:
+        """Add a line of modt.energy; one that is not usable is counted as dropped."""
+        self.conditions = window["conditions"]
+        self.marks.update(window["marks"])
+        if not usable(window):
+            self.dropped += 1
+            self.marks.update(() if window["energy_J"] is None or window["marks"] else {"implausible"})
+        elif window["frames"][2]:
+            self._add(window)
+
+    def add_frame(self, line: Line) -> None:
+        """Add a frame of the ledger by the power model."""
+        self._add(modelled(line, self._board))
+
+    def watts(self, *stages: str) -> float:
+        """Power above idling while the stages compute: their energy over their CPU time; NaN where it has no part."""
+        ran = [stage for stage in stages if self._cpu_ns[stage]]
+        joules = sum(self.parts_J.get(stage, math.nan) for stage in ran)
+        return 1e9 * joules / sum(self._cpu_ns[stage] for stage in ran) if ran else 0.0
+
+    def stage_watts(self, stages: Iterable[str]) -> dict[str, float]:
+        """The same of each of these stages, without those that have no part."""
+        return {stage: watts for stage in stages if not math.isnan(watts := self.watts(stage))}
+
+    def _add(self, window: Line) -> None:
+        self.kind = worst([Kind(window["kind"]), *([self.kind] if self.count else [])])
+        self.meter = self.meter or window["meters"][0]["name"]
+        self.count += 1
+        self.frames += window["frames"][2]
+        self.wall_ns += window["wall_ns"]
+        self.gross_J += window["energy_J"]
+        self.error2_J2 += window["resolution_J"] ** 2
+        self.parts_J.update(attribute(window, self._board))
+        self._cpu_ns.update({stage: row["cpu_ns"] for stage, row in window["stages"].items()})
+
+
+def run_energy(windows: Iterable[Line], frames: Iterable[Line], board: EnergyConfig) -> EnergySums:
+    """Energy of a run: of its windows where a meter was read, else of its frames by the power model."""
+    sums = EnergySums(board)
+    for window in windows:
+        sums.add_window(window)
+    if not sums.count:
+        for line in frames:
+            sums.add_frame(line)
+    return sums
