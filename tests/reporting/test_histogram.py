@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.reporting.histogram import MAX_EXACT, Histogram, bucket_middle
+from modt.reporting.histogram import Histogram, bucket_middle
 
 QUANTILES = (0.0, 0.25, 0.5, 0.95, 0.99, 1.0)
 
@@ -25,10 +25,9 @@ def long_run(seed, n=30_000):
     return np.exp(rng.normal(np.log(5e6), 0.5 + rng.exponential(0.3, n), n)).astype(np.int64).tolist()
 
 
-@given(st.lists(st.integers(0, 2**40), min_size=1, max_size=200))
-def test_a_short_run_is_exact(values):
+@given(st.lists(st.integers(0, 255), min_size=1, max_size=200))
+def test_small_values_are_exact(values):
     spread = histogram_of(values)
-    assert (spread.count, spread.total, spread.maximum) == (len(values), sum(values), max(values))
     for share in QUANTILES:
         assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1e-12)
 
@@ -44,21 +43,12 @@ def test_no_values_and_negative_ones_have_figures():
 
 @pytest.mark.parametrize("bits", [3, 5, 8])
 def test_fewer_bits_hold_fewer_values_within_the_stated_error(bits):
-    values, spread = long_run(1), Histogram(max_exact=0, bits=bits)
+    values, spread = long_run(1), Histogram(bits)
     for value in values:
         spread.add(value)
     assert len(spread) <= 2 ** (bits - 1) * np.log2(2 * max(values) / min(values)) + 1
     for share in QUANTILES:
         assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=2.0**-bits)
-
-
-def test_without_exact_values_the_error_is_the_stated_one_from_the_start():
-    values, spread = long_run(1, 500), Histogram(max_exact=0)
-    for value in values:
-        spread.add(value)
-    assert len(spread) < len(set(values))
-    for share in QUANTILES:
-        assert spread.quantile(share) == pytest.approx(np.quantile(values, share), rel=1 / 128)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -72,9 +62,9 @@ def test_quantiles_of_many_values_are_within_the_stated_error(seed):
 
 
 def test_memory_is_bounded():
-    spread = histogram_of(long_run(0, 2 * MAX_EXACT))
+    spread = histogram_of(long_run(0, 8192))
     held = len(spread)
-    assert held < MAX_EXACT
+    assert held < 4096
     for value in long_run(1, 50_000):
         spread.add(value)
     assert len(spread) < 2 * held

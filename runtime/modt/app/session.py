@@ -260,4 +260,4 @@ def service(
     recording = Recording(RunDirectory(out), stages.config.recording, writer, describe)
     deadlines = Deadlines(source.info.period_s)
     kinds = deadlines, Containment(), Monitor(recording, deadlines.timing, metrics), Stop(reload=True)
-    return Session(source, stages, recording, sinks, *kinds, Summary(0), meter.meters, core, lacking)
+    return Session(source, stages, recording, sinks, *kinds, Summary(), meter.meters, core, lacking)

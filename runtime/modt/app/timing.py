@@ -22,7 +22,7 @@ class Timing:
     """
 
     def __init__(self) -> None:
-        self.lateness, self.execution, self.latency = (Histogram(max_exact=0, bits=_BITS) for _ in range(3))
+        self.lateness, self.execution, self.latency = (Histogram(_BITS) for _ in range(3))
         self.missed = 0
 
     def add(self, release_s: float, start_s: float, finish_s: float, period_s: float) -> float:

@@ -8,25 +8,22 @@ import numpy as np
 
 from modt.types import Int
 
-MAX_EXACT = 4096
-"""Distinct values held exactly by default."""
 BITS = 8
-"""Leading bits held of each value beyond that, by default."""
+"""Leading bits held of each value: values below 256 are exact, quantiles of greater ones within 0.4 %."""
 
 
 class Histogram:
     """Count, sum, maximum and quantiles of integers; negative ones count as 0.
 
-    Count, sum and maximum are exact. Quantiles are exact up to `max_exact` distinct values; then each value is
-    replaced by the middle of those that share its leading `bits`, an error below 2^-bits. Integers of 63 bits have
-    fewer than 2^(bits - 1) (65 - bits) such middles, which bounds the memory.
+    Count, sum and maximum are exact. For quantiles each value is replaced by the middle of those that share its
+    leading `bits`, an error of at most 2^-bits. Integers of 63 bits have fewer than 2^(bits - 1) (65 - bits) such
+    middles, which bounds the memory.
     """
 
-    def __init__(self, max_exact: int = MAX_EXACT, bits: int = BITS) -> None:
+    def __init__(self, bits: int = BITS) -> None:
         self.count = self.total = self.maximum = 0
-        self._max_exact, self._bits = max_exact, bits
+        self._bits = bits
         self._occurrences: Counter[int] = Counter()
-        self._exact = max_exact > 0
 
     def __len__(self) -> int:
         """Distinct values held."""
@@ -38,12 +35,7 @@ class Histogram:
         self.count += 1
         self.total += value
         self.maximum = max(self.maximum, value)
-        self._occurrences[value if self._exact else bucket_middle(value, self._bits)] += 1
-        if self._exact and len(self) > self._max_exact:
-            self._exact = False
-            exact, self._occurrences = self._occurrences, Counter()
-            for each, occurrences in exact.items():
-                self._occurrences[bucket_middle(each, self._bits)] += occurrences
+        self._occurrences[bucket_middle(value, self._bits)] += 1
 
     def occurrences(self) -> dict[str, list[int]]:
         """The distinct values held, in order, and how often each occurred."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from modt.classes import CLASS_NAMES, OBJECTS, ObjectClass
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE
-from modt.reporting.histogram import MAX_EXACT, Histogram
+from modt.reporting.histogram import Histogram
 from modt.types import NONE, FrameResult
 
 _SCHEMA = "modt.summary/1"
@@ -47,21 +47,15 @@ class TrackLives:
 
 
 class Summary:
-    """Totals of a run of any length; memory is bounded (`Histogram`, `TrackLives`).
+    """Totals of a run of any length; memory is bounded (`Histogram`, `TrackLives`)."""
 
-    Args:
-        max_exact: distinct times of which quantiles are exact; 0 takes little memory from the first frame on.
-    """
-
-    def __init__(self, max_exact: int = MAX_EXACT) -> None:
+    def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
         self.lives = TrackLives()
         self._last: FrameResult | None = None
         self._calls: Counter[str] = Counter()
         self._items: Counter[str] = Counter()
-        self._times: dict[str, dict[str, Histogram]] = defaultdict(
-            lambda: {"wall": Histogram(max_exact), "cpu": Histogram(max_exact)}
-        )
+        self._times: dict[str, dict[str, Histogram]] = defaultdict(lambda: {"wall": Histogram(), "cpu": Histogram()})
 
     def add_result(self, result: FrameResult) -> None:
         """Add the result of a frame."""
