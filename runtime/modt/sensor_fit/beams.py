@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from modt import assets, profile
-from modt.config import SensorConfig
+from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry.beams import Beams, BeamTable, EvenBeams
 from modt.types import Float32, Float64, Int
 
@@ -263,3 +263,26 @@ def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
             away_m = abs((sensor.height_m or 0.0) - (found.height_m or 0.0))
             best = min(best or (np.inf, ""), (away_m, path.stem))
     return best[1] if best else None
+
+
+MAX_SPACING_DEG = 10.0
+"""Greatest spacing that a profile can state."""
+EVEN_DEG, EVEN_SHARE = 0.05, 0.05
+"""Deviation from even spacing up to which beams need no table: the greater of the two, and of the spacing."""
+
+
+def cell_m(spacing_deg: float, azimuth_step_deg: float) -> float:
+    """Side of a cell at 10 m: the root of the mean spacing of the returns, as cells grow as the root of range."""
+    return max(SegmentationConfig().cell_m, round(0.18 * float(np.sqrt(np.sqrt(spacing_deg * azimuth_step_deg))), 3))
+
+
+def beam_keys(pattern: BeamPattern) -> dict[str, Any]:
+    """Keys of `sensor` that describe a pattern: a table of the beams, or their step where they are evenly spaced."""
+    found, step_deg = pattern.elevations_deg, round(pattern.azimuth_step_deg, 3)
+    if not len(found):
+        step_deg = min(step_deg, MAX_SPACING_DEG)
+        return {"elevation_step_deg": step_deg, "azimuth_step_deg": step_deg}
+    mean_deg = float(np.ptp(found)) / (len(found) - 1)
+    if np.abs(np.diff(found) - mean_deg).max() < max(EVEN_DEG, EVEN_SHARE * mean_deg):
+        return {"elevation_step_deg": min(round(mean_deg, 3), MAX_SPACING_DEG), "azimuth_step_deg": step_deg}
+    return {"elevations_deg": tuple(np.round(found[::-1], 2).tolist()), "azimuth_step_deg": step_deg}

@@ -7,26 +7,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modt.config import ProfileConfig, SensorConfig
+from modt.config import ProfileConfig, SegmentationConfig, SensorConfig
 from modt.placement import Mount
 from modt.sensor_fit.beams import (
     COARSE_ORIGINS_M,
     azimuth_ratio,
+    beam_keys,
+    cell_m,
     find_beams,
     nearest_profile,
     spacing_ratio,
     tangents,
 )
-from modt.sensor_fit.findings import (
-    NONE,
-    Recording,
-    apply,
-    find_height,
-    find_reflectance,
-    pattern_findings,
-    reflectance_scale,
-)
-from modt.sensor_fit.tilt import MIN_TILT_DEG, Floor, find_floor
+from modt.sensor_fit.reflectance import NONE, reflectance_scale, usable_scale
+from modt.sensor_fit.tilt import MIN_TILT_DEG, Floor, find_floor, mount_height_m
 from modt.types import Float32
 
 MAX_SPACING_RATIO = 1.35  # of the beams, median over the points, and of the returns along a beam
@@ -82,27 +76,29 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
     pattern = find_beams([points], COARSE_ORIGINS_M)
     if pattern is None:
         return Recognition((), None, config)
-    found = apply(ProfileConfig(), pattern_findings(pattern))
-    tangent = tangents(points)
-    of_sensor = _pattern_differences(config.sensor, found.sensor, tangent)
+    sensor, tangent = SensorConfig(**beam_keys(pattern)), tangents(points)
+    of_sensor = _pattern_differences(config.sensor, sensor, tangent)
     floor = find_floor(points, None if of_sensor else config.sensor.height_m)
     tilt_deg = None
     if floor is not None and floor.tilt_deg > MIN_TILT_DEG and _is_open(config.sensor):
         tilt_deg = floor.roll_pitch_deg
     mount = Mount.of(*(tilt_deg or (config.sensor.roll_deg, config.sensor.pitch_deg)))
-    found = apply(found, find_height(Recording([mount.turn(points[::2])], [0.0]), found))
-    found = apply(found, find_reflectance(Recording([points], [0.0]), found))
-    scale, _ = reflectance_scale(points[:, 3])
+    sensor = replace(sensor, height_m=mount_height_m([mount.turn(points[::2])], sensor))
+    scale = reflectance_scale(points[:, 3])
+    sensor = replace(sensor, reflectance=usable_scale(points, scale, sensor))
     if NONE not in {config.sensor.reflectance, scale} and scale != config.sensor.reflectance:
         of_sensor.append(f"reflectance of another scale than {config.sensor.reflectance}")
-    of_mount = _height_differences(config.sensor.height_m, found.sensor.height_m)
+    of_mount = _height_differences(config.sensor.height_m, sensor.height_m)
     if floor is not None and not _is_open(config.sensor):
         of_mount += _tilt_differences(mount, floor)
     nearest, fitted = None, config
     if of_sensor:
-        nearest, fitted = nearest_profile(found.sensor, tangent), _with_reach(found)
+        if sensor.height_m is not None:  # a small robot is near its sensor
+            sensor = replace(sensor, min_range_m=min(sensor.min_range_m, sensor.height_m))
+        cells = SegmentationConfig(cell_m=cell_m(pattern.spacing_deg, pattern.azimuth_step_deg))
+        nearest, fitted = nearest_profile(sensor, tangent), ProfileConfig(sensor=sensor, segmentation=cells)
     elif of_mount:
-        fitted = replace(config, sensor=replace(config.sensor, height_m=found.sensor.height_m))
+        fitted = replace(config, sensor=replace(config.sensor, height_m=sensor.height_m))
     recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg)
     return replace(recognition, fitted=recognition.mounted(fitted))
 
@@ -137,11 +133,3 @@ def _height_differences(expected_m: float | None, found_m: float | None) -> list
     ):
         return []
     return [f"{found_m:.2f} m above the ground, not {expected_m:.2f}"]
-
-
-def _with_reach(found: ProfileConfig) -> ProfileConfig:
-    """Its least range no longer than its height: a small robot is near its sensor."""
-    if found.sensor.height_m is None:
-        return found
-    least_m = min(found.sensor.min_range_m, found.sensor.height_m)
-    return replace(found, sensor=replace(found.sensor, min_range_m=least_m))

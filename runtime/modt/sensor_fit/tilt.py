@@ -1,12 +1,15 @@
-"""Roll and pitch of a sensor, by the floor in a sweep."""
+"""Roll, pitch and height of a sensor, by the floor in a sweep."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from modt.config import SensorConfig
 from modt.geometry import rotation_zyx
+from modt.geometry.field_of_view import BlindSectors
 from modt.types import Float32, Float64
 
 REACH_M, DEPTH_M = 12.0, 3.0
@@ -115,3 +118,25 @@ def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
 def _turned(R: Float64, columns: Float64) -> Float64:
     """(3, C) columns after a rotation (3, 3)."""
     return np.asarray((R[:, :, None] * columns[None]).sum(axis=1))
+
+
+HEIGHTS_M = (0.05, 5.0)
+"""Heights that a profile can state."""
+
+
+def ground_height_m(sweeps: Sequence[Float32], sensor: SensorConfig) -> float | None:
+    """Height above the floor, median over level sweeps of (N, 4) points [m]; None where none shows one."""
+    sectors = BlindSectors(sensor.blind_sectors_deg or (), sensor.blind_range_m)
+    heights_m = []
+    for points in sweeps:
+        kept = points[(np.hypot(points[:, 0], points[:, 1]) > sensor.min_range_m) & ~sectors.contain(points)]
+        floor = find_floor(kept)
+        if floor is not None and floor.up[2] > 0:
+            heights_m.append(floor.depth_m)
+    return float(np.median(heights_m)) if heights_m else None
+
+
+def mount_height_m(sweeps: Sequence[Float32], sensor: SensorConfig) -> float | None:
+    """The same as a value of sensor.height_m; None where it is not known, or none that a profile can state."""
+    height_m = ground_height_m(sweeps, sensor)
+    return None if height_m is None or not HEIGHTS_M[0] <= height_m <= HEIGHTS_M[1] else round(height_m, 2)

@@ -9,8 +9,10 @@ import pytest
 from modt import assets, profile
 from modt.config import ProfileConfig
 from modt.config.profile import REFLECTANCE_SCALES
-from modt.sensor_fit.findings import SCALES, Finding, Recording, cell_m
+from modt.sensor_fit.beams import cell_m
+from modt.sensor_fit.reflectance import SCALES
 from modt.sources.recognise import open_stream
+from modt_desk.sensor_fit.findings import Finding, Recording
 from modt_desk.sensor_fit.fit import FINDERS, fit
 from modt_desk.sensor_fit.profile_text import doubts, profile_text
 from modt_desk.simulation.sensors import sensor

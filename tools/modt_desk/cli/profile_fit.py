@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from modt.config import ProfileConfig
-    from modt.sensor_fit.findings import Finding, Recording
+    from modt_desk.sensor_fit.findings import Finding, Recording
 
 MOST_FRAMES = 1000
 """Frames of a recording of which the sweeps are taken."""
@@ -45,8 +45,8 @@ def class_frequencies(recording: Recording, config: ProfileConfig) -> Iterator[F
     from modt.app import assembly
     from modt.energy.ledger import NullLedger
     from modt.geometry import FieldOfView
-    from modt.sensor_fit.findings import Finding
     from modt.types import Frame
+    from modt_desk.sensor_fit.findings import Finding
 
     pipeline = assembly.pipeline(assembly.MODES["conventional"], config, FieldOfView(), NullLedger())
     found = 0
@@ -61,9 +61,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Fit."""
     from itertools import islice
 
-    from modt.sensor_fit.findings import Recording
     from modt.sinks.output import writing
     from modt.sources.recognise import open_stream
+    from modt_desk.sensor_fit.findings import Recording
     from modt_desk.sensor_fit.fit import FINDERS, fit
     from modt_desk.sensor_fit.profile_text import doubts, profile_text
 

@@ -10,19 +10,18 @@ import numpy as np
 from modt.config import ProfileConfig
 from modt.geometry.field_of_view import BlindSectors
 from modt.sensor_fit.beams import find_beams
-from modt.sensor_fit.findings import (
+from modt.sensor_fit.tilt import find_floor, ground_height_m
+from modt.types import Float32
+from modt_desk.sensor_fit.body import BODY_REACH_M, find_body
+from modt_desk.sensor_fit.findings import (
     Finding,
     Recording,
     apply,
     find_height,
     find_reflectance,
-    ground_height_m,
     level,
     pattern_findings,
 )
-from modt.sensor_fit.tilt import find_floor
-from modt.types import Float32
-from modt_desk.sensor_fit.body import BODY_REACH_M, find_body
 
 MAX_RANGE_M = 100.0
 """Objects farther away have too few returns to be known."""

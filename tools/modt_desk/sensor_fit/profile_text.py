@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Sequence
 from typing import Any
 
-from modt.sensor_fit.findings import Finding
+from modt_desk.sensor_fit.findings import Finding
 
 CHECK = "check this"
 WIDTH = 116

@@ -1,0 +1,67 @@
+"""The scale of a sensor's reflectance, by which a model may know it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modt.config import SensorConfig
+from modt.sensor_fit.beams import nearest_profile, tangents
+from modt.types import Float32
+
+NONE, OTHER = "none", "other"
+"""Scales of a sweep without reflectance, and of one on a scale that models do not know."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """What a sensor reports in streets.
+
+    Attributes:
+        deciles: of its reflectances, the first to the ninth.
+        max_difference: mean over the deciles.
+        hundredths: whether all of them are, as no other sensor's; else others may have the same scale.
+    """
+
+    deciles: tuple[float, ...]
+    max_difference: float
+    hundredths: bool = False
+
+
+SCALES = {
+    "hdl-64e": Scale((0.0, 0.15, 0.20, 0.24, 0.28, 0.30, 0.32, 0.36, 0.41), 0.12, hundredths=True),
+    "pandar64": Scale((0.004, 0.012, 0.020, 0.027, 0.035, 0.047, 0.063, 0.084, 0.117), 0.025),
+}
+"""Scales that models know: of KITTI's object frames, and of nine scans of PandaSet."""
+
+
+def recorded_in(reflectance: Float32) -> Float32:
+    """The recorded ones of (N,) reflectances; none where they are few or all alike."""
+    recorded = reflectance[reflectance >= 0]
+    few = len(recorded) < 0.5 * len(reflectance) or not len(recorded) or np.ptp(recorded) == 0
+    return recorded[:0] if few else recorded
+
+
+def reflectance_scale(reflectance: Float32) -> str:
+    """Scale of (N,) reflectances: a name of SCALES, NONE or OTHER."""
+    recorded = recorded_in(reflectance)
+    if not len(recorded):
+        return NONE
+    deciles = np.quantile(recorded, np.arange(0.1, 0.95, 0.1))
+    hundredths = np.mean(np.abs(recorded * 100 - np.rint(recorded * 100)) < 0.01) > 0.99
+    for name, scale in SCALES.items():
+        near = np.abs(deciles - scale.deciles).mean() < scale.max_difference
+        if near and (hundredths or not scale.hundredths):
+            return name
+    return OTHER
+
+
+def usable_scale(points: Float32, scale: str, sensor: SensorConfig) -> str:
+    """The scale of (N, 4) points if a model may use it, else NONE.
+
+    A scale that several sensors have counts with the beams of the one that the models know.
+    """
+    known = SCALES.get(scale)
+    usable = known and (known.hundredths or nearest_profile(sensor, tangents(points)) == scale)
+    return scale if usable else NONE

@@ -1,0 +1,108 @@
+"""Values of a profile's keys, with the evidence for each, as sweeps of the sensor show them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from modt.config import ProfileConfig, SegmentationConfig
+from modt.placement import Mount
+from modt.sensor_fit.beams import BeamPattern, beam_keys, cell_m
+from modt.sensor_fit.reflectance import NONE, SCALES, recorded_in, reflectance_scale, usable_scale
+from modt.sensor_fit.tilt import mount_height_m
+from modt.types import Float32
+
+SURE_CONTRAST = 0.985
+"""Least share of the points in the peaks of beams that are told apart without a doubt."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Some sweeps of a sensor.
+
+    Attributes:
+        sweeps: (N, 4) points of each [m, sensor frame], without those that lie at the origin.
+        stamps_s: time of each.
+    """
+
+    sweeps: Sequence[Float32]
+    stamps_s: Sequence[float]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A value of a profile's key."""
+
+    stage: str  # of the profile
+    key: str  # of the stage
+    value: Any  # of the key
+    evidence: str  # what was measured, or why nothing could be
+    sure: bool = True  # measured well; else to be checked by the user
+
+
+def apply(config: ProfileConfig, findings: Iterable[Finding]) -> ProfileConfig:
+    """The profile with the values found."""
+    for found in findings:
+        stage = replace(getattr(config, found.stage), **{found.key: found.value})
+        config = replace(config, **{found.stage: stage})
+    return config
+
+
+def pattern_findings(pattern: BeamPattern) -> Iterator[Finding]:
+    """Keys of a pattern of beams."""
+    found, sure = pattern.elevations_deg, True
+    if len(found):
+        spacing, azimuth = (
+            f"{len(found)} beams from {found[-1]:.2f} to {found[0]:.2f} deg",
+            "most frequent step along a beam",
+        )
+        sure = pattern.contrast > SURE_CONTRAST
+        spacing += "" if sure else "; blurred, perhaps by compensation for motion: take a recording at a walking pace"
+    else:
+        spacing, azimuth = "no beams: spacing of the returns of a sweep, in any direction", "the same"
+    evidence = {
+        "elevations_deg": f"{spacing}; a beam that met nothing is not among them",
+        "elevation_step_deg": spacing,
+        "azimuth_step_deg": azimuth,
+    }
+    for key, value in beam_keys(pattern).items():
+        yield Finding("sensor", key, value, evidence[key], sure or key == "azimuth_step_deg")
+    side_m = cell_m(pattern.spacing_deg, pattern.azimuth_step_deg)
+    if side_m != SegmentationConfig().cell_m:
+        yield Finding("segmentation", "cell_m", side_m, "by the spacing of the returns")
+
+
+def level(recording: Recording, config: ProfileConfig) -> Recording:
+    """The recording of a level sensor."""
+    mount = Mount.of(config.sensor.roll_deg, config.sensor.pitch_deg)
+    return replace(recording, sweeps=[mount.turn(points) for points in recording.sweeps])
+
+
+def find_height(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
+    """Height of the sensor above the ground."""
+    height_m = mount_height_m(level(recording, config).sweeps, config.sensor)
+    if height_m is None:
+        yield Finding("sensor", "height_m", None, "no flat ground in sight: estimated as it comes", sure=False)
+    else:
+        yield Finding("sensor", "height_m", height_m, "above a plane through the ground around, median of the sweeps")
+
+
+def find_reflectance(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
+    """Scale of the reflectance."""
+    points = np.concatenate(recording.sweeps)
+    scale = reflectance_scale(points[:, 3])
+    usable = usable_scale(points, scale, config.sensor)
+    if scale == NONE:
+        evidence = "none is recorded"
+    else:
+        median, most = np.quantile(recorded_in(points[:, 3]), [0.5, 0.9])
+        evidence = f"median {median:.2f}, 90 % below {most:.2f}"
+        if scale in SCALES:
+            evidence = f"{'hundredths, ' * SCALES[scale].hundredths}{evidence}: as of the {scale}"
+            evidence += "" if usable == scale else ", but these are other beams: not used"
+        else:
+            evidence += ": of no scale that models have learnt"
+    yield Finding("sensor", "reflectance", usable, evidence)
