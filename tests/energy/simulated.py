@@ -29,7 +29,7 @@ class SimulatedMachine:
         self.random = np.random.default_rng(seed)
         self.true_J = float(self.random.uniform(0, 1e-6 * wrap_uJ))
         self.now_ns = self.cpu_ns = 1_000_000_000
-        self.slept_ns = self.stepped_ns = 0
+        self.slept_ns = 0
         self.zone = sys / "class" / "powercap" / "intel-rapl:0"
         write_zone(self.zone, "package-0", wrap_uJ)
         self.cpufreq = sys / "devices" / "system" / "cpu" / "cpu0" / "cpufreq"
@@ -43,7 +43,6 @@ class SimulatedMachine:
         return Clocks(
             monotonic_ns=lambda: self.now_ns,
             boot_ns=lambda: self.now_ns + self.slept_ns,
-            calendar_ns=lambda: self.now_ns + self.slept_ns + self.stepped_ns,
             process_ns=lambda: self.cpu_ns,
         )
 
@@ -67,9 +66,6 @@ class SimulatedMachine:
 
     def suspend(self, seconds: float) -> None:
         self.slept_ns += round(seconds * 1e9)
-
-    def step_calendar(self, seconds: float) -> None:
-        self.stepped_ns += round(seconds * 1e9)
 
     def vanish(self) -> None:
         self.zone.rename(self.zone.with_name("gone"))

@@ -302,22 +302,6 @@ def test_power_that_the_chip_computes_is_preferred(tmp_path: Path) -> None:
     assert candidate.meters[0].facts.unit == "uW"
 
 
-def test_amd_sockets_are_added_up_without_their_cores(tmp_path: Path) -> None:
-    write_files(
-        tmp_path / "class" / "hwmon" / "hwmon0",
-        name="amd_energy",
-        energy1_label="Ecore000",
-        energy1_input=1_000_000,
-        energy2_label="Esocket0",
-        energy2_input=8_000_000,
-        energy3_label="Esocket1",
-        energy3_input=9_000_000,
-    )
-    best = look(tmp_path).best
-    assert best.name == "AMD sockets"
-    assert sum(m.read() for m in best.meters) == pytest.approx(17.0)
-
-
 def test_other_chips_are_not_meters(tmp_path: Path) -> None:
     write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="nct6775", in1_input=5000, curr1_input=900)
     (candidate,) = find_hwmon(tmp_path)

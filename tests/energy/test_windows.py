@@ -133,16 +133,6 @@ def test_window_of_a_suspension_has_no_energy(machine: SimulatedMachine) -> None
     assert second(machine, ledger, windows)["energy_J"] == pytest.approx(3.5, abs=1e-3)
 
 
-@pytest.mark.parametrize("seconds", [-86_400.0, 3600.0])
-def test_calendar_step_changes_no_value(machine: SimulatedMachine, seconds: float) -> None:
-    ledger, windows = machine.ledger(), windows_of(machine)
-    machine.step_calendar(seconds)
-    line = second(machine, ledger, windows)
-    assert line["marks"] == ["clock-step"]
-    assert line["wall_ns"] == 1_000_000_000
-    assert line["energy_J"] == pytest.approx(3.5, abs=1e-3)
-
-
 def test_power_is_integrated_between_edges(tmp_path: Path) -> None:
     machine = SimulatedMachine(tmp_path)
     rail = write_files(tmp_path / "class" / "hwmon" / "hwmon0", name="ina226", power1_input=4_000_000, in1_input=5000,

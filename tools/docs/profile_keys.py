@@ -10,9 +10,8 @@ import argparse
 from pathlib import Path
 
 from modt import assets
-from modt.config.profile import Key, keys
 from modt.profile.yaml_text import nested, value_text
-from modt_desk.cli.profile_schema import FILE, schema_text
+from modt_desk.cli.profile_schema import FILE, Key, keys, schema_text
 from tools.docs.sections import replace_section
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "profile-keys.md"

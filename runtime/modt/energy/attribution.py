@@ -11,7 +11,7 @@ from modt.config import EnergyConfig
 from modt.energy.ledger import Line
 from modt.energy.meters.meter import Kind
 
-_HARMLESS_MARKS = frozenset({"wrap", "clock-step"})
+_HARMLESS_MARKS = frozenset({"wrap"})
 _MAX_W = 10_000.0
 """Power above which the record of a window is not believed [W]."""
 

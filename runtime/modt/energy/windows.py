@@ -20,7 +20,6 @@ class Clocks:
 
     monotonic_ns: Clock = time.monotonic_ns  # stops while the machine is suspended
     boot_ns: Clock = lambda: time.clock_gettime_ns(time.CLOCK_BOOTTIME)  # includes suspended time
-    calendar_ns: Clock = time.time_ns  # may be set
     process_ns: Clock = time.process_time_ns  # CPU time of all threads
 
 
@@ -28,8 +27,6 @@ MIN_S = 1.0
 """Shortest window [s]: RAPL steps in milliseconds, INA chips and batteries average over longer times."""
 SUSPEND_S = 0.2
 """Lead of the boot clock over the monotonic one [s] from which a window is marked suspended and has no energy."""
-CLOCK_STEP_S = 0.5
-"""Step of the calendar clock that is marked [s]."""
 PRIMING_S = 0.05
 """Length of the first window of a counter [s], which has no energy: there is no power yet to judge it by."""
 
@@ -83,12 +80,9 @@ class Windows:
         clocks, marks, frames = self._clocks, self._marks, self._frames
         wall_ns = clocks.monotonic_ns() - self._start_ns
         suspended_ns = clocks.boot_ns() - self._boot0_ns - wall_ns
-        stepped_ns = clocks.calendar_ns() - self._calendar0_ns - wall_ns - max(suspended_ns, 0)
         suspended = suspended_ns > 1e9 * SUSPEND_S
         if suspended:
             marks.append("suspended")
-        if abs(stepped_ns) > 1e9 * CLOCK_STEP_S:
-            marks.append("clock-step")
         seconds = 1e-9 * (wall_ns + max(suspended_ns, 0))
         readings: list[dict[str, Any]] = []
         resolution_J = 0.0
@@ -127,7 +121,7 @@ class Windows:
     def _open(self) -> None:
         clocks = self._clocks
         self._start_ns, self._boot0_ns = clocks.monotonic_ns(), clocks.boot_ns()
-        self._calendar0_ns, self._process0_ns = clocks.calendar_ns(), clocks.process_ns()
+        self._process0_ns = clocks.process_ns()
         self._frames: list[int] = []
         self._stages: dict[str, dict[str, int]] = {}
         self._overhead_ns = 0

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from modt import assets
 from modt.config import ProfileConfig, StageConfig, ValueRangeError
-from modt.config.profile import keys, value_of
 from modt.errors import MisuseError
 from modt.profile.yaml_text import MAX_CHARACTERS, Written, nested, read, value_text
 
@@ -68,7 +67,7 @@ class Resolved:
     def shown(self) -> str:
         """The configuration as YAML, itself a profile, with who set it behind each value, and what is seen near."""
         set_by = {path: layer.name for layer in (*self.assumed, *self.layers) for path in layer.settings}
-        rows = ((key.path, value_of(self.config, key.path)) for key in keys())
+        rows = _by_path(dump(self.config))
         text = nested((path, f"{value_text(value)} # {set_by.get(path, 'default')}") for path, value in rows)
         near_m = self.config.sensor.person_seen_from_m
         return text if near_m is None else f"{text}# a third of a person's height is in view from {near_m:.1f} m on\n"
@@ -104,6 +103,15 @@ def dump(config: ProfileConfig) -> dict[str, dict[str, Any]]:
 
 def _listed(items: list[tuple[str, Any]]) -> dict[str, Any]:
     return {key: list(value) if isinstance(value, tuple) else value for key, value in items}
+
+
+def _by_path(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Values of a profile by the paths of their keys."""
+    for key, value in data.items():
+        if isinstance(value, dict):
+            yield from _by_path(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
 
 
 def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:

@@ -51,7 +51,7 @@ class Board:
         return value
 
     def clocks(self):
-        return Clocks(lambda: self.now_ns, lambda: self.now_ns, lambda: self.now_ns, lambda: self.cpu_ns)
+        return Clocks(lambda: self.now_ns, lambda: self.now_ns, lambda: self.cpu_ns)
 
 
 class Steps:

@@ -101,7 +101,7 @@ def test_meters_are_read_at_the_ends_of_turns():
         now[0] += 1_000_000
         return now[0]
 
-    clocks = Clocks(tick, tick, tick, tick)
+    clocks = Clocks(tick, tick, tick)
     made = [
         mode_run(
             name,

@@ -13,6 +13,7 @@ import json
 import socket
 from collections.abc import Callable, Iterator
 from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -27,7 +28,6 @@ from modt.app.ladder import Ladder
 from modt.app.stages import within
 from modt.classification import pointnet
 from modt.config import ProfileConfig
-from modt.config.profile import Key, keys, value_of
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
 from modt.segmentation.ground import HeightEstimator
@@ -35,6 +35,7 @@ from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sources.pose_socket import PoseSocket
 from modt.types import Frame
+from modt_desk.cli.profile_schema import Key, keys
 from modt_desk.reporting.run_report import run_tree
 from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 from tests.desk.reporting.test_run_report import write_run
@@ -293,7 +294,7 @@ def scenario_of(key: Key) -> Scenario:
 
 def others(key: Key) -> Iterator[Any]:
     """Other values of a key, the moderate ones first."""
-    value, facts = value_of(BASE, key.path), key.facts
+    value, facts = attrgetter(key.path)(BASE), key.facts
     if "options" in facts:
         yield from (option for option in facts["options"] if option != value)
     elif "length" in facts and value is None:
@@ -324,7 +325,7 @@ DIGESTS: dict[Scenario, str] = {}
 def has_effect(key: Key, scenario: Scenario, folder: Path) -> bool:
     if scenario not in DIGESTS:
         DIGESTS[scenario] = scenario(BASE, folder / "base")
-    values = [value for value in others(key) if value != value_of(BASE, key.path)]
+    values = [value for value in others(key) if value != attrgetter(key.path)(BASE)]
     return any(
         scenario(changed(BASE, key.path, value), folder / str(n)) != DIGESTS[scenario]
         for n, value in enumerate(values)

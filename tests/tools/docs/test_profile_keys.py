@@ -2,8 +2,7 @@
 
 from modt import profile
 from modt.config import ProfileConfig
-from modt.config.profile import keys
-from modt_desk.cli.profile_schema import schema_text
+from modt_desk.cli.profile_schema import keys, schema_text
 from tools.docs.profile_keys import CONDITIONS, DOCUMENT, SCHEMA, WHOLE, document, whole
 
 

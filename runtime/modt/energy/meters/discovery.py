@@ -64,10 +64,10 @@ def find_powercap(sys: Path) -> list[Candidate]:
             packages.append(_rapl(zone, name, Scope.CPU))
         else:
             found.append(Candidate(name, (), "of unknown extent", "none: its scope is not documented"))
-    return _counters("RAPL packages", packages, _RAPL_REMEDY) + found
+    return _packages(packages) + found
 
 
-def _counters(name: str, meters: list[Meter], remedy: str) -> list[Candidate]:
+def _packages(meters: list[Meter]) -> list[Candidate]:
     """The sum of the counters; beside it each that shows another's: every reading lies between two of the other."""
     try:
         pairs = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
@@ -82,7 +82,7 @@ def _counters(name: str, meters: list[Meter], remedy: str) -> list[Candidate]:
         else:
             cause = f"shows the counter of {meters[twin].facts.name}"
             found.append(Candidate(meter.facts.name, (), cause, "none needed: it is counted once"))
-    return [probe(name, tuple(meters[k] for k in own), remedy), *found] if meters else []
+    return [probe("RAPL packages", tuple(meters[k] for k in own), _RAPL_REMEDY), *found] if meters else []
 
 
 def _rapl(zone: Path, name: str, scope: Scope) -> Meter:
@@ -102,24 +102,18 @@ _PART_SHARE = 1.1
 
 
 def find_hwmon(sys: Path) -> list[Candidate]:
-    """AMD sockets, then every rail; rails may feed one another, so that only a known board's are summed."""
+    """Every rail; rails may feed one another, so that only a known board's are summed."""
     folders = sorted((sys / "class" / "hwmon").glob("hwmon*"), key=lambda p: (len(p.name), p.name))
-    sockets: list[Meter] = []
     rails: dict[str, Meter] = {}
     for folder in folders:
         chip = text_or_none(folder / "name")
-        if chip == "amd_energy":
-            sockets += _sockets(folder)
-        elif chip in _INA_CHIPS:
+        if chip in _INA_CHIPS:
             found_here = _rails(folder, chip)
             rails |= {f"{label} of {folder.name}" if label in rails else label: m for label, m in found_here.items()}
-    found = _counters("AMD sockets", sockets, "run as root, or chmod a+r its energy inputs")
-    if rails:
-        found += _rails_of_board(text_or_none(sys / "firmware/devicetree/base/model") or "", rails)
-    if not found:
+    if not rails:
         remedy = "wire an INA219, INA226 or INA3221 into the supply and load its driver"
-        found.append(Candidate("hwmon", (), "no power monitor and no energy counter under /sys/class/hwmon", remedy))
-    return found
+        return [Candidate("hwmon", (), "no power monitor under /sys/class/hwmon", remedy)]
+    return _rails_of_board(text_or_none(sys / "firmware/devicetree/base/model") or "", rails)
 
 
 def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
@@ -152,29 +146,14 @@ def _scoped(meter: Meter, scope: Scope) -> Meter:
     return replace(meter, facts=replace(meter.facts, scope=scope))
 
 
-def _channels(folder: Path, prefix: str) -> list[int]:
-    names = (p.name for p in folder.glob(f"{prefix}[0-9]*_input"))
-    return sorted(int(name[len(prefix) : -len("_input")]) for name in names)
-
-
-def _sockets(folder: Path) -> list[Meter]:
-    """Energy counters of the sockets, without those of the cores; the driver widens them to 64 bits."""
-    sockets = []
-    for n in _channels(folder, "energy"):
-        if (text_or_none(folder / f"energy{n}_label") or "").startswith("Esocket"):
-            name = f"hwmon amd_energy socket {n}"
-            facts = Facts(name, "uJ", 15.3e-6, 1000.0, Scope.CPU, Kind.MEASURED, privilege="root")
-            sockets.append(file_meter(facts, folder / f"energy{n}_input"))
-    return sockets
-
-
 def _rails(folder: Path, chip: str) -> dict[str, Meter]:
     """Enabled and connected channels, by label; the power that the chip computes, else voltage x current.
 
     The fourth channel of an INA3221 is the sum of the others.
     """
     rails = {}
-    for n in _channels(folder, "curr"):
+    names = (p.name for p in folder.glob("curr[0-9]*_input"))
+    for n in sorted(int(name[len("curr") : -len("_input")]) for name in names):
         voltage, current, power = (folder / f"{prefix}{n}_input" for prefix in ("in", "curr", "power"))
         label = text_or_none(folder / f"in{n}_label") or f"{folder.name} channel {n}"
         if n > 3 or text_or_none(folder / f"in{n}_enable") == "0" or not voltage.exists() or label == "NC":
