@@ -9,7 +9,6 @@ import pytest
 
 import modt
 from modt.app import assembly
-from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView, inverse, se3
 from modt.profile import load
@@ -38,7 +37,7 @@ def test_the_package_lists_its_public_names_before_they_are_used():
 def test_step_returns_what_the_pipeline_finds(frames, mode):
     library = modt.Pipeline.from_profile("vlp-16", mode=mode)
     config, chosen = load("vlp-16"), assembly.MODES[mode]
-    pipeline = assembly.pipeline(chosen, config, FieldOfView(), NullLedger())
+    pipeline = assembly.pipeline(chosen, config, FieldOfView())
     for frame in frames:
         found = library.step(frame.points, frame.stamp_s, frame.T_world_sensor)
         result = pipeline.step(frame, chosen.budget(config))

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from modt.app import assembly
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, quaternion_of, rotation_zyx, se3, transform
 from modt.placement import LEVEL, Mount
 from modt.profile import load, parse
@@ -63,7 +62,7 @@ def test_a_tilted_sensor_gives_the_tracks_of_a_level_one():
         ("sensor: {roll_deg: 10, pitch_deg: -5, elevation_span_deg: null}\nextends: vlp-16", TILTED),
     ):
         profile, mode = parse(text, "test"), assembly.MODES["accurate"]
-        pipeline = assembly.pipeline(mode, profile, FieldOfView(), NullLedger())
+        pipeline = assembly.pipeline(mode, profile, FieldOfView())
         back = Mount(None if mount.R_level_sensor is None else mount.R_level_sensor.T)
         for frame in SyntheticStream("yard", "vlp-16", 0.5, seed=4):
             result = pipeline.step(back.level(frame))

@@ -16,7 +16,6 @@ from modt.app.chosen_profile import choose
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES, ObjectClass
 from modt.config import ProfileConfig
-from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.sources.pose_file import pose_defect
@@ -126,7 +125,7 @@ class Pipeline:
     def _use(self, config: ProfileConfig) -> None:
         chosen = assembly.MODES[self.mode]
         self.config = config
-        self._pipeline = assembly.pipeline(chosen, config, FieldOfView(), NullLedger())
+        self._pipeline = assembly.pipeline(chosen, config, FieldOfView())
         self._budget = chosen.budget(config)
 
     @classmethod

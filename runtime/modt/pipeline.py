@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from modt.classification.scheduler import Scheduler
-from modt.energy.ledger import StageLedger
+from modt.energy.ledger import Ledger
 from modt.observations import Located, StaticTracks
 from modt.placement import LEVEL, Mount
 from modt.types import (
@@ -115,7 +115,7 @@ class Pipeline:
     scheduler: Scheduler
     classifier: Classifier
     decision: Decision
-    ledger: StageLedger
+    ledger: Ledger
     mount: Mount = LEVEL
 
     def step(self, frame: Frame, budget: Budget = UNLIMITED) -> FrameResult:

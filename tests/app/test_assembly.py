@@ -10,7 +10,6 @@ import pytest
 from modt import profile
 from modt.app import assembly
 from modt.classification.pointnet import PointNet
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.types import Budget
 from modt_desk.simulation.synthetic_stream import SyntheticStream
@@ -20,7 +19,7 @@ BASE = profile.load("vlp-16")
 
 def pipeline(mode="accurate", **scheduler):
     config = dataclasses.replace(BASE, scheduler=dataclasses.replace(BASE.scheduler, **scheduler))
-    return assembly.pipeline(assembly.MODES[mode], config, FieldOfView(), NullLedger())
+    return assembly.pipeline(assembly.MODES[mode], config, FieldOfView())
 
 
 def test_the_network_has_run_on_every_size_of_batch_before_the_first_frame(monkeypatch):

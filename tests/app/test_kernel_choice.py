@@ -8,7 +8,6 @@ import pytest
 
 from modt import profile
 from modt.app import assembly, checks, kernel_choice
-from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.native.library import NotAvailableError
@@ -35,7 +34,7 @@ def test_numpy_takes_their_place_with_a_warning(none_compiled, caplog):
 def test_a_pipeline_warns_once(none_compiled, caplog):
     config = profile.load("vlp-16")
     with caplog.at_level(logging.WARNING):
-        assembly.pipeline(assembly.MODES["efficient"], config, FieldOfView(), NullLedger())
+        assembly.pipeline(assembly.MODES["efficient"], config, FieldOfView())
     assert caplog.text.count("run on NumPy") == 1
 
 

@@ -16,7 +16,7 @@ from modt.app.loop import NAP_S, Loop, Stop
 from modt.app.playback import FixedPeriod, FullSpeed, Playback
 from modt.app.supervisor import NoSupervisor
 from modt.config import OdometryConfig
-from modt.energy.ledger import NullLedger
+from modt.energy.ledger import Ledger
 from modt.sources.pose_socket import PoseSocket
 from modt.sources.stream import Faults, StreamInfo
 from modt.types import Budget, Frame
@@ -89,7 +89,7 @@ def test_full_speed_never_waits():
 
 
 class Stages:
-    ledger, budget = NullLedger(), Budget(7)
+    ledger, budget = Ledger(), Budget(7)
 
     def __init__(self):
         self.seen, self.recognised = [], []

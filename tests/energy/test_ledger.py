@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.energy.ledger import SCHEMA, Ledger, NullLedger, StageLedger
+from modt.energy.ledger import SCHEMA, Ledger
 
 
 class Machine:
@@ -134,10 +134,3 @@ def test_real_clocks_advance() -> None:
     row = ledger.close_frame(0)["stages"]["segmentation"]
     assert row["wall_ns"] > 0
     assert row["cpu_ns"] > 0
-
-
-def test_null_ledger_only_calls() -> None:
-    ledger: StageLedger = NullLedger()
-    assert ledger.run("tracking", max, 3, 4) == 4
-    ledger.count("tracking", points=3)
-    assert ledger.close_frame(3) == {"schema": SCHEMA, "frame": 3, "stages": {}}

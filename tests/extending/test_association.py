@@ -6,7 +6,6 @@ import numpy as np
 
 from modt.app import assembly
 from modt.config import FragmentConfig
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, transform
 from modt.profile import load
 from modt.tracking.association import Matches, assign
@@ -35,7 +34,7 @@ class NearestCentroid:
 
 def test_the_tracker_follows_by_the_association_it_is_given():
     profile = load("vlp-16")
-    pipeline = assembly.pipeline(assembly.MODES["accurate"], profile, FieldOfView(), NullLedger())
+    pipeline = assembly.pipeline(assembly.MODES["accurate"], profile, FieldOfView())
     config = replace(profile.tracking, fragments=FragmentConfig(min_coverage=1.0))  # every track keeps its proposal
     tracker = Tracker(config, ACCURATE, association=NearestCentroid(), regroupings=())
     pipeline = replace(pipeline, tracker=tracker)

@@ -7,7 +7,6 @@ import pytest
 
 from modt import profile
 from modt.app import assembly
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
 from tests.sensor_fit.recordings import recording, with_mast
@@ -41,7 +40,7 @@ def test_the_robot_itself_is_no_proposal():
     sensor = dataclasses.replace(config.sensor, blind_sectors_deg=(140.0, 160.0), blind_range_m=2.5)
     sighted = dataclasses.replace(config, sensor=sensor)
     mode = assembly.MODES["accurate"]
-    stages = [assembly.pipeline(mode, c, FieldOfView(), NullLedger()) for c in (config, sighted)]
+    stages = [assembly.pipeline(mode, c, FieldOfView()) for c in (config, sighted)]
     members = [stage.segmenter.segment(points).members for stage in stages]
     mast = len(points) - 800
     assert (members[0] >= mast).any()

@@ -18,7 +18,6 @@ import numpy as np
 
 from modt.app import assembly
 from modt.classes import CLASSES
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import load
 from modt.types import NONE, FrameResult
@@ -35,7 +34,7 @@ def replay(scene: str, mode_name: str) -> Iterator[FrameResult]:
     """Results of a mode on a scene."""
     world, sensor, profile_name = SCENES[scene]
     profile, mode = load(profile_name), assembly.MODES[mode_name]
-    pipeline = assembly.pipeline(mode, profile, FieldOfView(), NullLedger())
+    pipeline = assembly.pipeline(mode, profile, FieldOfView())
     for frame in SyntheticStream(world, sensor, SECONDS, seed=7):
         yield pipeline.step(frame, mode.budget(profile))
 

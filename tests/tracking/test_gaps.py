@@ -9,7 +9,6 @@ from modt import profile
 from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.tracking.states import ACCURATE, EFFICIENT
 from modt_desk.simulation.synthetic_stream import SyntheticStream
@@ -106,7 +105,7 @@ def test_a_clock_set_back_by_an_hour_goes_on_with_its_tracks():
 
 def pipeline():
     config = profile.load("vlp-16")
-    return assembly.pipeline(assembly.MODES["accurate"], config, FieldOfView(), NullLedger())
+    return assembly.pipeline(assembly.MODES["accurate"], config, FieldOfView())
 
 
 def sweeps(seed, seconds=1.0, start_s=0.0, posed=True):

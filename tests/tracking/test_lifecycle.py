@@ -7,7 +7,7 @@ import pytest
 
 from modt.classes import ObjectClass
 from modt.config import TrackingConfig
-from modt.energy.ledger import NullLedger
+from modt.energy.ledger import Ledger
 from modt.odometry.odometry import Odometry
 from modt.pipeline import Pipeline
 from modt.tracking.states import ACCURATE, CONVENTIONAL, EFFICIENT, Event, StateMachine
@@ -70,7 +70,7 @@ def live(machine, script):
     """State after every frame of a scene with one object, GONE when its track is deleted."""
     stub = Scripted()
     tracker = Tracker(TrackingConfig(max_missed=MAX_MISSED), machine)
-    pipeline = Pipeline(stub, Odometry(), tracker, stub, stub, stub, stub, NullLedger())
+    pipeline = Pipeline(stub, Odometry(), tracker, stub, stub, stub, stub, Ledger())
     states = []
     for i, step in enumerate(script):
         boxes = [] if step == HIDDEN else [box(11 if step == MOVED else 10, 2)]

@@ -24,7 +24,6 @@ import numpy as np
 from modt import host, profile
 from modt.app import assembly
 from modt.cli.options import frames as number_range
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.synthetic_stream import SyntheticStream
@@ -84,7 +83,7 @@ def work_of(sensor: str, mode_name: str, seeds: Sequence[int], seconds: float) -
     mode, config = assembly.MODES[mode_name], profile.load(sensor)
     for seed in seeds:
         frames = list(SyntheticStream("street", sensor, seconds, seed))
-        pipeline, budget = assembly.pipeline(mode, config, FieldOfView(), NullLedger()), mode.budget(config)
+        pipeline, budget = assembly.pipeline(mode, config, FieldOfView()), mode.budget(config)
         gc.collect()
         for number, frame in enumerate(frames):
             start = time.thread_time_ns()

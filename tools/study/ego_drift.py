@@ -20,7 +20,6 @@ import numpy as np
 
 from modt.app import assembly
 from modt.cli.options import frames as frame_range
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, rotation_zyx, se3, yaw_of
 from modt.observations import Located, StaticTracks
 from modt.pipeline import Odometry
@@ -86,7 +85,7 @@ def by_proposals(stream: Stream, *, camera: bool) -> Float64:
     profile, mode = load(), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, profile, fov)
     recorder = PoseRecorder(pipeline.odometry)
     pipeline = replace(pipeline, odometry=recorder)
     for frame in map(NoPoses().place, stream):

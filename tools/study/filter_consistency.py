@@ -23,7 +23,6 @@ from scipy.stats import chi2
 from modt.app import assembly
 from modt.classes import CLASS_NAMES
 from modt.cli.options import frames as number_range
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, wrap
 from modt.profile import load
 from modt.types import NONE, Float64, FrameResult, Int, Proposals
@@ -64,7 +63,7 @@ def replay(stream: SyntheticStream, profile_name: str, *, camera: bool = False) 
     profile, mode = load(profile_name), assembly.MODES["efficient"]
     assert stream.info.camera is not None
     fov = FieldOfView.of_camera(stream.info.camera) if camera else FieldOfView()
-    pipeline = assembly.pipeline(mode, profile, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, profile, fov)
     for frame, truth in stream.sweeps():
         result = pipeline.step(frame, mode.budget(profile))
         yield JudgedFrame(result, truth, *majority_bodies(result.proposals, truth.instance))

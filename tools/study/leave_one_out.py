@@ -26,7 +26,6 @@ import numpy as np
 from modt.app import assembly
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT, load
 from modt.sources.recognise import open_stream
@@ -87,7 +86,7 @@ def labelled(path: Path) -> Drive:
 def run(drive: Drive, mode_name: str, switch: Switch | None = None) -> Float64:
     """FIGURES of a drive in a mode of the method, with one mechanism switched off; NaN for what it cannot show."""
     profile, mode = drive.profile if switch is None else switch(drive.profile), assembly.MODES[mode_name]
-    pipeline, budget = assembly.pipeline(mode, profile, drive.fov, NullLedger()), mode.budget(profile)
+    pipeline, budget = assembly.pipeline(mode, profile, drive.fov), mode.budget(profile)
     results, cpu_ns = [], 0
     gc.collect()
     for frame, _ in drive.frames:

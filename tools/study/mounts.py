@@ -22,7 +22,6 @@ from modt.app import assembly
 from modt.classes import ObjectClass
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView, inverse, transform_boxes
 from modt.placement import Mount
 from modt.profile import load
@@ -86,7 +85,7 @@ def run(drive: Drive, mode_name: str, config: ProfileConfig, *, levelled: bool =
     mount, mode, longer = drive.mount, assembly.MODES[mode_name], 0
     given = [mount.level(frame) if levelled else frame for frame, _ in drive.frames]
     config = recognise(given[0].points, config).mounted(config)
-    pipeline, budget = assembly.pipeline(mode, config, FieldOfView(), NullLedger()), mode.budget(config)
+    pipeline, budget = assembly.pipeline(mode, config, FieldOfView()), mode.budget(config)
 
     def judged() -> Iterator[JudgedFrame]:
         nonlocal longer

@@ -18,7 +18,6 @@ from modt.app import assembly
 from modt.classes import CLASS_NAMES
 from modt.cli.options import frames as number_range
 from modt.config import ProfileConfig
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt_desk.evaluation.evaluation import ALL, DriveRows, Evaluation, collect, evaluation
 from modt_desk.evaluation.frame import JudgedFrame
@@ -33,7 +32,7 @@ CLASSES = CLASS_NAMES[1:]
 def run(drive: Drive, config: ProfileConfig, mode_name: str, fov: FieldOfView, number: int) -> DriveRows:
     """What became of a drive in a mode of the method."""
     mode = assembly.MODES[mode_name]
-    pipeline, budget = assembly.pipeline(mode, config, fov, NullLedger()), mode.budget(config)
+    pipeline, budget = assembly.pipeline(mode, config, fov), mode.budget(config)
 
     def judged() -> Iterator[JudgedFrame]:
         for frame, truth in drive.frames:

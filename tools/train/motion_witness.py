@@ -14,7 +14,6 @@ from modt.app import assembly
 from modt.classes import N_CLASSES
 from modt.classification.motion_witness import LENGTH_M, MOVED_M, YOUNG_S, cells
 from modt.cli.options import frames as number_range
-from modt.energy.ledger import NullLedger
 from modt.types import Float64, Int
 from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
@@ -33,7 +32,7 @@ TEST_SEEDS = range(450, 453)
 def counted(drive: Drive, number: int) -> Int:
     """(3, CELLS, 4) tracks of a drive, frame by frame, by length, cell and true class."""
     mode = assembly.MODES["accurate"]
-    pipeline, budget = assembly.pipeline(mode, drive.profile, drive.fov, NullLedger()), mode.budget(drive.profile)
+    pipeline, budget = assembly.pipeline(mode, drive.profile, drive.fov), mode.budget(drive.profile)
     results = [pipeline.step(frame, budget) for frame, _ in drive.frames]
     judged = (JudgedFrame.of_result(r, truth, drive.fov) for r, (_, truth) in zip(results, drive.frames, strict=True))
     rows = collect(judged, drive.rules, number).proposals

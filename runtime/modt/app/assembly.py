@@ -17,7 +17,7 @@ from modt.classification.pointnet import PointNet
 from modt.classification.prior import Prior, make_prior, with_background
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
 from modt.config import FusionConfig, ProfileConfig
-from modt.energy.ledger import StageLedger
+from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
 from modt.geometry.field_of_view import BlindSectors
 from modt.geometry.kernels import GeometryKernels
@@ -114,8 +114,8 @@ def _check_budget(budget: Budget, cost: LinearCost, profile: ProfileConfig) -> N
     log.warning("scheduler: the budget is %s: %s; for one in each raise %s", price, often, remedy)
 
 
-def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: StageLedger) -> Pipeline:
-    """The stages of a mode.
+def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledger | None = None) -> Pipeline:
+    """The stages of a mode; without a ledger they have one that nobody reads.
 
     Raises:
         MisuseError: the model cannot be used.
@@ -127,7 +127,9 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Stage
     cost = LinearCost(limits.max_points, padded_size(limits), profile.scheduler.cost)
     warm_up(network.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost, profile)
-    return stages(mode, profile, network, segmenter(profile, fov, kernels), network, cost, ledger, kernels)
+    return stages(
+        mode, profile, network, segmenter(profile, fov, kernels), network, cost, ledger or Ledger(), kernels
+    )
 
 
 def stages(
@@ -137,7 +139,7 @@ def stages(
     segmenter: SegmenterStage,
     classifier: Classifier,
     cost: LinearCost,
-    ledger: StageLedger,
+    ledger: Ledger,
     kernels: GeometryKernels,
 ) -> Pipeline:
     """A pipeline around a given segmenter and classifier: the network, or what stands for it at this cost."""

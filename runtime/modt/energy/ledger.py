@@ -110,32 +110,5 @@ class Ledger:
         return min(span_ns), min(frame_ns)
 
 
-class NullLedger:
-    """Records nothing."""
-
-    def __init__(self, cpu_ns: Clock = time.thread_time_ns) -> None:
-        self._cpu_ns = cpu_ns
-
-    def run(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> R:
-        """Result of function(*args)."""
-        return function(*args, **kwargs)
-
-    def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
-        """Result of function(*args), and its CPU time [ns]."""
-        began_ns = self._cpu_ns()
-        result = function(*args, **kwargs)
-        return result, self._cpu_ns() - began_ns
-
-    def count(self, stage: str, *, items: int = 0, points: int = 0) -> None:
-        """No effect."""
-
-    def close_frame(self, index: int) -> Line:
-        """Line without stages."""
-        return {"schema": SCHEMA, "frame": index, "stages": {}}
-
-
-StageLedger = Ledger | NullLedger
-
-
 def _nothing() -> None:
     return None

@@ -7,7 +7,6 @@ import pytest
 
 from modt import profile
 from modt.app import assembly
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.sources.recognise import open_stream
 from modt_desk.evaluation.evaluation import score
@@ -25,7 +24,7 @@ def judged(frames, truth_of, fov=None, name="hdl-64e"):
     fov = fov or FieldOfView()
     mode = assembly.MODES["accurate"]
     settings = profile.load(name)
-    pipeline = assembly.pipeline(mode, settings, fov, NullLedger())
+    pipeline = assembly.pipeline(mode, settings, fov)
     for frame in frames:
         truth = truth_of(frame.index)
         yield JudgedFrame.of_result(pipeline.step(frame, mode.budget(settings)), truth, fov)

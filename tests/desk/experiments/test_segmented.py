@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from modt.app import assembly
-from modt.energy.ledger import NullLedger
 from modt.profile import load
 from modt.segmentation.kernels import NUMPY
 from modt_desk.evaluation.evaluation import collect
@@ -35,7 +34,7 @@ def test_a_replay_of_the_points_that_matter_is_judged_as_the_whole_sweeps_are(na
     config = load(name)
     found = NetworkReplay(config).judged(DRIVE)
     mode = assembly.MODES["accurate"]
-    pipeline = assembly.pipeline(mode, config, DRIVE.fov(), NullLedger())
+    pipeline = assembly.pipeline(mode, config, DRIVE.fov())
     whole = collect(
         (
             JudgedFrame.of_result(pipeline.step(frame, mode.budget(config)), truth, DRIVE.fov())

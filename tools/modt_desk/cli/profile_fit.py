@@ -43,12 +43,11 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 def class_frequencies(recording: Recording, config: ProfileConfig) -> Iterator[Finding]:
     """The frequency of the classes among the proposals of a recording, as the decision estimates it."""
     from modt.app import assembly
-    from modt.energy.ledger import NullLedger
     from modt.geometry import FieldOfView
     from modt.types import Frame
     from modt_desk.sensor_fit.findings import Finding
 
-    pipeline = assembly.pipeline(assembly.MODES["conventional"], config, FieldOfView(), NullLedger())
+    pipeline = assembly.pipeline(assembly.MODES["conventional"], config, FieldOfView())
     found = 0
     for number, points in enumerate(recording.sweeps):
         found += len(pipeline.step(Frame(number, recording.stamps_s[0] + number, points)).proposals)

@@ -10,7 +10,7 @@ import numpy as np
 from modt.app import assembly, inputs, metering
 from modt.classification.scheduler import padded_size
 from modt.config import ProfileConfig
-from modt.energy.ledger import Ledger, NullLedger
+from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Meter
 from modt.sources.stream import StreamInfo
 from modt.types import UNLIMITED, Budget, Frame, Int
@@ -87,7 +87,7 @@ def observe(request: inputs.Request, profile: ProfileConfig, frames: int | None)
 def _tracked(request: inputs.Request, profile: ProfileConfig, frames: int | None, mode: str) -> Int:
     """(F, 6) prediction.OBSERVED, and the tracks that ask for the first time."""
     fov = inputs.field_of_view(request, inputs.stream(request).info)
-    pipeline = assembly.pipeline(assembly.MODES[mode], profile, fov, NullLedger())
+    pipeline = assembly.pipeline(assembly.MODES[mode], profile, fov)
     fusion = RecordingFusion(pipeline.fusion)
     pipeline, size, rows = replace(pipeline, fusion=fusion), padded_size(profile.classification), []
     alive: set[int] = set()

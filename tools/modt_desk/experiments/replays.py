@@ -10,7 +10,7 @@ import numpy as np
 from modt.app import assembly, kernel_choice
 from modt.classification.scheduler import LinearCost, padded_size
 from modt.config import ProfileConfig
-from modt.energy.ledger import NullLedger
+from modt.energy.ledger import Ledger
 from modt.pipeline import Pipeline
 from modt.types import FrameResult
 from modt_desk.experiments.drives import Drive
@@ -64,7 +64,7 @@ class NetworkReplay:
         kernels = kernel_choice.choose(config.segmentation.kernels)
         ideal = IdealTracking(known, config, self.range_m) if self.ideal else None
         played = ideal or PlayedBack(known, self.range_m)
-        pipeline = assembly.stages(mode, config, known.network, played, played, cost, NullLedger(), kernels)
+        pipeline = assembly.stages(mode, config, known.network, played, played, cost, Ledger(), kernels)
         return pipeline if ideal is None else replace(pipeline, odometry=ideal, tracker=ideal)
 
 
