@@ -26,32 +26,36 @@ REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 class SensorConfig(StageConfig):
     """Mount, range and resolution of the sensor."""
 
-    height_m: float | None = number(1.73, 0.05, 5.0, "m", "above the ground; null: estimated from the stream")
+    height_m: float | None = number(
+        1.73, 0.05, 5.0, "m", "height of the sensor above the ground; null: estimated from the first sweeps"
+    )
     roll_deg: float | None = number(
         None,
         -180.0,
         180.0,
         "deg",
-        "of the mount, left side up; null: by the first sweep, where it is tilted by 2 or more",
+        "roll of the mount, left side up; null: measured in the first sweep and corrected from 2 deg on",
     )
-    pitch_deg: float | None = number(None, -90.0, 90.0, "deg", "of the mount, nose down; null: likewise")
-    min_range_m: float = number(2.0, 0.0, 20.0, "m", "of the points used; nearer ones are on the robot itself")
-    max_range_m: float = number(80.0, 1.0, 400.0, "m", "of the points used")
-    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "between neighbouring beams that are evenly spaced")
+    pitch_deg: float | None = number(None, -90.0, 90.0, "deg", "pitch of the mount, nose down; null: as roll_deg")
+    min_range_m: float = number(2.0, 0.0, 20.0, "m", "nearer points are left out: they are on the robot itself")
+    max_range_m: float = number(80.0, 1.0, 400.0, "m", "farther points are left out")
+    elevation_step_deg: float = number(0.42, 0.01, 10.0, "deg", "step between neighbouring beams, evenly spaced")
     elevations_deg: tuple[float, ...] | None = numbers(
-        -90.0, 90.0, 512, "deg", "of all beams, in any order; null: evenly spaced"
+        -90.0, 90.0, 512, "deg", "elevation of every beam, in any order; null: beams are evenly spaced"
     )
     elevation_span_deg: tuple[float, ...] | None = numbers(
-        -90.0, 90.0, 2, "deg", "lowest, highest beam; null: unknown"
+        -90.0, 90.0, 2, "deg", "elevations of the lowest and the highest beam; null: unknown"
     )
-    azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "between neighbouring returns of a beam")
+    azimuth_step_deg: float = number(0.17, 0.01, 10.0, "deg", "step between neighbouring returns of a beam")
     blind_sectors_deg: tuple[float, ...] | None = numbers(
-        -360.0, 360.0, 64, "deg", "from, to of each, counter-clockwise: onto the robot", pairs=True
+        -360.0, 360.0, 64, "deg", "sectors hidden by the robot: from, to of each, counter-clockwise", pairs=True
     )
-    blind_range_m: float = number(3.0, 0.1, 20.0, "m", "of returns left out in these sectors, at most")
-    period_s: float = number(0.1, 0.001, 10.0, "s", "between sweeps, of folders without stamps and of max_missed")
+    blind_range_m: float = number(3.0, 0.1, 20.0, "m", "returns in blind_sectors_deg up to this range are left out")
+    period_s: float = number(
+        0.1, 0.001, 10.0, "s", "time between sweeps: for scans without time stamps, and the unit of max_missed"
+    )
     reflectance: str = choice(
-        "none", ("none", *REFLECTANCE_SCALES), "scale; models use only those they learnt; none: not used"
+        "none", ("none", *REFLECTANCE_SCALES), "sensor whose scale the reflectance has; none: it is not used"
     )
 
     @property
@@ -81,19 +85,18 @@ class SensorConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnergyConfig(StageConfig):
-    """Power of the board where it is not measured, and the coefficients of its calibration.
+    """Power of the board where no meter is read, and the coefficients that `modt-profile calibrate` finds.
 
-    The coefficients are those of a fit over windows: energy = idle_W x time + seg_J x segmentations + class_J x
-    classifications + point_J x points classified.
+    Energy of a window = idle_W x time + seg_J x segmentations + class_J x classifications + point_J x points.
     """
 
-    board: str = field(default="unknown", metadata={"meaning": "name of the board"})
-    idle_W: float = number(3.0, 0.0, 1000.0, "W", "power while the process waits")
-    busy_W: float = number(7.0, 0.0, 1000.0, "W", "power while it computes on one core")
-    meter: str = field(default="none", metadata={"meaning": "meter of the calibration"})
-    seg_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one segmentation")
-    class_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one classification")
-    point_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one point classified")
+    board: str = field(default="unknown", metadata={"meaning": "name of the board, for reports"})
+    idle_W: float = number(3.0, 0.0, 1000.0, "W", "power of the board while the process waits")
+    busy_W: float = number(7.0, 0.0, 1000.0, "W", "power of the board while the process computes on one core")
+    meter: str = field(default="none", metadata={"meaning": "meter of the calibration, for the record"})
+    seg_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one segmentation; null: not calibrated")
+    class_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one classification; null: not calibrated")
+    point_J: float | None = number(None, -1000.0, 1000.0, "J", "energy of one point classified; null: not calibrated")
 
     @property
     def active_W(self) -> float:
