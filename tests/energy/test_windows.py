@@ -69,48 +69,6 @@ def test_window_closes_after_a_second(machine: SimulatedMachine) -> None:
     assert line["frames"] == [0, 1, 2]
 
 
-def test_wrapping_counter_gives_constant_energy(tmp_path: Path) -> None:
-    machine = SimulatedMachine(tmp_path, wrap_uJ=2_000_000_000, idle_W=900.0)
-    machine.true_J = 0.0
-    machine.wait(0.0)
-    ledger, windows = machine.ledger(), windows_of(machine)
-    second(machine, ledger, windows)
-    lines = [second(machine, ledger, windows, k) for k in range(20)]
-    assert sum("wrap" in line["marks"] for line in lines) == 9
-    assert [line["energy_J"] for line in lines] == [pytest.approx(900.5, abs=1e-3)] * 20
-
-
-def test_window_as_long_as_the_counter_range_is_ambiguous(tmp_path: Path) -> None:
-    machine = SimulatedMachine(tmp_path, wrap_uJ=2_000_000_000)
-    machine.true_J = 0.0
-    machine.wait(0.0)
-    ledger, windows = machine.ledger(), windows_of(machine)
-    assert second(machine, ledger, windows)["energy_J"] == pytest.approx(3.5, abs=1e-3)
-    machine.wait(300.0)  # a fraction of the range by what was shown, a round by what is plausible
-    line = second(machine, ledger, windows)
-    assert line["energy_J"] is None
-    assert line["kind"] == "unavailable"
-    assert "ambiguous" in line["marks"]
-
-
-def test_counter_without_known_range_drops_the_sample_when_it_goes_back(machine: SimulatedMachine) -> None:
-    (machine.zone / "max_energy_range_uj").unlink()
-    ledger, windows = machine.ledger(), windows_of(machine)
-    assert second(machine, ledger, windows)["energy_J"] == pytest.approx(3.5, abs=1e-3)
-    machine.true_J = 0.0
-    assert second(machine, ledger, windows)["marks"] == ["reset"]
-    assert second(machine, ledger, windows)["energy_J"] == pytest.approx(3.5, abs=1e-3)
-
-
-def test_counter_reset_is_not_a_wrap(machine: SimulatedMachine) -> None:
-    ledger, windows = machine.ledger(), windows_of(machine)
-    machine.true_J = 0.5e-6 * machine.wrap_uJ
-    second(machine, ledger, windows)
-    machine.true_J -= 10_000.0
-    line = second(machine, ledger, windows)
-    assert (line["energy_J"], line["marks"]) == (None, ["reset"])
-
-
 def test_lost_meter_is_marked_and_resumes(machine: SimulatedMachine) -> None:
     ledger, windows = machine.ledger(), windows_of(machine)
     second(machine, ledger, windows)

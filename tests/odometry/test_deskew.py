@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.observations import observe
-from modt.odometry.odometry import SweepSkew, delays, skews_alike
+from modt.odometry.odometry import SweepSkew, delays
 from modt.odometry.registration import Landmarks, Registration
 from modt.placement import Placement, PlanarMotion
 from modt.types import Frame, Proposals
@@ -148,12 +148,6 @@ def test_moving_proposals_as_a_whole_leaves_little_error(turn_s):
     assert len(frame.points) == len(true_frame.points)
 
 
-def test_no_elapsed_time_is_no_motion():
-    assert PlanarMotion.between(np.eye(4), constant_turn_pose(1.0, 10.0, 0.5), 0.0) == PlanarMotion()
-    step = PlanarMotion().displacement(np.array([[3.0, 4.0]]), np.array([0.05]))
-    np.testing.assert_array_equal(step, 0)
-
-
 def drive(turn_s, known, posed=False, frames=25):
     """Odometry and tracker after a drive with skewed sweeps at 8 m/s and 35 degrees/s, and the true pose."""
     tracker = Follower()
@@ -208,16 +202,3 @@ def test_a_placement_deskews_positions_like_the_proposals_there(speed, yaw_rate,
     position = observe(proposals, T).centroid
     np.testing.assert_allclose(Placement(T, motion, turn_s).deskew(position), step, atol=1e-9)
     assert not Placement(T, motion).deskew(position).any()
-
-
-def test_motions_are_alike_up_to_a_tolerance_at_a_range():
-    a, b = PlanarMotion(10 + 0j, 0.1), PlanarMotion(10.5 + 0j, 0.1)
-    assert skews_alike(a, b, 0.1, range_m=20.0, tolerance_m=0.03)
-    assert not skews_alike(a, b, 0.1, range_m=20.0, tolerance_m=0.02)
-    turned = PlanarMotion(10 + 0j, 0.2)
-    assert not skews_alike(a, turned, -0.1, range_m=20.0, tolerance_m=0.03)
-    assert skews_alike(a, turned, 0.0, range_m=20.0, tolerance_m=0.0)
-
-
-def test_a_sweep_without_rotation_has_no_skew():
-    assert SweepSkew.of(one(1, 0, 1, 1), 0.0) is None

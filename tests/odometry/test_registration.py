@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from modt.geometry import inverse, rotation_zyx, se3, transform_boxes, yaw_of
 from modt.observations import observe
-from modt.odometry.registration import ESTABLISHED_FRAMES, REACH_M, Fit, LandmarkMap, Landmarks, Registration
+from modt.odometry.registration import ESTABLISHED_FRAMES, REACH_M, LandmarkMap, Landmarks, Registration
 from tests.odometry.odometry_scenes import constant_turn_pose, static_tracks, street
 from tests.tracking.tracking_scenes import Follower, box, frame_of
 
@@ -65,10 +65,6 @@ def test_a_third_of_moving_objects_does_not_bias_the_path():
     distance, turn = pose_error(gentle_curve(19), drive(20, world=world))
     assert distance < 0.03 * 0.8 * 19
     assert turn < 0.5
-
-
-def test_a_given_pose_is_used_as_it_is():
-    np.testing.assert_array_equal(drive(3, given_pose=gentle_curve).T_world_sensor, gentle_curve(2))
 
 
 def test_registration_bridges_missing_poses():
@@ -240,12 +236,6 @@ def test_pairs_are_sought_farther_away_where_few_agree_nearby(near_share, found_
     moved[round(near_share * len(world)) :, 0] += 1.5
     correction = registration.correct(landmarks_of(world), observed(moved))
     np.testing.assert_allclose(correction[:2, 3], [found_m, 0], atol=0.05)
-
-
-def test_a_fit_needs_three_inliers_and_more_than_its_share():
-    assert not Fit(np.zeros(3), inliers=2, pairs=2).supported(0.5)
-    assert Fit(np.zeros(3), inliers=3, pairs=5).supported(0.5)
-    assert not Fit(np.zeros(3), inliers=5, pairs=10).supported(0.5)
 
 
 def test_a_landmark_is_the_mean_since_its_object_rests():
