@@ -47,10 +47,11 @@ def test_threads_begun_elsewhere_stay_there_and_the_loop_where_it_is():
     assert seen == [others]
 
 
-def test_what_is_not_permitted_has_a_remedy(monkeypatch):
-    def refuse(*_):
-        raise PermissionError(1, "Operation not permitted")
+def refuse(*_):
+    raise PermissionError(1, "Operation not permitted")
 
+
+def test_what_is_not_permitted_has_a_remedy(monkeypatch):
     monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: os.SCHED_OTHER)
     monkeypatch.setattr(host.os, "sched_setscheduler", refuse)
     monkeypatch.setattr(host.sys, "setswitchinterval", lambda _: None)
@@ -72,9 +73,6 @@ def test_a_thread_that_serves_the_loop_is_real_time_below_it(monkeypatch, loop, 
 
 
 def test_a_receiver_without_permission_has_a_remedy(monkeypatch):
-    def refuse(*_):
-        raise PermissionError(1, "Operation not permitted")
-
     monkeypatch.setattr(host.os, "sched_getscheduler", lambda _: os.SCHED_FIFO)
     monkeypatch.setattr(host.os, "sched_getparam", lambda _: os.sched_param(10))
     monkeypatch.setattr(host.os, "sched_setscheduler", refuse)

@@ -33,7 +33,7 @@ def test_report_of_a_replay(tmp_path):
     assert modt("replay", "--mode", "efficient", "--frames", "0:5", "--out", "run", cwd=tmp_path).returncode == 0
     done = modt_profile("report", "run", "--html", "page.html", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "energy a frame" in done.stdout
+    assert "energy of the pipeline a frame" in done.stdout
     assert "N_go" in done.stdout
     assert (tmp_path / "page.html").read_text().startswith("<!doctype html>")
     tree = json.loads(modt_profile("report", "run", "--json", cwd=tmp_path).stdout)

@@ -1,6 +1,5 @@
 """Profiles: strict, bounded, and back again."""
 
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st

@@ -39,6 +39,11 @@ def test_a_profile_is_based_on_those_that_it_extends(write):
     own, both = profile.load("mine.yaml"), profile.load(["vlp-16", "raspberry-pi-5"])
     assert own == replace(both, sensor=replace(both.sensor, height_m=0.45))
     assert profile.parse("extends: mine.yaml\n", "other.yaml") == own
+    found = profile.resolve(["os1-32", "raspberry-pi-5"])
+    assert (found.sensor, found.used("as found")) == ("os1-32", ("os1-64", "os1-32", "raspberry-pi-5"))
+    write(a="extends: vlp-16\nsensor: {height_m: 2.0}\n", b="extends: vlp-16\n")  # a shared base undoes nothing
+    assert profile.load(["a.yaml", "b.yaml"]).sensor.height_m == 2.0
+    assert profile.load(["a.yaml", "vlp-16"]).sensor.height_m == profile.load("vlp-16").sensor.height_m
 
 
 def test_a_file_that_is_extended_lies_beside_the_one_that_does(write, tmp_path):
@@ -48,26 +53,12 @@ def test_a_file_that_is_extended_lies_beside_the_one_that_does(write, tmp_path):
     assert profile.load("robots/mine.yaml").sensor.height_m == 0.45
 
 
-def test_a_base_that_two_profiles_share_does_not_undo_the_first(write):
-    write(
-        base="sensor: {height_m: 1.0}\n", a="extends: base.yaml\nsensor: {height_m: 2.0}\n", b="extends: base.yaml\n"
-    )
-    assert profile.load(["a.yaml", "b.yaml"]).sensor.height_m == 2.0
-    assert profile.load(["a.yaml", "base.yaml"]).sensor.height_m == 1.0
-
-
 def test_a_board_alone_goes_with_the_default_sensor():
     found = profile.resolve("raspberry-pi-5")
     assert found.config == replace(profile.load(), energy=profile.load("raspberry-pi-5").energy)
     assert found.sensor is None
     assert found.used("as found") == ("as found", "raspberry-pi-5")
     assert found.over(profile.load("vlp-16")) == profile.load(["vlp-16", "raspberry-pi-5"])
-
-
-def test_the_profile_of_the_sensor_is_the_last_that_speaks_of_it():
-    found = profile.resolve(["os1-32", "raspberry-pi-5"])
-    assert found.sensor == "os1-32"
-    assert found.used("as found") == ("os1-64", "os1-32", "raspberry-pi-5")
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """Times in bounded memory, beside the way that keeps them all."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -87,9 +87,16 @@ def test_interval_is_narrower_than_its_coefficient(tmp_path: Path) -> None:
     assert result["idle_W"].high - result["idle_W"].low < TRUE["idle_W"]
 
 
-def test_loads_that_vary_together_are_refused() -> None:
-    lines = [line_of(3.0 + n, n, 10 * n) for n in range(1, 20)]
-    with pytest.raises(FitError, match="varied together"):
+@pytest.mark.parametrize(
+    ("lines", "cause"),
+    [
+        ([line_of(3.0 + n, n, 10 * n) for n in range(1, 20)], "varied together"),
+        ([line_of(3.0 + n, n) for n in range(1, 20)], "class_J, point_J"),
+        ([line_of(None, 1), line_of(3.0, 1, marks=["suspended"]), line_of(3.0, 1)], "at least 8"),
+    ],
+)
+def test_windows_that_determine_no_coefficient_are_refused(lines: list[dict[str, Any]], cause: str) -> None:
+    with pytest.raises(FitError, match=cause):
         fit(lines, np.random.default_rng(0))
 
 
@@ -115,17 +122,6 @@ def test_readings_that_fall_with_the_load_are_refused() -> None:
         line["stages"]["classification"]["points"] = points
     with pytest.raises(FitError, match=r"class_J is -0\.1 .* gives no energy back"):
         fit(lines, np.random.default_rng(0))
-
-
-def test_load_that_is_missing_is_named() -> None:
-    lines = [line_of(3.0 + n, n) for n in range(1, 20)]
-    with pytest.raises(FitError, match="class_J, point_J"):
-        fit(lines, np.random.default_rng(0))
-
-
-def test_too_few_windows_are_refused() -> None:
-    with pytest.raises(FitError, match="at least 8"):
-        fit([line_of(None, 1), line_of(3.0, 1, marks=["suspended"]), line_of(3.0, 1)], np.random.default_rng(0))
 
 
 def test_unit_energy_of_bursts_is_the_true_one(tmp_path: Path) -> None:
