@@ -1,8 +1,7 @@
-"""The rule that turns readings into joules: its table, faults of real meters, and a model that knows the truth."""
+"""The rule that turns readings into joules: faults of real meters, and a model that knows the truth."""
 
 import math
 from collections.abc import Iterator
-from itertools import product
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.energy.meters.meter import Facts, Kind, Scope
-from modt.energy.readings import CONFIRMED, DOUBTED, TABLE, Event, History, judge
+from modt.energy.readings import History, judge
 
 RANGE_J = 65_532.610987
 
@@ -33,11 +32,6 @@ def judged(meter: Facts, readings: list[float | None], seconds: float = 1.0) -> 
 
 KNOWN = [1000.0, 1040.0, 1080.0]
 """Readings of a counter after which its power, 40 W, is known."""
-
-
-def test_every_state_and_event_has_a_row() -> None:
-    """But for a confirmed reading, there is no doubtful one to continue."""
-    assert TABLE.keys() == set(product((CONFIRMED, DOUBTED), Event)) - {(CONFIRMED, Event.AGREES)}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import Enum
 
 from modt.energy.meters.meter import Facts, Kind, Measurand
 
@@ -19,33 +18,11 @@ TICK_S = 0.01
 """Time between two steps of a counter, at most [s]."""
 
 
-class Event(Enum):
-    """Relation of a reading to those before."""
-
-    FITS = "continues the confirmed reading, or one before a standstill"
-    AGREES = "continues the doubtful reading"
-    STRAYS = "continues neither"
-    LOST = "there is none"
-
-
-CONFIRMED, DOUBTED = True, False
-TABLE = {
-    (CONFIRMED, Event.FITS): (CONFIRMED, True),
-    (CONFIRMED, Event.STRAYS): (DOUBTED, False),
-    (CONFIRMED, Event.LOST): (DOUBTED, False),
-    (DOUBTED, Event.FITS): (CONFIRMED, False),
-    (DOUBTED, Event.AGREES): (CONFIRMED, True),
-    (DOUBTED, Event.STRAYS): (DOUBTED, False),
-    (DOUBTED, Event.LOST): (DOUBTED, False),
-}
-"""Whether the last reading is confirmed, by this and the event; and whether the interval up to it is measured."""
-
-
 @dataclass(frozen=True, slots=True)
 class History:
     """The readings so far, as far as the next one is judged by them."""
 
-    state: bool = DOUBTED
+    confirmed: bool = False  # whether the last reading is
     base: float | None = None  # last confirmed reading
     base_s: float = 0.0  # time since
     doubtful: float | None = None  # last reading, while it is doubted
@@ -82,28 +59,29 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     shown, counts = (before.low_W, before.high_W), facts.measurand is Measurand.ENERGY
     unsettled = replace(before, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None)
     if reading is None or not math.isfinite(reading) or (counts and not 0 <= reading <= (facts.wrap_J or reading)):
-        return replace(unsettled, state=TABLE[before.state, Event.LOST][0]), None, "lost"
+        return replace(unsettled, confirmed=False), None, "lost"
     if facts.kind is Kind.ESTIMATED:  # a formula
-        return History(CONFIRMED, reading), None if before.base is None else reading - before.base, ""
+        return History(True, reading), None if before.base is None else reading - before.base, ""
     step = from_base = _step(facts, before, before.base, reading, unsettled.base_s)
-    event, near_W = Event.STRAYS, before.doubtful_W
+    near_W = before.doubtful_W
     if before.doubtful is not None:
         step = _step(facts, before, before.doubtful, reading, before.doubtful_s + seconds)
     agrees = near_W is not None and not step.mark and step.near(near_W, near_W)
-    if step.fault != "stuck" and from_base.near(*shown):
-        step, event, agrees = from_base, Event.FITS, False
-    elif before.doubtful is not None and (agrees or step.near(*shown)):
-        event = Event.FITS if before.doubtful_s else Event.AGREES
-    state, measured = TABLE[before.state, event]
-    if state is DOUBTED:
+    fits = step.fault != "stuck" and from_base.near(*shown)  # continues the confirmed reading
+    follows = not fits and before.doubtful is not None and (agrees or step.near(*shown))  # continues the doubtful one
+    if fits:
+        step, agrees = from_base, False
+    if not fits and not follows:
         mark = step.fault or ("first" if before.base is None else "implausible")
         age_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
-        return replace(unsettled, state=state, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts), None, mark
+        doubt = replace(unsettled, confirmed=False, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts)
+        return doubt, None, mark
+    measured = before.confirmed if fits else not before.doubtful_s  # none of an interval that begins in a standstill
     levels = [W for W in (step.watts, near_W if agrees else None) if W is not None] if measured else []
-    after = History(state, reading, low_W=min(shown[0], *levels, math.inf), high_W=max(shown[1], *levels, -math.inf))
+    after = History(True, reading, low_W=min(shown[0], *levels, math.inf), high_W=max(shown[1], *levels, -math.inf))
     if not measured:
         return after, None, "back"
-    start = before.base if event is Event.FITS else before.doubtful
+    start = before.base if fits else before.doubtful
     joules = step.joules if counts else 0.5 * seconds * (max(start or 0.0, 0.0) + reading)
     return after, max(joules, 0.0), step.mark
 

@@ -31,33 +31,16 @@ PRIMING_S = 0.05
 """Length of the first window of a counter [s], which has no energy: there is no power yet to judge it by."""
 
 
-class EnergyAccumulator:
-    """Energy between successive readings of one meter, by the rule of `judge`."""
-
-    def __init__(self, meter: Meter) -> None:
-        self.meter = meter
-        self._history = History()
-
-    def advance(self, seconds: float) -> tuple[float | None, str]:
-        """Energy since the last reading [J], None where it is not measured, and the cause or mark."""
-        try:
-            reading: float | None = self.meter.read()
-        except MeterLostError:
-            reading = None
-        self._history, energy_J, mark = judge(self.meter.facts, self._history, reading, seconds)
-        return energy_J, mark
-
-
 class Windows:
     """Sums the lines of the ledger, and closes a window over them when enough time has passed."""
 
     def __init__(self, meters: Sequence[Meter], clocks: Clocks, conditions: Conditions, min_s: float = MIN_S) -> None:
-        self._accumulators = [EnergyAccumulator(meter) for meter in meters]
+        self._meters, self._histories = meters, [History() for _ in meters]
         self._clocks, self._conditions, self._min_s = clocks, conditions, min_s
         self._index = 0
         self._least_s = min(PRIMING_S, min_s) if any(m.facts.kind is Kind.MEASURED for m in meters) else min_s
-        for accumulator in self._accumulators:
-            accumulator.advance(0.0)
+        for k in range(len(meters)):
+            self._advance(k, 0.0)
         self._open()
 
     def add(self, line: Line) -> Line | None:
@@ -86,10 +69,10 @@ class Windows:
         seconds = 1e-9 * (wall_ns + max(suspended_ns, 0))
         readings: list[dict[str, Any]] = []
         resolution_J = 0.0
-        for accumulator in self._accumulators:
-            energy_J, mark = accumulator.advance(seconds)
+        for k, meter in enumerate(self._meters):
+            energy_J, mark = self._advance(k, seconds)
             marks += [mark] if mark else []
-            facts = accumulator.meter.facts
+            facts = meter.facts
             readings.append({"name": facts.name, "kind": facts.kind.value, "scope": facts.scope.value, "J": energy_J})
             resolution_J += facts.resolution * (seconds if facts.measurand is Measurand.POWER else 1.0)
         spans_ns = sum(row["wall_ns"] for row in self._stages.values())
@@ -117,6 +100,16 @@ class Windows:
         self._index, self._least_s = self._index + 1, self._min_s
         self._open()
         return line
+
+    def _advance(self, k: int, seconds: float) -> tuple[float | None, str]:
+        """Energy since the last reading of a meter [J], None where it is not measured, and its mark."""
+        meter = self._meters[k]
+        try:
+            reading: float | None = meter.read()
+        except MeterLostError:
+            reading = None
+        self._histories[k], energy_J, mark = judge(meter.facts, self._histories[k], reading, seconds)
+        return energy_J, mark
 
     def _open(self) -> None:
         clocks = self._clocks

@@ -16,7 +16,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from modt import assets, profile
 from modt.config import SegmentationConfig, SensorConfig
-from modt.geometry.beams import Beams, BeamTable, EvenBeams
 from modt.types import Float32, Float64, Int
 
 _GAUSSIAN_REACH = 4.0
@@ -106,11 +105,6 @@ class BeamPattern:
     spacing_deg: float
     azimuth_step_deg: float
     contrast: float = 0.0
-
-    @property
-    def beams(self) -> Beams:
-        """Spacing of the beams."""
-        return BeamTable(self.elevations_deg.tolist()) if len(self.elevations_deg) else EvenBeams(self.spacing_deg)
 
 
 def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> BeamPattern | None:
