@@ -37,7 +37,7 @@ def test_threads_begun_elsewhere_stay_there_and_the_loop_where_it_is():
     try:
         os.sched_setaffinity(0, {loop})
         assert host.other_cores(loop) is None
-        with host.elsewhere(others):
+        with host.threads_on(others):
             thread = threading.Thread(target=lambda: seen.append(os.sched_getaffinity(0)))
             thread.start()
             thread.join()
@@ -56,7 +56,7 @@ def test_what_is_not_permitted_has_a_remedy(monkeypatch):
     monkeypatch.setattr(host.os, "sched_setscheduler", refuse)
     monkeypatch.setattr(host.sys, "setswitchinterval", lambda _: None)
     monkeypatch.setattr(host, "_lock_memory", lambda: "the limit of locked memory is finite")
-    lacking = host.be_punctual()
+    lacking = host.take_real_time_priority()
     assert len(lacking) == 2
     assert all("; " in what for what in lacking)
 

@@ -1,4 +1,4 @@
-"""Files of the package, models/ and profiles/, and the models of the desk's where it is installed.
+"""Files of the package: models/ and profiles/, and the models of the desk if it is installed.
 
 They lie beside runtime/ in a checkout and an editable install, and inside the package in a wheel.
 """
@@ -23,7 +23,7 @@ def folder(kind: str) -> Path:
 
 
 def find(kind: str, name: str, suffix: str, beside: Path = Path()) -> Path:
-    """A file by its path, from a folder, or by the name of one of the package; an error lists the names."""
+    """A file by its path below a folder, or by its name in the package; a wrong name is answered with all names."""
     path = beside / name
     if path.suffix == suffix or len(Path(name).parts) > 1:
         if path.is_file():
@@ -36,7 +36,7 @@ def find(kind: str, name: str, suffix: str, beside: Path = Path()) -> Path:
 
 
 def shipped(kind: str, suffix: str) -> list[Path]:
-    """Files of a kind, those of the desk included, by name."""
+    """Files of a kind by name, with those of the desk."""
     folders = (folder(kind), *(root / kind for root in _DESK))
     return sorted((path for place in folders for path in place.glob(f"*{suffix}")), key=lambda path: path.name)
 

@@ -1,4 +1,4 @@
-"""The machine: pinning to one core, a check of all threads, and its description."""
+"""The machine: pinning to one core, real-time priority, a check of all threads, and a description."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from modt.errors import MisuseError
 
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 _MAX_HELPER_SHARE = 0.01
-"""CPU time of other threads over that of the loop, up to which the process counts as single-threaded."""
+"""The process counts as single-threaded if other threads use at most this share of the CPU time of the loop."""
 SWITCH_S = 0.0005
-"""For which another thread may keep the interpreter from the loop; 5 ms by default."""
+"""Time for which another thread may keep the interpreter from the loop [s]; Python's default is 5 ms."""
 _MCL_CURRENT, _MCL_FUTURE, _MCL_ONFAULT = 1, 2, 4  # mlockall(2)
 _NICE = 23  # bit of CAP_SYS_NICE, capabilities(7)
 _LIBRARIES = ("modt", "numpy", "scipy", "onnxruntime", "psutil", "pyyaml")
@@ -57,7 +57,7 @@ def last_core() -> int:
 
 
 def other_cores(core: int | None) -> frozenset[int] | None:
-    """The cores that this process may use beside one: for threads that serve the loop; None where there are none.
+    """Cores that this process may use besides the one of the loop; None if there are none.
 
     Call it before `pin_to_core`.
     """
@@ -66,13 +66,13 @@ def other_cores(core: int | None) -> frozenset[int] | None:
 
 
 @contextmanager
-def elsewhere(cores: frozenset[int] | None) -> Iterator[None]:
-    """Threads that are begun within the context run on other cores than the loop."""
+def threads_on(cores: frozenset[int] | None) -> Iterator[None]:
+    """Context in which new threads run on these cores, while this thread stays on its own."""
     if cores is None:
         yield
         return
     before = os.sched_getaffinity(0)
-    with suppress(OSError):  # not permitted any more: they share the core
+    with suppress(OSError):  # no longer permitted: they share the core of the loop
         os.sched_setaffinity(0, cores)
     try:
         yield
@@ -80,28 +80,28 @@ def elsewhere(cores: frozenset[int] | None) -> Iterator[None]:
         os.sched_setaffinity(0, before)
 
 
-def be_punctual(priority: int = 10) -> list[str]:
-    """Schedule this thread before ordinary ones (SCHED_FIFO), and keep its memory from being swapped out.
+def take_real_time_priority(priority: int = 10) -> list[str]:
+    """Give this thread real-time priority (SCHED_FIFO), and keep the memory of the process from being swapped out.
 
-    Threads begun afterwards stay ordinary. Returns what is not permitted, with the remedy.
+    Threads that are started later have ordinary priority. Returns a line on each refusal, with its remedy.
     """
     sys.setswitchinterval(SWITCH_S)
-    lacking = []
+    refusals = []
     if os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK != os.SCHED_FIFO:
         try:
             policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
             os.sched_setscheduler(0, policy, os.sched_param(priority))
         except OSError as error:
             cause, remedy = fifo_refusal(priority)
-            lacking.append(f"ordinary priority: SCHED_FIFO is not permitted: {cause or error.strerror}; {remedy}")
+            refusals.append(f"ordinary priority: SCHED_FIFO is not permitted: {cause or error.strerror}; {remedy}")
     cause = _lock_memory()
     if cause:
-        lacking.append(f"memory may be swapped out: {cause}; set LimitMEMLOCK=infinity in the unit, or ulimit -l")
-    return lacking
+        refusals.append(f"memory may be swapped out: {cause}; set LimitMEMLOCK=infinity in the unit, or ulimit -l")
+    return refusals
 
 
 def fifo_refusal(priority: int, proc: Path = Path("/proc"), groups: Path = Path("/sys/fs/cgroup")) -> tuple[str, str]:
-    """Why the kernel refuses SCHED_FIFO, empty where this process lacks the right to it, and what helps."""
+    """Cause for which the kernel refuses SCHED_FIFO, empty if only a right is missing, and remedy."""
     if content(proc / "sys/kernel/sched_rt_runtime_us").strip() == "0":
         return "it is switched off (sched_rt_runtime_us 0)", "sysctl -w kernel.sched_rt_runtime_us=950000"
     for controllers, path in (line.split(":", 2)[1:] for line in content(proc / "self/cgroup").splitlines()):
@@ -117,12 +117,12 @@ def fifo_refusal(priority: int, proc: Path = Path("/proc"), groups: Path = Path(
 
 
 def serve_loop(cores: frozenset[int] | None) -> str:
-    """Let this thread serve the loop: on these cores, and before ordinary ones if the loop is; what is not permitted.
+    """Move this thread to these cores, with real-time priority if the loop has it; returns a refusal with remedy.
 
-    An ordinary thread that is put aside while it has the interpreter keeps the loop waiting, on its own core as well.
+    An ordinary thread that is preempted while it holds the interpreter keeps the loop waiting, even on another core.
     """
     if cores:
-        with suppress(OSError):  # not allowed any more: it stays where the process is
+        with suppress(OSError):  # no longer permitted: it stays where the process is
             os.sched_setaffinity(0, cores)
     loop = os.getpid()
     if os.sched_getscheduler(loop) & ~os.SCHED_RESET_ON_FORK != os.SCHED_FIFO:
@@ -137,7 +137,7 @@ def serve_loop(cores: frozenset[int] | None) -> str:
 
 
 def _lock_memory() -> str:
-    """Keep all pages in memory once they are used; the reason where that is not permitted."""
+    """Lock all pages in memory once they are used; returns the cause of a refusal."""
     if resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] != resource.RLIM_INFINITY:
         return "the limit of locked memory is finite"  # beyond it, allocations would fail later
     if ctypes.CDLL(None, use_errno=True).mlockall(_MCL_CURRENT | _MCL_FUTURE | _MCL_ONFAULT):
@@ -146,19 +146,19 @@ def _lock_memory() -> str:
 
 
 def resident_mb() -> float:
-    """Memory of this process that is in use now [MB]."""
+    """Resident memory of this process [MB]."""
     return float(psutil.Process().memory_info().rss) / 2**20
 
 
 def usage(core: int | None) -> dict[str, object]:
-    """Threads and memory of this process, as the kernel accounts for them, and whether it kept to its core."""
+    """Threads and memory of this process by the kernel's accounts, and whether it has kept to its core."""
     process = psutil.Process()
     used = {t.id: t.user_time + t.system_time for t in process.threads()}
     cores: set[int] = set()
     for thread in used:
         try:
             cores |= os.sched_getaffinity(thread)
-        except ProcessLookupError:  # ended meanwhile
+        except ProcessLookupError:  # it has ended meanwhile
             continue
     main_s = used.get(process.pid, 0.0)
     others_s = sum(used.values()) - main_s
@@ -181,7 +181,7 @@ def keep_freed_pages() -> None:
 
 
 def release_freed_pages() -> None:
-    """Return to the kernel what is free now: after large parts were replaced. A millisecond, with glibc."""
+    """Return free memory to the kernel, after large parts were replaced. Takes a millisecond with glibc."""
     with suppress(AttributeError):
         ctypes.CDLL(None).malloc_trim(0)
 
@@ -218,7 +218,7 @@ def _cpu_model() -> str:
 
 
 def core_list(text: str) -> set[int]:
-    """Cores of a list of the kernel, as 0-2,5."""
+    """Cores of a list as the kernel writes it, such as 0-2,5."""
     ranges = (part.partition("-") for part in text.strip().split(",") if part)
     return {core for first, _, last in ranges for core in range(int(first), int(last or first) + 1)}
 

@@ -1,4 +1,4 @@
-"""The placement of a sweep: mount of the sensor, its pose at the stamp, and its motion during the sweep."""
+"""Placement of a sweep: mount of the sensor, its pose at the stamp, and its motion during the sweep."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modt.types import Float32, Float64, Frame
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """How the sensor is turned on its robot.
+    """Rotation of the sensor on its robot.
 
     Attributes:
         R_level_sensor: (3, 3) from the sensor to the level frame at its place and heading; None if it is level.
@@ -27,7 +27,7 @@ class Mount:
         return cls(rotation_zyx(roll, pitch, 0.0) if roll or pitch else None)
 
     def turn(self, points: Float32) -> Float32:
-        """(N, 4) points, or wider, as a level sensor has them."""
+        """(N, 4) or wider points in the level frame."""
         if self.R_level_sensor is None:
             return points
         out = points.copy()
@@ -37,7 +37,7 @@ class Mount:
         return out
 
     def level(self, frame: Frame) -> Frame:
-        """The frame of a level sensor; the head of one that hangs upside down turns the other way."""
+        """The same sweep in the level frame. The head of a sensor that hangs upside down turns the other way."""
         R, T = self.R_level_sensor, frame.T_world_sensor
         if R is None:
             return frame
@@ -46,7 +46,7 @@ class Mount:
         return replace(frame, points=self.turn(frame.points), T_world_sensor=pose, turn_s=turn_s, R_level_sensor=R)
 
     def camera(self, camera: Camera) -> Camera:
-        """A camera beside the sensor, for level points."""
+        """A camera beside the sensor, for points in the level frame."""
         if self.R_level_sensor is None:
             return camera
         T = inverse(se3(self.R_level_sensor, np.zeros(3)))
@@ -70,7 +70,7 @@ class PlanarMotion:
 
     @classmethod
     def between(cls, T_world_before: Float64, T_world_after: Float64, dt_s: float) -> PlanarMotion:
-        """Motion from one pose to the next; none where no time passed."""
+        """Motion from one pose to the next; no motion if no time has passed."""
         if dt_s <= 0.0:
             return cls()
         T = T_world_before[:3, :3].T @ T_world_after[:3]
@@ -81,7 +81,7 @@ class PlanarMotion:
         return cls(velocity, yaw / dt_s)
 
     def displacement(self, position_m: Float64, delay_s: Float64) -> Float64:
-        """(P, 2) from positions (P, 2) seen delay_s (P,) after the stamp to where the sensor sees them at it [m]."""
+        """(P, 2) displacement of positions (P, 2) [m] from delay_s (P,) after the stamp to the stamp."""
         position = position_m.copy().view(np.complex128)[:, 0]
         half = np.exp(0.5j * self.yaw_rate_radps * delay_s)
         step = position * (half * half - 1.0) + self.velocity_mps * delay_s * half
@@ -91,7 +91,7 @@ class PlanarMotion:
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where a sweep was taken.
+    """Pose and motion of the sensor in a sweep.
 
     Attributes:
         T_world_sensor: (4, 4) pose at the stamp.

@@ -41,7 +41,7 @@ def test_a_governor_that_saves_power_is_warned_of(tmp_path, name, level):
     [([], "", ["ok"]), (["a is not permitted; set b", "c; set d"], "", ["warn"] * 2), ([], "e; set f", ["warn"])],
 )
 def test_each_missing_permission_has_its_line(monkeypatch, loop, receiver, levels):
-    monkeypatch.setattr(checks.host, "be_punctual", lambda: [*loop])
+    monkeypatch.setattr(checks.host, "take_real_time_priority", lambda: [*loop])
     monkeypatch.setattr(checks.host, "serve_loop", lambda cores: receiver)
     found = checks.permissions()
     assert [f.level for f in found] == levels

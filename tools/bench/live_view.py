@@ -40,7 +40,7 @@ def main() -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
-        with host.elsewhere(cores):
+        with host.threads_on(cores):
             sink = open_sink(f"view://127.0.0.1:{port}")
         assert isinstance(sink, LedgerSink)
         cpu_ns = worst_ns = 0

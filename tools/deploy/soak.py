@@ -213,7 +213,7 @@ def main(arguments: list[str] | None = None) -> int:
     others = host.other_cores(core)
     host.pin_to_core(core)
     if given.fifo:
-        host.be_punctual()
+        host.take_real_time_priority()
     world = World(core, given.hogs, fifo=given.fifo)
     world.install()
     metering.discovery = lambda config: world.meters(time.monotonic)  # type: ignore[attr-defined]
@@ -222,7 +222,7 @@ def main(arguments: list[str] | None = None) -> int:
     witness = Witness()
     source = LiveStream(recording.info, reader, cores=others)
     request = Request(profile=given.profile)
-    with host.elsewhere(others):
+    with host.threads_on(others):
         session = service(request, source, {"witness": witness}, given.out, None, core, ["soak"])
     witness.session = reader.session = session
     try:

@@ -26,11 +26,11 @@ def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
         yield from leaves(choice)
 
 
-Choice = argparse._SubParsersAction  # of commands, without a public name
+Choice = argparse._SubParsersAction  # action that holds the commands; it has no public name
 
 
 def leaves(choice: Choice[argparse.ArgumentParser]) -> Iterator[tuple[str, argparse.ArgumentParser]]:
-    """The same of the commands of a choice, and of the groups among them."""
+    """Summary and parser of the commands of a choice and of its groups."""
     summaries = {action.dest: action.help or "" for action in choice._choices_actions}
     for name, parser in choice.choices.items():
         groups = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]

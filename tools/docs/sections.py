@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def replace_section(text: str, mark: str, section: str) -> str:
-    """The document with what lies between `<!-- mark -->` and `<!-- end of mark -->` replaced.
+    """The document with another text between `<!-- mark -->` and `<!-- end of mark -->`.
 
     Raises:
         ValueError: the document lacks one of them.

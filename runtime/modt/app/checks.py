@@ -62,7 +62,7 @@ def governor(number: int | None, sys: Path = Path("/sys")) -> Finding:
 
 def permissions() -> list[Finding]:
     """Priority and memory; takes what is permitted."""
-    said = host.be_punctual()
+    said = host.take_real_time_priority()
     with ThreadPoolExecutor(1) as receiving:
         said.append(receiving.submit(host.serve_loop, None).result())
     lacking = [Finding(WARN, "permissions", *what.split("; ", 1)) for what in said if what]

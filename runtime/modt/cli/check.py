@@ -1,4 +1,4 @@
-"""`modt check`: what will not work here, and how to mend it."""
+"""`modt check`: find out beforehand what will not work here, and print the remedies."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from modt.cli.run import OUT
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("check", help="say what modt run will lack here, and how to mend it")
+    p = commands.add_parser("check", help="check this machine, and a sensor, for modt run; print remedies")
     source = "address of the sensor to listen to, or a recording (default: none)"
     p.add_argument("source", nargs="?", metavar="SOURCE", help=source)
     options.add_profile_option(p)

@@ -46,6 +46,6 @@ def dispatch(name: str, description: str, commands: Mapping[str, str], argv: Seq
 
 
 def show_help(parser: argparse.ArgumentParser) -> int:
-    """Print the help in place of a command that is missing; returns the exit status."""
+    """Print the help instead of running a command that is missing; returns the exit status."""
     parser.print_help()
     return MisuseError.exit_status

@@ -24,7 +24,7 @@ COMMANDS = {
     "profiles": "modt.cli.profile_list",
     "completion": "modt_desk.cli.completion",
 }
-"""Module of each command; those of the desk are named here alone."""
+"""Module of each command. Only this table names modules of the desk."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -17,13 +17,13 @@ CAPTURE_KEYS = ("model", "calibration", "metadata", "topic")
 
 
 def add_examples(p: Parser, *examples: str) -> None:
-    """Lines at the end of the help."""
+    """Add example lines to the end of the help."""
     p.formatter_class = argparse.RawDescriptionHelpFormatter
     p.epilog = "\n  ".join(["examples:", *examples])
 
 
 def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, None)) -> None:
-    """Stream, frames, profile and core."""
+    """Add the options of a stream: path, capture, frames, profile and core."""
     stream = (
         "KITTI drive, folder of .bin, .pcd or .ply scans, PCAP file, ROS 2 recording (default: a synthetic stream)"
     )
@@ -35,29 +35,29 @@ def add_stream_options(p: Parser, first_frames: tuple[int, int | None] = (0, Non
 
 
 def add_frames_option(p: Parser, default: tuple[int, int | None] = (0, None)) -> None:
-    """Frames."""
+    """Add the range of frames."""
     a, b = default
     which = f"frames from A to B - 1 (default: {a}:{'' if b is None else b})"
     p.add_argument("--frames", type=frames, default=default, metavar="A:B", help=which)
 
 
 def add_mode_option(p: Parser) -> None:
-    """Mode."""
+    """Add the mode."""
     p.add_argument("--mode", choices=MODES, default="accurate", help="default: %(default)s")
 
 
 def add_core_option(p: Parser) -> None:
-    """Core."""
+    """Add the core."""
     p.add_argument("--core", type=core, default="last", metavar="N|none", help="pin to core N (default: the last)")
 
 
 def add_profile_option(p: argparse._ActionsContainer, meaning: str = PROFILES) -> None:
-    """Profiles."""
+    """Add the profiles."""
     p.add_argument("--profile", action="append", default=[], metavar="NAME|FILE", help=meaning)
 
 
 def add_sink_option(p: Parser) -> None:
-    """Sinks."""
+    """Add the sinks."""
     forms = ", ".join(scheme.form for scheme in SINKS.values())
     p.add_argument(
         "--sink", action="append", default=[], metavar="ADDRESS", help=f"send tracks to {forms}; repeatable"
@@ -65,7 +65,7 @@ def add_sink_option(p: Parser) -> None:
 
 
 def add_capture_option(p: Parser) -> None:
-    """What a recording does not tell."""
+    """Add the facts that a recording does not hold."""
     what = (
         "of a PCAP file: model=MODEL or calibration=FILE of a Velodyne, metadata=FILE of an Ouster; of a ROS 2 "
         "recording with several topics of point clouds: topic=NAME; repeatable"
@@ -74,23 +74,23 @@ def add_capture_option(p: Parser) -> None:
 
 
 def add_fov_option(p: Parser) -> None:
-    """Field of view."""
+    """Add the field of view."""
     p.add_argument("--fov", choices=("camera", "full"), default="full", help="field of view (default: %(default)s)")
 
 
 def add_meter_option(p: Parser) -> None:
-    """Meter."""
+    """Add the meter."""
     p.add_argument("--meter", metavar="NAME", help="meter to read (default: the best)")
 
 
 def add_report_options(p: Parser) -> None:
-    """Formats of a report."""
+    """Add the formats of a report."""
     p.add_argument("--json", action="store_true", help="print JSON")
     p.add_argument("--html", type=Path, metavar="FILE", help="write an HTML page with plots")
 
 
 def capture(text: str) -> tuple[str, str]:
-    """KEY=VALUE of a capture."""
+    """Parse KEY=VALUE of a capture."""
     key, equals, value = text.partition("=")
     if not equals or key not in CAPTURE_KEYS:
         raise argparse.ArgumentTypeError(f"{text!r}: write KEY=VALUE, KEY one of {', '.join(CAPTURE_KEYS)}")
@@ -98,7 +98,7 @@ def capture(text: str) -> tuple[str, str]:
 
 
 def frames(text: str) -> tuple[int, int | None]:
-    """A:B; either may be left out."""
+    """Parse a range A:B, either end of which may be left out."""
     first, colon, last = text.partition(":")
     try:
         a, b = int(first or 0), int(last) if last else None
@@ -110,14 +110,14 @@ def frames(text: str) -> tuple[int, int | None]:
 
 
 def core(text: str) -> int | None:
-    """Number of a core, or None to leave the affinity unchanged."""
+    """Parse the number of a core; None leaves the affinity unchanged."""
     if text in ("last", "none"):
         return host.last_core() if text == "last" else None
     return integer(0, 65535, "the number of a core, or none")(text)
 
 
 def integer(low: int, high: int, what: str) -> Callable[[str], int]:
-    """Type of an integer within bounds."""
+    """Parser of an integer within bounds."""
 
     def parse(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
@@ -128,7 +128,7 @@ def integer(low: int, high: int, what: str) -> Callable[[str], int]:
 
 
 def real(low: float, high: float, what: str) -> Callable[[str], float]:
-    """Type of a number within bounds."""
+    """Parser of a number within bounds."""
 
     def parse(text: str) -> float:
         try:

@@ -15,7 +15,7 @@ COMMANDS = {
     "regimes": "modt_desk.cli.profile_regimes",
 }
 """Module of each command."""
-WHAT = "Account for the energy of modt. Profiles of sensors and boards are another command's: modt profile."
+WHAT = "Account for the energy of modt. For profiles of sensors and boards see `modt profile`."
 
 
 def main(argv: Sequence[str] | None = None) -> int:

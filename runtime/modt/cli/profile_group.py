@@ -17,7 +17,7 @@ COMMANDS = {
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the group and its commands."""
-    what, beside = "profiles of sensors and boards", "The energy of runs is another command's: modt-profile."
+    what, beside = "profiles of sensors and boards", "For the energy of runs see `modt-profile`."
     p = commands.add_parser("profile", help=what, description=f"Write and show {what}.", epilog=beside)
     p.set_defaults(run=lambda _: show_help(p))
     group = p.add_subparsers(dest="profile_command", metavar="COMMAND")

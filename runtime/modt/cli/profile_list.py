@@ -1,4 +1,4 @@
-"""`modt profiles`: the profiles that come along, one line each."""
+"""`modt profiles`: list the shipped profiles, one line each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from modt.cli import options
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command."""
-    p = commands.add_parser("profiles", help="list the profiles of sensors and boards that come along")
+    p = commands.add_parser("profiles", help="list the shipped profiles of sensors and boards")
     options.add_examples(p, "modt profiles   names for --profile; modt profile show NAME prints one")
     p.set_defaults(run=run)
 

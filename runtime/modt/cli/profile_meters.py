@@ -1,4 +1,4 @@
-"""`modt-profile meters`: the meters of this machine, the one used, and the reasons against the others."""
+"""`modt-profile meters`: list the meters of this machine, and why others cannot be used."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def text(found: Discovery) -> str:
-    """The usable ones, the best first; then the others, with reason and remedy."""
+    """List of the usable meters, the best first, then of the others with reason and remedy."""
     lines = []
     for candidate in found.candidates:
         facts = candidate.facts

@@ -1,4 +1,4 @@
-"""`modt profile show`: what profiles come to, and who set each key."""
+"""`modt profile show`: print the configuration of profiles, with the profile that has set each key."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from modt.cli import options
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("show", help="print the configuration that profiles come to, and who set each key")
+    p = commands.add_parser("show", help="print the configuration of profiles, and which of them has set each key")
     which = f"name or file; later ones win key by key (default: {profile.DEFAULT})"
     p.add_argument("names", nargs="*", metavar="NAME|FILE", help=which)
     options.add_examples(
@@ -22,6 +22,6 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show."""
+    """Print it."""
     print(profile.resolve(arguments.names).shown(), end="")
     return 0

@@ -58,10 +58,10 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.schemes import open_sink
 
     supervisor = supervisor_of(os.environ)
-    lacking = host.be_punctual()
+    lacking = host.take_real_time_priority()
     for what in lacking:
         log.warning("%s", what)
-    with host.elsewhere(cores):
+    with host.threads_on(cores):
         source, path = live_source(arguments.source, cores)
         addresses = [*arguments.sink, *([] if arguments.view is None else [f"view://{arguments.view}"])]
         sinks = {address: open_sink(address) for address in dict.fromkeys(addresses)}

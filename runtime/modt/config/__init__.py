@@ -1,4 +1,4 @@
-"""Configuration: one frozen dataclass a stage, one nested in it a mechanism; every value is checked as it is made."""
+"""Configuration: one frozen dataclass a stage, whose values are checked as it is made."""
 
 from modt.config.base import StageConfig, ValueRangeError
 from modt.config.classification import (

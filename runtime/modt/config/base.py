@@ -19,36 +19,36 @@ class ValueRangeError(MisuseError):
 
 
 def number(default: float | None, low: float, high: float, unit: str, meaning: str) -> Any:
-    """Field of a number within bounds, and where its default comes from, if the meaning says so."""
+    """Field of a number within bounds."""
     return field(default=default, metadata={"low": low, "high": high, "unit": unit, "meaning": meaning})
 
 
 def numbers(low: float, high: float, most: int, unit: str, meaning: str, *, pairs: bool = False) -> Any:
-    """Field of two to `most` numbers within bounds, or of an even number of them, none by default."""
+    """Field of two to `most` numbers within bounds; in pairs their number is even. The default is null."""
     facts = {"low": low, "high": high, "least": 2, "most": most, "unit": unit, "meaning": meaning}
     return field(default=None, metadata={**facts, "pairs": pairs})
 
 
 def choice(default: str, options: tuple[str, ...], meaning: str) -> Any:
-    """Field of one of some names."""
+    """Field of one name among options."""
     return field(default=default, metadata={"options": options, "meaning": meaning})
 
 
 def per_class(column: str, low: float, high: float, meaning: str, classes: tuple[ObjectClass, ...] = OBJECTS) -> Any:
-    """Field of a number for each of the classes; the defaults are that column of the class table."""
+    """Field of a number for each class; the defaults are a column of the class table."""
     values = tuple(getattr(CLASSES[c], column) for c in classes)
     meaning = f"{meaning}: {', '.join(CLASS_NAMES[c] for c in classes)}"
     return field(default=values, metadata={"low": low, "high": high, "length": len(classes), "meaning": meaning})
 
 
 def shares(high: float, meaning: str) -> Any:
-    """Field of a share for each class of objects, none by default."""
+    """Field of a share for each class of objects. The default is null."""
     meaning = f"{meaning}: {', '.join(CLASS_NAMES[c] for c in OBJECTS)}"
     return field(default=None, metadata={"low": 0.0001, "high": high, "length": len(OBJECTS), "meaning": meaning})
 
 
 def mechanism(config: type[StageConfig]) -> Any:
-    """Field of a mechanism's own configuration, a mapping in a profile."""
+    """Field of a nested configuration, a mapping in a profile."""
     return field(default_factory=config)
 
 

@@ -9,7 +9,7 @@ from modt.config.base import StageConfig, number
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryConfig(StageConfig):
-    """Poses received by a socket."""
+    """Poses received by a socket, in effect with `--odometry udp://` and `unix://`."""
 
     max_age_s: float = number(0.3, 0.001, 10.0, "s", "greatest distance in time of a frame from its poses")
     max_ahead_s: float = number(60.0, 0.1, 3600.0, "s", "greatest lead of a pose over its frame by the same clock")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from modt.geometry.beams import Beams
 
 GRID_CELLS, MAX_CELLS = 200, 5e7
-"""Cells of both grids of the segmentation for each m of range and 1/m2 of cell_m, and most of them: 200 MB."""
+"""Cells of both grids of the segmentation per metre of range at a cell of 1 m, and greatest number (200 MB)."""
 REFLECTANCE_SCALES = ("hdl-64e", "pandar64")
 """Sensors whose reflectance a model may have learnt."""
 
@@ -60,13 +60,13 @@ class SensorConfig(StageConfig):
 
     @property
     def span_deg(self) -> tuple[float, float] | None:
-        """Elevations of the lowest and the highest beam; None where they are not known."""
+        """Elevations of the lowest and the highest beam; None if unknown."""
         beams = self.elevations_deg or self.elevation_span_deg
         return None if beams is None else (min(beams), max(beams))
 
     @property
     def person_seen_from_m(self) -> float | None:
-        """Distance from which a third of a person is in view [m]; None where mount or beams are not known."""
+        """Distance from which a third of a person is in view [m]; None if the mount or the beams are unknown."""
         if self.height_m is None or self.span_deg is None:
             return None
         h, (low, high) = self.height_m, (math.tan(math.radians(deg)) for deg in self.span_deg)
@@ -113,7 +113,7 @@ class EnergyConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopConfig(StageConfig):
-    """What the loop keeps to, and what it gives up for it."""
+    """Limits of the live loop, in effect with `modt run`."""
 
     range_share: float = number(0.6, 0.05, 1.0, "", "of sensor.max_range_m that is kept where the range is reduced")
     power_W: float | None = number(None, 0.01, 1000.0, "W", "limit, by the meter or the board's model; null: none")
@@ -121,7 +121,7 @@ class LoopConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingConfig(StageConfig):
-    """Records of the live loop."""
+    """Records of the live loop, in effect with `modt run`."""
 
     keep: str = choice("all", ("all", "tracks", "ledger", "none"), "which records are written")
     disk_mb: float = number(
@@ -131,7 +131,7 @@ class RecordingConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileConfig:
-    """All of it: a sensor and a board, as a profile file describes them."""
+    """The whole configuration: a sensor, a board and all stages, as profiles describe them."""
 
     sensor: SensorConfig = field(default_factory=SensorConfig)
     segmentation: SegmentationConfig = field(default_factory=SegmentationConfig)
@@ -160,7 +160,7 @@ class ProfileConfig:
 
     @property
     def classification_ms(self) -> float | None:
-        """CPU time that a frame may spend on classification [ms]: what its time and its energy allow."""
+        """CPU time that a frame may spend on classification [ms], the smaller of both budgets; None without one."""
         stage = self.scheduler
         by_energy = stage.energy_mJ_per_frame
         limits = [stage.cpu_ms_per_frame, None if by_energy is None else by_energy / self.energy.active_W]

@@ -1,4 +1,4 @@
-"""Attribution of the energy of windows to idling and the stages: the one rule by which everything splits energy.
+"""Attribution of energy to idling and the stages. Reports, pages and the status all split energy by this rule.
 
 A board is described by E_window = P_idle T + e_seg N_seg + e_class N_class + e_point N_point.
 """
@@ -20,10 +20,10 @@ _MAX_W = 10_000.0
 class Regressor:
     """One count of a window: an entry of a stage, or of the whole window where the stage is empty."""
 
-    name: str  # of its coefficient, with the unit
+    name: str  # name of its coefficient, with the unit
     stage: str
     key: str
-    scale: float = 1.0  # of the count, so that the coefficient has its unit
+    scale: float = 1.0  # factor on the count, so that the coefficient has its unit
 
     def count(self, line: Line) -> float:
         """Count of one window."""
@@ -46,7 +46,7 @@ def usable(line: Line) -> bool:
 
 
 def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
-    """Energy of idling, of each stage, and of the rest of a window, unattributed [J]; none without a reading.
+    """Energy of idling, of each stage, and of the unattributed rest of a window [J]; empty without a reading.
 
     With P_idle of the board, E and T of the window and t of its CPU time, in all and of a stage,
 

@@ -38,7 +38,7 @@ class Ledger:
         return self.timed(stage, function, *args, **kwargs)[0]
 
     def timed(self, stage: str, function: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> tuple[R, int]:
-        """The same, and the CPU time of the span [ns]."""
+        """Result as of `run`, and the CPU time of the span [ns]."""
         wall0, cpu0 = self._wall_ns(), self._cpu_ns()
         try:
             result = function(*args, **kwargs)
@@ -62,8 +62,8 @@ class Ledger:
     def close_frame(self, index: int) -> Line:
         """Line of the frame: its stages, and the parts of the time since the last line.
 
-        wall_ns = sum of the stages' wall_ns + overhead_ns + idle_ns holds exactly. A clock that ran backwards is
-        marked "clock" and counts as zero time.
+        The stages' wall_ns, overhead_ns and idle_ns sum to wall_ns exactly. A clock that ran backwards is marked
+        "clock" and counts as zero time.
         """
         wall, cpu = self._wall_ns(), self._cpu_ns()
         frame_wall, frame_cpu = wall - self._wall0, cpu - self._cpu0

@@ -1,8 +1,8 @@
-"""The one rule that turns readings of a meter into joules, for counters and power samples alike.
+"""The rule that turns the readings of a meter into joules, for counters and power samples alike.
 
-An interval is measured when the readings at both its ends are confirmed; any other one is marked with its cause.
-A reading is confirmed by the power that it implies: near what the meter has shown, counted from the last confirmed
-reading, or near what the doubtful reading before it implied. Only so does a doubtful reading become a base.
+An interval is measured if the readings at both its ends are confirmed. Any other interval is marked with its cause. A
+reading is confirmed if the power that it implies lies near the power that the meter has shown, counted from the last
+confirmed reading, or near the power that the doubtful reading before it implied.
 """
 
 from __future__ import annotations
@@ -13,28 +13,28 @@ from dataclasses import dataclass, replace
 from modt.energy.meters.meter import Facts, Kind, Measurand
 
 SURGE = 4.0
-"""Factor beyond the lowest and the highest power shown up to which a reading is confirmed at once."""
+"""A reading is confirmed at once up to this factor beyond the lowest and the highest power shown."""
 TICK_S = 0.01
-"""Time between two steps of a counter, at most [s]."""
+"""Greatest time between two steps of a counter [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """The readings so far, as far as the next one is judged by them."""
+    """State of a meter by which its next reading is judged."""
 
-    confirmed: bool = False  # whether the last reading is
+    confirmed: bool = False  # whether the last reading is confirmed
     base: float | None = None  # last confirmed reading
-    base_s: float = 0.0  # time since
-    doubtful: float | None = None  # last reading, while it is doubted
-    doubtful_s: float = 0.0  # time for which it had stood still before
+    base_s: float = 0.0  # time since that reading
+    doubtful: float | None = None  # last reading, while it is doubtful
+    doubtful_s: float = 0.0  # time for which the meter had stood still before it
     doubtful_W: float | None = None  # power that it implies
-    low_W: float = math.inf  # lowest and highest power measured
+    low_W: float = math.inf  # lowest power measured, and below it the highest [W]
     high_W: float = -math.inf
 
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """Change between two readings: its energy, the power that it implies within bounds, and what is wrong with it."""
+    """Change between two readings: its energy, bounds of its power, and its fault."""
 
     joules: float
     watts: float | None  # None where the interval is too short to tell
@@ -44,7 +44,7 @@ class _Step:
     mark: str = ""
 
     def near(self, low_W: float, high_W: float) -> bool:
-        """Whether the power may lie in a range, or not far from it."""
+        """Whether the power lies within SURGE of a range."""
         return not self.fault and low_W / SURGE <= self.most_W and self.least_W <= SURGE * high_W
 
 
@@ -60,7 +60,7 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     unsettled = replace(before, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None)
     if reading is None or not math.isfinite(reading) or (counts and not 0 <= reading <= (facts.wrap_J or reading)):
         return replace(unsettled, confirmed=False), None, "lost"
-    if facts.kind is Kind.ESTIMATED:  # a formula
+    if facts.kind is Kind.ESTIMATED:  # computed by a formula, which is never wrong
         return History(True, reading), None if before.base is None else reading - before.base, ""
     step = from_base = _step(facts, before, before.base, reading, unsettled.base_s)
     near_W = before.doubtful_W
@@ -87,7 +87,7 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
 
 
 def _step(facts: Facts, before: History, start: float | None, end: float, seconds: float) -> _Step:
-    """Change from a counter's reading to another; a power sample is judged by itself, as the joules of a second."""
+    """Change from one reading of a counter to another. A power sample stands alone, as the joules of a second."""
     counts, fault, mark, tick_s = facts.measurand is Measurand.ENERGY, "", "", TICK_S
     if not counts:
         start, seconds, tick_s = 0.0, 1.0, 0.0
@@ -98,7 +98,7 @@ def _step(facts: Facts, before: History, start: float | None, end: float, second
         joules, mark = joules + wrap_J, "wrap"
     least_W = (joules - facts.resolution) / (seconds + tick_s)
     most_W = (joules + facts.resolution) / (seconds - tick_s) if seconds > tick_s else math.inf
-    # A wrap beyond what was shown may as well be a reset.
+    # A wrap that implies another power than was shown may as well be a reset.
     if joules < -facts.resolution or (mark and not (before.low_W <= most_W and least_W <= before.high_W)):
         fault = "reset" if counts else "negative"
     elif seconds * min(facts.max_W, SURGE * before.high_W if before.base is not None else math.inf) >= wrap_J:

@@ -1,4 +1,4 @@
-"""Windows of a second or more: the only times at which meters are read."""
+"""Windows of a second or more, at whose ends the meters are read."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Clocks:
 
 
 MIN_S = 1.0
-"""Shortest window [s]: RAPL steps in milliseconds, INA chips and batteries average over longer times."""
+"""Shortest window [s]. RAPL counters step every millisecond; INA chips and batteries average over longer times."""
 SUSPEND_S = 0.2
-"""Lead of the boot clock over the monotonic one [s] from which a window is marked suspended and has no energy."""
+"""Time asleep [s], by the boot clock, from which a window is marked suspended and has no energy."""
 PRIMING_S = 0.05
-"""Length of the first window of a counter [s], which has no energy: there is no power yet to judge it by."""
+"""Length of the first window of a counter [s]. It has no energy, as no power is known yet to judge it by."""
 
 
 class Windows:
-    """Sums the lines of the ledger, and closes a window over them when enough time has passed."""
+    """Sums the lines of the ledger into windows, and reads the meters when a window closes."""
 
     def __init__(self, meters: Sequence[Meter], clocks: Clocks, conditions: Conditions, min_s: float = MIN_S) -> None:
         self._meters, self._histories = meters, [History() for _ in meters]
@@ -44,7 +44,7 @@ class Windows:
         self._open()
 
     def add(self, line: Line) -> Line | None:
-        """Add a ledger line; the window's line if it is time to close it, else None."""
+        """Add a ledger line; returns the line of the window if that closes, else None."""
         self._frames.append(line["frame"])
         for stage, row in line["stages"].items():
             total = self._stages.setdefault(stage, dict.fromkeys(row, 0))
@@ -56,9 +56,9 @@ class Windows:
         return self.close() if self._clocks.monotonic_ns() - self._start_ns >= 1e9 * self._least_s else None
 
     def close(self) -> Line:
-        """Line of the open window, however short; the next begins.
+        """Close the open window, however short, and return its line; the next one begins.
 
-        wall_ns = sum of the stages' wall_ns + overhead_ns + idle_ns holds exactly.
+        The stages' wall_ns, overhead_ns and idle_ns sum to wall_ns exactly.
         """
         clocks, marks, frames = self._clocks, self._marks, self._frames
         wall_ns = clocks.monotonic_ns() - self._start_ns

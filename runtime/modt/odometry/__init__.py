@@ -1,1 +1,1 @@
-"""Where the sensor is: deskew, and registration against what stands still."""
+"""Poses of the sensor: deskewing, and registration against stationary objects."""

@@ -17,11 +17,11 @@ from modt.types import Float64, Frame, Proposals
 
 @dataclass(frozen=True, slots=True)
 class SweepSkew:
-    """Where and when the proposals of a frame were seen; P rows.
+    """Position and time of view of the proposals of a frame; P rows.
 
-    A proposal is moved as a whole, by the time at which its middle was seen. The remaining error of a body of radius
-    r at distance d: its own rotation, at most r times what the sensor turns in half a sweep, and the delays of its
-    ends, which differ by r / (2 pi d) of a sweep from that of its middle (3 cm for a car 10 m away at 10 m/s).
+    A proposal is moved as a whole, by the time at which its middle was seen. For a body of radius r at distance d two
+    errors remain. It turns about itself by at most r times the turn of the sensor in half a sweep. Its ends are seen
+    r / (2 pi d) of a sweep before and after its middle (3 cm for a car 10 m away at 10 m/s).
 
     Attributes:
         position: (P, 2) their centroids [m, sensor frame at that time].
@@ -37,18 +37,18 @@ class SweepSkew:
         return cls(proposals.centroid[:, :2], delays(proposals, turn_s)) if turn_s else None
 
     def step(self, motion: PlanarMotion, T_world_sensor: Float64) -> Float64:
-        """(P, 2) from where the pose at the stamp puts them to where they are at the stamp [m, world]."""
+        """(P, 2) correction of the positions that the pose at the stamp yields [m, world]."""
         step: Float64 = motion.displacement(self.position, self.delay_s) @ T_world_sensor[:2, :2].T
         return step
 
     def share(self, dt_s: float) -> Float64:
-        """(P,) share of a correction of the pose, dt_s after the pose before, that applies at the time of view."""
+        """(P,) share of a correction of the pose that applies at the time of view; dt_s since the last pose."""
         share: Float64 = 1.0 + self.delay_s / dt_s
         return share
 
 
 def skews_alike(a: PlanarMotion, b: PlanarMotion, turn_s: float, range_m: float, tolerance_m: float) -> bool:
-    """Whether two motions displace nothing within a range by more than a tolerance from one another."""
+    """Whether no position within a range is displaced by two motions to places further apart than a tolerance."""
     faster = abs(a.velocity_mps - b.velocity_mps) + range_m * abs(a.yaw_rate_radps - b.yaw_rate_radps)
     return bool(faster * abs(turn_s) / 2 <= tolerance_m)
 
@@ -69,10 +69,10 @@ def delays(proposals: Proposals, turn_s: float) -> Float64:
 
 
 FAR_M = 1e5
-"""Greatest coordinate of a first pose from which the world keeps its origin: beyond it float32, used in the
-association, is coarser than a centimetre, and the world begins at the position of that pose."""
+"""Greatest coordinate of a first pose [m] whose world is kept. Beyond it float32, which the association uses, is
+coarser than a centimetre, so the world has its origin at the position of that pose."""
 _RANGE_M, _TOLERANCE_M = 20.0, 0.05
-"""A second registration is worth its cost if the first one moves something within this range by more than this."""
+"""A sweep is registered a second time if the first registration moves a position within this range by more [m]."""
 
 
 class Odometry:
@@ -92,7 +92,7 @@ class Odometry:
         self._restarts = 0
 
     def adopt(self, other: Odometry) -> None:
-        """Go on in the world of another odometry, where it stands."""
+        """Continue in the world of another odometry, at its last pose."""
         self._landmarks.clear()
         self._time_s, self._before, self._last = other._time_s, other._before, other._last
         self._T_world_odometry, self._restarts = other._T_world_odometry, other._restarts
@@ -103,7 +103,7 @@ class Odometry:
         Args:
             frame: its pose, if any, is in the world of an odometry that may restart (Frame.restarts).
             proposals: of the frame.
-            static_tracks: by the time of a frame, those it may continue; called where there is no pose.
+            static_tracks: the tracks that a frame at a time may continue; called where there is no pose.
         """
         given, first = frame.T_world_sensor, self._time_s is None
         if frame.restarts != self._restarts:
@@ -114,7 +114,7 @@ class Odometry:
             self._last = Placement(self._T_world_odometry @ given)
         skew = SweepSkew.of(proposals, frame.turn_s)
         dt_s = 0.0 if self._time_s is None else frame.time_s - self._time_s
-        if 2 * dt_s < abs(frame.turn_s):  # errors of the poses would be extrapolated: assume no motion
+        if 2 * dt_s < abs(frame.turn_s):  # the errors of the poses would be extrapolated, so no motion is assumed
             dt_s = np.inf
         before = self._last.T_world_sensor
 
@@ -138,18 +138,18 @@ class Odometry:
                 correction = self._registration.correct(landmarks, observed(placement), share)
                 return placed(_rigid(correction @ placement.T_world_sensor))
 
-            predicted = placed(before @ (inverse(self._before.T_world_sensor) @ before))  # as it moved last
+            predicted = placed(before @ (inverse(self._before.T_world_sensor) @ before))  # the last motion continues
             placement = registered(predicted)
             moved = not skews_alike(placement.motion, predicted.motion, frame.turn_s, _RANGE_M, _TOLERANCE_M)
             if skew is not None and moved:
                 placement = registered(placement)
-            if given is not None:  # an odometry that begins late, or anew, is brought to the world of the tracks
+            if given is not None:  # an odometry that begins late or restarts is aligned with the world of the tracks
                 self._T_world_odometry = placement.T_world_sensor @ inverse(given)
         self._before, self._last, self._time_s = self._last, placement, frame.time_s
         return Located(placement, observed(placement))
 
 
 def _rigid(T: Float64) -> Float64:
-    """(4, 4) nearest rigid transform: products of transforms drift from being rigid."""
+    """(4, 4) nearest rigid transform, as products of transforms drift from being rigid."""
     U, _, Vt = np.linalg.svd(T[:3, :3])
     return se3(U @ Vt, T[:3, 3])

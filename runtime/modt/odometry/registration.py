@@ -18,11 +18,11 @@ from modt.types import Bool, Float64, Int
 
 @dataclass(frozen=True, slots=True)
 class Landmarks:
-    """What the registration matches against; n rows.
+    """Stationary objects that observations are matched against; n rows.
 
     Attributes:
-        kdop: (8, n) where it should be seen [m, world].
-        established: (n,) a mean over several frames.
+        kdop: (8, n) their k-DOPs [m, world].
+        established: (n,) whether the k-DOP is a mean over several frames.
     """
 
     kdop: Float64
@@ -43,7 +43,7 @@ MAX_JUMP_M = 0.2
 class LandmarkMap:
     """Mean k-DOPs of stationary tracks, by track id; kept only while no poses are given.
 
-    A landmark lies where it was seen on average, not where it was seen last: the error of one frame is not handed on.
+    A landmark lies at the mean of its sightings, so that the error of one frame is not carried on.
     """
 
     def __init__(self) -> None:
@@ -56,7 +56,7 @@ class LandmarkMap:
         self._mean = np.zeros((0, 8))
 
     def update(self, tracks: StaticTracks) -> Landmarks:
-        """Take in the last frame, and return the landmarks; once a frame without a pose."""
+        """Add the last frame and return the landmarks; to be called once in each frame without a pose."""
         frames, mean = np.zeros(len(tracks.id), np.int64), np.zeros((len(tracks.id), 8))
         known = np.isin(tracks.id, self._id, assume_unique=True)
         before = self._id.searchsorted(tracks.id[known])
@@ -93,15 +93,15 @@ INLIER_M = 0.2
 MIN_AGREEMENT = 0.3
 """Share of inliers above which the motion is known and the next search is a near one."""
 INLIER_RATIO, INLIER_DROP = 0.75, 0.5
-"""Shares of inliers, among the pairs and relative to the last frame, below which pairs are sought farther away."""
+"""Shares of inliers, of the pairs and of the last frame's inliers, below which pairs are sought farther away."""
 INITIAL_TURN_RAD = 0.05
 """Step between the seven turns that are tried while no motion is known [rad]."""
 _SCALES = (8.0, 4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-"""Factors to the scale of the errors in the iterations of a fit: coarse to fine, against local minima."""
+"""Factors on the scale of the errors in the iterations of a fit, from coarse to fine against local minima."""
 _MATCH_ROUNDS = 4
-"""Rounds of matching and fitting of a wide search; each fit takes as many of the scales, the coarsest."""
+"""Rounds of matching and fitting in a wide search, and number of the coarsest scales that each fit uses."""
 _MIN_LANDMARKS = 3
-"""A planar motion needs two; one more is a check."""
+"""Fewest pairs of a fit. A planar motion needs two, and the third one checks it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ class Fit:
     Attributes:
         motion: (3,) x, y [m] and turn [rad].
         inliers: pairs that agree with it.
-        pairs: that it was fitted to.
+        pairs: number of pairs that it was fitted to.
     """
 
     motion: Float64
@@ -119,12 +119,12 @@ class Fit:
     pairs: int
 
     def supported(self, min_inlier_share: float) -> bool:
-        """Whether more than this share of the pairs are inliers."""
+        """Whether there are enough inliers, and more than this share of the pairs are."""
         return self.inliers >= _MIN_LANDMARKS and self.inliers > min_inlier_share * self.pairs
 
 
 class Registration:
-    """Corrects a predicted pose by stationary objects.
+    """Correction of a predicted pose by stationary objects.
 
     Args:
         kernels: passes over pairs.
@@ -141,12 +141,12 @@ class Registration:
         """Motion in the world that brings the observations onto the landmarks.
 
         Args:
-            landmarks: of the frames before.
-            observations: of the frame, placed by the predicted pose.
+            landmarks: stationary objects of the frames before.
+            observations: proposals of the frame, placed by the predicted pose.
             motion_share: (P,) share of the motion that applies to each observation, as SweepSkew.share.
 
         Returns:
-            (4, 4) motion of the pose; identity where nothing supports another.
+            (4, 4) motion of the pose; identity without support for another one.
         """
         jacobian = _jacobian(observations) * motion_share
         rest = np.zeros(3)
@@ -154,7 +154,7 @@ class Registration:
         if self._motion_known:
             fit = self._solve(landmarks, observations, jacobian, rest, GATE_M, _SCALES, match_rounds=1)
         enough = INLIER_DROP * self._inliers
-        if fit is None or not fit.supported(INLIER_RATIO) or fit.inliers < enough:  # look farther
+        if fit is None or not fit.supported(INLIER_RATIO) or fit.inliers < enough:  # search farther away
             wide_fit = self._search(landmarks, observations, jacobian, rest)
             if self._initialised and wide_fit is not None and not wide_fit.supported(MIN_AGREEMENT):
                 retry = self._search(landmarks, observations, jacobian, wide_fit.motion)
@@ -174,7 +174,7 @@ class Registration:
     def _search(
         self, landmarks: Landmarks, observations: Observations, jacobian: Float64, motion: Float64
     ) -> Fit | None:
-        """Best supported motion near another one, or near several turns while none is known."""
+        """Motion with the most inliers near a given one, or near several turns while no motion is known."""
         initial = not self._initialised
         starts = [[0.0, 0.0, k * INITIAL_TURN_RAD] for k in (0, 1, -1, 2, -2, 3, -3)] if initial else [motion]
         scales = _SCALES[:_MATCH_ROUNDS]
@@ -194,7 +194,7 @@ class Registration:
         scales: tuple[float, ...],
         match_rounds: int,
     ) -> Fit | None:
-        """Motion fitted to pairs within reach of a first one, matched anew in each round."""
+        """Motion fitted to pairs within reach of a given motion, matched anew in each round."""
         near = observations.kdop + np.tensordot(motion, jacobian, 1)
         i, j = self._pairs(landmarks.kdop, near, reach_m)
         if len(i) < _MIN_LANDMARKS:
@@ -252,7 +252,9 @@ def _mutual(i: Int, j: Int, cost: Float64) -> Int:
     """Indices of the pairs that are the best of their row and of their column."""
     worst_first = np.argsort(cost, kind="stable")[::-1]
     best_of_i, best_of_j = (np.empty(int(index.max(initial=0)) + 1, np.int64) for index in (i, j))
-    best_of_i[i[worst_first]] = best_of_j[j[worst_first]] = worst_first  # the last written is the best
+    best_of_i[i[worst_first]] = best_of_j[j[worst_first]] = (
+        worst_first  # later values overwrite earlier ones: the best remains
+    )
     k = np.arange(len(cost))
     return np.flatnonzero((best_of_i[i] == k) & (best_of_j[j] == k))
 
@@ -262,8 +264,8 @@ def _fit(
 ) -> Float64:
     """Motion that undoes the displacement of the ends of k-DOPs, by iteratively reweighted least squares.
 
-    An end that comes into view moves while the other stays: each end has its own weight, of a Cauchy distribution. A
-    millionth of the weights pulls towards no motion, so that the normal equations are never singular.
+    An end that comes into view moves while the other stays, so each end has its own weight, by a Cauchy distribution.
+    A millionth of the weights pulls towards no motion, which keeps the normal equations regular.
 
     Args:
         outward_shift: (8, K) displacement of each end outward, from landmark to observation [m].

@@ -1,4 +1,4 @@
-"""Several profiles, and those that they extend, as one configuration."""
+"""Several profiles, and the profiles that they extend, combined to one configuration."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from modt.errors import MisuseError
 from modt.profile.yaml_text import MAX_CHARACTERS, Written, nested, read, value_text
 
 DEFAULT = "hdl-64e"
-"""Profile of the sensor where none is asked for."""
+"""Profile of the sensor if none is asked for."""
 Names = str | Path | Sequence[str | Path] | None
-"""Names or files of profiles, of which later ones win key by key."""
+"""Names or files of profiles; later ones win key by key."""
 
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One profile as written: its name or file, and the values by the paths of their keys."""
+    """One profile as written: its name or file, and its values by the paths of their keys."""
 
     name: str
     settings: Mapping[str, Any]
 
     @property
     def of_sensor(self) -> bool:
-        """Whether it says anything of the sensor."""
+        """Whether it sets a key of the sensor."""
         return any(path.startswith("sensor.") for path in self.settings)
 
 
 @dataclass(frozen=True, slots=True)
 class Resolved:
-    """What profiles come to.
+    """Profiles, combined.
 
     Attributes:
-        layers: those asked for, each after those that it extends; later ones win.
-        assumed: the DEFAULT, beneath the others, where none of them says anything of the sensor.
-        config: their configuration.
+        layers: the profiles that are asked for, each after those that it extends; later ones win.
+        assumed: the DEFAULT profile below them, if none of them sets a key of the sensor.
+        config: the resulting configuration.
     """
 
     layers: tuple[Layer, ...]
@@ -47,25 +47,25 @@ class Resolved:
     config: ProfileConfig
 
     def used(self, default: str) -> tuple[str, ...]:
-        """Names of the profiles, after `default` for the sensor where none of them says which it is."""
+        """Names of the profiles, after `default` if none of them sets a key of the sensor."""
         names = tuple(layer.name for layer in self.layers)
         return names if self.sensor else (default, *names)
 
     @property
     def sensor(self) -> str | None:
-        """The last profile that says anything of the sensor; None where nobody does."""
+        """Name of the last profile that sets a key of the sensor; None if none does."""
         return next((layer.name for layer in reversed(self.layers) if layer.of_sensor), None)
 
     def over(self, base: ProfileConfig) -> ProfileConfig:
-        """Another configuration with what the layers set.
+        """Another configuration with the values of the layers.
 
         Raises:
-            MisuseError: the two do not go together.
+            MisuseError: the values contradict one another.
         """
         return _configured(self.layers, base)
 
     def shown(self) -> str:
-        """The configuration as YAML, itself a profile, with who set it behind each value, and what is seen near."""
+        """The configuration as YAML, itself a profile. A comment on each value names the profile that has set it."""
         set_by = {path: layer.name for layer in (*self.assumed, *self.layers) for path in layer.settings}
         rows = _by_path(dump(self.config))
         text = nested((path, f"{value_text(value)} # {set_by.get(path, 'default')}") for path, value in rows)
@@ -74,12 +74,12 @@ class Resolved:
 
 
 def load(names: Names = None) -> ProfileConfig:
-    """Configuration of profiles by name or file, without any of the DEFAULT; raises as resolve does."""
+    """Configuration of profiles by name or file, of the DEFAULT if there are none; raises as `resolve` does."""
     return resolve(names).config
 
 
 def resolve(names: Names = None) -> Resolved:
-    """Read profiles by name or file, and those that they extend.
+    """Read profiles by name or file, and the profiles that they extend.
 
     Raises:
         MisuseError: no such profile, unreadable, not YAML, an unknown key or a value out of range, with the
@@ -91,7 +91,7 @@ def resolve(names: Names = None) -> Resolved:
 
 
 def parse(text: str, origin: Path | str = "profile") -> ProfileConfig:
-    """Configuration of a YAML text, and of what it extends; raises as resolve does."""
+    """Configuration of a YAML text and of the profiles that it extends; raises as `resolve` does."""
     layers = _chain(read(text, origin), Path(origin), ())
     return _configured(tuple(layers.values()), ProfileConfig())
 
@@ -119,14 +119,14 @@ def _layers(names: Sequence[str | Path]) -> tuple[Layer, ...]:
     layers: dict[Path, Layer] = {}
     for name in names:
         path = assets.find("profiles", str(name), ".yaml")
-        layers.pop(path.resolve(), None)  # named again: it wins over those before
+        layers.pop(path.resolve(), None)  # named twice: it wins over the profiles between
         for file, layer in _chain(_read(path), path, ()).items():
             layers.setdefault(file, layer)
     return tuple(layers.values())
 
 
 def _chain(written: Written, path: Path, within: tuple[Path, ...]) -> dict[Path, Layer]:
-    """A profile by its resolved file, after those that it extends; `within`: the files that lead to it."""
+    """A profile by its resolved file, after the profiles that it extends; `within`: the files that lead to it."""
     chain: dict[Path, Layer] = {}
     within = (*within, path.resolve())
     for name in written.extends:

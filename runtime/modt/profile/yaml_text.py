@@ -1,4 +1,4 @@
-"""YAML of profiles: text to settings with strict keys, and values to text."""
+"""YAML of profiles: from text to settings with strict keys, and from values to text."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from modt.config.base import check
 from modt.errors import MisuseError
 
 EXTENDS = "extends"
-"""The key at a profile's head that names the profiles which it is based on."""
+"""Key that names the profiles on which a profile is based."""
 
 MAX_CHARACTERS = 100_000
-"""In a text; the longest that is shipped has 2,000."""
+"""Greatest length of a text; the longest shipped profile has 2,000 characters."""
 
 
 class _Loader(yaml.SafeLoader):
-    """Without aliases: a few lines of them stand for any number of values."""
+    """Loader that refuses aliases: a few lines of them stand for any number of values."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """A node."""
+        """Compose a node, unless it is an alias."""
         if self.check_event(yaml.AliasEvent):
             parser: Any = self  # its stubs are incomplete
             raise yaml.MarkedYAMLError(problem="an alias", problem_mark=parser.peek_event().start_mark)
@@ -35,11 +35,11 @@ class _Loader(yaml.SafeLoader):
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What a profile says.
+    """Content of a profile.
 
     Attributes:
-        extends: the profiles that it names as its base.
-        place: file and line where it does, of the file without.
+        extends: names of the profiles on which it is based.
+        place: file and line of that key, or the file alone without it.
         settings: value by the path of its key, "sensor.height_m".
     """
 
@@ -49,7 +49,7 @@ class Written:
 
 
 def read(text: str, origin: Path | str) -> Written:
-    """What a YAML text says, in which every key is optional.
+    """Content of a YAML text, in which every key is optional.
 
     Raises:
         MisuseError: not YAML, an unknown key or a value out of range, with the line and the nearest valid key.
@@ -94,7 +94,7 @@ def value_text(value: Any) -> str:
 
 
 def nested(rows: Iterable[tuple[str, str]]) -> str:
-    """YAML text of keys, by their paths and the texts behind their colons, each mechanism's together."""
+    """YAML text of keys by their paths and the texts behind their colons; keys of one mapping are neighbours."""
     lines: list[str] = []
     opened: list[str] = []
     for path, text in rows:
@@ -108,7 +108,7 @@ def nested(rows: Iterable[tuple[str, str]]) -> str:
 
 
 def _stage(kind: type[StageConfig], node: yaml.Node, origin: Path | str, line: int, prefix: str) -> dict[str, Any]:
-    """Values of a stage or mechanism by their paths."""
+    """Values of a mapping by the paths of their keys."""
     known = {f.name: f for f in dataclasses.fields(kind)}
     settings: dict[str, Any] = {}
     for key, value, at in _entries(node, origin, known, kind.__name__, line):

@@ -26,7 +26,7 @@ class Histogram:
         self._occurrences: Counter[int] = Counter()
 
     def __len__(self) -> int:
-        """Distinct values held."""
+        """Number of distinct values that are held."""
         return len(self._occurrences)
 
     def add(self, value: int) -> None:
@@ -38,7 +38,7 @@ class Histogram:
         self._occurrences[bucket_middle(value, self._bits)] += 1
 
     def occurrences(self) -> dict[str, list[int]]:
-        """The distinct values held, in order, and how often each occurred."""
+        """Distinct values that are held, in order, and how often each occurred."""
         values, counts = self._sorted()
         return {"values": values.tolist(), "counts": counts.tolist()}
 
@@ -58,12 +58,12 @@ class Histogram:
         return min(float(low + part * (high - low)), float(self.maximum))
 
     def figures(self, unit: float, **shares: float) -> dict[str, float]:
-        """Mean, quantiles at the named shares, and maximum, in a unit of so many."""
+        """Mean, quantiles at the named shares and maximum, divided by a unit."""
         quantiles = {name: self.quantile(share) / unit for name, share in shares.items()}
         return {"mean": self.mean / unit, **quantiles, "max": self.maximum / unit}
 
     def _sorted(self) -> tuple[Int, Int]:
-        """(V,) distinct values held, in order, and how often each occurred."""
+        """(V,) distinct values in order, and (V,) how often each occurred."""
         held = np.array(sorted(self._occurrences.items()), np.int64).reshape(-1, 2)
         return held[:, 0], held[:, 1]
 

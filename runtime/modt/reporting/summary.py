@@ -17,14 +17,14 @@ _SCHEMA = "modt.summary/1"
 
 
 class TrackLives:
-    """Number of tracks and of the frames in which they had a proposal; holds only the tracks alive."""
+    """Count of the tracks, and of the frames in which they had a proposal; only live tracks are held."""
 
     def __init__(self) -> None:
         self._alive: dict[int, tuple[int, bool]] = {}
         self._ended = {True: [0, 0], False: [0, 0]}  # foreground: tracks, frames with a proposal
 
     def __len__(self) -> int:
-        """Tracks held."""
+        """Number of tracks that are held."""
         return len(self._alive)
 
     def add(self, tracks: Iterable[tuple[int, bool, bool]]) -> None:
@@ -39,7 +39,7 @@ class TrackLives:
         self._alive = present
 
     def totals(self, *, foreground_only: bool) -> tuple[int, int]:
-        """Number of tracks and of their frames with a proposal; the class of a track is its last."""
+        """Number of tracks and of their frames with a proposal; the last class of a track counts."""
         groups = (True,) if foreground_only else (True, False)
         alive = [seen for seen, foreground in self._alive.values() if foreground in groups]
         tracks, frames = (sum(self._ended[g][k] for g in groups) for k in (0, 1))

@@ -1,1 +1,1 @@
-"""The sensor, recognised from its first sweep."""
+"""Recognition of the sensor by its first sweep."""

@@ -1,8 +1,9 @@
-"""Elevations of a sensor's beams, from the points alone.
+"""Elevations of a sensor's beams, found in its points.
 
-Points of a beam lie on a cone: z = height of its origin + range * tangent of its elevation. In the histogram of the
-tangents each beam is a peak, blurred where sweeps are compensated for motion, and where its origin is not that of the
-frame: of several heights of the origin, each point takes the one of the highest peaks about it (a Hough transform).
+Points of a beam lie on a cone: z = height of its origin + range * tangent of its elevation. Each beam is a peak in
+the histogram of the tangents. Compensation for motion blurs the peak, and so does an origin apart from that of the
+frame. Several heights of the origin are tried, and each point takes the one with the highest peaks around it (Hough
+transform).
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from modt.config import SegmentationConfig, SensorConfig
 from modt.types import Float32, Float64, Int
 
 _GAUSSIAN_REACH = 4.0
-"""Half width of a Gaussian, in standard deviations. Rows that are filtered go on mirrored beyond their ends."""
+"""Half width of a Gaussian [standard deviations]. Filtered rows continue mirrored beyond their ends."""
 
 
 def gaussian(values: Float64, deviation: float) -> Float64:
@@ -35,7 +36,7 @@ def gaussian(values: Float64, deviation: float) -> Float64:
 
 
 def running_mean(values: Float64, width: int) -> Float64:
-    """Mean of windows of a width, of which an even one begins one value earlier."""
+    """Mean of windows of a width; windows of even width begin one value earlier."""
     padded = np.pad(values, (width // 2, (width - 1) // 2), "symmetric")
     first = padded[:width].cumsum()[-1:]
     mean: Float64 = np.concatenate([first, padded[width:] - padded[:-width]]).cumsum() / width
@@ -49,7 +50,7 @@ def running_median(values: Int, width: int) -> Int:
 
 
 def prominent_peaks(count: Float64) -> tuple[Int, Float64]:
-    """(B,) bins of the local maxima, in the middle of a plateau, and (B,) by how much each stands out.
+    """(B,) bins of the local maxima, in the middle of a plateau, and (B,) prominence of each.
 
     The prominence of a peak is its height above the higher of the two valleys that part it from higher ground.
     """
@@ -62,42 +63,42 @@ def prominent_peaks(count: Float64) -> tuple[Int, Float64]:
 
 
 def _valley(height: Float64) -> float:
-    """Lowest value before the first that is higher than the first one."""
+    """Lowest value before the row rises above its first value."""
     higher = int(np.argmax(height > height[0]))
     return float(height[: higher or None].min())
 
 
-BIN = np.deg2rad(0.01)  # of the histogram, tangent
-STEEPEST = 2.75  # tangent: 70 degrees
+BIN = np.deg2rad(0.01)  # width of a bin of the histogram of tangents
+STEEPEST = 2.75  # greatest tangent in the histogram: 70 degrees
 N_BINS = int(2 * STEEPEST / BIN)
-SMOOTH_BINS = 2.0  # standard deviation
-WINDOW_BINS = 250  # half of that about a point in which the peaks of its origin are judged
-ORIGINS_M = np.arange(0.0, 0.26, 0.01)  # heights of beams' origins above that of the frame
+SMOOTH_BINS = 2.0  # standard deviation of the smoothing
+WINDOW_BINS = 250  # half the window around a point in which the peaks of an origin are compared
+ORIGINS_M = np.arange(0.0, 0.26, 0.01)  # tried heights of the beams' origin above that of the frame
 FRAME_ORIGIN_FAVOUR = 1.1  # factor on the peaks of the frame's own origin
 COARSE_ORIGINS_M = ORIGINS_M[::2]
 MIN_POINTS = 1000
-ASIDE = np.tan(np.deg2rad(60.0))  # compensation for a drive ahead moves what lies to the side along its ring
-MIN_ASIDE = 0.1  # share of the points there from which the others are left out
-MIN_RANGE_M = 1.0  # nearer points may be on the robot
-FULL_WEIGHT_M = 20.0  # range from which all points count alike; errors of position blur nearer ones
-MIN_PROMINENCE = 0.35  # of a peak, share of its height
-MIN_MASS = 3e-4  # of a beam, share of all points
-MIN_GAP, GAPS_AROUND = 0.5, 7  # between beams, share of the median of the gaps around
-MIN_CONTRAST = 0.6  # share of the points in the peaks, above the valleys, of a sensor that has beams
-ONE_ORIGIN_CONTRAST = 0.995  # share from which other origins are not tried
+ASIDE = np.tan(np.deg2rad(60.0))  # points to the side: compensation for a drive ahead moves them along their ring
+MIN_ASIDE = 0.1  # the other points are left out if this share lies there
+MIN_RANGE_M = 1.0  # nearer points may lie on the robot
+FULL_WEIGHT_M = 20.0  # points beyond it have the full weight; errors of position blur nearer ones
+MIN_PROMINENCE = 0.35  # least prominence of a peak, as a share of its height
+MIN_MASS = 3e-4  # least share of all points on a beam
+MIN_GAP, GAPS_AROUND = 0.5, 7  # least gap between beams, as a share of the median of 7 gaps around
+MIN_CONTRAST = 0.6  # a sensor has beams if this share of the points lies in the peaks, above the valleys
+ONE_ORIGIN_CONTRAST = 0.995  # other origins are tried below this share
 MAX_BEAMS = 512
-MAX_ASPECT = 8.0  # azimuth step over the spacing of beams; beyond it the peaks are chance
-CELL_DEG = (2.0, 4.0)  # elevation and azimuth of a cell in which returns are counted
+MAX_ASPECT = 8.0  # greatest azimuth step over the spacing of beams; beyond it the peaks are chance
+CELL_DEG = (2.0, 4.0)  # size in elevation and azimuth of a cell in which returns are counted
 
 
 @dataclass(frozen=True, slots=True)
 class BeamPattern:
-    """Beams, or the mean spacing of the returns of a sensor without any.
+    """Beams of a sensor, or the mean spacing of its returns where it has no beams.
 
     Attributes:
-        elevations_deg: (B,) ascending; none where no beams are seen.
-        spacing_deg: between neighbouring beams, median; without beams between neighbouring returns.
-        azimuth_step_deg: between neighbouring returns of a beam.
+        elevations_deg: (B,) elevations, ascending; empty without beams.
+        spacing_deg: median step between neighbouring beams; without beams that between neighbouring returns.
+        azimuth_step_deg: step between neighbouring returns of a beam.
         contrast: share of the points in the peaks of the beams, above the valleys; 0 without beams.
     """
 
@@ -108,7 +109,7 @@ class BeamPattern:
 
 
 def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> BeamPattern | None:
-    """Beams of sweeps of (N, 4) points; None where there are too few points to tell."""
+    """Beams of sweeps of (N, 4) points; None if there are too few points."""
     far = [points[np.hypot(points[:, 0], points[:, 1]) > MIN_RANGE_M] for points in sweeps]
     if sum(map(len, far)) < MIN_POINTS:
         return None
@@ -128,13 +129,13 @@ def find_beams(sweeps: Sequence[Float32], origins_m: Float64 = ORIGINS_M) -> Bea
 
 @dataclass(frozen=True, slots=True)
 class _Rings:
-    bins: Int  # (N,) of each point, by its best origin
+    bins: Int  # (N,) bin of each point, by its best origin
     peaks: Int  # (B,) bins of the beams
     contrast: float  # share of the points above the line through the valleys between the peaks
 
     @classmethod
     def of_points(cls, points: Float32, origins_m: Float64) -> Self:
-        """Rings of (N, 4) points whose beams may start at some heights."""
+        """Rings of (N, 4) points whose beams may have their origin at some heights."""
         range_m = np.hypot(points[:, 0], points[:, 1])
         weight = np.minimum(range_m, np.float32(FULL_WEIGHT_M))
         best: Int = np.zeros(len(points), np.int64)
@@ -162,7 +163,7 @@ def _mean(count: Float64) -> Float64:
 
 
 def _peaks(count: Float64) -> Int:
-    """(B,) bins of the beams."""
+    """(B,) bins of the beams in a histogram."""
     peaks, prominence = prominent_peaks(count)
     peaks = peaks[prominence > MIN_PROMINENCE * count[peaks]]
     if not len(peaks):
@@ -192,7 +193,7 @@ def _contrast(count: Float64, peaks: Int) -> float:
 
 
 def _azimuth_step_deg(sweeps: Sequence[Float32], rings: _Rings) -> float:
-    """Most frequent step between neighbouring returns of a ring, of points that are those of the rings."""
+    """Most frequent step between neighbouring returns of a ring; the sweeps hold the points of the rings."""
     points = np.concatenate(sweeps)
     sweep = np.repeat(np.arange(len(sweeps)), [len(points) for points in sweeps])
     ring = sweep * len(rings.peaks) + np.searchsorted((rings.peaks[1:] + rings.peaks[:-1]) / 2, rings.bins)
@@ -208,7 +209,7 @@ def _azimuth_step_deg(sweeps: Sequence[Float32], rings: _Rings) -> float:
 
 
 def _without_beams(sweeps: Sequence[Float32]) -> BeamPattern:
-    """The root of the solid angle of a return, where a sweep has returns, as spacing."""
+    """Pattern without beams: its spacing is the root of the solid angle of a return, where the sweep has returns."""
     spacings = []
     for points in sweeps:
         elevation = np.rad2deg(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1]))) + 90
@@ -221,9 +222,9 @@ def _without_beams(sweeps: Sequence[Float32]) -> BeamPattern:
 
 
 MAX_LIKENESS_RATIO = 1.2
-"""Of the spacings of a shipped profile of the same beams."""
+"""Greatest ratio of spacings at which a shipped profile counts as one of the same beams."""
 SAMPLE = 20
-"""Points per one that is compared."""
+"""One point in so many is compared."""
 
 
 def tangents(points: Float32) -> Float32:
@@ -240,17 +241,17 @@ def spacing_ratio(a: SensorConfig, b: SensorConfig, tangent: Float32) -> float:
 
 
 def azimuth_ratio(a: SensorConfig, b: SensorConfig) -> float:
-    """Of the spacings along a beam, the greater by the smaller."""
+    """Ratio of the spacings along a beam, the greater by the smaller."""
     ratio = a.azimuth_step_deg / b.azimuth_step_deg
     return max(ratio, 1 / ratio)
 
 
 def nearest_profile(found: SensorConfig, tangent: Float32) -> str | None:
-    """The shipped profile of the same beams, by the height of the mount where several have them."""
+    """Name of the shipped profile with the same beams; of several the one whose mount is nearest in height."""
     best = None
     for path in sorted(assets.folder("profiles").glob("*.yaml")):
         shipped = profile.resolve(path.stem)
-        if shipped.sensor is None:  # a board
+        if shipped.sensor is None:  # the profile of a board
             continue
         sensor = shipped.config.sensor
         if max(spacing_ratio(sensor, found, tangent), azimuth_ratio(sensor, found)) < MAX_LIKENESS_RATIO:

@@ -1,4 +1,4 @@
-"""Whether a profile is that of the sensor: the first sweep against it."""
+"""Comparison of the first sweep with a profile: is it the profile of this sensor?"""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from modt.sensor_fit.reflectance import NONE, reflectance_scale, usable_scale
 from modt.sensor_fit.tilt import MIN_TILT_DEG, Floor, find_floor, mount_height_m
 from modt.types import Float32
 
-MAX_SPACING_RATIO = 1.35  # of the beams, median over the points, and of the returns along a beam
-MAX_AZIMUTH_RATIO = 1.6  # a head may turn faster
-MAX_HEIGHT_SHARE, MAX_HEIGHT_M = 0.2, 0.15  # difference of the height: the greater of the two
+MAX_SPACING_RATIO = 1.35  # greatest ratio of the beam spacings, median over the points
+MAX_AZIMUTH_RATIO = 1.6  # greatest ratio of the spacings along a beam: a head may turn faster
+MAX_HEIGHT_SHARE, MAX_HEIGHT_M = 0.2, 0.15  # greatest difference of the height: the larger of the two
 
 
 @dataclass(frozen=True, slots=True)
 class Recognition:
-    """What differs between a profile and a sweep.
+    """Differences between a profile and a sweep.
 
     Attributes:
         differences: in words, none if the profile fits.
         nearest: name of the shipped profile of the same beams, None where there is none.
-        fitted: the profile with what was found in its place.
+        fitted: the profile, with the findings in the place of what differs.
         tilt_deg: roll and pitch of the sensor where the profile leaves them open and they are not small.
     """
 
@@ -45,7 +45,7 @@ class Recognition:
     tilt_deg: tuple[float, float] | None = None
 
     def mounted(self, config: ProfileConfig) -> ProfileConfig:
-        """A profile with the tilt that was found, where it leaves the mount open."""
+        """The profile with the measured tilt, if it leaves the mount open."""
         sensor = config.sensor
         if self.tilt_deg is None or not _is_open(sensor):
             return config
@@ -53,7 +53,7 @@ class Recognition:
         return replace(config, sensor=replace(sensor, roll_deg=roll_deg, pitch_deg=pitch_deg))
 
     def warnings(self, name: str, *, replaced: bool) -> Iterator[str]:
-        """A line of what differs from the profile of a name, and one of the tilt."""
+        """A line on the differences from the profile of a name, and a line on the tilt."""
         if self.differences:
             yield self.warning(name, replaced=replaced)
         if self.tilt_deg is not None:
@@ -63,7 +63,7 @@ class Recognition:
             yield f"the sensor {how}rolled by {roll:.1f} and pitched by {pitch:.1f} deg: {done}"
 
     def warning(self, name: str, *, replaced: bool) -> str:
-        """One line of what differs from the profile of a name, what became of it, and the remedy."""
+        """One line: the differences from the profile of a name, the profile that is used, and the remedy."""
         done = "used instead: what the first sweep shows" if replaced else "used all the same"
         known = f"--profile {self.nearest}, or " if self.nearest else ""
         remedy = f"better: {known}a profile by modt profile fit"
@@ -71,7 +71,7 @@ class Recognition:
 
 
 def recognise(points: Float32, config: ProfileConfig) -> Recognition:
-    """Compare (N, 4) points of a sweep with a profile; a sweep of few points fits any."""
+    """Compare (N, 4) points of a sweep with a profile; a sweep of few points fits every profile."""
     points = points[(points[:, 0] != 0) | (points[:, 1] != 0)]
     pattern = find_beams([points], COARSE_ORIGINS_M)
     if pattern is None:

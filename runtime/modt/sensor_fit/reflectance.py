@@ -1,4 +1,4 @@
-"""The scale of a sensor's reflectance, by which a model may know it."""
+"""Recognition of the sensor on whose scale reflectances are."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ NONE, OTHER = "none", "other"
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """What a sensor reports in streets.
+    """Reflectances that a sensor reports in streets.
 
     Attributes:
-        deciles: of its reflectances, the first to the ninth.
-        max_difference: mean over the deciles.
-        hundredths: whether all of them are, as no other sensor's; else others may have the same scale.
+        deciles: first to ninth decile of its reflectances.
+        max_difference: greatest mean difference from the deciles at which reflectances are on this scale.
+        hundredths: whether all reflectances are hundredths, which tells this sensor from any other.
     """
 
     deciles: tuple[float, ...]
@@ -33,11 +33,11 @@ SCALES = {
     "hdl-64e": Scale((0.0, 0.15, 0.20, 0.24, 0.28, 0.30, 0.32, 0.36, 0.41), 0.12, hundredths=True),
     "pandar64": Scale((0.004, 0.012, 0.020, 0.027, 0.035, 0.047, 0.063, 0.084, 0.117), 0.025),
 }
-"""Scales that models know: of KITTI's object frames, and of nine scans of PandaSet."""
+"""Scales that models know, measured in KITTI's object frames and in nine scans of PandaSet."""
 
 
 def recorded_in(reflectance: Float32) -> Float32:
-    """The recorded ones of (N,) reflectances; none where they are few or all alike."""
+    """Recorded values among (N,) reflectances; none where these are few or all alike."""
     recorded = reflectance[reflectance >= 0]
     few = len(recorded) < 0.5 * len(reflectance) or not len(recorded) or np.ptp(recorded) == 0
     return recorded[:0] if few else recorded
@@ -60,7 +60,7 @@ def reflectance_scale(reflectance: Float32) -> str:
 def usable_scale(points: Float32, scale: str, sensor: SensorConfig) -> str:
     """The scale of (N, 4) points if a model may use it, else NONE.
 
-    A scale that several sensors have counts with the beams of the one that the models know.
+    Sensors may share a scale. Without hundredths it counts only with the beams of the sensor that models know.
     """
     known = SCALES.get(scale)
     usable = known and (known.hundredths or nearest_profile(sensor, tangents(points)) == scale)

@@ -1,4 +1,4 @@
-"""Roll, pitch and height of a sensor, by the floor in a sweep."""
+"""Roll, pitch and height of a sensor, measured by the floor in a sweep."""
 
 from __future__ import annotations
 
@@ -13,33 +13,34 @@ from modt.geometry.field_of_view import BlindSectors
 from modt.types import Float32, Float64
 
 REACH_M, DEPTH_M = 12.0, 3.0
-"""Range within which the floor is looked for, and its greatest depth below the sensor."""
+"""Range within which the floor is searched, and its greatest depth below the sensor [m]."""
 WAY_M = 1.5
-"""Half the width of the way ahead and behind that a floor is fitted to: beside it are other slopes of a street."""
+"""Half the width of the strip ahead and behind to which a floor is fitted [m]; a street slopes away beside it."""
 CUBE_M, MOST_CUBES = 0.25, 2000
-"""Side of the cubes that count once each, since near returns are many, and how many a search takes."""
+"""Side of the cubes [m] that count once each, as near returns are many, and greatest number in a search."""
 TILTS_DEG = np.arange(-20.0, 20.1, 2.5)
-"""Rolls and pitches that are tried."""
+"""Rolls and pitches that a search tries [deg]."""
 BIN_M = 0.1
-"""Resolution of the depth of a plane that is tried."""
+"""Resolution of the depth in a search [m]."""
 NEAR_M = (0.25, 0.12, 0.08, 0.06)
-"""Distance from the plane within which a cube counts, in each round of the fit."""
+"""Distance from the plane within which a cube counts in each round of the fit [m]."""
 MIN_CUBES = 30
+"""Fewest cubes on a floor."""
 MIN_TILT_DEG = 2.0
-"""Of a mount that is turned level: streets fall to their sides, and cars lean on their springs."""
+"""Least tilt that is corrected [deg]: streets slope to their sides, and cars lean on their springs."""
 OTHER_SHARE = 0.25
-"""Difference from the height of the mount, as a share of it, from which a plane is not its floor."""
+"""A plane is no floor if its depth differs from the height of the mount by this share of it."""
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True)
 class Floor:
-    """A plane below the sensor.
+    """A floor below the sensor.
 
     Attributes:
         up: (3,) normal, sensor frame.
         depth_m: distance of the plane.
-        cubes: number of cubes on it.
+        cubes: number of cubes on the plane.
     """
 
     up: Float64
@@ -59,7 +60,7 @@ class Floor:
 
 
 def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
-    """The floor in (N, 3) or wider points, None where none is seen.
+    """The floor in (N, 3) or wider points; None if no floor is in view.
 
     A ceiling looks like the floor of a sensor that hangs upside down. The floor is the plane whose depth is the
     height of the mount, else the one below the sensor, unless the one above is nearer and larger.
@@ -79,7 +80,7 @@ def find_floor(points: Float32, height_m: float | None = None) -> Floor | None:
 
 
 def _floor(cubes: Float64, R: Float64) -> Floor | None:
-    """The floor in (3, C) cubes of a sensor that R (3, 3) turns about upright."""
+    """The floor in (3, C) cubes of a sensor that R (3, 3) turns upright, up to the angles of a search."""
     if cubes.shape[1] < MIN_CUBES:
         return None
     x, y, z = _turned(R, cubes[:, :: 1 + cubes.shape[1] // MOST_CUBES])
@@ -97,7 +98,7 @@ def _floor(cubes: Float64, R: Float64) -> Floor | None:
 
 
 def _fitted(cubes: Float64, R: Float64, depth_m: float) -> Floor | None:
-    """A plane by least squares, from that at a depth which R (3, 3) turns about level."""
+    """A plane by least squares; the first guess lies at a depth, level after R (3, 3)."""
     x, y, z = _turned(R, cubes)
     way = np.abs(y) < WAY_M
     level, z = np.stack([np.ones(way.sum()), x[way], y[way]], axis=1), z[way]
@@ -125,7 +126,7 @@ HEIGHTS_M = (0.05, 5.0)
 
 
 def ground_height_m(sweeps: Sequence[Float32], sensor: SensorConfig) -> float | None:
-    """Height above the floor, median over level sweeps of (N, 4) points [m]; None where none shows one."""
+    """Median height above the floor in level sweeps of (N, 4) points [m]; None if no floor is in view."""
     sectors = BlindSectors(sensor.blind_sectors_deg or (), sensor.blind_range_m)
     heights_m = []
     for points in sweeps:
@@ -137,6 +138,6 @@ def ground_height_m(sweeps: Sequence[Float32], sensor: SensorConfig) -> float | 
 
 
 def mount_height_m(sweeps: Sequence[Float32], sensor: SensorConfig) -> float | None:
-    """The same as a value of sensor.height_m; None where it is not known, or none that a profile can state."""
+    """Height above the floor as a value of sensor.height_m; None if unknown or out of the bounds of a profile."""
     height_m = ground_height_m(sweeps, sensor)
     return None if height_m is None or not HEIGHTS_M[0] <= height_m <= HEIGHTS_M[1] else round(height_m, 2)

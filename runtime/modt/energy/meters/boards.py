@@ -1,4 +1,4 @@
-"""Boards whose power rails are known: the rails that sum to the module, and those that these feed.
+"""Boards whose power rails are known: the rails that sum to the module, and the rails that these feed.
 
 Sources: NVIDIA's Jetson Linux developer guides and product design guides, and the device trees of the kernel.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A board by the model in its device tree and by the labels of its rails."""
+    """A board, recognised by the model in its device tree and the labels of its rails."""
 
     name: str
     model: str  # pattern in the model of the device tree
@@ -30,7 +30,7 @@ BOARDS = (
 
 
 def board_of(model: str, labels: Collection[str]) -> Board | None:
-    """The board with these rails that a device tree names; without a device tree, the one whose rails these are."""
+    """The board of a model in the device tree with these rails; by the rails alone where the model is empty."""
     for board in BOARDS:
         if {board.cpu, *board.whole}.issubset(labels) and (not model or re.search(board.model, model)):
             return board

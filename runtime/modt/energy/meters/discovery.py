@@ -1,4 +1,4 @@
-"""Discovery of a machine's meters: sysfs, the chip of a Raspberry Pi 5, and the choice of one."""
+"""Search for the meters of a machine in sysfs and in the chip of a Raspberry Pi 5, and choice of one."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 _RAPL_REMEDY = "run as root, grant CAP_DAC_READ_SEARCH, or chmod a+r its energy_uj (a udev rule keeps that)"
 _SAME_J = 1e-3
-"""Difference of two readings up to which they may be of one counter [J]."""
+"""Readings of two zones that differ by no more than this may show one counter [J]."""
 
 
 def find_powercap(sys: Path) -> list[Candidate]:
-    """RAPL packages, the platform counter, SCMI; and every zone left out, with the reason.
+    """RAPL packages, the platform counter and SCMI, and every zone that is left out with the reason.
 
     Nested zones are left out, since the outer one includes them; so is a memory-mapped zone beside the same package,
     a zone that shows the counter of another one, and all but the top zones of SCMI.
@@ -68,7 +68,7 @@ def find_powercap(sys: Path) -> list[Candidate]:
 
 
 def _packages(meters: list[Meter]) -> list[Candidate]:
-    """The sum of the counters; beside it each that shows another's: every reading lies between two of the other."""
+    """The packages as one candidate. A package whose readings lie between those of another shows the same counter."""
     try:
         pairs = [*pairwise([meter.read() for meter in meters] for _ in range(4))]
     except MeterLostError:
@@ -98,11 +98,11 @@ def _scmi(zone: Path, name: str) -> Meter:
 
 _INA_CHIPS = ("ina219", "ina220", "ina226", "ina230", "ina231", "ina238", "ina3221")
 _PART_SHARE = 1.1
-"""Sum of the parts over their whole, above which the one or the other is wrong: they are read one after the other."""
+"""A module is refused if the rails that it feeds draw more than this factor of its own power."""
 
 
 def find_hwmon(sys: Path) -> list[Candidate]:
-    """Every rail; rails may feed one another, so that only a known board's are summed."""
+    """A candidate for each rail. Rails may feed one another, so only those of a known board are summed."""
     folders = sorted((sys / "class" / "hwmon").glob("hwmon*"), key=lambda p: (len(p.name), p.name))
     rails: dict[str, Meter] = {}
     for folder in folders:
@@ -117,8 +117,8 @@ def find_hwmon(sys: Path) -> list[Candidate]:
 
 
 def _rails_of_board(model: str, rails: dict[str, Meter]) -> list[Candidate]:
-    """Each rail by itself; the module of a known board is the one that feeds the others, or the sum of several."""
-    from modt.energy.meters.boards import board_of  # for those that have rails
+    """A candidate for each rail, after one for the module of a known board: the feeding rail or a sum."""
+    from modt.energy.meters.boards import board_of  # only machines with rails load it
 
     remedy, board = "make the chip's inputs readable", board_of(model, rails)
     found = [] if board is None else [_module(board, rails, remedy)]
@@ -147,7 +147,7 @@ def _scoped(meter: Meter, scope: Scope) -> Meter:
 
 
 def _rails(folder: Path, chip: str) -> dict[str, Meter]:
-    """Enabled and connected channels, by label; the power that the chip computes, else voltage x current.
+    """Meters of the enabled and connected channels, by label: the power that the chip computes, or voltage x current.
 
     The fourth channel of an INA3221 is the sum of the others.
     """
@@ -166,7 +166,7 @@ def _rails(folder: Path, chip: str) -> dict[str, Meter]:
 
 
 def find_batteries(sys: Path) -> list[Candidate]:
-    """Every battery of the machine itself; those of peripherals (scope Device) are left out."""
+    """A candidate for each battery of the machine itself; batteries of peripherals (scope Device) are left out."""
     supplies = sorted((sys / "class" / "power_supply").glob("*"))
     own = [p for p in supplies if text_or_none(p / "type") == "Battery" and text_or_none(p / "scope") != "Device"]
     if not own:
@@ -196,12 +196,12 @@ def _battery(folder: Path) -> Meter:
 
 
 _RAIL_VALUE = re.compile(r"(\S+)_([AV])\s+(?:current|volt)\(\d+\)=(\S*)[AV](?!\S)")
-_STEP_W = 0.02  # from the width of the converter
+_STEP_W = 0.02  # by the width of the converter
 _FACTS = Facts("Raspberry Pi 5 PMIC", "V x A", _STEP_W, 50.0, Scope.MODULE, Kind.INTEGRATED, privilege="group video")
 
 
 def find_pmic(command: str = "vcgencmd") -> list[Candidate]:
-    """The chip, where the firmware's command is installed.
+    """The power chip of a Raspberry Pi 5, where the command of the firmware is installed.
 
     Loads on the 5 V rail itself (USB, HATs, the fan) and the loss of the chip are not included. A reading takes a few
     milliseconds of another process.
@@ -228,7 +228,7 @@ def _adc_text(command: str) -> str:
 
 
 def rail_power_W(text: str, known: set[str]) -> float:
-    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`; the same rails every time."""
+    """Sum of voltage times current over the rails of `vcgencmd pmic_read_adc`; no `known` rail may be missing."""
     amperes: dict[str, float] = {}
     volts: dict[str, float] = {}
     for rail, quantity, value in _RAIL_VALUE.findall(text):
@@ -246,21 +246,21 @@ def rail_power_W(text: str, known: set[str]) -> float:
 
 
 FINDERS = (find_powercap, find_hwmon, find_batteries)
-"""Searches of a mount point of sysfs; each returns the candidates of one type of meter."""
+"""Functions that search sysfs, mounted at a path, for candidates of one type of meter."""
 _KINDS = (Kind.MEASURED, Kind.INTEGRATED, Kind.ESTIMATED)
 _SCOPES = (Scope.CPU, Scope.CPU_RAIL, Scope.SOC, Scope.MODULE, Scope.BOARD, Scope.ROBOT, Scope.RAIL, Scope.PROCESS)
-"""Order of preference: the narrower the scope, the larger the share of this program."""
+"""Order of preference. Of a narrower scope this program has a larger share."""
 
 
 @dataclass(frozen=True, slots=True)
 class Discovery:
-    """The meters of a machine: usable ones first, the best before all; then the others, with the reason."""
+    """The meters of a machine: usable ones, the best first, then the others with the reason."""
 
     candidates: tuple[Candidate, ...]
 
     @property
     def best(self) -> Candidate:
-        """The first usable one; the model always is."""
+        """The first usable candidate; the model always is usable."""
         return next(c for c in self.candidates if c.usable)
 
     def choose(self, name: str | None) -> Candidate:
@@ -281,7 +281,7 @@ class Discovery:
 
 
 def discover(model: Meter, sys: Path = Path("/sys"), vcgencmd: str = "vcgencmd") -> Discovery:
-    """Search every type of meter; the model is the last of the usable ones."""
+    """Search for every type of meter. The model of the board is the last of the usable ones."""
     found = [candidate for find in FINDERS for candidate in find(sys)]
     found += [*find_pmic(vcgencmd), Candidate(model.facts.name, (model,))]
     return Discovery(tuple(sorted(found, key=_rank)))

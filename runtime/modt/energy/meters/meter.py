@@ -19,7 +19,7 @@ class Kind(StrEnum):
 
 
 def worst(kinds: Iterable[Kind]) -> Kind:
-    """The least reliable kind, which is that of a sum."""
+    """The least reliable of some kinds: the kind of their sum."""
     return max(kinds, key=list(Kind).index)
 
 
@@ -44,7 +44,7 @@ class Scope(StrEnum):
 
 
 class MeterLostError(Exception):
-    """The meter cannot be read now."""
+    """A meter cannot be read now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +52,9 @@ class Facts:
     """Static properties of a meter."""
 
     name: str
-    unit: str  # of the device's own readings
+    unit: str  # unit of the device's own readings
     resolution: float  # smallest step of a reading [J or W]
-    max_W: float  # range: more power than it can show
+    max_W: float  # power beyond its range
     scope: Scope  # consumers covered
     kind: Kind  # reliability of the energy derived from it
     wrap_J: float | None = None  # range of an energy counter; None where it never wraps, or the range is unknown
@@ -62,7 +62,7 @@ class Facts:
 
     @property
     def measurand(self) -> Measurand:
-        """Power where it is integrated, else energy."""
+        """Power if the kind is integrated, else energy."""
         return Measurand.POWER if self.kind is Kind.INTEGRATED else Measurand.ENERGY
 
     @property
@@ -81,7 +81,7 @@ class Meter:
 
 
 def file_meter(facts: Facts, *paths: Path, scale: float = 1e-6) -> Meter:
-    """Meter whose value is the scaled product of the integers in its files: one, or a voltage and a current."""
+    """Meter whose value is the scaled product of the integers in its files: a value, or voltage and current."""
     return Meter(facts, lambda: scale * math.prod(read_number(path) for path in paths))
 
 
@@ -139,7 +139,7 @@ class Candidate:
 
 
 def probe(name: str, meters: tuple[Meter, ...], remedy: str) -> Candidate:
-    """A candidate, read once to find out whether it can be."""
+    """A candidate whose meters are read once to find out whether they are usable."""
     try:
         for meter in meters:
             meter.read()
@@ -152,8 +152,8 @@ def model_meter(idle_W: float, busy_W: float, wall_ns: Callable[[], int], cpu_ns
     """A meter that computes the energy of this process by `model_J`.
 
     Args:
-        idle_W: drawn while this process waits.
-        busy_W: drawn while it computes on one core.
+        idle_W: power while this process waits.
+        busy_W: power while it computes on one core.
         wall_ns: monotonic clock.
         cpu_ns: CPU time of this process.
     """
@@ -174,7 +174,7 @@ def model_name(idle_W: float, busy_W: float) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """Clock policy, frequency and temperature of a core, by the sysfs mounted at a path."""
+    """Clock policy, frequency and temperature of a core, as sysfs shows them."""
 
     core: int = 0
     sys: Path = Path("/sys")
