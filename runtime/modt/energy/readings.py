@@ -1,8 +1,8 @@
 """The rule that turns the readings of a meter into joules, for counters and power samples alike.
 
-An interval is measured if the readings at both its ends are confirmed. Any other interval is marked with its cause. A
-reading is confirmed if the power that it implies lies near the power that the meter has shown, counted from the last
-confirmed reading, or near the power that the doubtful reading before it implied.
+An interval is measured if the readings at both its ends are accepted. Any other interval is marked with its cause. A
+reading is accepted if the power that it implies lies near the power that the meter has shown, counted from the last
+accepted reading, or near the power that the doubtful reading before it implied.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from modt.energy.meters.meter import Facts, Kind, Measurand
 
 SURGE = 4.0
-"""A reading is confirmed at once up to this factor beyond the lowest and the highest power shown."""
+"""A reading is accepted at once up to this factor beyond the lowest and the highest power shown."""
 TICK_S = 0.01
 """Greatest time between two steps of a counter [s]."""
 
@@ -22,8 +22,8 @@ TICK_S = 0.01
 class History:
     """State of a meter by which its next reading is judged."""
 
-    confirmed: bool = False  # whether the last reading is confirmed
-    base: float | None = None  # last confirmed reading
+    accepted: bool = False  # whether the last reading is accepted
+    base: float | None = None  # last accepted reading
     base_s: float = 0.0  # time since that reading
     doubtful: float | None = None  # last reading, while it is doubtful
     doubtful_s: float = 0.0  # time for which the meter had stood still before it
@@ -59,7 +59,7 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     shown, counts = (before.low_W, before.high_W), facts.measurand is Measurand.ENERGY
     unsettled = replace(before, base_s=before.base_s + seconds, doubtful=None, doubtful_s=0.0, doubtful_W=None)
     if reading is None or not math.isfinite(reading) or (counts and not 0 <= reading <= (facts.wrap_J or reading)):
-        return replace(unsettled, confirmed=False), None, "lost"
+        return replace(unsettled, accepted=False), None, "lost"
     if facts.kind is Kind.ESTIMATED:  # computed by a formula, which is never wrong
         return History(True, reading), None if before.base is None else reading - before.base, ""
     step = from_base = _step(facts, before, before.base, reading, unsettled.base_s)
@@ -67,16 +67,16 @@ def judge(facts: Facts, before: History, reading: float | None, seconds: float) 
     if before.doubtful is not None:
         step = _step(facts, before, before.doubtful, reading, before.doubtful_s + seconds)
     agrees = near_W is not None and not step.mark and step.near(near_W, near_W)
-    fits = step.fault != "stuck" and from_base.near(*shown)  # continues the confirmed reading
+    fits = step.fault != "stuck" and from_base.near(*shown)  # continues the accepted reading
     follows = not fits and before.doubtful is not None and (agrees or step.near(*shown))  # continues the doubtful one
     if fits:
         step, agrees = from_base, False
     if not fits and not follows:
         mark = step.fault or ("first" if before.base is None else "implausible")
         age_s = before.doubtful_s + seconds if mark == "stuck" else 0.0
-        doubt = replace(unsettled, confirmed=False, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts)
+        doubt = replace(unsettled, accepted=False, doubtful=reading, doubtful_s=age_s, doubtful_W=step.watts)
         return doubt, None, mark
-    measured = before.confirmed if fits else not before.doubtful_s  # none of an interval that begins in a standstill
+    measured = before.accepted if fits else not before.doubtful_s  # none of an interval that begins in a standstill
     levels = [W for W in (step.watts, near_W if agrees else None) if W is not None] if measured else []
     after = History(True, reading, low_W=min(shown[0], *levels, math.inf), high_W=max(shown[1], *levels, -math.inf))
     if not measured:
