@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modt.config import EnergyConfig
-from modt.energy.attribution import REGRESSORS, attribute
+from modt.energy.attribution import attribute
 
 from .simulated import CALIBRATED, line_of
 
@@ -27,7 +27,3 @@ def test_coefficients_split_the_reading_of_a_calibrated_board_but_not_the_model(
     assert parts == pytest.approx(expected)
     estimated = line_of(5.0, 2, 4, kind="estimated")
     assert attribute(estimated, CALIBRATED) == attribute(estimated, EnergyConfig())
-
-
-def test_regressors_count_the_work_of_a_window() -> None:
-    assert [term.count(line_of(1.0, 2, 3)) for term in REGRESSORS] == [1.0, 2.0, 3.0, 27.0]

@@ -27,7 +27,7 @@ def test_another_sensor_is_told_from_the_default_and_named(name):
     found = recognise(recording(name).sweeps[0], profile.load())
     assert found.differences
     assert found.nearest == name
-    line = found.warning("hdl-64e", replaced=True)
+    line = next(found.warnings("hdl-64e", replaced=True))
     assert f"--profile {name}" in line
     assert "modt profile fit" in line
     assert "\n" not in line

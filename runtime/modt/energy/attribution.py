@@ -5,44 +5,22 @@ A board is described by E_window = P_idle T + e_seg N_seg + e_class N_class + e_
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from modt.config import EnergyConfig
 from modt.energy.ledger import Line
 from modt.energy.meters.meter import Kind
 
+SEGMENTATION, CLASSIFICATION = "segmentation", "classification"
+NO_WORK = {"calls": 0, "items": 0, "points": 0}
 _HARMLESS_MARKS = frozenset({"wrap"})
 _MAX_W = 10_000.0
 """Power above which the record of a window is not believed [W]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Regressor:
-    """One count of a window: an entry of a stage, or of the whole window where the stage is empty."""
-
-    name: str  # name of its coefficient, with the unit
-    stage: str
-    key: str
-    scale: float = 1.0  # factor on the count, so that the coefficient has its unit
-
-    def count(self, line: Line) -> float:
-        """Count of one window."""
-        row = line["stages"].get(self.stage, {}) if self.stage else line
-        return self.scale * float(row.get(self.key, 0))
-
-
-IDLE = Regressor("idle_W", "", "wall_ns", 1e-9)
-SEG = Regressor("seg_J", "segmentation", "calls")
-CLASS = Regressor("class_J", "classification", "items")
-POINT = Regressor("point_J", "classification", "points")
-REGRESSORS = (IDLE, SEG, CLASS, POINT)
 
 
 def usable(line: Line) -> bool:
     """Whether a window has a reading that can be true, and no mark that forbids its use."""
     energy_J = line["energy_J"]
     known = energy_J is not None and _HARMLESS_MARKS.issuperset(line.get("marks", ()))
-    return known and 0.0 <= energy_J <= _MAX_W * IDLE.count(line)
+    return known and 0.0 <= energy_J <= _MAX_W * 1e-9 * line["wall_ns"]
 
 
 def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
@@ -60,16 +38,20 @@ def attribute(line: Line, board: EnergyConfig) -> dict[str, float]:
     energy_J = line["energy_J"]
     if energy_J is None:
         return {}
+    idle_J, stages = board.idle_W * 1e-9 * line["wall_ns"], line["stages"]
     if board.coefficients is not None and line["kind"] != Kind.ESTIMATED:
-        parts: dict[str, float] = {}
-        for regressor, value in zip(REGRESSORS, (board.idle_W, *board.coefficients), strict=True):
-            name = regressor.stage or "idle"
-            parts[name] = parts.get(name, 0.0) + value * regressor.count(line)
+        seg_J, class_J, point_J = board.coefficients
+        segmented, classified = (stages.get(stage, NO_WORK) for stage in (SEGMENTATION, CLASSIFICATION))
+        parts = {
+            "idle": idle_J,
+            SEGMENTATION: seg_J * segmented["calls"],
+            CLASSIFICATION: class_J * classified["items"] + point_J * classified["points"],
+        }
         return parts | {"unattributed": energy_J - sum(parts.values())}
-    cpu_ns = {stage: row["cpu_ns"] for stage, row in line["stages"].items()}
+    cpu_ns = {stage: row["cpu_ns"] for stage, row in stages.items()}
     cpu_ns["unattributed"] = max(line["process_ns"] - sum(cpu_ns.values()), 0)
     total_ns = sum(cpu_ns.values())
     if not total_ns:
         return {"idle": energy_J}
-    idle_J = min(board.idle_W * IDLE.count(line), energy_J)
+    idle_J = min(idle_J, energy_J)
     return {"idle": idle_J, **{name: (energy_J - idle_J) * ns / total_ns for name, ns in cpu_ns.items()}}

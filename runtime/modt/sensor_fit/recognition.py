@@ -53,21 +53,17 @@ class Recognition:
         return replace(config, sensor=replace(sensor, roll_deg=roll_deg, pitch_deg=pitch_deg))
 
     def warnings(self, name: str, *, replaced: bool) -> Iterator[str]:
-        """A line on the differences from the profile of a name, and a line on the tilt."""
+        """A line on the differences from the profile of a name with the remedy, and a line on the tilt."""
         if self.differences:
-            yield self.warning(name, replaced=replaced)
+            done = "used instead: what the first sweep shows" if replaced else "used all the same"
+            known = f"--profile {self.nearest}, or " if self.nearest else ""
+            remedy = f"better: {known}a profile by modt profile fit"
+            yield f"profile {name} is not of this sensor ({'; '.join(self.differences)}); {done}; {remedy}"
         if self.tilt_deg is not None:
             roll, pitch = self.tilt_deg
             how = "hangs upside down, " if abs(roll) > 90 else "is tilted, "
             done = "its sweeps are turned level; sensor.roll_deg and pitch_deg of a profile state the mount"
             yield f"the sensor {how}rolled by {roll:.1f} and pitched by {pitch:.1f} deg: {done}"
-
-    def warning(self, name: str, *, replaced: bool) -> str:
-        """One line: the differences from the profile of a name, the profile that is used, and the remedy."""
-        done = "used instead: what the first sweep shows" if replaced else "used all the same"
-        known = f"--profile {self.nearest}, or " if self.nearest else ""
-        remedy = f"better: {known}a profile by modt profile fit"
-        return f"profile {name} is not of this sensor ({'; '.join(self.differences)}); {done}; {remedy}"
 
 
 def recognise(points: Float32, config: ProfileConfig) -> Recognition:

@@ -4,11 +4,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modt.energy.attribution import CLASS, SEG
 from modt.energy.meters.discovery import find_powercap
 from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Windows
-from modt_desk.energy.board_fit import Fit, FitError, fit, unit_energy_J
+from modt_desk.energy.board_fit import CLASS, REGRESSORS, SEG, Fit, FitError, fit, unit_energy_J
 from tests.energy.simulated import SimulatedMachine, line_of
 
 TRUE = {"idle_W": 3.0, "seg_J": 0.2, "class_J": 0.015, "point_J": 4e-5}
@@ -138,3 +137,7 @@ def test_unit_energy_of_bursts_is_the_true_one(tmp_path: Path) -> None:
         lines.append(line)
     assert unit_energy_J(lines, 3.0, SEG) == pytest.approx(TRUE["seg_J"], rel=1e-3)
     assert unit_energy_J(lines, 3.0, CLASS) is None
+
+
+def test_regressors_count_the_work_of_a_window() -> None:
+    assert [term.count(line_of(1.0, 2, 3)) for term in REGRESSORS] == [1.0, 2.0, 3.0, 27.0]

@@ -9,11 +9,10 @@ from itertools import cycle
 
 import numpy as np
 
-from modt.energy.attribution import CLASS, IDLE, SEG
 from modt.energy.ledger import Ledger, Line
 from modt.energy.windows import Windows
 from modt.types import Float32, Float64, Frame, Int, Proposals
-from modt_desk.energy.board_fit import Fit, fit, unit_energy_J, usable_windows
+from modt_desk.energy.board_fit import CLASS, IDLE, SEG, Fit, fit, unit_energy_J, usable_windows
 
 _BURSTS = 5
 """Bursts of each stage; the median counts."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import optimize, stats
 
-from modt.energy.attribution import IDLE, REGRESSORS, Regressor, usable
+from modt.energy.attribution import CLASSIFICATION, SEGMENTATION, usable
 from modt.energy.ledger import Line
 from modt.types import Float64
 
@@ -16,6 +16,28 @@ _MAX_CONDITION = 1e6
 """Condition number of the scaled regressors above which they are collinear."""
 _TAILS = (0.025, 0.975)
 """Quantiles of the intervals at 95 %."""
+
+
+@dataclass(frozen=True, slots=True)
+class Regressor:
+    """One count of a window: an entry of a stage, or of the whole window where the stage is empty."""
+
+    name: str  # name of its coefficient, with the unit
+    stage: str
+    key: str
+    scale: float = 1.0  # factor on the count, so that the coefficient has its unit
+
+    def count(self, line: Line) -> float:
+        """Count of one window."""
+        row = line["stages"].get(self.stage, {}) if self.stage else line
+        return self.scale * float(row.get(self.key, 0))
+
+
+IDLE = Regressor("idle_W", "", "wall_ns", 1e-9)
+SEG = Regressor("seg_J", SEGMENTATION, "calls")
+CLASS = Regressor("class_J", CLASSIFICATION, "items")
+POINT = Regressor("point_J", CLASSIFICATION, "points")
+REGRESSORS = (IDLE, SEG, CLASS, POINT)
 
 
 @dataclass(frozen=True, slots=True)
