@@ -25,7 +25,6 @@ from modt import profile
 from modt.app import assembly, inputs, kernel_choice
 from modt.app.ladder import Ladder
 from modt.app.stages import within
-from modt.classification import pointnet
 from modt.config import ProfileConfig
 from modt.config.profile import Key, keys, value_of
 from modt.energy.ledger import Ledger
@@ -65,10 +64,9 @@ def replay(
     config: ProfileConfig,
     mode: str = "accurate",
     view: Any = None,
-    cpu_ns: Callable[[], int] = lambda: 0,
 ) -> str:
     """Digest of the tracks, the proposals, the class frequency and the work of every frame."""
-    ledger = Ledger(lambda: 0, cpu_ns)
+    ledger = Ledger(lambda: 0, lambda: 0)
     pipeline = assembly.pipeline(assembly.MODES[mode], config, view or FieldOfView(), ledger)
     digest = hashlib.sha256()
     for frame in stream:
@@ -131,28 +129,6 @@ def paper(config: ProfileConfig, _folder: Path) -> str:
 def printed(config: ProfileConfig, folder: Path) -> str:
     """The paper's cost as printed, by which pairs that lie apart compete."""
     return paper(changed(config, "tracking.paper.differences", "subtracted"), folder)
-
-
-def one_call(config: ProfileConfig, _folder: Path) -> str:
-    one = changed(config, "scheduler.calls_per_frame", 1)
-    return replay(frames(8, 4.0), one, view=FieldOfView.of_camera(CAMERA))
-
-
-def two_ms(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(3, 1.0), changed(config, "scheduler.cpu_ms_per_frame", 2.0))
-
-
-def noisy_clock(config: ProfileConfig, _folder: Path) -> str:
-    """A budget where the CPU time of a classification varies."""
-    ns = np.random.default_rng(0).integers(200_000, 1_400_000, 100_000).cumsum().tolist()
-    clock = iter(ns).__next__
-    with mock.patch.object(assembly, "time", type("Clock", (), {"thread_time_ns": clock})):
-        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 0.3), cpu_ns=clock)
-
-
-def model_without_frequency(config: ProfileConfig, _folder: Path) -> str:
-    with mock.patch.object(pointnet, "_class_frequency", return_value=None):
-        return replay(frames(3, 1.0), config)
 
 
 def one_mJ(config: ProfileConfig, _folder: Path) -> str:
@@ -285,9 +261,6 @@ SCENARIOS: dict[str, Scenario] = {
     "--mode efficient": efficient,
     "--mode accurate, efficient": street,
     "--mode accurate, rule: product": product,
-    "a binding budget": one_call,
-    "a model that states no frequency": model_without_frequency,
-    "scheduler.cpu_ms_per_frame or energy_mJ_per_frame": two_ms,
     "--odometry udp://, unix://": pose_socket,
     "frames without a pose": unposed,
     "the first frames without a pose": turning,
@@ -312,11 +285,10 @@ RARE: dict[str, Scenario] = {
     "tracking.paper.gate": printed,
     "tracking.split.": long_street,
     "tracking.merge.": long_street,
-    "scheduler.cost.": noisy_clock,
     "tracking.background_map.": long_street,
     "odometry.registration.max_turn_rad": turning,
     "energy.windows.": windows,
-    "decision.hysteresis": long_street,
+    "decision.rule": long_street,
     "energy.busy_W": report_without_meter,
 }
 """Scenario of what a second of the street has no occasion for, by the beginning of the path."""
