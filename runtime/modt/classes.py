@@ -24,7 +24,6 @@ class ClassSpec:
         semantic_kitti: SemanticKITTI labels that count as the class.
         max_length_m, max_width_m: greatest size of one object, with room for the noise of its outline [m].
         person: is or carries a person: never part of a larger object.
-        prior: frequency among proposals.
         missed_cost: of a missed object over that of a false one.
         point_change: relative change of the number of points that makes a view independent (alpha of Equation 4).
         colour: in pictures and pages.
@@ -35,7 +34,6 @@ class ClassSpec:
     max_length_m: float
     max_width_m: float
     person: bool
-    prior: float
     missed_cost: float
     point_change: float
     colour: str
@@ -43,12 +41,12 @@ class ClassSpec:
 
 CLASSES: dict[ObjectClass, ClassSpec] = {
     # What counts as background may be a car that is not recognised yet: its size is that of a car.
-    ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, False, 0.88, 0.0, 0.5, "#8a8f98"),
-    ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 0.08, 1.5, 0.2, "#2f6fde"),
+    ObjectClass.BACKGROUND: ClassSpec((), (), 6.0, 2.7, False, 0.0, 0.5, "#8a8f98"),
+    ObjectClass.CAR: ClassSpec(("Car", "Van"), (10, 252), 6.0, 2.7, False, 1.5, 0.2, "#2f6fde"),
     ObjectClass.PEDESTRIAN: ClassSpec(
-        ("Pedestrian", "Person", "Person_sitting"), (30, 254), 1.1, 1.1, True, 0.02, 1.0, 0.16, "#d9480f"
+        ("Pedestrian", "Person", "Person_sitting"), (30, 254), 1.1, 1.1, True, 1.0, 0.16, "#d9480f"
     ),
-    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 0.02, 1.0, 0.22, "#2b8a3e"),
+    ObjectClass.CYCLIST: ClassSpec(("Cyclist",), (31, 253), 2.2, 1.1, True, 1.0, 0.22, "#2b8a3e"),
 }
 """The classes in the order of their values."""
 

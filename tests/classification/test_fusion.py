@@ -14,7 +14,7 @@ from modt.classes import ObjectClass
 from modt.classification import fusion as rule
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews, FusedTracks
 from modt.classification.motion_witness import log_likelihood
-from modt.classification.prior import object_probability_reaches
+from modt.classification.prior import FrequencyPrior, object_probability_reaches
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
 from modt.pipeline import Fusion
@@ -22,8 +22,10 @@ from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 from tests.classification.scenes import blobs, new_tracks
 
 CONFIG = FusionConfig()
-ALL = (EveryFrame(), FirstViews(CONFIG), FurtherViews(CONFIG), AnyView(CONFIG), KeyViews(CONFIG))
-FREQUENCY = np.append(1 - sum(CONFIG.prior), CONFIG.prior)
+FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
+ALIKE = FrequencyPrior(FREQUENCY)
+MODES = (FirstViews, FurtherViews, AnyView, KeyViews)
+ALL = (EveryFrame(), *(mode(CONFIG, ALIKE) for mode in MODES))
 ROW, YES = np.array([0]), np.array([True])
 WALL, UNCERTAIN, CAR = [0.999, 0.001 / 3, 0.001 / 3, 0.001 / 3], [0.95, 0.03, 0.01, 0.01], [0.2, 0.6, 0.1, 0.1]
 CLEARLY_A_CAR = np.array([[0.001, 0.997, 0.001, 0.001]])
@@ -31,6 +33,8 @@ CLEARLY_A_CAR = np.array([[0.001, 0.997, 0.001, 0.001]])
 
 class FixedPrior:
     """Prior given by a test."""
+
+    frequency = FREQUENCY
 
     def __init__(self, *rows: list[float], pool_weight: float = 0.0) -> None:
         self.rows = np.array(rows)
@@ -135,7 +139,7 @@ def test_posterior_is_that_of_the_plain_formula(
 
 def test_a_view_of_many_points_outweighs_one_of_few() -> None:
     proposals, tracks = scene((400,))
-    fusion = FusedTracks(CONFIG)
+    fusion = FusedTracks(CONFIG, ALIKE)
     fusion.observe(tracks, proposals)
     fusion.fuse(tracks, proposals, ROW, CLEARLY_A_CAR)
     fusion.fuse(tracks, with_points(proposals, 10), ROW, np.array([[0.1, 0.1, 0.7, 0.1]]))
@@ -144,7 +148,7 @@ def test_a_view_of_many_points_outweighs_one_of_few() -> None:
 
 def test_the_same_view_again_adds_little() -> None:
     proposals, tracks = scene((50,))
-    fusion, view = FusedTracks(CONFIG), np.array([[0.5, 0.3, 0.1, 0.1]])
+    fusion, view = FusedTracks(CONFIG, ALIKE), np.array([[0.5, 0.3, 0.1, 0.1]])
     fusion.observe(tracks, proposals)
     odds = []
     for _ in range(3):
@@ -155,7 +159,7 @@ def test_the_same_view_again_adds_little() -> None:
 
 def test_motion_counts_once_however_long_it_lasts() -> None:
     proposals, tracks = scene((50,))
-    fusion = FusedTracks(CONFIG)
+    fusion = FusedTracks(CONFIG, ALIKE)
     tracks.moved_m[:], tracks.observed_s[:], tracks.length_m[:] = 1.5, 5.0, 0.7
     fusion.observe(tracks, proposals)
     once = tracks.posterior.copy()
@@ -178,11 +182,11 @@ def test_what_is_hardly_an_object_is_not_classified(make: type[FusedTracks], ask
 
 def test_efficient_requests_one_certain_view() -> None:
     proposals, tracks = scene()
-    fusion, both = FirstViews(FusionConfig(first_view_min_hits=3), FixedPrior(CAR, CAR)), np.array([True, True])
+    fusion, both = FirstViews(CONFIG, FixedPrior(CAR, CAR)), np.array([True, True])
     assert fusion.asks(tracks, proposals, both).all()
     assert fuse(fusion, tracks, proposals, ROW, CLEARLY_A_CAR).all()
     assert fusion.asks(tracks, proposals, ~tracks.final).tolist() == [False, True]
-    tracks.hits[1] = 2  # too few
+    tracks.hits[1] = 1  # too few
     assert not fusion.asks(tracks, proposals, ~tracks.final).any()
 
 

@@ -1,5 +1,7 @@
 """Points that the network processes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,9 +9,10 @@ from modt.classification.scheduler import padded_each, padded_size
 from modt.config import ClassificationConfig
 
 
-@pytest.mark.parametrize(("batch", "points"), [(1, 10 + 290 + 400), (2, 2 * 290 + 400), (8, 3 * 400)])
-def test_points_are_counted_with_padding(batch: int, points: int) -> None:
-    limits, count = ClassificationConfig(max_points=400, batch=batch), np.array([10, 700, 290])
+@pytest.mark.parametrize(("likelihood", "points"), [("network", 6 * 400), ("pooled", 4 * 290 + 2 * 400)])
+def test_points_are_counted_with_padding(likelihood: str, points: int) -> None:
+    limits, count = ClassificationConfig(likelihood=likelihood), np.array([10, 700, 290, 10, 20, 400])
+    limits = replace(limits, max_points=400)
     assert padded_size(limits)(count) == padded_each(count, limits).sum() == points
 
 

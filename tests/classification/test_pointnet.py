@@ -126,8 +126,10 @@ def test_the_network_alone(shipped: PointNet) -> None:
 
 def test_points_are_repeated_to_a_least_number(shipped: PointNet, monkeypatch: pytest.MonkeyPatch) -> None:
     points, proposals = blobs([40, 7, 500], np.random.default_rng(4))
-    paper, sizes = network(shipped.path, max_points=400, min_points=400, batch=1), []
-    expected = network(shipped.path, max_points=400).classify(points, proposals, np.arange(3))
+    paper, sizes = network(shipped.path, max_points=400, likelihood="network"), []
+    bare = network(shipped.path, max_points=400)
+    bare._pooled = lambda out, *_: out  # type: ignore[method-assign]
+    expected = bare.classify(points, proposals, np.arange(3))
     infer = PointNet.infer
     monkeypatch.setattr(
         PointNet, "infer", lambda self, batch, *_: (sizes.append(batch.shape[:2]), infer(self, batch))[1]

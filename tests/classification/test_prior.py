@@ -27,6 +27,7 @@ from modt.types import Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(5)
+FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 WEIGHTS = PoolWeights(network=0.8, box=0.4)
 SHAPES = ((N_FEATURES, 5), (5, 4))
 LAYERS = from_lists([[RNG.normal(size=shape), RNG.normal(size=shape[1])] for shape in SHAPES], N_FEATURES)
@@ -46,18 +47,20 @@ def standing(points: int, distance_m: float, length_m: float, width_m: float, he
 
 def test_box_prior_excludes_proposals_below_the_threshold() -> None:
     probability = np.array([[0.995, 0.005, 0.0, 0.0], [0.97, 0.01, 0.01, 0.01], [0.1, 0.9, 0.0, 0.0]])
-    prior = BoxPrior(SCORES)
+    prior = BoxPrior(SCORES, FREQUENCY)
     assert prior.may_be_object(probability, 0.02).tolist() == [False, True, True]
 
 
 def test_prior_is_the_class_frequency_without_a_box_classifier() -> None:
     _, proposals = blobs([10, 20], np.random.default_rng(0))
-    prior = make_prior(BoxScores(NoBoxClassifier(), NO_REFLECTANCE, SensorConfig()), (0.08, 0.02, 0.01))
+    prior = make_prior(
+        BoxScores(NoBoxClassifier(), NO_REFLECTANCE, SensorConfig()), np.array([0.89, 0.08, 0.02, 0.01])
+    )
     np.testing.assert_allclose(prior.probability(proposals), [[0.89, 0.08, 0.02, 0.01]] * 2)
     assert prior.may_be_object(prior.probability(proposals), 1.0).all()
     assert isinstance(prior, FrequencyPrior)
     boxes = from_metadata({METADATA_KEY: to_metadata(LAYERS, WEIGHTS)})
-    by_box = make_prior(BoxScores(boxes, NO_REFLECTANCE, SensorConfig()), (0.1, 0.1, 0.1))
+    by_box = make_prior(BoxScores(boxes, NO_REFLECTANCE, SensorConfig()), FREQUENCY)
     assert isinstance(by_box, BoxPrior)
     assert (prior.pool_weight, by_box.pool_weight) == (0.0, 0.4)
 
@@ -71,7 +74,7 @@ def test_features_are_independent_of_the_resolution() -> None:
 
 def test_ground_of_the_proposals_overrides_the_profile() -> None:
     sensors = (SensorConfig(height_m=height_m) for height_m in (1.0, 2.0))
-    low, high = (BoxPrior(BoxScores(BOXES, NO_REFLECTANCE, sensor)) for sensor in sensors)
+    low, high = (BoxPrior(BoxScores(BOXES, NO_REFLECTANCE, sensor), FREQUENCY) for sensor in sensors)
     unknown = standing(40, 20.0, 4.0, 1.6, 1.4)
     measured = dataclasses.replace(unknown, ground_z_m=np.array([-2.0]))
     assert (low.probability(measured) == high.probability(unknown)).all()
@@ -82,7 +85,7 @@ def test_ground_of_the_proposals_overrides_the_profile() -> None:
 def test_box_priors_of_the_shipped_models(name: str) -> None:
     sensor = SensorConfig()
     model = PointNet(ClassificationConfig(model=name), sensor)
-    prior = make_prior(model.box_scores, (0.08, 0.02, 0.02))
+    prior = make_prior(model.box_scores, FREQUENCY)
     car = prior.probability(standing(300, 12.0, 4.0, 1.6, 1.3))[0]
     person = prior.probability(standing(120, 12.0, 0.6, 0.5, 1.4))[0]
     wall = prior.probability(standing(600, 15.0, 12.0, 0.5, 2.3))[0]
@@ -93,8 +96,8 @@ def test_box_priors_of_the_shipped_models(name: str) -> None:
 
 
 def test_no_proposals_give_no_priors() -> None:
-    assert BoxPrior(SCORES).probability(Proposals.empty()).shape == (0, 4)
-    assert FrequencyPrior((0.1, 0.1, 0.1)).probability(Proposals.empty()).shape == (0, 4)
+    assert BoxPrior(SCORES, FREQUENCY).probability(Proposals.empty()).shape == (0, 4)
+    assert FrequencyPrior(FREQUENCY).probability(Proposals.empty()).shape == (0, 4)
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from modt.classification.prior import FrequencyPrior
 from modt.classification.product_fusion import AnyView, KeyViews
 from modt.config import FusionConfig
 from modt.types import Float64, Proposals, Tracks
 from tests.classification.scenes import blobs, new_tracks
 
-PAPER = FusionConfig(rule="product", prior=(0.25, 0.25, 0.25), start_frame=1)
+PAPER = FusionConfig(rule="product", start_frame=1)
+ALIKE = FrequencyPrior(np.full(4, 0.25))
 ROW, YES = np.array([0]), np.array([True])
 
 
@@ -34,9 +36,8 @@ def with_points(proposals: Proposals, count: int) -> Proposals:
 )
 def test_key_views_are_fused_by_equation_6(views: Float64, prior: Float64) -> None:
     views = views / views.sum(axis=1, keepdims=True)
-    proposals, tracks = scene()
-    fusion = KeyViews(dataclasses.replace(PAPER, prior=(prior[0], prior[1], prior[2]), object_threshold=1.0))
-    full = np.append(1 - prior.sum(), prior)
+    proposals, tracks, full = *scene(), np.append(1 - prior.sum(), prior)
+    fusion = KeyViews(dataclasses.replace(PAPER, object_threshold=1.0), FrequencyPrior(full))
     expected = full.copy()
     for view in views:
         fusion.fuse(tracks, proposals, ROW, view[None])
@@ -50,7 +51,7 @@ def test_key_views_are_fused_by_equation_6(views: Float64, prior: Float64) -> No
 
 def test_the_first_view_of_the_efficient_mode_is_final_whatever_it_says() -> None:
     proposals, tracks = scene()
-    fusion = AnyView(PAPER)
+    fusion = AnyView(PAPER, ALIKE)
     assert fusion.asks(tracks, proposals, YES).all()
     assert fusion.fuse(tracks, proposals, ROW, np.array([[0.4, 0.2, 0.2, 0.2]])).all()
     assert not fusion.asks(tracks, proposals, YES).any()
@@ -59,14 +60,14 @@ def test_the_first_view_of_the_efficient_mode_is_final_whatever_it_says() -> Non
 @pytest.mark.parametrize(("points", "independent"), [(50, False), (59, False), (62, True), (38, True)])
 def test_independence_by_change_of_points(points: int, independent: bool) -> None:
     proposals, tracks = scene()
-    fusion = KeyViews(PAPER)
+    fusion = KeyViews(PAPER, ALIKE)
     fusion.fuse(tracks, proposals, ROW, np.array([[0.2, 0.6, 0.1, 0.1]]))
     assert fusion.asks(tracks, with_points(proposals, points), YES)[0] == independent
 
 
 def test_point_change_is_that_of_the_most_probable_class() -> None:
     proposals, tracks = scene()
-    fusion = KeyViews(dataclasses.replace(PAPER, point_change=(0.5, 0.9, 0.1, 0.9)))
+    fusion = KeyViews(dataclasses.replace(PAPER, point_change=(0.5, 0.9, 0.1, 0.9)), ALIKE)
     fusion.fuse(tracks, proposals, ROW, np.array([[0.2, 0.6, 0.1, 0.1]]))
     more = with_points(proposals, 60)
     assert not fusion.asks(tracks, more, YES)[0]
@@ -76,7 +77,7 @@ def test_point_change_is_that_of_the_most_probable_class() -> None:
 
 def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
     proposals, tracks = scene()
-    fusion = KeyViews(dataclasses.replace(PAPER, start_frame=3))
+    fusion = KeyViews(dataclasses.replace(PAPER, start_frame=3), ALIKE)
     misled, clear = np.array([[0.1, 0.1, 0.7, 0.1]]), np.array([[0.2, 0.6, 0.1, 0.1]])
     fusion.fuse(tracks, proposals, ROW, misled)
     np.testing.assert_allclose(tracks.posterior[0], misled[0], rtol=1e-6)
@@ -90,14 +91,14 @@ def test_an_uncertain_early_view_is_replaced_at_the_start_frame() -> None:
 
 def test_a_distinct_first_view_is_certain() -> None:
     proposals, tracks = scene()
-    fusion = KeyViews(dataclasses.replace(PAPER, start_frame=4))
+    fusion = KeyViews(dataclasses.replace(PAPER, start_frame=4), ALIKE)
     assert fusion.fuse(tracks, proposals, ROW, np.array([[0.98, 0.01, 0.005, 0.005]])).all()
     assert tracks.views.tolist() == [1]
 
 
 def test_no_class_is_excluded_for_good() -> None:
     proposals, tracks = scene()
-    fusion = KeyViews(PAPER)
+    fusion = KeyViews(PAPER, ALIKE)
     for _ in range(50):
         fusion.fuse(tracks, proposals, ROW, np.array([[1.0, 0.0, 0.0, 0.0]]))
     for _ in range(4):

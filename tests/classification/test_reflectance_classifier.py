@@ -29,6 +29,7 @@ from modt.types import N_REFLECTANCE, Cut, Proposals
 from tests.classification.scenes import blobs
 
 RNG = np.random.default_rng(6)
+FREQUENCY = np.array([0.88, 0.08, 0.02, 0.02])
 BOX_LAYERS = from_lists([[RNG.normal(size=(N_FEATURES, 4)), RNG.normal(size=4)]], N_FEATURES)
 BOXES = MlpBoxClassifier(BOX_LAYERS, PoolWeights())
 N_BOTH = N_FEATURES + N_REFLECTANCE
@@ -36,7 +37,7 @@ LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH
 REFLECTANCE = RNG.uniform(0, 1, (3, N_REFLECTANCE))
 FREQUENCY = np.array([0.8, 0.12, 0.05, 0.03])
 SENSOR = SensorConfig(reflectance="hdl-64e")
-WITHOUT = BoxPrior(BoxScores(BOXES, NoReflectanceClassifier(), SENSOR))
+WITHOUT = BoxPrior(BoxScores(BOXES, NoReflectanceClassifier(), SENSOR), FREQUENCY)
 """The prior without reflectance."""
 WEIGHTS = PoolWeights(network=0.7, box=0.3, reflectance=0.5)
 OTHER_LAYERS = from_lists([[RNG.normal(size=(N_BOTH, 4)), RNG.normal(size=4)]], N_BOTH)
@@ -59,7 +60,7 @@ def test_prior_is_box_probability_times_reflectance_likelihood() -> None:
     score = logits(BOX_LAYERS, boxes) + logits(LAYERS, np.c_[boxes, REFLECTANCE])
     expected = np.exp(score) / np.exp(score).sum(axis=1, keepdims=True)
     reflectance = from_metadata(METADATA, SENSOR)
-    prior = make_prior(BoxScores(BOXES, reflectance, SENSOR), (0.1, 0.1, 0.1))
+    prior = make_prior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY)
     np.testing.assert_allclose(prior.probability(proposals), expected)
 
 
@@ -85,7 +86,7 @@ def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.
     bare = dataclasses.replace(measured(), reflectance=None)
     with caplog.at_level(logging.WARNING):
         for _ in range(3):
-            probability = BoxPrior(BoxScores(BOXES, reflectance, SENSOR)).probability(bare)
+            probability = BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY).probability(bare)
             np.testing.assert_array_equal(probability, WITHOUT.probability(bare))
     assert len(caplog.records) == 1
     assert "sensor.reflectance" in caplog.text
@@ -93,7 +94,7 @@ def test_a_sweep_without_reflectance_adds_nothing_and_warns_once(caplog: pytest.
 
 def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
     reflectance = from_metadata(METADATA, SENSOR)
-    prior, whole = BoxPrior(BoxScores(BOXES, reflectance, SENSOR)), measured()
+    prior, whole = BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY), measured()
     statistics = REFLECTANCE.copy()
     statistics[1] = np.nan
     probability = prior.probability(dataclasses.replace(whole, reflectance=statistics))
@@ -103,7 +104,7 @@ def test_a_proposal_without_reflectance_does_not_affect_the_others() -> None:
 
 def test_no_warning_for_an_empty_frame(caplog: pytest.LogCaptureFixture) -> None:
     reflectance = from_metadata(METADATA, SENSOR)
-    assert BoxPrior(BoxScores(BOXES, reflectance, SENSOR)).probability(Proposals.empty()).shape == (0, 4)
+    assert BoxPrior(BoxScores(BOXES, reflectance, SENSOR), FREQUENCY).probability(Proposals.empty()).shape == (0, 4)
     assert not caplog.records
 
 
@@ -171,7 +172,7 @@ def test_network_box_and_reflectance_are_pooled(tmp_path: Path) -> None:
         network = PointNet(model, sensor)
         probability = network.classify(points, given, which)
         np.testing.assert_allclose(probability, expected / expected.sum(axis=1, keepdims=True), rtol=1e-5)
-        prior = make_prior(network.box_scores, (0.1, 0.1, 0.1))
+        prior = make_prior(network.box_scores, FREQUENCY)
         assert prior.pool_weight == weight
 
 
@@ -189,7 +190,7 @@ def test_shipped_model_separates_number_plates_from_leaves() -> None:
     box = np.array([[18.0, 0.0, -0.8, 3.9, 1.6, 1.3, 0.0]])
     proposals = dataclasses.replace(proposals, box=box)
     plates, leaves = np.array([[0.16, 0.22, 0.99, 0.04, 0.45]]), np.array([[0.33, 0.12, 0.6, 0.0, 0.07]])
-    prior = make_prior(model.box_scores, (0.08, 0.02, 0.02))
+    prior = make_prior(model.box_scores, FREQUENCY)
     car, bush = (
         prior.probability(dataclasses.replace(proposals, reflectance=statistics))[0]
         for statistics in (plates, leaves)

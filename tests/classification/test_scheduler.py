@@ -9,12 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt.classification.scheduler import LinearCost, Scheduler, warm_up
-from modt.config import SchedulerConfig
+from modt.classification.scheduler import START_MARGIN, LinearCost, Scheduler, warm_up
 from modt.types import NONE, UNLIMITED, Budget, Float32, Float64, Int, Proposals
 from tests.classification.scenes import blobs, new_tracks
 
-CONFIG = SchedulerConfig()
 COUNTS = st.lists(st.integers(1, 400), min_size=1, max_size=20)
 BUDGETS = st.builds(
     Budget,
@@ -30,7 +28,7 @@ def work_ms(points: Int, slow: float = 1.0) -> float:
 
 def cost_model(max_points: int = 400, slow: float = 1.0) -> LinearCost:
     """Of that machine, warmed up."""
-    cost = LinearCost(max_points, lambda points: int(np.minimum(points, max_points).sum()), CONFIG.cost)
+    cost = LinearCost(max_points, lambda points: int(np.minimum(points, max_points).sum()))
     for n, size in ((1, 8), (1, 128), (8, 8), (8, 128), (16, 128)):
         cost.warmed_up(np.full(n, size), work_ms(np.full(n, size), slow))
     return cost
@@ -44,7 +42,7 @@ def test_selection_is_within_budget_and_complete(counts: list[int], budget: Budg
     tracks.waiting = rng.integers(0, 20, len(tracks))
     asks = rng.random(len(tracks)) < 0.7
     cost = cost_model()
-    chosen = Scheduler(CONFIG.worth, cost).select(tracks, proposals, asks, budget)
+    chosen = Scheduler(cost).select(tracks, proposals, asks, budget)
     assert asks[chosen.rows].all()
     assert len(set(chosen.rows.tolist())) == len(chosen.rows)
     assert len(chosen.rows) + chosen.deferred == asks.sum()
@@ -60,7 +58,7 @@ def test_every_track_is_served_although_new_ones_keep_coming(counts: list[int], 
     tracks = new_tracks(proposals)
     newcomers = len(tracks) // 2  # a track of this half that was served is replaced by a new one at once
     served = np.zeros(len(tracks), np.bool_)
-    scheduler = Scheduler(CONFIG.worth, cost_model())
+    scheduler = Scheduler(cost_model())
     for _ in range(20 + 2 * len(tracks)):
         asks = ~served | (np.arange(len(tracks)) < newcomers)
         chosen = scheduler.select(tracks, proposals, asks, Budget(calls=calls))
@@ -76,7 +74,7 @@ def test_a_tight_time_budget_serves_every_call_that_fits(counts: list[int], seed
     budget = Budget(cpu_ms=cost.cost_ms(np.array([max(counts)])) + 1e-9)
     served = np.zeros(len(tracks), np.bool_)
     for _ in range(2 * len(tracks)):
-        served[Scheduler(CONFIG.worth, cost).select(tracks, proposals, ~served, budget).rows] = True
+        served[Scheduler(cost).select(tracks, proposals, ~served, budget).rows] = True
     assert served.all()
 
 
@@ -87,7 +85,7 @@ def test_without_a_budget_all_are_served_by_decreasing_worth() -> None:
     tracks.posterior[1] = [0.97, 0.01, 0.01, 0.01]
     proposals.box[:, :2] = [20.0, 0.0]
     tracks.waiting[2] = 3
-    chosen = Scheduler(CONFIG.worth, cost_model()).select(tracks, proposals, np.ones(3, np.bool_), UNLIMITED)
+    chosen = Scheduler(cost_model()).select(tracks, proposals, np.ones(3, np.bool_), UNLIMITED)
     assert chosen.rows.tolist() == [2, 0, 1]
     assert chosen.deferred == 0
 
@@ -97,18 +95,14 @@ def test_waiting_counts_deferred_frames() -> None:
     tracks = new_tracks(proposals)
     tracks.proposal[2] = NONE
     tracks.waiting[:] = 5
-    chosen = Scheduler(CONFIG.worth, cost_model()).select(
-        tracks, proposals, np.array([True, False, True]), Budget(calls=0)
-    )
+    chosen = Scheduler(cost_model()).select(tracks, proposals, np.array([True, False, True]), Budget(calls=0))
     assert chosen.deferred == 1
     assert tracks.waiting.tolist() == [6, 0, 5]
 
 
 def test_no_tracks() -> None:
     proposals = Proposals.empty()
-    chosen = Scheduler(CONFIG.worth, cost_model()).select(
-        new_tracks(proposals), proposals, np.zeros(0, np.bool_), Budget(1, 1.0)
-    )
+    chosen = Scheduler(cost_model()).select(new_tracks(proposals), proposals, np.zeros(0, np.bool_), Budget(1, 1.0))
     assert len(chosen.rows) == chosen.deferred == 0
 
 
@@ -125,7 +119,7 @@ SCENES = 400
 
 def frames(cost: LinearCost, budget_ms: float, n: int, seed: int = 0, slow: float = 1.0) -> tuple[Float64, Int]:
     """(n,) CPU time and calls of frames in which a dozen proposals ask, on a machine of some noise."""
-    rng, scheduler = np.random.default_rng(seed), Scheduler(CONFIG.worth, cost)
+    rng, scheduler = np.random.default_rng(seed), Scheduler(cost)
     times, calls = np.zeros(n), np.zeros(n, np.int64)
     for k in range(n):
         proposals = dozen((100 * seed + k) % SCENES)
@@ -164,7 +158,7 @@ def test_a_budget_is_kept_in_99_of_100_frames_and_starves_nobody(budget_ms: floa
 
 def paid_ms(mean_ms: float, n: int, period_s: float = 0.1, ask: float = 1.0, cpu_ms: float | None = None) -> Float64:
     """(n,) CPU time of frames in which a dozen proposals ask, or none, under a mean budget; a call takes 0.6 ms."""
-    rng, scheduler = np.random.default_rng(0), Scheduler(CONFIG.worth, cost_model(), period_s)
+    rng, scheduler = np.random.default_rng(0), Scheduler(cost_model(), period_s)
     times = np.zeros(n)
     tracks = new_tracks(blobs([20] * 12, rng)[1])
     for k in range(n):
@@ -200,7 +194,7 @@ def test_a_budget_of_nothing_buys_nothing() -> None:
 def test_a_large_proposal_is_saved_for_while_small_ones_ask() -> None:
     """Those that are worth less wait, else they would spend what it needs."""
     _, proposals = blobs([400] + [5] * 11, np.random.default_rng(0))
-    tracks, scheduler = new_tracks(proposals), Scheduler(CONFIG.worth, cost_model())
+    tracks, scheduler = new_tracks(proposals), Scheduler(cost_model())
     served = np.zeros(12, np.int64)
     for _ in range(400):
         rows = scheduler.select(tracks, proposals, np.ones(12, np.bool_), Budget(mean_ms=0.3)).rows
@@ -266,7 +260,7 @@ class Constant:
 
 def test_the_warm_up_classifies_small_and_large_frames_and_prices_them() -> None:
     network, clock = Constant(), iter(range(0, 10**12, 2_000_000))
-    cost = LinearCost(128, lambda points: int(points.sum()), CONFIG.cost)
+    cost = LinearCost(128, lambda points: int(points.sum()))
     warm_up(network.classify, cost, 128, 8, lambda: next(clock))
     assert set(network.sizes) == {1, 8, 16}
-    assert cost.cost_ms(np.array([60])) == pytest.approx(CONFIG.cost.margin * 2.0, rel=0.01)
+    assert cost.cost_ms(np.array([60])) == pytest.approx(START_MARGIN * 2.0, rel=0.01)

@@ -30,7 +30,7 @@ def a_package_with_trucks(tmp_path_factory):
     table = source / "runtime" / "modt" / "classes.py"
     text = table.read_text()
     assert text.count(VALUE) == text.count(ROW) == 1
-    truck = '    ObjectClass.TRUCK: ClassSpec(("Truck",), (18, 258), 9.0, 2.7, False, 0.01, 2.0, 0.2, "#7048e8"),\n'
+    truck = '    ObjectClass.TRUCK: ClassSpec(("Truck",), (18, 258), 9.0, 2.7, False, 2.0, 0.2, "#7048e8"),\n'
     text = text.replace(VALUE, f"{VALUE}    TRUCK = 4\n")
     table.write_text(text.replace("}\n", f"{truck}}}\n", 1))
     return source

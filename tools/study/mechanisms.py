@@ -74,11 +74,7 @@ MECHANISMS: dict[str, tuple[str, Switch]] = {
     "rest position follows": ("the track", values(_FILTER, rest_gain=0.0)),
     "mean of views": ("not their product", values("fusion", rule="product")),
     "probable objects": ("are classified", values("fusion", min_object_probability=0.0)),
-    "hysteresis": ("of the class that is said", values("decision", hysteresis=1.0)),
-    "worth": (
-        "order of calls; off: longest waiting first",
-        values("scheduler.worth", uncertainty_weight=0.0, nearness_weight=0.0, novelty_weight=0.0),
-    ),
+    "adapted decision": ("class frequency of the stream, hysteresis", values("decision", rule="likeliest")),
     "reflectance": ("evidence, hdl-64e only", values("sensor", reflectance="none")),
 }
 """What each is, and its switch."""

@@ -5,16 +5,16 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from modt import host
 from modt.app import kernel_choice
-from modt.classification.decision import Decision
+from modt.classification.decision import Decision, LikeliestClass
 from modt.classification.fusion import EveryFrame, FirstViews, FurtherViews
 from modt.classification.pointnet import PointNet
-from modt.classification.prior import Prior, make_prior, with_background
+from modt.classification.prior import Prior, make_prior
 from modt.classification.scheduler import LinearCost, Scheduler, padded_size, warm_up
 from modt.config import FusionConfig, ProfileConfig
 from modt.energy.ledger import Ledger
@@ -124,7 +124,7 @@ def pipeline(mode: Mode, profile: ProfileConfig, fov: FieldOfView, ledger: Ledge
     kernels = kernel_choice.choose(profile.segmentation.kernels)
     limits = profile.classification
     network = PointNet(limits, profile.sensor)
-    cost = LinearCost(limits.max_points, padded_size(limits), profile.scheduler.cost)
+    cost = LinearCost(limits.max_points, padded_size(limits))
     warm_up(network.classify, cost, limits.max_points, limits.batch, time.thread_time_ns)
     _check_budget(mode.budget(profile), cost, profile)
     return stages(
@@ -143,18 +143,16 @@ def stages(
     kernels: GeometryKernels,
 ) -> Pipeline:
     """A pipeline around a given segmenter and classifier: the network, or what stands for it at this cost."""
-    fusion = profile.fusion
-    if network.class_frequency is not None:
-        fusion = replace(fusion, prior=network.class_frequency)
-    prior = make_prior(network.box_scores, fusion.prior)
+    prior = make_prior(network.box_scores, network.class_frequency)
+    decision = LikeliestClass if profile.decision.rule == "likeliest" else Decision
     return Pipeline(
         segmenter=segmenter,
         odometry=Odometry(kernels),
         tracker=Tracker(profile.tracking, mode.machine, period_s=profile.sensor.period_s, kernels=kernels),
-        fusion=mode.fusion(fusion, prior),
-        scheduler=Scheduler(profile.scheduler.worth, cost, profile.sensor.period_s),
+        fusion=mode.fusion(profile.fusion, prior),
+        scheduler=Scheduler(cost, profile.sensor.period_s),
         classifier=classifier,
-        decision=Decision(profile.decision, with_background(fusion.prior)),
+        decision=decision(profile.decision, network.class_frequency),
         ledger=ledger,
         mount=Mount.of(profile.sensor.roll_deg, profile.sensor.pitch_deg),
     )

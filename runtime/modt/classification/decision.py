@@ -18,13 +18,45 @@ from modt.types import NONE, Float64, Tracks
 
 MIN_BACKGROUND = 0.1
 """Least frequency of background."""
+HYSTERESIS = 0.4
+"""The reported class is kept down to this share of its threshold; 1 would give it up at the threshold."""
+START_PROPOSALS, MEMORY_PROPOSALS = 2000, 20_000
+"""Proposals that the frequency at the start counts for, and from which that of the stream is estimated."""
+MAX_CHANGE = 5.0
+"""A class becomes at most so many times as frequent as the model assumes."""
 
 
-class Decision:
+class LikeliestClass:
+    """The likeliest object, where its posterior reaches its threshold: nothing is adapted or remembered.
+
+    Args:
+        config: costs.
+        frequency: (4,) of the classes among proposals, which the posteriors assume.
+
+    Attributes:
+        frequency: the same.
+    """
+
+    def __init__(self, config: DecisionConfig, frequency: Float64) -> None:
+        self.frequency = frequency
+        self._threshold = 1.0 / (1.0 + np.array(config.missed_cost))
+
+    def decide(self, tracks: Tracks) -> None:
+        """Write the class of every track."""
+        self._say(tracks, tracks.posterior)
+
+    def _say(self, tracks: Tracks, weighed: Float64) -> None:
+        """Write the class of every track, of its weight (M, 4)."""
+        likeliest = weighed[:, 1:].argmax(axis=1) + 1
+        said = weighed[np.arange(len(weighed)), likeliest] >= self._threshold[likeliest - 1]
+        tracks.object_class = np.where(said, likeliest, 0)
+
+
+class Decision(LikeliestClass):
     """Posteriors to classes.
 
     Args:
-        config: costs, and the pace and bounds of the adaptation.
+        config: costs, and the frequency at the start.
         frequency: (4,) of the classes among proposals, which the posteriors assume.
 
     Attributes:
@@ -32,22 +64,19 @@ class Decision:
     """
 
     def __init__(self, config: DecisionConfig, frequency: Float64) -> None:
-        self.config = config
+        super().__init__(config, frequency)
         self._assumed = frequency
         start = config.frequency
         self._start = frequency if start is None else np.array([1.0 - sum(start), *start])
         self.frequency = self._start.copy()
         self._mass = np.zeros(N_CLASSES)
-        self._threshold = 1.0 / (1.0 + np.array(config.missed_cost))
 
     def decide(self, tracks: Tracks) -> None:
         """Write the class of every track; those with a proposal add to the frequency of the classes."""
         adapted = self.adapted(tracks.posterior)
-        rows, weighed = np.arange(len(adapted)), adapted.copy()
-        weighed[rows, tracks.object_class] /= self.config.hysteresis
-        likeliest = weighed[:, 1:].argmax(axis=1) + 1
-        said = weighed[rows, likeliest] >= self._threshold[likeliest - 1]
-        tracks.object_class = np.where(said, likeliest, 0)
+        weighed = adapted.copy()
+        weighed[np.arange(len(weighed)), tracks.object_class] /= HYSTERESIS
+        self._say(tracks, weighed)
         self._learn(adapted[tracks.proposal != NONE])
 
     def adapted(self, posterior: Float64) -> Float64:
@@ -57,14 +86,13 @@ class Decision:
         return adapted
 
     def _learn(self, adapted: Float64) -> None:
-        """The mean of the adapted posteriors, the frequency at the start counting as `start_proposals`."""
-        config = self.config
+        """The mean of the adapted posteriors, the frequency at the start counting as START_PROPOSALS."""
         self._mass += adapted.sum(axis=0)
         total = self._mass.sum()
-        if total > config.memory_proposals:
-            self._mass *= config.memory_proposals / total
-        frequency = config.start_proposals * self._start + self._mass
+        if total > MEMORY_PROPOSALS:
+            self._mass *= MEMORY_PROPOSALS / total
+        frequency = START_PROPOSALS * self._start + self._mass
         frequency /= frequency.sum()
-        frequency[1:] = np.minimum(np.maximum(frequency, self._assumed), self._assumed * config.max_change)[1:]
+        frequency[1:] = np.minimum(np.maximum(frequency, self._assumed), self._assumed * MAX_CHANGE)[1:]
         frequency[0] = max(1.0 - frequency[1:].sum(), MIN_BACKGROUND)
         self.frequency = frequency / frequency.sum()

@@ -20,7 +20,7 @@ import numpy as np
 from modt.classes import N_CLASSES, ObjectClass
 from modt.classification.motion_witness import log_likelihood
 from modt.classification.pool import pooled_prior
-from modt.classification.prior import FrequencyPrior, Prior, with_background
+from modt.classification.prior import Prior
 from modt.config import FusionConfig
 from modt.types import NONE, Bool, Float64, Int, Proposals, Tracks
 
@@ -36,6 +36,10 @@ SURPRISE = 2.3
 """Change of the log-odds of an object by box and motion, since the last view, that is worth another one."""
 MORE_POINTS, MORE_POINTS_BY = 1.25, 5
 """Clearly more points than at the last view: by this ratio, and so many beyond random variation."""
+BACKGROUND_THRESHOLD = 0.5
+"""Posterior under equal class frequencies at which background is final where it is looked at again; less: sooner."""
+FIRST_VIEW_MIN_HITS = 2
+"""Frames with a proposal that mode efficient waits for: more of them spare calls on spurious proposals."""
 REVIEW_FRAMES = 10
 """An object is looked at again after so many frames, then after twice as many, and so on."""
 _BACKGROUND = np.eye(N_CLASSES)[ObjectClass.BACKGROUND]
@@ -56,9 +60,9 @@ def from_log_weights(log_weight: Float64) -> Float64:
     return normalise(np.exp(log_weight - log_weight.max(axis=1, keepdims=True, initial=-np.inf)))
 
 
-def log_frequency_of(config: FusionConfig) -> Float64:
-    """(4,) logarithm of the class frequency that the model assumes."""
-    frequency = np.maximum(with_background(config.prior), MIN_PROBABILITY)
+def log_frequency_of(prior: Prior) -> Float64:
+    """(4,) logarithm of the class frequency that a prior assumes."""
+    frequency = np.maximum(prior.frequency, MIN_PROBABILITY)
     log_frequency: Float64 = np.log(frequency / frequency.sum())
     return log_frequency
 
@@ -70,13 +74,13 @@ class Certainty:
     posterior under equal class frequencies.
 
     Args:
-        config: frequencies, and the threshold of objects.
-        background_threshold: that of background.
+        log_frequency: (4,) of the classes.
+        object_threshold, background_threshold: of either.
     """
 
-    def __init__(self, config: FusionConfig, background_threshold: float) -> None:
-        self._frequency = np.exp(log_frequency_of(config))
-        self._object, self._background = config.object_threshold, background_threshold
+    def __init__(self, log_frequency: Float64, object_threshold: float, background_threshold: float) -> None:
+        self._frequency = np.exp(log_frequency)
+        self._object, self._background = object_threshold, background_threshold
 
     def __call__(self, posterior: Float64) -> Bool:
         """(R,) of posteriors (R, 4)."""
@@ -106,17 +110,16 @@ class FusedTracks:
     """What is common to the modes that fuse: the posterior of every track with a proposal, in every frame.
 
     Args:
-        config: frequencies, conditions of a view, thresholds of certainty.
-        prior: of a proposal before its view; the class frequency by default.
-        background_threshold: at which background is certain; by default that of mode accurate.
+        config: condition of a view, threshold of certainty.
+        prior: of a proposal before its view.
+        background_threshold: evidence at which background is certain.
     """
 
     def __init__(
-        self, config: FusionConfig, prior: Prior | None = None, background_threshold: float | None = None
+        self, config: FusionConfig, prior: Prior, background_threshold: float = BACKGROUND_THRESHOLD
     ) -> None:
-        self.config, self.prior = config, prior or FrequencyPrior(config.prior)
-        self.certain = Certainty(config, background_threshold or config.background_threshold)
-        self._log_frequency = log_frequency_of(config)
+        self.config, self.prior, self._log_frequency = config, prior, log_frequency_of(prior)
+        self.certain = Certainty(self._log_frequency, config.object_threshold, background_threshold)
 
     def observe(self, tracks: Tracks, proposals: Proposals) -> None:
         """Add the box and the motion of every track with a proposal to what is known of it."""
@@ -166,13 +169,13 @@ class FirstViews(FusedTracks):
     again once it shows clearly more points. Background is as final as an object here, and as certain.
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
+    def __init__(self, config: FusionConfig, prior: Prior) -> None:
         super().__init__(config, prior, config.object_threshold)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks without a final class that meet the conditions."""
         self.observe(tracks, proposals)
-        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= self.config.first_view_min_hits)
+        asks: Bool = wants_class & (tracks.proposal != NONE) & (tracks.hits >= FIRST_VIEW_MIN_HITS)
         asks &= self.prior.may_be_object(_expected(tracks), self.config.min_object_probability)
         return asks & (~tracks.viewed | _shows_more(tracks, proposals))
 

@@ -24,7 +24,7 @@ from modt.classes import N_CLASSES
 from modt.classification import box_classifier, reflectance_classifier
 from modt.classification.crops import canonical, gather, ground_z_m
 from modt.classification.pool import log_pool, softmax
-from modt.classification.prior import BoxScores, with_background
+from modt.classification.prior import BoxScores
 from modt.config import ClassificationConfig, SensorConfig
 from modt.errors import MisuseError
 from modt.types import Float32, Float64, Int, Proposals
@@ -187,7 +187,8 @@ class PointNet:
         path: model file.
         sha256: its hash, equal to that in its card (the file beside it that ends in .md).
         box_scores: of its box classifier, and of its reflectance classifier for this sensor.
-        class_frequency: of the objects' classes among proposals, which the posteriors assume; None where not stated.
+        class_frequency: (4,) of the classes among proposals, which the posteriors assume; a model that states none
+            assumes that all are equal.
 
     Raises:
         MisuseError: no such model, a hash that differs from the card's, not plain ONNX, not (batch, points, 3) to
@@ -210,8 +211,7 @@ class PointNet:
             boxes = box_classifier.from_metadata(pooled, beside)
             self.box_scores = BoxScores(boxes, reflectance_classifier.from_metadata(pooled, sensor), sensor)
             self.class_frequency = _class_frequency(metadata)
-            objects = self.class_frequency or (1 / N_CLASSES,) * (N_CLASSES - 1)
-            self._log_frequency = np.log(with_background(objects))
+            self._log_frequency = np.log(self.class_frequency)
         except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError) as error:
             cause = f"malformed box or reflectance classifier ({error})"
             raise MisuseError(self.path, cause, "export the model again") from None
@@ -312,14 +312,14 @@ def _session(path: Path, raw: bytes) -> ort.InferenceSession:
     return session
 
 
-def _class_frequency(metadata: Mapping[str, str]) -> tuple[float, ...] | None:
+def _class_frequency(metadata: Mapping[str, str]) -> Float64:
     text = metadata.get(CLASS_FREQUENCY_KEY)
     if text is None:
-        return None
-    frequency = tuple(float(share) for share in json.loads(text))
-    if len(frequency) != N_CLASSES or min(frequency) <= 0 or not sum(frequency[1:]) < 1:  # nor NaN
+        return np.full(N_CLASSES, 1 / N_CLASSES)
+    frequency = np.array([float(share) for share in json.loads(text)])
+    if len(frequency) != N_CLASSES or not frequency.min() > 0 or not frequency[1:].sum() < 1:
         raise ValueError(f"class frequency {text}")
-    return frequency[1:]
+    return np.append(1.0 - frequency[1:].sum(), frequency[1:])
 
 
 def _fits(shape: tuple[int | str | None, ...], wanted: tuple[int | None, ...]) -> bool:

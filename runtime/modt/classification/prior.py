@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -63,6 +62,10 @@ class Prior(Protocol):
     """P(class) of proposals that are not classified yet."""
 
     @property
+    def frequency(self) -> Float64:
+        """(4,) frequency of the classes among proposals."""
+
+    @property
     def pool_weight(self) -> float:
         """Exponent of what the prior says of an object, in the classifier's pool (0 to 1)."""
 
@@ -77,17 +80,17 @@ class FrequencyPrior:
     """The frequency of the classes among proposals, the same for each: it excludes none.
 
     Args:
-        objects: frequency of every class but background.
+        frequency: (4,) of the classes.
     """
 
     pool_weight = 0.0
 
-    def __init__(self, objects: Sequence[float]) -> None:
-        self._frequency = with_background(objects)
+    def __init__(self, frequency: Float64) -> None:
+        self.frequency = frequency
 
     def probability(self, proposals: Proposals) -> Float64:
         """(P, 4) equal rows."""
-        return np.tile(self._frequency, (len(proposals), 1))
+        return np.tile(self.frequency, (len(proposals), 1))
 
     def may_be_object(self, probability: Float64, threshold: float) -> Bool:
         """(M,) True."""
@@ -95,10 +98,10 @@ class FrequencyPrior:
 
 
 class BoxPrior:
-    """P(class | box, reflectance)."""
+    """P(class | box, reflectance), under the class frequency (4,) that the scores assume."""
 
-    def __init__(self, scores: BoxScores) -> None:
-        self._scores = scores
+    def __init__(self, scores: BoxScores, frequency: Float64) -> None:
+        self._scores, self.frequency = scores, frequency
 
     @property
     def pool_weight(self) -> float:
@@ -114,17 +117,12 @@ class BoxPrior:
         return object_probability_reaches(probability, threshold)
 
 
-def with_background(objects: Sequence[float]) -> Float64:
-    """(4,) frequency of every class, background having the rest of the objects'."""
-    return np.append(1.0 - np.sum(objects), objects)
-
-
 def object_probability_reaches(probability: Float64, threshold: float) -> Bool:
     """(M,) rows (M, 4) that give the objects together at least this probability."""
     reaches: Bool = 1.0 - probability[:, ObjectClass.BACKGROUND] >= threshold
     return reaches
 
 
-def make_prior(scores: BoxScores, frequency: Sequence[float]) -> Prior:
+def make_prior(scores: BoxScores, frequency: Float64) -> Prior:
     """BoxPrior; FrequencyPrior where the model has no box classifier."""
-    return FrequencyPrior(frequency) if isinstance(scores.boxes, NoBoxClassifier) else BoxPrior(scores)
+    return FrequencyPrior(frequency) if isinstance(scores.boxes, NoBoxClassifier) else BoxPrior(scores, frequency)

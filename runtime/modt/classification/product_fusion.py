@@ -13,8 +13,8 @@ from modt.types import Bool, Float64, Int, Proposals, Tracks
 class AnyView:
     """Mode efficient of the paper: every track is classified once, and that is final (Table I)."""
 
-    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
-        self._log_frequency = log_frequency_of(config)
+    def __init__(self, config: FusionConfig, prior: Prior) -> None:
+        self._log_frequency = log_frequency_of(prior)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks never viewed."""
@@ -36,10 +36,10 @@ class KeyViews(AnyView):
     `start_frame`, since first views are often far and partial (Fig. 11).
     """
 
-    def __init__(self, config: FusionConfig, prior: Prior | None = None) -> None:
-        super().__init__(config)
+    def __init__(self, config: FusionConfig, prior: Prior) -> None:
+        super().__init__(config, prior)
         self._point_change, self._start_frame = np.array(config.point_change), config.start_frame
-        self._certain = Certainty(config, config.background_threshold)
+        self._certain = Certainty(self._log_frequency, config.object_threshold, config.object_threshold)
 
     def asks(self, tracks: Tracks, proposals: Proposals, wants_class: Bool) -> Bool:
         """(M,) tracks at their first or an independent view."""

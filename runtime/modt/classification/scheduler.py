@@ -11,7 +11,7 @@ from itertools import product
 import numpy as np
 
 from modt.classes import N_CLASSES
-from modt.config import CallWorthConfig, ClassificationConfig, CostModelConfig
+from modt.config import ClassificationConfig
 from modt.types import NONE, Bool, Budget, Float32, Float64, Int, Proposals, Tracks
 
 
@@ -39,6 +39,17 @@ def padded_each(count: Int, limits: ClassificationConfig) -> Int:
     return size
 
 
+UNCERTAINTY_WEIGHT, NEARNESS_WEIGHT, NOVELTY_WEIGHT = 0.4, 0.3, 0.3
+"""Weights in the worth of a call: of the normalised entropy of the posterior, of exp(-distance / NEARNESS_RANGE_M),
+and of the relative change of points since the last view. They decide who comes first where the budget binds."""
+NEARNESS_RANGE_M = 30.0
+"""Distance at which nearness is 1/e [m]: with less, far objects wait longer."""
+WAITING_WEIGHT = 0.1
+"""Worth added per frame of waiting, so that every call is made in the end."""
+FORGETTING = 0.98
+"""Weight per frame of the past in the fit of a call's cost: with less, it follows the machine faster."""
+START_MARGIN, MARGIN_STEP = 1.5, 0.05
+"""The estimate of a call's cost over the fit, at the start, and by how much an underestimate raises its logarithm."""
 _POINTS = 100.0  # the unit of points, which conditions the fit
 _DIAGONAL = np.eye(3)
 _LEAST_MS = 1e-3  # what takes less was not measured
@@ -57,12 +68,11 @@ class LinearCost:
     Args:
         max_points: limit of the points of a proposal handed to the network.
         size: points that the network processes, padding included, for proposals of (R,) points.
-        config: of the margin, and the memory.
     """
 
-    def __init__(self, max_points: int, size: Callable[[Int], int], config: CostModelConfig) -> None:
-        self._max_points, self.size, self._config = max_points, size, config
-        self._margin, self._starved = config.margin, 0
+    def __init__(self, max_points: int, size: Callable[[Int], int]) -> None:
+        self._max_points, self.size = max_points, size
+        self._margin, self._starved = START_MARGIN, 0
         self._equations = np.zeros((3, 4))
         self._fitted_ms: Float64 | None = None
 
@@ -91,7 +101,7 @@ class LinearCost:
         if len(points) and _LEAST_MS <= cpu_ms < math.inf:
             terms = self._terms(points)
             self._adapt(cpu_ms > float(terms @ self._terms_ms()))
-            self._equations *= self._config.forgetting ** (1 + self._starved)
+            self._equations *= FORGETTING ** (1 + self._starved)
             self._learn(terms, cpu_ms, 1.0)
             self._starved = 0
 
@@ -101,7 +111,7 @@ class LinearCost:
         self._starved += 1
 
     def _adapt(self, underestimated: bool) -> None:
-        step = self._config.margin_step * (underestimated - _UNDERESTIMATES)
+        step = MARGIN_STEP * (underestimated - _UNDERESTIMATES)
         self._margin = max(1.0, self._margin * math.exp(step))
 
     def _learn(self, terms: Float64, cpu_ms: float, weight: float) -> None:
@@ -138,13 +148,12 @@ class Scheduler:
     object; and more with each frame of waiting: every call that fits into the budget is made eventually.
 
     Args:
-        config: weights of the worth.
         cost: CPU time of a call.
         period_s: time between two frames, for a second of which a mean budget is saved.
     """
 
-    def __init__(self, config: CallWorthConfig, cost: LinearCost, period_s: float = 0.1) -> None:
-        self._config, self.cost, self._period_s = config, cost, period_s
+    def __init__(self, cost: LinearCost, period_s: float = 0.1) -> None:
+        self.cost, self._period_s = cost, period_s
         self._saved_ms = 0.0  # of a mean budget; negative after a call beyond it
 
     def paid(self, points: Int, cpu_ms: float) -> None:
@@ -172,17 +181,17 @@ class Scheduler:
 
     def worth(self, tracks: Tracks, proposals: Proposals, rows: Int) -> Float64:
         """(R,) worth of a call for these tracks: at most 1, plus the frames waited times their weight."""
-        config, proposal_rows = self._config, tracks.proposal[rows]
+        proposal_rows = tracks.proposal[rows]
         posterior = np.maximum(tracks.posterior[rows], 1e-12)
         uncertainty = -(posterior * np.log(posterior)).sum(axis=1) / np.log(N_CLASSES)
         count, last_points = proposals.count[proposal_rows], tracks.key_points[rows]
         novelty = np.minimum(np.abs(count - last_points) / np.maximum(last_points, 1), 1.0)
-        nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / config.range_scale_m)
+        nearness = np.exp(-np.hypot(*proposals.box[proposal_rows, :2].T) / NEARNESS_RANGE_M)
         value: Float64 = (
-            config.uncertainty_weight * uncertainty
-            + config.nearness_weight * nearness
-            + config.novelty_weight * novelty
-            + config.waiting_weight * tracks.waiting[rows]
+            UNCERTAINTY_WEIGHT * uncertainty
+            + NEARNESS_WEIGHT * nearness
+            + NOVELTY_WEIGHT * novelty
+            + WAITING_WEIGHT * tracks.waiting[rows]
         )
         return value
 

@@ -2,9 +2,7 @@
 
 from modt.config.base import StageConfig, ValueRangeError
 from modt.config.classification import (
-    CallWorthConfig,
     ClassificationConfig,
-    CostModelConfig,
     DecisionConfig,
     FusionConfig,
     SchedulerConfig,
@@ -25,9 +23,7 @@ from modt.config.tracking import (
 
 __all__ = [
     "BackgroundMapConfig",
-    "CallWorthConfig",
     "ClassificationConfig",
-    "CostModelConfig",
     "DecisionConfig",
     "EnergyConfig",
     "FilterConfig",

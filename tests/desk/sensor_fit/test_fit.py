@@ -112,10 +112,10 @@ def test_the_text_is_the_profile(name):
 def test_a_finder_adds_keys_that_rest_on_those_before_it():
     def frequencies(_: Recording, config: ProfileConfig):
         assert config.sensor.height_m == pytest.approx(0.8, abs=0.1)
-        yield Finding("fusion", "prior", (0.1, 0.1, 0.1), "counted")
+        yield Finding("decision", "frequency", (0.1, 0.1, 0.1), "counted")
 
     config, findings = fit(recording("vlp-16"), (*FINDERS, frequencies))
-    assert config.fusion.prior == (0.1, 0.1, 0.1)
+    assert config.decision.frequency == (0.1, 0.1, 0.1)
     assert profile.parse(profile_text("with frequencies", findings)) == config
 
 

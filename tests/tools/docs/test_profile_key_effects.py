@@ -26,7 +26,6 @@ from modt import profile
 from modt.app import assembly, inputs, kernel_choice
 from modt.app.ladder import Ladder
 from modt.app.stages import within
-from modt.classification import pointnet
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
@@ -63,10 +62,9 @@ def replay(
     config: ProfileConfig,
     mode: str = "accurate",
     view: Any = None,
-    cpu_ns: Callable[[], int] = lambda: 0,
 ) -> str:
     """Digest of the tracks, the proposals, the class frequency and the work of every frame."""
-    ledger = Ledger(lambda: 0, cpu_ns)
+    ledger = Ledger(lambda: 0, lambda: 0)
     pipeline = assembly.pipeline(assembly.MODES[mode], config, view or FieldOfView(), ledger)
     digest = hashlib.sha256()
     for frame in stream:
@@ -129,24 +127,6 @@ def paper(config: ProfileConfig, _folder: Path) -> str:
 def printed(config: ProfileConfig, folder: Path) -> str:
     """The paper's cost as printed, by which pairs that lie apart compete."""
     return paper(changed(config, "tracking.paper.differences", "subtracted"), folder)
-
-
-def one_call(config: ProfileConfig, _folder: Path) -> str:
-    one = changed(config, "scheduler.calls_per_frame", 1)
-    return replay(frames(8, 4.0), one, view=FieldOfView.of_camera(CAMERA))
-
-
-def noisy_clock(config: ProfileConfig, _folder: Path) -> str:
-    """A budget where the CPU time of a classification varies."""
-    ns = np.random.default_rng(0).integers(200_000, 1_400_000, 100_000).cumsum().tolist()
-    clock = iter(ns).__next__
-    with mock.patch.object(assembly, "time", type("Clock", (), {"thread_time_ns": clock})):
-        return replay(frames(1, 4.0), changed(config, "scheduler.cpu_ms_per_frame", 0.3), cpu_ns=clock)
-
-
-def model_without_frequency(config: ProfileConfig, _folder: Path) -> str:
-    with mock.patch.object(pointnet, "_class_frequency", return_value=None):
-        return replay(frames(3, 1.0), config)
 
 
 def one_mJ(config: ProfileConfig, _folder: Path) -> str:
@@ -253,13 +233,8 @@ SCENARIOS: dict[str, Scenario] = {
     "tracking.split.": long_street,
     "tracking.merge.": long_street,
     "tracking.background_map.": long_street,
-    "scheduler.worth.": one_call,
-    "scheduler.cost.": noisy_clock,
-    "fusion.prior": model_without_frequency,
-    "fusion.first_view_min_hits": efficient,
     "fusion.start_frame": product,
     "fusion.point_change": product,
-    "decision.hysteresis": long_street,
     "odometry.": pose_socket,
     "energy.": report_of_a_run,
     "energy.busy_W": report_without_meter,

@@ -60,7 +60,7 @@ class NetworkReplay:
 
     def _pipeline(self, known: SegmentedDrive) -> Pipeline:
         config, limits, mode = self.config, self.config.classification, assembly.MODES[self.mode]
-        cost = LinearCost(limits.max_points, padded_size(limits), config.scheduler.cost)
+        cost = LinearCost(limits.max_points, padded_size(limits))
         kernels = kernel_choice.choose(config.segmentation.kernels)
         ideal = IdealTracking(known, config, self.range_m) if self.ideal else None
         played = ideal or PlayedBack(known, self.range_m)

@@ -39,7 +39,7 @@ from modt_desk.reporting.run_sums import COLUMNS, FrameSums
 
 SCHEMA = "modt.report/2"
 _CONVENTIONAL = "conventional"
-_LIMITS = ("max_points", "min_points", "batch")
+_LIMITS = ("max_points", "likelihood")
 _APART = (SOURCE, SINK, "idle", "unattributed")
 """Parts of the energy that are not the pipeline's."""
 _BOARD = ("board", "idle_W", "busy_W", "seg_J", "class_J", "point_J")
