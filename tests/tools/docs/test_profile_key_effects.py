@@ -128,11 +128,6 @@ def paper(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "tracking.association", "paper"))
 
 
-def printed(config: ProfileConfig, folder: Path) -> str:
-    """The paper's cost as printed, by which pairs that lie apart compete."""
-    return paper(changed(config, "tracking.paper.differences", "subtracted"), folder)
-
-
 def one_call(config: ProfileConfig, _folder: Path) -> str:
     one = changed(config, "scheduler.calls_per_frame", 1)
     return replay(frames(8, 4.0), one, view=FieldOfView.of_camera(CAMERA))
@@ -309,7 +304,6 @@ RARE: dict[str, Scenario] = {
     "segmentation.sensor_height.sweeps": heights,
     "segmentation.person_splitting.min_gap_columns": long_street,
     "segmentation.car_merging.min_person_top_m": long_street,
-    "tracking.paper.gate": printed,
     "tracking.split.": long_street,
     "tracking.merge.": long_street,
     "scheduler.cost.": noisy_clock,
