@@ -3,8 +3,7 @@ from __future__ import annotations
 import pytest
 
 from modt.errors import MisuseError
-from modt_desk.experiments.catalogue.lives import TABLE_III
-from modt_desk.experiments.catalogue.ranges import FIGURE_8
+from modt_desk.experiments.catalogue import chosen
 from modt_desk.experiments.drives import kitti_drives
 from modt_desk.experiments.study import Study
 
@@ -16,7 +15,7 @@ def test_a_folder_without_labels_is_refused(tmp_path):
 
 @pytest.mark.kitti
 def test_the_labels_give_table_iii(kitti_root):
-    study = Study([TABLE_III, FIGURE_8], kitti_drives(kitti_root), [()], {})
+    study = Study(chosen(["table3", "fig8"]), kitti_drives(kitti_root), [()])
     rows = study.rows(1, lambda name: None)
     found = {row.streams: row for row in rows if row.experiment == "table3" and row.quantity == "N_go"}
     lives = {"0005, tracking 0000": 34.9, "0014, tracking 0004": 26.9, "0001": 33.1, "0059, tracking 0011": 63.3}
