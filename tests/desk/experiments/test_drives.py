@@ -3,14 +3,37 @@ from __future__ import annotations
 import pytest
 
 from modt.errors import MisuseError
+from modt_desk.evaluation.truth import Role
 from modt_desk.experiments.catalogue import chosen
-from modt_desk.experiments.drives import kitti_drives
+from modt_desk.experiments.drives import completed, kitti_drives
 from modt_desk.experiments.study import Study
+from modt_desk.simulation.kitti_raw import DriveWriter
+from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 
 
 def test_a_folder_without_labels_is_refused(tmp_path):
     with pytest.raises(MisuseError, match="no labelled KITTI drives"):
         kitti_drives(tmp_path)
+
+
+def test_further_objects_make_another_drive_of_the_one_that_has_its_sweeps(tmp_path):
+    writer = DriveWriter(tmp_path, CAMERA)
+    for frame, truth in SyntheticStream("street", "vlp-16", 0.2, seed=2).sweeps():
+        writer.write(frame, truth)
+    writer.close()
+    table = tmp_path / "further.csv"
+    head = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
+    table.write_text(f"{head}\n0,0,Pedestrian,9,0,-1.7,0.6,0.6,1.7,0\n")
+    drives = kitti_drives(tmp_path)
+    whole = completed(drives, table)
+    before, after = drives[0].labels()[0], whole.labels()[0]
+    added = after.role == Role.FURTHER
+    assert added.sum() == 1
+    assert not set(after.id[added]) & set(before.id), "its number may be that of a label"
+    streams = {name for name, _ in Study([], [*drives, whole], [()])._streams(chosen(["table4"])[0])}
+    assert streams == {drives[0].name, whole.name}
+    with pytest.raises(MisuseError, match="2 have their sweeps"):
+        completed([*drives, *drives], table)
 
 
 @pytest.mark.kitti
