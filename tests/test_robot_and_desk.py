@@ -81,7 +81,7 @@ def test_no_frame_loads_scipy(command, tmp_path):
     [
         (main, {"view", "evaluate", "export", "simulate", "track", "completion"}),
         (profile_group, {"fit", "schema"}),
-        (profile, {"calibrate", "report", "compare", "predict", "regimes"}),
+        (profile, {"calibrate", "report", "compare", "predict"}),
     ],
 )
 def test_the_desks_commands_are_told_by_their_module(module, of_the_desk):

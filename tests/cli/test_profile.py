@@ -80,19 +80,6 @@ def test_a_prediction_is_compared_with_what_is_measured(compared, tmp_path):
     assert done.returncode == 0, done.stderr
     for name in ("predicted", "gamma = N_go", "Equation 3 bare", "the calibration's ratio"):
         assert f"gamma, accurate: {name}" in done.stdout
-    arguments = ("--frames", "6:12", "--repeat", 1, "--against", "blind.json", "--json")
-    (tmp_path / "itself.json").write_text(modt_profile("compare", *arguments, cwd=tmp_path).stdout)
-    done = modt_profile("regimes", "itself.json", "other.json", "--html", "page.html", "--json", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    regimes = json.loads(done.stdout)["regimes"]
-    assert [(row["name"], row["mode"], "blind prediction" in row["said"]) for row in regimes] == [
-        ("itself", "efficient", True),
-        ("itself", "accurate", True),
-        ("other", "efficient", False),
-        ("other", "accurate", False),
-    ]
-    assert all(row["gamma"]["low"] <= row["gamma"]["value"] <= row["gamma"]["high"] for row in regimes)
-    assert len(re.findall("<svg", (tmp_path / "page.html").read_text())) == 3
     done = modt_profile("compare", "--frames", "0:6", "--against", "blind.json", cwd=tmp_path)
     assert done.returncode == 2
     assert "asked" in done.stderr
@@ -113,7 +100,6 @@ def test_calibration_writes_a_profile_that_loads(tmp_path):
     ("arguments", "said"),
     [
         (("report", "nowhere"), "run.yaml"),
-        (("regimes", "nowhere", "neither"), "modt-profile compare --json"),
         (("compare", "nowhere"), "nowhere"),
         (("compare", "--meter", "wattmeter"), "wattmeter"),
         (("compare", "--repeat", "0"), "from 1 to 1000"),

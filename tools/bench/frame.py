@@ -17,6 +17,8 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +32,6 @@ from modt.geometry import FieldOfView
 from modt.pipeline import SEGMENTATION
 from modt.sources.recognise import open_stream
 from modt.types import Float64, Frame
-from tools.bench.segmentation import optional
 from tools.docs.sections import replace_section
 from tools.options import parser
 
@@ -62,8 +63,8 @@ def segmentation_ms(ledger: Ledger, frame: Frame) -> float:
 def contenders() -> dict[str, Work]:
     """What is timed."""
     found: dict[str, Work] = {YARDSTICK: partial(timed, lambda _: np.sort(_NUMBERS))}
-    patchwork = optional("pypatchworkpp")
-    if patchwork is not None:
+    if find_spec("pypatchworkpp"):
+        patchwork = import_module("pypatchworkpp")
         parameters = patchwork.Parameters()
         parameters.verbose = False
         ground = patchwork.patchworkpp(parameters).estimateGround

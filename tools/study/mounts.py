@@ -37,7 +37,7 @@ from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.simulator import Truth
 from modt_desk.simulation.synthetic_stream import SCENES, SyntheticStream
 from tools.options import parser
-from tools.study.leave_one_out import TYPES
+from tools.study.drives import TYPES
 
 BANDS_M = ((0.5, 3.0), (3.0, 8.0), (8.0, 20.0), (20.0, 60.0))
 LONG_M = 1.5

@@ -24,7 +24,7 @@ from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.simulation.sensors import SENSORS
 from modt_desk.simulation.synthetic_stream import CAMERA
 from tools.options import parser
-from tools.study.leave_one_out import Drive, labelled, simulated
+from tools.study.drives import Drive, labelled, simulated
 
 CLASSES = CLASS_NAMES[1:]
 

@@ -19,7 +19,7 @@ from modt_desk.evaluation.evaluation import collect
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.simulation.sensors import SENSORS
 from tools.options import parser
-from tools.study.leave_one_out import Drive, simulated
+from tools.study.drives import Drive, simulated
 
 CELLS = len(YOUNG_S) + 1 + len(MOVED_M)
 WEIGHT, MOST = 0.5, 1.5

@@ -12,7 +12,6 @@ COMMANDS = {
     "report": "modt_desk.cli.profile_report",
     "compare": "modt_desk.cli.profile_compare",
     "predict": "modt_desk.cli.profile_predict",
-    "regimes": "modt_desk.cli.profile_regimes",
 }
 """Module of each command."""
 WHAT = "Account for the energy of modt. For profiles of sensors and boards see `modt profile`."

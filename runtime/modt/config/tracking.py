@@ -27,15 +27,10 @@ class FilterConfig(StageConfig):
 class PaperAssociationConfig(StageConfig):
     """The paper's association cost (section III-B); in effect with association: paper."""
 
-    alpha: float = number(2.0, 0.0, 100.0, "", "weight of 1 - IoU")
-    beta: float = number(0.01, 0.0, 10.0, "", "weight of the difference of point number")
-    gamma: float = number(0.1, 0.0, 10.0, "", "weight of the difference of size")
+    alpha: float = number(2.0, 0.0, 100.0, "", "weight of 1 - IoU, seen from above")
+    beta: float = number(0.01, 0.0, 10.0, "", "reward of like numbers of points")
+    gamma: float = number(0.1, 0.0, 10.0, "", "reward of like sizes")
     t_da: float = number(0.95, 0.0, 100.0, "", "highest cost of an association")
-    differences: str = choice(
-        "added", ("added", "subtracted"), "of number and size, to the cost; the paper: subtracted"
-    )
-    gate: str = choice("before", ("before", "after"), "the assignment, T_DA; the paper: after")
-    position_sigma_m: float = number(0.3, 0.01, 5.0, "m", "of a measured position")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

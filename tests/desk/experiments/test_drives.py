@@ -3,10 +3,12 @@ from __future__ import annotations
 import pytest
 
 from modt.errors import MisuseError
-from modt_desk.experiments.catalogue.lives import TABLE_III
-from modt_desk.experiments.catalogue.ranges import FIGURE_8
-from modt_desk.experiments.drives import kitti_drives
+from modt_desk.evaluation.truth import Role
+from modt_desk.experiments.catalogue import chosen
+from modt_desk.experiments.drives import completed, kitti_drives
 from modt_desk.experiments.study import Study
+from modt_desk.simulation.kitti_raw import DriveWriter
+from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
 
 
 def test_a_folder_without_labels_is_refused(tmp_path):
@@ -14,9 +16,29 @@ def test_a_folder_without_labels_is_refused(tmp_path):
         kitti_drives(tmp_path)
 
 
+def test_further_objects_make_another_drive_of_the_one_that_has_its_sweeps(tmp_path):
+    writer = DriveWriter(tmp_path, CAMERA)
+    for frame, truth in SyntheticStream("street", "vlp-16", 0.2, seed=2).sweeps():
+        writer.write(frame, truth)
+    writer.close()
+    table = tmp_path / "further.csv"
+    head = "frame,object,type,x,y,z_bottom,length,width,height,yaw"
+    table.write_text(f"{head}\n0,0,Pedestrian,9,0,-1.7,0.6,0.6,1.7,0\n")
+    drives = kitti_drives(tmp_path)
+    whole = completed(drives, table)
+    before, after = drives[0].labels()[0], whole.labels()[0]
+    added = after.role == Role.FURTHER
+    assert added.sum() == 1
+    assert not set(after.id[added]) & set(before.id), "its number may be that of a label"
+    streams = {name for name, _ in Study([], [*drives, whole], [()])._streams(chosen(["table4"])[0])}
+    assert streams == {drives[0].name, whole.name}
+    with pytest.raises(MisuseError, match="2 have their sweeps"):
+        completed([*drives, *drives], table)
+
+
 @pytest.mark.kitti
 def test_the_labels_give_table_iii(kitti_root):
-    study = Study([TABLE_III, FIGURE_8], kitti_drives(kitti_root), [()], {})
+    study = Study(chosen(["table3", "fig8"]), kitti_drives(kitti_root), [()])
     rows = study.rows(1, lambda name: None)
     found = {row.streams: row for row in rows if row.experiment == "table3" and row.quantity == "N_go"}
     lives = {"0005, tracking 0000": 34.9, "0014, tracking 0004": 26.9, "0001": 33.1, "0059, tracking 0011": 63.3}

@@ -7,9 +7,10 @@ from modt.classes import ObjectClass
 from modt.types import NONE
 from modt_desk.evaluation.class_score import class_scores
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, table
-from modt_desk.experiments.catalogue.estimate import Estimate, ratio
-from modt_desk.experiments.catalogue.figures import ObjectLives, TrackLives, latencies, precisions
-from modt_desk.experiments.judged import CALL, CENTRE, FRAME, Judged
+from modt_desk.evaluation.truth import Role
+from modt_desk.experiments.estimate import Estimate, ratio
+from modt_desk.experiments.figures import ObjectLives, TrackLives, curves, precisions
+from modt_desk.experiments.judged import CALL, FRAME, Judged
 
 CAR = int(ObjectClass.CAR)
 
@@ -38,7 +39,7 @@ def judged(n_objects: int, n_frames: int, seed: int = 0) -> Judged:
         said=np.where(score > 0.5, CAR, 0),
     )
     calls = table(CALL, n_objects, track=np.arange(n_objects), points=10)
-    return Judged(np.zeros(n_frames, FRAME), objects, proposals, calls, np.zeros(0, CENTRE))
+    return Judged(np.zeros(n_frames, FRAME), objects, proposals, calls)
 
 
 def test_average_precision_is_that_of_the_judgement():
@@ -70,8 +71,7 @@ def test_ratio_is_one_of_sums_and_resamples_whole_objects():
 def test_lives_of_objects_count_breaks_and_frames_without_a_track():
     objects = table(OBJECT, 6, id=[1, 1, 1, 1, 2, 2], frame=[0, 1, 2, 3, 0, 1], **{"class": CAR}, to_follow=True)
     objects["track"] = [7, NONE, 8, 8, 9, 9]
-    made = Judged(*(np.zeros(0, kind) for kind in (FRAME, OBJECT, PROPOSAL, CALL, CENTRE)))
-    found = ObjectLives.of(Judged(made.frames, objects, made.proposals, made.calls, made.centres))
+    found = ObjectLives.of(Judged(np.zeros(0, FRAME), objects, np.zeros(0, PROPOSAL), np.zeros(0, CALL)))
     assert (found.wanted.tolist(), found.followed.tolist(), found.breaks.tolist()) == ([4, 2], [3, 2], [1, 0])
 
 
@@ -81,10 +81,18 @@ def test_lives_of_tracks_tell_objects_from_background():
     assert found.calls.tolist() == [1] * 3 + [0] * 3
 
 
-def test_latency_is_counted_from_the_first_frame():
-    objects = table(OBJECT, 4, id=[1, 1, 1, 2], frame=[5, 6, 7, 5], **{"class": CAR}, to_classify=True)
-    objects["said"] = [NONE, 0, CAR, 0]
-    empty = Judged(*(np.zeros(0, kind) for kind in (FRAME, OBJECT, PROPOSAL, CALL, CENTRE)))
-    waited, ever = latencies(Judged(empty.frames, objects, empty.proposals, empty.calls, empty.centres), "x")
-    assert waited.estimate.value == 2.0
-    assert ever.estimate.value == 0.5
+def test_further_objects_count_for_precision_alone():
+    made = judged(5, 30)
+    made.objects["role"][made.objects["id"] > 2] = Role.FURTHER
+    made.objects["to_follow"] = made.objects["role"] != Role.FURTHER
+    car = next(f for f in precisions(made, "x") if f.quantity == "AP car").estimate
+    assert car.n == 5
+    assert len(ObjectLives.of(made).wanted) == 3
+
+
+def test_a_curve_falls_from_the_most_probable_to_the_last_found():
+    found = [(f.at, f.estimate.value) for f in curves(judged(5, 30), "x") if f.quantity == "precision car"]
+    recalls, values = zip(*found, strict=True)
+    assert list(recalls) == sorted(recalls)
+    assert list(values) == sorted(values, reverse=True)
+    assert recalls[-1] <= 0.95

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from modt.profile import load
-from modt_desk.experiments.catalogue.figures import ObjectLives
+from modt_desk.experiments.figures import ObjectLives
 from modt_desk.experiments.replays import NetworkReplay
 from tests.desk.experiments.drives import short_drives
 

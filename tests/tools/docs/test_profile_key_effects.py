@@ -124,11 +124,6 @@ def paper(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "tracking.association", "paper"))
 
 
-def printed(config: ProfileConfig, folder: Path) -> str:
-    """The paper's cost as printed, by which pairs that lie apart compete."""
-    return paper(changed(config, "tracking.paper.differences", "subtracted"), folder)
-
-
 def one_mJ(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(3, 1.0), changed(config, "scheduler.energy_mJ_per_frame", 1.0))
 
@@ -229,7 +224,6 @@ SCENARIOS: dict[str, Scenario] = {
     "segmentation.view_margin.": camera,
     "segmentation.car_merging.min_person_top_m": long_street,
     "tracking.paper.": paper,
-    "tracking.paper.gate": printed,
     "tracking.split.": long_street,
     "tracking.merge.": long_street,
     "tracking.background_map.": long_street,

@@ -2,7 +2,7 @@
 
 from modt.geometry import FieldOfView
 from modt_desk.evaluation.evaluation import evaluation
-from tools.study.leave_one_out import simulated
+from tools.study.drives import simulated
 from tools.study.sensors import row, run
 
 

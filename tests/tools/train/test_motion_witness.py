@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tools.study.leave_one_out import simulated
+from tools.study.drives import simulated
 from tools.train.motion_witness import CELLS, MOST, WEIGHT, counted, log_likelihood_ratio
 
 

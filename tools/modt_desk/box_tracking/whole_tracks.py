@@ -9,8 +9,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from modt.geometry import wrap
-from modt.geometry.boxes import iou_3d
 from modt.types import Bool, Float64, Int
+from modt_desk.box_tracking.overlap import iou_3d
 
 MIN_IOU = 0.25
 """Overlap of boxes of two classes from which both are of one object."""

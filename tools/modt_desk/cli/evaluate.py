@@ -45,8 +45,6 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: a run or its labels cannot be used, or do not belong together.
     """
     if arguments.experiment:
-        if arguments.further:
-            raise MisuseError("--experiment", "takes no further objects", "leave --further out, or --experiment")
         if arguments.pairs:
             raise MisuseError("--experiment", "takes no runs", "leave RUN TRUTH out, or --experiment")
         return experiments.run(arguments)

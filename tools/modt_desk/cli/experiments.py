@@ -6,17 +6,15 @@ import argparse
 import shlex
 import sys
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from modt import host
 from modt.cli import options
 from modt.cli.progress import bar
-from modt.errors import MisuseError, install
+from modt.errors import MisuseError
 
 if TYPE_CHECKING:  # NumPy is imported once the process is pinned
-    from modt.config import EnergyConfig
     from modt_desk.experiments.study import Row
 
 
@@ -34,8 +32,6 @@ def add_options(p: argparse.ArgumentParser) -> None:
     options.add_profile_option(g, "on top of each drive's sensor; later ones win key by key")
     beside = "the same again with this profile on top; repeatable"
     g.add_argument("--beside", action="append", default=[], metavar="NAME|FILE", help=beside)
-    board = "from modt-profile calibrate, for the energy of the first profile; then of each beside; repeatable"
-    g.add_argument("--calibration", action="append", default=[], metavar="FILE", help=board)
     g.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="default: %(default)s")
     jobs = options.integer(1, 1024, "processes")
     g.add_argument("--jobs", type=jobs, default=1, metavar="N", help="processes (default: %(default)s)")
@@ -50,24 +46,23 @@ def run(arguments: argparse.Namespace) -> int:
     """
     host.pin_to_core(None)  # one thread a process: NumPy is imported from here on
     from modt.sinks.output import writing
-    from modt_desk.experiments.catalogue.every import chosen
-    from modt_desk.experiments.drives import Drive, kitti_drives, simulated_drives
-    from modt_desk.experiments.markdown import markdown
-    from modt_desk.experiments.sources import sources
+    from modt_desk.experiments.catalogue import chosen
+    from modt_desk.experiments.drives import Drive, completed, kitti_drives, simulated_drives
+    from modt_desk.experiments.markdown import markdown, sources
     from modt_desk.experiments.study import Study
 
     experiments = chosen(arguments.experiment)
-    drives: list[Drive] = [] if arguments.kitti is None else [*kitti_drives(arguments.kitti)]
+    recorded = [] if arguments.kitti is None else kitti_drives(arguments.kitti)
+    drives: list[Drive] = [*recorded]
+    if arguments.further is not None:
+        drives.append(completed(recorded, arguments.further))
     drives += simulated_drives(arguments.simulated, arguments.seconds)
     if not drives:
         raise MisuseError("--experiment", "no drives", "give --kitti ROOT, --simulated N or both")
     out: Path = arguments.out
     base = tuple(arguments.profile)
     profiles = [base, *((*base, name) for name in arguments.beside)]
-    if len(arguments.calibration) > len(profiles):
-        raise MisuseError("--calibration", "more of them than profiles", "give one, and one for each --beside")
-    boards = dict(zip(profiles, map(_board, arguments.calibration), strict=False))
-    study = Study(experiments, drives, profiles, boards)
+    study = Study(experiments, drives, profiles)
     with bar(len(study.tasks()), "replay", shown=not arguments.quiet and sys.stderr.isatty()) as tick:
         rows = study.rows(arguments.jobs, tick)
     if not rows:
@@ -77,15 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
         _write_table(out / "results.csv", rows)
-        text = markdown(_command(arguments), sources(profiles, boards.values()), experiments, rows)
+        text = markdown(_command(arguments), sources(profiles), experiments, rows)
         (out / "results.md").write_text(text, encoding="utf-8")
-        if find_spec("matplotlib"):
-            from modt_desk.experiments.charts import draw
-
-            for experiment in experiments:
-                draw(out, experiment, [row for row in rows if row.experiment == experiment.name])
-        else:
-            print(f"modt: no charts; {install('view')}", file=sys.stderr)
     print(f"{len(rows)} figures: {out / 'results.md'}, {out / 'results.csv'}")
     return 0
 
@@ -100,21 +88,6 @@ def _write_table(path: Path, rows: Sequence[Row]) -> None:
         table.writerows(map(asdict, rows))
 
 
-def _board(file: str) -> EnergyConfig:
-    """Coefficients of a calibration.
-
-    Raises:
-        MisuseError: the file has none.
-    """
-    from modt import profile
-
-    energy = profile.load((profile.DEFAULT, file)).energy
-    if energy.coefficients is None:
-        cause, remedy = "no energy of a classification", "write it by modt-profile calibrate"
-        raise MisuseError(f"--calibration {file}", cause, remedy)
-    return energy
-
-
 def _command(arguments: argparse.Namespace) -> str:
     """As another user would write it."""
     words = ["modt", "evaluate", "--experiment", *arguments.experiment]
@@ -123,5 +96,5 @@ def _command(arguments: argparse.Namespace) -> str:
     words += ["--seconds", f"{arguments.seconds:g}"] if arguments.simulated else []
     words += [word for name in arguments.profile for word in ("--profile", name)]
     words += [word for name in arguments.beside for word in ("--beside", name)]
-    words += [word for name in arguments.calibration for word in ("--calibration", name)]
+    words += ["--further", arguments.further.name] if arguments.further else []
     return shlex.join(words)

@@ -38,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     path = arguments.run_directory
     if path.is_file():
-        raise MisuseError(path, "is a file", "give the directory of a run; comparisons: modt-profile regimes")
+        raise MisuseError(path, "is a file", "give the directory of a run")
     with records_of(path), np.errstate(over="raise", invalid="raise"):
         tree = run_tree(path)
         document, plots = run_document(tree), [*run_plots(tree), *lateness_plots(path)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -15,8 +15,10 @@ from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.profile import DEFAULT
 from modt.types import Frame
+from modt_desk.evaluation.further_objects import with_further
+from modt_desk.evaluation.kitti_labels import MAX_ID
 from modt_desk.evaluation.rules import CUBOID_RULES, Rules
-from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role, Truth
+from modt_desk.evaluation.truth import KITTI_TYPES, PAPER_TYPES, FrameTruth, Role, Truth
 from modt_desk.evaluation.truth_files import TRACKLETS, open_truth
 from modt_desk.simulation.kinds import TRUCK
 from modt_desk.simulation.synthetic_stream import SyntheticStream
@@ -32,6 +34,8 @@ DEVELOPMENT_DRIVES = frozenset({"0005"})
 FIRST_SEED = 7000
 """First seed of the simulated drives; nothing is trained or chosen on these."""
 SCENES = ("street", "crossing")
+_FURTHER = MAX_ID + 1
+"""Added to the numbers of further objects, which may equal those of labels."""
 SIMULATED_TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTRAL)}
 _NO_LABELS = frozenset({"velodyne_points", "velodyne", "oxts", "image_00", "image_01", "image_02", "image_03"})
 
@@ -45,12 +49,14 @@ class KittiDrive:
         number: of the raw drive, the sequence where it is not known.
         path: of the drive, or the label file.
         scans: whether sweeps of half of the labelled frames or more are there.
+        further: table of objects that its labels leave out, None for the labels alone.
     """
 
     name: str
     number: str
     path: Path
     scans: bool
+    further: Path | None = None
     kind: str = KITTI
     sensor: str = DEFAULT
 
@@ -61,7 +67,7 @@ class KittiDrive:
 
     def labels(self) -> dict[int, FrameTruth]:
         """Labels by frame; vans and sitting people are ignored, as in the paper."""
-        return dict(_truth(self.path).frames)
+        return dict(_truth(self.path, self.further).frames)
 
     def rules(self) -> Rules:
         """Labels cover the camera's view."""
@@ -75,7 +81,7 @@ class KittiDrive:
 
     def sweeps(self) -> Iterator[tuple[Frame, FrameTruth]]:
         """Its labelled sweeps."""
-        truth = _truth(self.path)
+        truth = _truth(self.path, self.further)
         for frame in truth.scans or ():
             if frame.index in truth.frames:
                 yield frame, truth.frames[frame.index]
@@ -138,6 +144,21 @@ def kitti_drives(root: Path) -> list[KittiDrive]:
     )
 
 
+def completed(drives: Sequence[KittiDrive], further: Path) -> KittiDrive:
+    """The drive whose sweeps are there, with the objects of a table that its labels leave out.
+
+    Raises:
+        MisuseError: there is not one such drive, or the table is broken or of another drive.
+    """
+    own = [drive for drive in drives if drive.scans]
+    if len(own) != 1:
+        cause = f"is the table of one drive, and {len(own)} have their sweeps"
+        raise MisuseError("--further", cause, "give a folder with the sweeps of that drive alone")
+    found = replace(own[0], name=f"{own[0].name}, complete", further=further)
+    found.labels()
+    return found
+
+
 def simulated_drives(n: int, seconds: float) -> list[SimulatedDrive]:
     """Scenes in turn, a seed each."""
     return [SimulatedDrive(SCENES[k % len(SCENES)], FIRST_SEED + k, seconds) for k in range(n)]
@@ -171,5 +192,13 @@ def _drive(path: Path) -> KittiDrive:
 
 
 @cache
-def _truth(path: Path) -> Truth:
-    return open_truth(path, paper=True)
+def _truth(path: Path, further: Path | None = None) -> Truth:
+    truth = open_truth(path, paper=True)
+    if further is None:
+        return truth
+    truth = with_further(truth, further, PAPER_TYPES)
+    frames = {
+        number: replace(frame, id=np.where(frame.role == Role.FURTHER, frame.id + _FURTHER, frame.id))
+        for number, frame in truth.frames.items()
+    }
+    return replace(truth, frames=frames)

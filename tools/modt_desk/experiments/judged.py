@@ -8,11 +8,10 @@ from typing import Self
 
 import numpy as np
 
-from modt.classes import ObjectClass
 from modt.classification.scheduler import padded_each
 from modt.config import ClassificationConfig
-from modt.geometry import FieldOfView, inverse, transform
-from modt.types import NONE, Float64, FrameResult
+from modt.geometry import FieldOfView
+from modt.types import NONE, FrameResult
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Rows, table
@@ -23,18 +22,6 @@ from modt_desk.experiments.segmented import SegmentedFrame
 FRAME = np.dtype([("drive", int), ("frame", int), ("proposals", int)])
 CALL = np.dtype([("drive", int), ("frame", int), ("track", int), ("points", int)])
 """A row a classification: points that the network processed, padding included."""
-CENTRE = np.dtype(
-    [
-        ("drive", int),
-        ("frame", int),
-        ("id", int),  # of a labelled car
-        ("truth", float, 2),  # centre of its box [m, world]
-        ("mean", float, 2),  # of the points of its track's proposal
-        ("box", float, 2),  # centre of their box
-        ("filter", float, 2),  # position of the track
-        ("start", float, 2),  # where the sensor was in the first frame
-    ]
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +32,6 @@ class Judged:
     objects: Rows
     proposals: Rows
     calls: Rows
-    centres: Rows
 
     @classmethod
     def of_labels(cls, labels: Iterable[tuple[int, FrameTruth]]) -> Self:
@@ -58,7 +44,7 @@ class Judged:
             rows.append(table(OBJECT, len(truth.id), **columns, frame=frame, range_m=range_m, to_follow=wanted))
         objects = np.concatenate([np.zeros(0, OBJECT), *rows])
         frames = np.array([(0, row["frame"][0] if len(row) else NONE, len(row)) for row in rows], FRAME)
-        return cls(frames, objects, np.zeros(0, PROPOSAL), np.zeros(0, CALL), np.zeros(0, CENTRE))
+        return cls(frames, objects, np.zeros(0, PROPOSAL), np.zeros(0, CALL))
 
     @classmethod
     def of_results(
@@ -69,25 +55,19 @@ class Judged:
         limits: ClassificationConfig,
     ) -> Self:
         """Of a drive's results beside its labels."""
-        frames, objects, proposals, calls, centres = [], [], [], [], []
-        start: Float64 | None = None
+        frames, objects, proposals, calls = [], [], [], []
         for result, known in results:
             truth = known.truth
             seen, tracked, _ = judge(JudgedFrame.of_result(result, truth, fov), rules, points=known.objects)
-            index, pose = result.frame.index, result.frame.T_world_sensor
-            frames.append((0, index, len(result.proposals)))
+            frames.append((0, result.frame.index, len(result.proposals)))
             objects.append(seen)
             proposals.append(tracked)
             calls.append(_calls(result, limits))
-            if pose is not None:
-                start = pose[:2, 3] if start is None else start
-                centres.append(_centres(result, truth, seen, pose, start))
         return cls(
             np.array(frames, FRAME),
             np.concatenate([np.zeros(0, OBJECT), *objects]),
             np.concatenate([np.zeros(0, PROPOSAL), *proposals]),
             np.concatenate([np.zeros(0, CALL), *calls]),
-            np.concatenate([np.zeros(0, CENTRE), *centres]),
         )
 
     @classmethod
@@ -109,29 +89,3 @@ def _calls(result: FrameResult, limits: ClassificationConfig) -> Rows:
     rows = np.flatnonzero(np.isin(tracks.id, result.classified))
     points = padded_each(result.proposals.count[tracks.proposal[rows]], limits)
     return table(CALL, len(rows), frame=result.frame.index, track=tracks.id[rows], points=points)
-
-
-def _centres(result: FrameResult, truth: FrameTruth, objects: Rows, pose: Float64, start: Float64) -> Rows:
-    """The cars of a frame that are followed."""
-    tracks, proposals = result.tracks, result.proposals
-    cars = np.flatnonzero((objects["class"] == ObjectClass.CAR) & (objects["track"] != NONE))
-    row = {int(id_): k for k, id_ in enumerate(tracks.id)}
-    rows = np.array([row[id_] for id_ in objects["track"][cars].tolist()], np.int64)
-    own = tracks.proposal[rows]
-    T_world_box = pose @ inverse(truth.T_box_sensor)
-
-    def placed(T: Float64, xyz: Float64) -> Float64:
-        xy: Float64 = transform(T, xyz.reshape(-1, 3))[:, :2]
-        return xy
-
-    return table(
-        CENTRE,
-        len(cars),
-        frame=result.frame.index,
-        id=objects["id"][cars],
-        truth=placed(T_world_box, truth.box[cars, :3]),
-        mean=placed(pose, proposals.centroid[own]),
-        box=placed(pose, proposals.box[own, :3]),
-        filter=tracks.x[rows, :2],
-        start=start,
-    )

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
+from modt import host, profile
+from modt.classification.pointnet import PointNet
 from modt_desk.experiments import paper
-from modt_desk.experiments.catalogue.experiment import Experiment
+from modt_desk.experiments.catalogue import Experiment
 from modt_desk.experiments.drives import KITTI
-from modt_desk.experiments.shortfalls import number, shortfalls
 from modt_desk.experiments.study import Row
 
 _MOST = 6
 """Values of a sweep in a table; the CSV file has all."""
-_CURVES = ("precision ", "distance ")
-"""Beginnings of quantities that are drawn, not listed."""
+_CURVES = "precision "
+"""Beginning of quantities that only the CSV file has."""
 _NOT_THERE = "-"
 
 
 def markdown(command: str, sources: str, experiments: Sequence[Experiment], rows: Sequence[Row]) -> str:
     """Results in tables, streams of development last."""
-    return "\n".join([*_head(command, sources, rows), *shortfalls(rows), *_body(experiments, rows)]) + "\n"
+    return "\n".join([*_head(command, sources, rows), *_body(experiments, rows)]) + "\n"
 
 
 def _head(command: str, sources: str, rows: Sequence[Row]) -> Iterator[str]:
@@ -27,14 +30,14 @@ def _head(command: str, sources: str, rows: Sequence[Row]) -> Iterator[str]:
     yield from (
         "# Results",
         "",
-        "The paper's tables and figures (its section VI), and what goes beyond them, as this command finds them:",
+        "The paper's tables and figures (its section VI), made by this command:",
         "",
         f"    {command}",
         "",
         f"{sources}. In brackets: the 95 % interval of a bootstrap over objects (beta, false alarms: over tracks), "
         "not given of a single one; *paper*: what the paper states, over its eight drives where not of the drive "
         "itself. Simulated drives and KITTI's stand apart; drives that choices of this project were confirmed on "
-        f"come last: {development}. Curves and whole sweeps are in the files that the command writes: CSV, SVG, PNG.",
+        f"come last: {development}. Curves and whole sweeps are in results.csv beside this file.",
         "",
     )
 
@@ -68,7 +71,7 @@ def _table(experiment: Experiment, rows: Sequence[Row]) -> Iterator[Sequence[str
         if any(row.at is None for row in rows):
             columns[None] = "not swept"
         columns.update((at, f"{at:g}") for at in _spread(swept))
-        columns[swept[0]] = f"{experiment.charts[0].x_label} {swept[0]:g}"
+        columns[swept[0]] = f"{experiment.swept} {swept[0]:g}"
     else:
         columns.update((row.quantity, row.quantity) for row in rows)
     head = ("streams", "variant", *(["quantity"] if swept else []), *columns.values())
@@ -84,6 +87,11 @@ def _spread(values: Sequence[float]) -> list[float]:
     return [values[round(k * (len(values) - 1) / (_MOST - 1))] for k in range(_MOST)]
 
 
+def number(value: float) -> str:
+    """Three digits."""
+    return f"{value:.0f}" if abs(value) >= 100 or value == int(value) else f"{value:.3g}"
+
+
 def _cell(row: Row) -> str:
     if row.value is None:
         return _NOT_THERE
@@ -91,3 +99,20 @@ def _cell(row: Row) -> str:
     if row.low is not None and row.high is not None:
         text += f" ({number(row.low)} to {number(row.high)})"
     return text if row.paper is None else f"{text}; paper {number(row.paper)}"
+
+
+def sources(profiles: Sequence[Sequence[str]]) -> str:
+    """A sentence: the commit, and the networks of these profiles."""
+    configs = [profile.load(list(names)) for names in profiles]
+    facts = [PointNet(config.classification, config.sensor).facts() for config in configs]
+    models = ", ".join(dict.fromkeys(f"{found['file']} ({found['sha256'][:12]})" for found in facts))
+    return f"Commit {commit()}, model {models}"
+
+
+def commit() -> str:
+    """Commit of the checkout, else the version."""
+    git = ["git", "-C", str(Path(__file__).parent), "describe", "--always", "--dirty", "--exclude=*"]
+    try:
+        return subprocess.run(git, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return f"version {host.versions()['modt']}"

@@ -37,14 +37,12 @@ class NetworkReplay:
         mode: mode of the method.
         ideal: whether the tracker is.
         range_m: range of interest; proposals beyond it are left out.
-        poses: whether those of the drive are used.
     """
 
     config: ProfileConfig
     mode: str = "accurate"
     ideal: bool = False
     range_m: float = np.inf
-    poses: bool = True
 
     def judged(self, drive: Drive) -> Judged:
         """Tables of the drive, replayed frame by frame."""
@@ -55,8 +53,7 @@ class NetworkReplay:
         pipeline = self._pipeline(known)
         budget = replace(assembly.MODES[self.mode].budget(self.config), mean_ms=None)
         for made in known.frames:
-            frame = made.frame if self.poses else replace(made.frame, T_world_sensor=None)
-            yield pipeline.step(frame, budget), made
+            yield pipeline.step(made.frame, budget), made
 
     def _pipeline(self, known: SegmentedDrive) -> Pipeline:
         config, limits, mode = self.config, self.config.classification, assembly.MODES[self.mode]

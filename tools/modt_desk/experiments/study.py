@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import pickle
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from modt import profile
-from modt.config import EnergyConfig
 from modt_desk.experiments import paper
-from modt_desk.experiments.catalogue.experiment import Experiment, Label
-from modt_desk.experiments.catalogue.figures import Figure
-from modt_desk.experiments.drives import KITTI, Drive, KittiDrive
+from modt_desk.experiments.catalogue import Experiment, Label
+from modt_desk.experiments.drives import Drive, KittiDrive
+from modt_desk.experiments.figures import Figure
 from modt_desk.experiments.judged import Judged
 from modt_desk.experiments.replays import Replay
 
@@ -68,13 +64,11 @@ class Study:
         experiments: to make.
         drives: to make them on.
         profiles: each on top of that of a drive's sensor, compared with one another; labels alone need the first.
-        boards: calibrations, of the networks of such profiles.
     """
 
     experiments: Sequence[Experiment]
     drives: Sequence[Drive]
     profiles: Sequence[Profiles]
-    boards: Mapping[Profiles, EnergyConfig]
 
     def tasks(self) -> list[Task]:
         """Every replay once, drive by drive, so that those with the same segmentation follow one another."""
@@ -90,37 +84,26 @@ class Study:
 
     def rows(self, jobs: int, tick: Callable[[str], None]) -> list[Row]:
         """Figures of every experiment, streams of development last; tick is called with the drive of each replay."""
-        with TemporaryDirectory() as folder:
-            files = {task: Path(folder, f"{k}.pickle") for k, task in enumerate(self.tasks())}
-            for name in _replayed(files, jobs):
-                tick(name)
-            return [
-                _row(e, streams, drives, names, figure)
-                for e in self.experiments
-                for streams, drives in self._streams(e)
-                for names in self._compared(e)
-                for figure in self._figures(e, drives, names, files)
-            ]
-
-    def _figures(
-        self, experiment: Experiment, drives: Sequence[Drive], names: Profiles, files: Mapping[Task, Path]
-    ) -> Iterator[Figure]:
-        found: dict[Label, list[Judged]] = {}
-        for drive in drives:
-            for label, replay in _replays(experiment, drive, names).items():
-                found.setdefault(label, []).append(pickle.loads(files[drive, replay].read_bytes()))
-        outcomes = {label: Judged.pooled(judged) for label, judged in found.items()}
-        for label, judged in outcomes.items():
-            yield from experiment.figures(judged, *label)
-        for label, judged in outcomes.items():
-            yield from experiment.energies(judged, *label, self.boards.get(names, EnergyConfig()))
+        outcomes: dict[Task, Judged] = {}
+        for task, judged in _replayed(self.tasks(), jobs):
+            outcomes[task] = judged
+            tick(task[0].name)
+        return [
+            _row(e, streams, drives, names, figure)
+            for e in self.experiments
+            for streams, drives in self._streams(e)
+            for names in self._compared(e)
+            for figure in _figures(e, drives, names, outcomes)
+        ]
 
     def _compared(self, experiment: Experiment) -> Sequence[Profiles]:
         return self.profiles if experiment.scans else self.profiles[:1]
 
     def _suited(self, experiment: Experiment) -> list[Drive]:
         """Drives with sweeps where they are needed; for labels alone, KITTI's."""
-        return [drive for drive in self.drives if (drive.scans if experiment.scans else drive.kind == KITTI)]
+        if experiment.scans:
+            return [drive for drive in self.drives if drive.scans]
+        return [drive for drive in self.drives if isinstance(drive, KittiDrive) and drive.further is None]
 
     def _streams(self, experiment: Experiment) -> Iterator[tuple[str, Sequence[Drive]]]:
         """Names of drives that are pooled, with these."""
@@ -129,36 +112,47 @@ class Study:
         if simulated:
             yield f"{len(simulated)} simulated drives", simulated
         recorded = [drive for drive in suited if isinstance(drive, KittiDrive)]
-        once = list({drive.number: drive for drive in recorded}.values())
+        once = list({drive.number: drive for drive in recorded if drive.further is None}.values())
         if len(once) > 1:
             yield f"{len(once)} KITTI drives", once
         for drive in sorted(recorded, key=lambda drive: drive.development):
             yield drive.name, [drive]
 
 
+def _figures(
+    experiment: Experiment, drives: Sequence[Drive], names: Profiles, outcomes: Mapping[Task, Judged]
+) -> Iterator[Figure]:
+    found: dict[Label, list[Judged]] = {}
+    for drive in drives:
+        for label, replay in _replays(experiment, drive, names).items():
+            found.setdefault(label, []).append(outcomes[drive, replay])
+    for label, judged in found.items():
+        yield from experiment.figures(Judged.pooled(judged), *label)
+
+
 def _replays(experiment: Experiment, drive: Drive, names: Profiles) -> Mapping[Label, Replay]:
     return experiment.replays(profile.load((drive.sensor, *names)))
 
 
-def _replayed(files: Mapping[Task, Path], jobs: int) -> Iterator[str]:
-    """The drive of each task, once its outcome is in its file."""
+def _replayed(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Task, Judged]]:
+    """Each task with its outcome."""
     if jobs == 1:
-        yield from map(_replay, files, files.values())
+        yield from zip(tasks, map(_replay, tasks), strict=True)
         return
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        yield from pool.map(_replay, files, files.values(), chunksize=_CHUNK)
+        yield from zip(tasks, pool.map(_replay, tasks, chunksize=_CHUNK), strict=True)
 
 
-def _replay(task: Task, file: Path) -> str:
+def _replay(task: Task) -> Judged:
     drive, replay = task
-    file.write_bytes(pickle.dumps(replay.judged(drive)))
-    return drive.name
+    return replay.judged(drive)
 
 
 def _row(experiment: Experiment, streams: str, drives: Sequence[Drive], names: Profiles, figure: Figure) -> Row:
     estimate, kind = figure.estimate, drives[0].kind
     stated = paper.figure(experiment.name, streams, figure.variant, figure.at, figure.quantity)
-    paper_value, paper_over = stated if stated and kind == KITTI else (None, None)
+    as_labelled = isinstance(drives[0], KittiDrive) and drives[0].further is None
+    paper_value, paper_over = stated if stated and as_labelled else (None, None)
     return Row(
         experiment=experiment.name,
         streams=streams,

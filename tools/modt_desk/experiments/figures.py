@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.classes import CLASS_NAMES
-from modt.types import NONE, Bool, Float64, Int
-from modt_desk.evaluation.rows import Rows
+from modt.types import NONE, Bool, Int
 from modt_desk.evaluation.track_score import track_scores
-from modt_desk.evaluation.truth import Role
-from modt_desk.experiments.catalogue.estimate import Estimate, Ranking, ratio
+from modt_desk.evaluation.truth import CLASSIFIED, Role
+from modt_desk.experiments.estimate import Estimate, Ranking, ratio
 from modt_desk.experiments.judged import Judged
 
 OBJECTS = CLASS_NAMES[1:]
-PRECISIONS = tuple(f"AP {name}" for name in OBJECTS)
 NOTHING = Estimate(None)
 
 
@@ -41,7 +39,7 @@ def rankings(judged: Judged) -> Iterator[tuple[str, Ranking]]:
     """The ranking of each class of objects."""
     objects = judged.objects
     for c, name in enumerate(OBJECTS, 1):
-        counted = (objects["class"] == c) & (objects["role"] == Role.COUNTED) & objects["to_classify"]
+        counted = (objects["class"] == c) & np.isin(objects["role"], CLASSIFIED) & objects["to_classify"]
         yield name, Ranking.of(objects, judged.proposals, c, counted)
 
 
@@ -57,8 +55,8 @@ def precisions(judged: Judged, variant: str, at: float | None = None) -> Iterato
 def curves(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
     """Precision over recall by class."""
     for name, ranking in rankings(judged):
-        for recall, estimate in ranking.precision_at_recalls():
-            yield Figure(variant, recall, f"precision {name}", estimate)
+        for recall, precision in ranking.precision_at_recalls():
+            yield Figure(variant, recall, f"precision {name}", Estimate(precision))
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,30 +127,3 @@ def efficiencies(judged: Judged, variant: str, at: float | None = None) -> Itera
     objects = tracks.take(tracks.on_object)
     yield Figure(variant, at, "beta", ratio(tracks.calls, tracks.frames))
     yield Figure(variant, at, "beta of objects", ratio(objects.calls, objects.frames))
-
-
-def alarms(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
-    """What is said to be an object and is none; a frame, over tracks."""
-    rows = judged.proposals
-    names, unit = np.unique(rows[["drive", "track"]], return_inverse=True)
-    share = np.full(len(names), len(judged.frames) / max(len(names), 1))
-    for c, name in [(None, "all"), *enumerate(OBJECTS, 1)]:
-        said = rows["said"] > 0 if c is None else rows["said"] == c
-        false = np.bincount(unit[said & (rows["owner"] == 0) & rows["to_call"]], minlength=len(names))
-        yield Figure(variant, at, f"false alarms a frame, {name}", ratio(false, share))
-
-
-def latencies(judged: Judged, variant: str, at: float | None = None) -> Iterator[Figure]:
-    """Frames from an object's first one to that in which it is first said to be what it is."""
-    rows: Rows = judged.objects
-    rows = rows[rows["to_classify"] & (rows["id"] != NONE)]
-    rows = np.sort(rows, order=["drive", "id", "frame"])
-    names, first, unit = np.unique(rows[["drive", "id"]], return_index=True, return_inverse=True)
-    right = rows["said"] == rows["class"]
-    never = np.iinfo(np.int64).max
-    at_frame = np.full(len(names), never)
-    np.minimum.at(at_frame, unit[right], rows["frame"][right])
-    called = at_frame < never
-    waited: Float64 = np.where(called, at_frame - rows["frame"][first], 0).astype(np.float64)
-    yield Figure(variant, at, "frames to a correct class", ratio(waited[called], np.ones(called.sum())))
-    yield Figure(variant, at, "objects ever called right", ratio(called, np.ones(len(names))))

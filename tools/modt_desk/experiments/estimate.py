@@ -25,11 +25,6 @@ class Estimate:
     high: float | None = None
     n: int | None = None
 
-    def sqrt(self) -> Estimate:
-        """The root of each."""
-        value, low, high = (None if v is None else float(np.sqrt(v)) for v in (self.value, self.low, self.high))
-        return Estimate(value, low, high, self.n)
-
 
 def ratio(part: ArrayLike, whole: ArrayLike) -> Estimate:
     """Sum of the parts (n,) of each object over that of their wholes (n,)."""
@@ -93,28 +88,14 @@ class Ranking:
         low, high = np.percentile(np.concatenate(parts), LEVEL).tolist()
         return Estimate(value, low, high, n)
 
-    def precision_at_recalls(self) -> list[tuple[float, Estimate]]:
-        """Precision at each of RECALLS that is reached."""
-        n = len(self.wanted)
-        if not n:
+    def precision_at_recalls(self) -> list[tuple[float, float]]:
+        """Each of RECALLS that is reached, with the precision there."""
+        if not len(self.wanted):
             return []
-        (precision,), (recall,) = self._curves(np.ones((1, n + self.tracks)))
+        (precision,), (recall,) = self._curves(np.ones((1, len(self.wanted) + self.tracks)))
         at = np.searchsorted(recall, RECALLS - 1e-9)
         reached = at < len(recall)
-        resampled = np.full((RESAMPLES, len(RECALLS)), np.nan)
-        if n > 1:
-            for row, weight in zip(resampled, self._weights(), strict=True):
-                (p,), (r,) = self._curves(weight[None])
-                row[:] = np.append(p, 0.0)[np.searchsorted(r, RECALLS - 1e-9)]
-        low, high = np.percentile(resampled, LEVEL, axis=0)
-        bounds: list[tuple[float | None, float | None]] = [
-            (None, None) if np.isnan(a) else (float(a), float(b)) for a, b in zip(low, high, strict=True)
-        ]
-        return [
-            (float(r), Estimate(float(precision[k]), a, b, n))
-            for r, k, (a, b), there in zip(RECALLS, at, bounds, reached, strict=True)
-            if there
-        ]
+        return list(zip(RECALLS[reached].tolist(), precision[at[reached]].tolist(), strict=True))
 
     def _weights(self) -> Float64:
         """(B, units) times that each object, and each track, is drawn."""

@@ -1,0 +1,52 @@
+"""Figures of the README and of the page on the paper."""
+
+import pytest
+
+from modt_desk.experiments.drives import kitti_drives
+from modt_desk.experiments.study import DEFAULT, Row
+from modt_desk.simulation.kitti_raw import DriveWriter
+from modt_desk.simulation.synthetic_stream import CAMERA, SyntheticStream
+from tools.docs import figures
+from tools.docs.paper_page import section
+
+
+def row(experiment, variant, quantity, value, stated, profile=DEFAULT):
+    """A row of a recorded drive."""
+    own = (experiment, "0005", "KITTI", profile, True, variant, None, quantity)
+    return Row(*own, value, 0.0, 1.0, 2, stated, "0005")
+
+
+def test_the_page_shows_what_tracking_adds_and_what_is_behind_the_paper():
+    made = section(
+        [
+            row("table4", "det_only", "AP car", 0.9, 0.922),
+            row("table4", "with_trk", "AP car", 0.98, 0.974),
+            row("table6", "accurate", "discontinuities", 61.0, 38.0, profile="paper"),
+            row("table6", "accurate", "N_go of objects", 5.74, 4.6, profile="paper"),
+        ],
+        "Commit x.",
+    )
+    assert made.startswith("Commit x.")
+    assert "90.0, 98.0 (+8.0)" in made
+    assert "54.4, 79.3 (+24.9)" in made
+    tables, behind = made.split("## Where this falls short")
+    assert "| 5.74 | 61 |" in tables
+    assert "discontinuities 61, not 38" in behind
+    assert "AP car 0.9, not 0.922" in behind
+    assert "0.98" not in behind
+    assert "N_go" not in behind
+
+
+@pytest.mark.slow
+def test_the_modes_of_a_drive_have_cost_and_accuracy(tmp_path, monkeypatch):
+    writer = DriveWriter(tmp_path, CAMERA)
+    for frame, truth in SyntheticStream("street", "hdl-64e", 0.4, seed=2).sweeps():
+        writer.write(frame, truth)
+    writer.close()
+    monkeypatch.setattr(figures, "FIRST", 0)
+    (drive,) = kitti_drives(tmp_path)
+    rows = [line.strip("| ").split(" | ") for line in figures.by_mode(drive, None)]
+    assert [len(cells) for cells in rows[2:]] == [5, 4, 4, 5]
+    compiled, numpy = ([float(cell.removesuffix(" ms")) for cell in cells[1:4]] for cells in rows[2:4])
+    assert min(compiled + numpy) > 0
+    assert rows[4][1] == "100.0 %"

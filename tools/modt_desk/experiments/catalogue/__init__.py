@@ -1,1 +1,0 @@
-"""The experiments, and the statistics that they share."""

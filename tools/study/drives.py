@@ -1,0 +1,50 @@
+"""Drives that studies are made on: simulated ones, and labelled recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from modt.config import ProfileConfig
+from modt.geometry import FieldOfView
+from modt.profile import DEFAULT, load
+from modt.sources.recognise import open_stream
+from modt.types import Frame
+from modt_desk.evaluation.rules import CUBOID_RULES, Rules
+from modt_desk.evaluation.truth import KITTI_TYPES, FrameTruth, Role
+from modt_desk.evaluation.truth_files import open_truth
+from modt_desk.simulation.kinds import TRUCK
+from modt_desk.simulation.synthetic_stream import SyntheticStream
+
+TYPES = {**KITTI_TYPES, TRUCK.name: (KITTI_TYPES["Car"][0], Role.NEUTRAL)}
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Frames with their labels, and the profile of their sensor."""
+
+    name: str
+    profile: ProfileConfig
+    frames: Sequence[tuple[Frame, FrameTruth]]
+    rules: Rules = CUBOID_RULES
+    fov: FieldOfView = field(default_factory=FieldOfView)
+
+
+def simulated(scene: str, sensor: str, seconds: float, seed: int) -> Drive:
+    """A simulated drive, labelled all round."""
+    stream = SyntheticStream(scene, sensor, seconds, seed)
+    frames = [
+        (frame, FrameTruth.of(TYPES, truth.bodies.tolist(), [kind.name for kind in truth.kinds], truth.boxes))
+        for frame, truth in stream.sweeps()
+    ]
+    return Drive(stream.info.name, load(sensor), frames)
+
+
+def labelled(path: Path, profile: str = DEFAULT) -> Drive:
+    """A labelled recording, its scans in `scans/` if there is such a folder; in the camera's view if it has one."""
+    scans = path / "scans"
+    stream, truth = open_stream(scans if scans.is_dir() else path), open_truth(path)
+    fov = FieldOfView() if stream.info.camera is None else FieldOfView.of_camera(stream.info.camera)
+    frames = [(frame, truth.frames[frame.index]) for frame in stream if frame.index in truth.frames]
+    return Drive(path.name, load(profile), frames, truth.rules, fov)
