@@ -70,6 +70,18 @@ def test_the_page_holds_the_run(run, records):
     assert [len(cell) > 1000 for cell, _ in page.points] == [True] * FRAMES
 
 
+def test_the_page_opens_where_there_is_an_object(run, records, tmp_path):
+    objects = [any(track["class"] != "background" for track in record["tracks"]) for record in records]
+    assert Page(run / "view.html").run["start"] == objects.index(True)
+    late = shutil.copytree(run, tmp_path / "late")
+    background = [record | {"tracks": [t | {"class": "background"} for t in record["tracks"]]} for record in records]
+    for first, begins in ((5, 5), (len(records), 0)):
+        lines = [*background[:first], *records[first:]]
+        (late / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+        assert modt("view", late, cwd=tmp_path).returncode == 0
+        assert Page(late / "view.html").run["start"] == begins
+
+
 def test_the_page_needs_nothing_from_outside(run):
     text = (run / "view.html").read_text()
     assert not re.search(r"https?:|<link|\bsrc=|\bimport\b|fetch\(", re.sub(r'<script type="text[^<]*', "", text))
