@@ -43,12 +43,14 @@ class Recognition:
         nearest: name of the shipped profile of the same beams, None where there is none.
         fitted: the profile with what was found in its place.
         tilt_deg: roll and pitch of the sensor where the profile leaves them open and they are not small.
+        same_sensor: whether all differences are those of the mount.
     """
 
     differences: tuple[str, ...]
     nearest: str | None
     fitted: ProfileConfig
     tilt_deg: tuple[float, float] | None = None
+    same_sensor: bool = False
 
     def mounted(self, config: ProfileConfig) -> ProfileConfig:
         """A profile with the tilt that was found, where it leaves the mount open."""
@@ -73,7 +75,8 @@ class Recognition:
         done = "used instead: what the first sweep shows" if replaced else "used all the same"
         known = f"--profile {self.nearest}, or " if self.nearest else ""
         remedy = f"better: {known}a profile by modt profile fit"
-        return f"profile {name} is not of this sensor ({'; '.join(self.differences)}); {done}; {remedy}"
+        what = "has another mount than this sensor's" if self.same_sensor else "is not of this sensor"
+        return f"profile {name} {what} ({'; '.join(self.differences)}); {done}; {remedy}"
 
 
 def recognise(points: Float32, config: ProfileConfig) -> Recognition:
@@ -103,7 +106,7 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
         nearest, fitted = nearest_profile(found.sensor, tangent), _with_reach(found)
     elif of_mount:
         fitted = replace(config, sensor=replace(config.sensor, height_m=found.sensor.height_m))
-    recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg)
+    recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg, not of_sensor)
     return replace(recognition, fitted=recognition.mounted(fitted))
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from modt.sinks.output import writing
 from modt.sources.stream import Stream
 from modt.types import Float32, Float64
-from modt.viewer.look import LIGHT
+from modt.viewer.look import COLOURS, LIGHT
 from modt_desk.evaluation.frames_by_number import FramesByNumber
 from modt_desk.evaluation.overlap import inside
 from modt_desk.evaluation.unlabelled import Mover
@@ -21,7 +21,7 @@ PICTURES = 10
 ROOM_M = 1.0
 """Shown around the box."""
 SIDE_IN, DPI = 1.4, 100
-COLOURS = LIGHT["soft"], "#d6177f"
+SHADES = LIGHT["soft"], COLOURS[0]
 """Points beside the box and in it."""
 
 
@@ -63,7 +63,7 @@ def _strip(mover: Mover, crops: Sequence[tuple[int, Float32]]) -> Figure:
         box = mover.box[k]
         c, s = np.cos(box[6]), np.sin(box[6])
         x, y, z = (points[:, :3] - box[:3]).T
-        colour = np.where(inside(points, box), *COLOURS[::-1])
+        colour = np.where(inside(points, box), *SHADES[::-1])
         along = c * x + s * y
         for axes, v, height in ((above, c * y - s * x, box[4]), (side, z, box[5])):
             _outline(axes, box[3], height, _reach_m(box))
