@@ -150,7 +150,7 @@ def test_a_turned_sensor_sees_the_floor_where_the_mount_says(mount_deg):
     np.testing.assert_allclose(T[:3, :3], rotation_zyx(*np.deg2rad([*mount_deg, 0.0])), atol=0.01)
 
 
-@pytest.mark.parametrize("scene", ["hall", "corridor", "lobby", "lift"])
+@pytest.mark.parametrize("scene", ["hall", "corridor"])
 def test_rooms_have_a_ceiling_above_the_sensor(scene):
     frame, _ = SyntheticStream(scene, "os1-64", 0.1, 2, height_m=0.5).simulator.sweep(0)
     z = transform(frame.T_world_sensor, frame.points[:, :3].astype(np.float64))[:, 2]

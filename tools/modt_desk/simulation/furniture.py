@@ -1,4 +1,4 @@
-"""Furniture, doors, glass and racks."""
+"""Furniture, doors and glass."""
 
 from __future__ import annotations
 
@@ -60,16 +60,3 @@ def pane(rng: np.random.Generator, height_m: float) -> Solids:
     glass = box((0, 0, height_m / 2), (long, 0.03, height_m), Material.GLASS)
     posts = [box((s * long / 2, 0, height_m / 2), (0.06, 0.06, height_m), Material.METAL) for s in (-1, 1)]
     return Solids.join([glass, *posts])
-
-
-def rack(rng: np.random.Generator) -> Solids:
-    """A rack of four levels with loads, 4 m long and 6 m high."""
-    posts = [box((i * 1.95, j * 0.5, 3.0), (0.1, 0.1, 6.0), Material.METAL) for i in (-1, 1) for j in (-1, 1)]
-    beams = [box((0, j * 0.5, z), (3.9, 0.06, 0.12), Material.METAL) for z in (1.6, 3.1, 4.6) for j in (-1, 1)]
-    loads = [
-        box((x, 0, z + tall / 2 + 0.1), (1.1, 0.9, tall), Material.WOOD)
-        for z in (0.0, 1.7, 3.2, 4.7)
-        for x, tall in zip((-1.25, 0.0, 1.25), rng.uniform(0.5, 1.2, 3).tolist(), strict=True)
-        if rng.random() < 0.8
-    ]
-    return Solids.join([*posts, *beams, *loads])

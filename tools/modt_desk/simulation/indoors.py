@@ -1,4 +1,4 @@
-"""Rooms under a ceiling: a hall, a corridor, a lobby, the cabin of a lift and a warehouse."""
+"""Rooms under a ceiling: a hall and a corridor."""
 
 from __future__ import annotations
 
@@ -57,65 +57,6 @@ def corridor(rng: np.random.Generator, seconds: float, height_m: float) -> World
             builder.scenery(box((0, 0, 0.4), (0.5, 0.4, 0.8), Material.WOOD), x + 2.0, -half[1] + 0.3, 0.0)
     ego = Path.steady(np.array([[-3.0, -0.1], [12.0, -0.1]]), 0.0, 0.8, seconds)
     return _under(builder, half, ceiling, ego, height_m)
-
-
-def lobby(rng: np.random.Generator, seconds: float, height_m: float) -> World:
-    """An entrance with a glass front, a counter, seats and people."""
-    half = (rng.uniform(6.0, 9.0), rng.uniform(5.0, 7.0))
-    ceiling = max(rng.uniform(2.3, 3.5), height_m + OVER_SENSOR_M)
-    builder = SceneBuilder(rng, seconds)
-    ego = Path.steady(np.array([[-half[0] + 2, 0.0], [half[0] - 2, 0.0]]), 0.0, 0.7, seconds)
-    walkers(builder, half, 4)
-    for x in np.arange(-half[0] + 1, half[0], 2.0):
-        builder.scenery(furniture.pane(rng, ceiling), x, half[1] - 0.3, 0.0)
-    builder.scenery(box((0, 0, 0.55), (3.0, 0.7, 1.1), Material.WOOD), 0.0, -half[1] + 1.5, 0.0)
-    _furnish(builder, half, 8)
-    return _under(builder, half, ceiling, ego, height_m)
-
-
-def lift(rng: np.random.Generator, seconds: float, height_m: float) -> World:
-    """The cabin of a lift with its door open to a lobby; the robot stands in it, people walk and wait outside."""
-    half, deep, wide = (6.0, 4.0), float(rng.uniform(0.8, 1.1)), float(rng.uniform(0.7, 0.9))
-    low, ceiling = max(2.3, height_m + OVER_SENSOR_M), max(rng.uniform(2.4, 3.0), height_m + OVER_SENSOR_M)
-    builder = SceneBuilder(rng, seconds)
-    back = -half[0] + deep
-    for side in (-1, 1):
-        builder.scenery(box((0, 0, low / 2), (2 * deep, 0.1, low), Material.METAL), back, side * (wide + 0.05), 0.0)
-        builder.scenery(
-            box((0, 0, low / 2), (0.1, half[1] - wide, low), Material.WALL), *_beside(back + deep, half, wide, side)
-        )
-    roof = box((0, 0, low + 0.05), (2 * deep, 2 * wide, 0.1), Material.METAL)
-    builder.scenery(roof, back, 0.0, 0.0)
-    for _ in range(3):
-        x, y = rng.uniform(back + deep + 1.0, half[0] - 0.5), rng.uniform(-2.0, 2.0)
-        builder.pedestrian(Path.standing(x, y, rng.uniform(-np.pi, np.pi)))
-    line = np.array([[half[0] - 0.5, 0.5], [back + deep + 0.5, -0.3]])
-    builder.pedestrian(Path.steady(line, 0.0, 0.8, seconds), 0.8)
-    return _under(builder, half, ceiling, Path.standing(back, 0.0, 0.0), height_m)
-
-
-def warehouse(rng: np.random.Generator, seconds: float, height_m: float) -> World:
-    """Aisles between tall racks under a high roof, pallets, a lorry's gate, and people who walk and pick."""
-    half = (22.0, 14.0)
-    builder = SceneBuilder(rng, seconds)
-    walkers(builder, (20.0, 2.0), 4)
-    for y in (-11.0, -5.0, 5.0, 11.0):
-        for x in np.arange(-16.0, 17.0, 4.0):
-            builder.scenery(furniture.rack(rng), x, y, 0.0)
-    for _ in range(4):
-        x, y = rng.uniform(-14.0, 14.0), rng.choice([-1, 1]) * rng.uniform(2.5, 3.8)
-        builder.pedestrian(Path.standing(x, y, rng.choice([-1, 1]) * np.pi / 2))
-    for _ in range(8):
-        builder.scenery(
-            furniture.pallets(rng), rng.uniform(-18.0, 18.0), rng.choice([-1, 1]) * 3.0, rng.normal(0, 0.2)
-        )
-    ego = Path.steady(np.array([[-14.0, 0.0], [14.0, 0.0]]), 0.0, 1.0, seconds)
-    return _under(builder, half, float(rng.uniform(5.0, 8.0)), ego, height_m)
-
-
-def _beside(x: float, half: tuple[float, float], wide: float, side: int) -> tuple[float, float, float]:
-    """Place of the wall beside the door of a lift."""
-    return x, side * (half[1] + wide) / 2, 0.0
 
 
 def _furnish(builder: SceneBuilder, half: tuple[float, float], n: int) -> None:

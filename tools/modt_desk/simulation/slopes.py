@@ -1,4 +1,4 @@
-"""Ground that rises: a ramp ahead of the robot, and a loading dock."""
+"""Ground that rises: a ramp ahead of the robot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from modt_desk.simulation.terrain import Terrain
 from modt_desk.simulation.world import World
 
 HALF_M = (40.0, 30.0)
-KERB_M, DOCK_M = 0.12, 1.1
+KERB_M = 0.12
 ROUGHNESS_M = 0.005
 STEEPEST = 0.4
 """Tangent of the rays that may meet a slope."""
@@ -41,19 +41,6 @@ def ramp(rng: np.random.Generator, seconds: float, height_m: float, slope_deg: f
     line = np.array([[13.0, 2.0], [-10.0, 2.0]])
     builder.pedestrian(Path.steady(line, 0.0, 1.0, seconds), 1.0)
     ego = Path.steady(np.array([[-3.0, 0.0], [3.5, 0.0]]), 0.0, 1.0, seconds)
-    return builder.world(_terrain(rng, height), ego, height_m, ego_m=ROBOT_M)
-
-
-def dock(rng: np.random.Generator, seconds: float, height_m: float) -> World:
-    """A loading dock: a platform with a sheer edge and a ramp 4 m wide up to it; people below and on the ramp."""
-    x, y = _grid()
-    on_ramp = np.clip((x - 2.0) / 8.0, 0, 1) * np.float32(DOCK_M)
-    height = np.where(np.abs(y) < 2.0, on_ramp, np.float32(DOCK_M) * (x > 10.0)).astype(np.float32)
-    builder = SceneBuilder(rng, seconds)
-    for place in ((4.0, 1.0), (8.0, -1.0), (7.0, 4.0), (5.0, -5.0), (-6.0, 3.0)):
-        at, left = np.array(place) + rng.uniform(-0.5, 0.5, 2)
-        builder.pedestrian(Path.standing(float(at), float(left), rng.uniform(-np.pi, np.pi)))
-    ego = Path.steady(np.array([[-5.0, 0.0], [9.5, 0.0]]), 0.0, 1.0, seconds)
     return builder.world(_terrain(rng, height), ego, height_m, ego_m=ROBOT_M)
 
 

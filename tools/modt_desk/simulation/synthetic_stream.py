@@ -15,10 +15,10 @@ from modt.sources.stream import Faults, StreamInfo
 from modt.types import Frame
 from modt_desk.simulation.crossing import crossing
 from modt_desk.simulation.crowd import crowd
-from modt_desk.simulation.indoors import corridor, hall, lift, lobby, warehouse
+from modt_desk.simulation.indoors import corridor, hall
 from modt_desk.simulation.sensors import sensor as sensor_model
 from modt_desk.simulation.simulator import Simulator, Truth
-from modt_desk.simulation.slopes import dock, ramp
+from modt_desk.simulation.slopes import ramp
 from modt_desk.simulation.street import street
 from modt_desk.simulation.yard import yard
 
@@ -27,10 +27,7 @@ K = np.array([[721.5, 0.0, 609.5, 0.0], [0.0, 721.5, 172.9, 0.0], [0.0, 0.0, 1.0
 CAMERA = Camera(K @ T_CAMERA_SENSOR, T_CAMERA_SENSOR, 1242.0, 375.0)
 """Intrinsics and mount of KITTI's left colour camera: level, 0.27 m ahead of the sensor, 0.08 m below it."""
 
-SCENES = {
-    scene.__name__: scene
-    for scene in (street, crossing, yard, crowd, ramp, dock, hall, corridor, lobby, lift, warehouse)
-}
+SCENES = {scene.__name__: scene for scene in (street, crossing, yard, crowd, ramp, hall, corridor)}
 """Scene by name: the world by a random generator, a duration [s] and the height of the sensor [m]."""
 
 
