@@ -196,27 +196,6 @@ def test_a_frame_as_a_picture(run, records):
         assert colours[(*bytes.fromhex(LIGHT[ground_or_above][1:]), 255)] > 1000
 
 
-def test_a_frame_as_pixels(run):
-    Image = pytest.importorskip("PIL.Image")
-    pytest.importorskip("matplotlib")
-    done = modt("view", run, "--frame", 9, "--out", "view.png", cwd=run)
-    assert done.returncode == 0, done.stderr
-    with Image.open(run / "view.png") as image:
-        assert image.size == (1280, 910)
-        colours = np.array([colour for _, colour in image.convert("RGB").getcolors(1 << 20)])
-    for wanted in ((0xFF, 0xFF, 0xFF), (0x2B, 0x8A, 0x3E)):  # paper, and the edge of what is classified
-        assert np.abs(colours - wanted).sum(axis=1).min() < 20
-
-
-def test_a_film_has_every_frame(run):
-    Image = pytest.importorskip("PIL.Image")
-    pytest.importorskip("matplotlib")
-    done = modt("view", run, "--frame", 4, "--out", "view.gif", cwd=run)
-    assert done.returncode == 0, done.stderr
-    with Image.open(run / "view.gif") as film:
-        assert (film.n_frames, film.info["duration"]) == (FRAMES - 4, 100)
-
-
 def test_a_film_by_ffmpeg(run):
     if shutil.which("ffmpeg") is None:
         pytest.skip("ffmpeg is not installed")
