@@ -28,9 +28,10 @@ FRAMES = 12
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """A run on the synthetic street, and the page of it."""
+    """A run on the synthetic street, and the page of it, which opens at its first frame."""
     path = tmp_path_factory.mktemp("runs") / "run"
-    for command in (("replay", "--frames", f"0:{FRAMES}", "--quiet", "--out", path), ("view", path)):
+    replay = ("replay", "--frames", f"0:{FRAMES}", "--quiet", "--out", path)
+    for command in (replay, ("view", path, "--frame", 0, "--out", path / "view.html")):
         done = modt(*command, cwd=path.parent)
         assert done.returncode == 0, done.stderr
     return path
@@ -73,14 +74,12 @@ def test_the_page_holds_the_run(run, records):
 
 
 def test_the_page_opens_where_there_is_an_object(run, records, tmp_path):
-    objects = [any(track["class"] != "background" for track in record["tracks"]) for record in records]
-    assert Page(run / "view.html").run["start"] == objects.index(True)
     late = shutil.copytree(run, tmp_path / "late")
     background = [record | {"tracks": [t | {"class": "background"} for t in record["tracks"]]} for record in records]
-    for first, begins in ((5, 5), (len(records), 0)):
+    for first, options, begins in ((5, (), 5), (5, ("--frame", 3), 3), (len(records), (), 0)):
         lines = [*background[:first], *records[first:]]
         (late / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
-        assert modt("view", late, cwd=tmp_path).returncode == 0
+        assert modt("view", late, *options, "--out", late / "view.html", cwd=tmp_path).returncode == 0
         assert Page(late / "view.html").run["start"] == begins
 
 
@@ -164,12 +163,6 @@ def test_keys_step_and_hide(run, records, chromium):
     assert chromium.opened(run / "view.html", "key:End")["at"] == FRAMES - 1
 
 
-def test_the_page_may_begin_at_a_frame(run, tmp_path):
-    done = modt("view", run, "--frame", 4, "--out", "page.html", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert Page(tmp_path / "page.html").run["start"] == 4
-
-
 def test_a_frame_as_a_picture(run, records):
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("matplotlib")
@@ -251,7 +244,7 @@ def test_without_its_source_a_run_has_no_points(moved, chromium):
     page = Page(moved / "view.html")
     assert (page.points, page.run["points"]) == ([], None)
     shown = chromium.opened(moved / "view.html")
-    assert (shown["pixels"], shown["at"]) == (0, 0)
+    assert (shown["pixels"], shown["at"]) == (0, page.run["start"])
     assert shown["boxes"] > 1
 
 
