@@ -5,18 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modt_desk.box_tracking.box_tracker import MAX_COST, BoxTracker, assign
-from modt_desk.box_tracking.config import (
-    BoxConfidenceConfig,
-    BoxTrackingConfig,
-)
+from modt_desk.box_tracking.box_tracker import MAX_COST, BoxClass, BoxTracker, assign
 
-REPORT_ALL = BoxConfidenceConfig(report_above=-100.0)
-CONFIG = BoxTrackingConfig(confidence=REPORT_ALL)
-
-
-def confident(**values):
-    return BoxTrackingConfig(confidence=BoxConfidenceConfig(report_above=5.0, **values))
+CONFIG = BoxClass(report_above=-100.0, keep_above=0.0)
+CONFIDENT = BoxClass(report_above=5.0, keep_above=0.0)
 
 
 def car(x, y, yaw=0.0):
@@ -69,27 +61,24 @@ def test_the_yaw_does_not_flip_by_pi():
 
 
 def test_a_low_score_continues_a_track_but_starts_none():
-    config = BoxTrackingConfig(min_birth_score=2.0, confidence=REPORT_ALL)
-    assert len(follow([[car(10, 0)]] * 3, config, score=1.0).id) == 0
-    tracker = BoxTracker(config)
-    for i, score in enumerate([3.0, 1.0, 1.0]):
+    assert len(follow([[car(10, 0)]] * 3, score=-1.0).id) == 0
+    tracker = BoxTracker(CONFIG)
+    for i, score in enumerate([3.0, -1.0, -1.0]):
         reported = step(tracker, i, [car(10, 0)], score)
     assert list(reported.id) == [0]
     assert list(reported.source) == [0]
 
 
 def test_a_track_is_reported_by_its_score_or_its_age():
-    config = confident(range_bonus_per_m=0.0, age_bonus=1.0)
-    assert len(follow([[car(10, 0)]], config, score=4.0).id) == 0
-    assert len(follow([[car(10, 0)]], config, score=5.0).id) == 1
-    assert len(follow([[car(10, 0)]] * 2, config, score=4.0).id) == 0
-    assert len(follow([[car(10, 0)]] * 3, config, score=4.0).id) == 1
+    assert len(follow([[car(10, 0)]], CONFIDENT, score=4.5).id) == 0
+    assert len(follow([[car(10, 0)]], CONFIDENT, score=5.0).id) == 1
+    assert len(follow([[car(10, 0)]] * 2, CONFIDENT, score=4.5).id) == 0
+    assert len(follow([[car(10, 0)]] * 3, CONFIDENT, score=4.5).id) == 1
 
 
 def test_a_track_that_is_not_reported_for_a_frame_keeps_its_id():
-    config = confident(range_bonus_per_m=0.0, score_gain=1.0, age_bonus=0.0)
-    tracker = BoxTracker(config)
-    ids = [list(step(tracker, i, [car(10, 0)], s).id) for i, s in enumerate([6.0, 1.0, 6.0])]
+    tracker = BoxTracker(CONFIDENT)
+    ids = [list(step(tracker, i, [car(10, 0)], s).id) for i, s in enumerate([6.0, 1.0, 9.0])]
     assert ids == [[0], [], [0]]
 
 
