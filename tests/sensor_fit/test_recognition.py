@@ -28,6 +28,7 @@ def test_another_sensor_is_told_from_the_default_and_named(name):
     assert found.differences
     assert found.nearest == name
     line = next(found.warnings("hdl-64e", replaced=True))
+    assert "profile hdl-64e is not of this sensor" in line
     assert f"--profile {name}" in line
     assert "modt profile fit" in line
     assert "\n" not in line
@@ -57,6 +58,7 @@ def test_another_mount_changes_the_height_alone():
     assert len(found.differences) == 1
     assert found.fitted.sensor.height_m == pytest.approx(1.73, abs=0.1)
     assert found.fitted == dataclasses.replace(own, sensor=found.fitted.sensor)
+    assert "hdl-64e has another mount than this sensor's (1.7" in next(found.warnings("hdl-64e", replaced=True))
 
 
 def test_few_points_fit_any_profile():

@@ -22,7 +22,6 @@ from modt.app import assembly
 from modt.config import ProfileConfig
 from modt.config.segmentation import NATIVE
 from modt.config.segmentation import NUMPY as NUMPY_KERNELS
-from modt.energy.ledger import NullLedger
 from modt.geometry import FieldOfView
 from modt.pipeline import Pipeline
 from modt.profile import load
@@ -132,7 +131,7 @@ def _run(
 
 def _pipeline(mode: str, kernels: str, shipped: ProfileConfig, fov: FieldOfView) -> tuple[Pipeline, Budget]:
     config = replace(shipped, segmentation=replace(shipped.segmentation, kernels=kernels))
-    return assembly.pipeline(assembly.MODES[mode], config, fov, NullLedger()), assembly.MODES[mode].budget(config)
+    return assembly.pipeline(assembly.MODES[mode], config, fov), assembly.MODES[mode].budget(config)
 
 
 def _judged(results: Sequence[FrameResult], truth: Truth, fov: FieldOfView) -> Evaluation:

@@ -37,12 +37,14 @@ class Recognition:
         nearest: name of the shipped profile of the same beams, None where there is none.
         fitted: the profile, with the findings in the place of what differs.
         tilt_deg: roll and pitch of the sensor where the profile leaves them open and they are not small.
+        same_sensor: whether all differences are those of the mount.
     """
 
     differences: tuple[str, ...]
     nearest: str | None
     fitted: ProfileConfig
     tilt_deg: tuple[float, float] | None = None
+    same_sensor: bool = False
 
     def mounted(self, config: ProfileConfig) -> ProfileConfig:
         """The profile with the measured tilt, if it leaves the mount open."""
@@ -58,7 +60,8 @@ class Recognition:
             done = "used instead: what the first sweep shows" if replaced else "used all the same"
             known = f"--profile {self.nearest}, or " if self.nearest else ""
             remedy = f"better: {known}a profile by modt profile fit"
-            yield f"profile {name} is not of this sensor ({'; '.join(self.differences)}); {done}; {remedy}"
+            what = "has another mount than this sensor's" if self.same_sensor else "is not of this sensor"
+            yield f"profile {name} {what} ({'; '.join(self.differences)}); {done}; {remedy}"
         if self.tilt_deg is not None:
             roll, pitch = self.tilt_deg
             how = "hangs upside down, " if abs(roll) > 90 else "is tilted, "
@@ -95,7 +98,7 @@ def recognise(points: Float32, config: ProfileConfig) -> Recognition:
         nearest, fitted = nearest_profile(sensor, tangent), ProfileConfig(sensor=sensor, segmentation=cells)
     elif of_mount:
         fitted = replace(config, sensor=replace(config.sensor, height_m=sensor.height_m))
-    recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg)
+    recognition = Recognition((*of_sensor, *of_mount), nearest, fitted, tilt_deg, not of_sensor)
     return replace(recognition, fitted=recognition.mounted(fitted))
 
 

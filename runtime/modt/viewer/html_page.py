@@ -13,7 +13,8 @@ from modt.viewer.point_cells import SIDE
 from modt.viewer.track_rows import COLUMNS, SCALE
 
 _PAGE = Path(__file__).parent / "page"
-_SCRIPTS = "data", "draw", "text", "input"
+_SCRIPTS = [_PAGE / f"{part}.js" for part in ("data", "draw", "text", "input")]
+LIVE = _PAGE / "live.js"
 
 
 def content(states: list[look.Entry], budget: str | None, step_cm: int | None) -> dict[str, Any]:
@@ -31,10 +32,10 @@ def content(states: list[look.Entry], budget: str | None, step_cm: int | None) -
     }
 
 
-def page(name: str, about: str, known: dict[str, Any], script: str) -> tuple[str, str]:
-    """The page before its data and after them; the script says where its frames come from."""
+def page(name: str, about: str, known: dict[str, Any], script: Path) -> tuple[str, str]:
+    """The page before and after its data; the script says where frames come from, and what Play does."""
     css, body = ((_PAGE / f"page.{kind}").read_text(encoding="utf-8") for kind in ("css", "html"))
-    scripts = "".join((_PAGE / f"{part}.js").read_text(encoding="utf-8") for part in (*_SCRIPTS, script))
+    scripts = "".join(part.read_text(encoding="utf-8") for part in (*_SCRIPTS, script))
     text = json.dumps(known, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
     head = (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'

@@ -9,7 +9,7 @@ from modt.address import Address
 from modt.energy import ledger, windows
 from modt.errors import MisuseError
 from modt.types import FrameResult
-from modt.viewer.html_page import content, page
+from modt.viewer.html_page import LIVE, content, page
 from modt.viewer.live_frame import STEP_CM, live_message
 from modt.viewer.live_server import LiveServer
 
@@ -23,7 +23,7 @@ class LivePage:
     """Publishes each frame with what it cost, when the ledger's line of it comes, to those who look."""
 
     def __init__(self, host: str, port: int) -> None:
-        head, tail = page("modt", "waits for a sweep", content([], None, STEP_CM), "live")
+        head, tail = page("modt", "waits for a sweep", content([], None, STEP_CM), LIVE)
         self._server = LiveServer(host, port, (head + tail).encode())
         self.port = int(self._server.server_address[1])
         self._result: FrameResult | None = None

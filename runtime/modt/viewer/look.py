@@ -10,7 +10,7 @@ from modt.energy.ledger import STAGES
 Entry = dict[str, str]
 """`name` and `colour` of a line of a legend."""
 
-COLOURS = ("#3b6ea5", "#d9822b", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a", "#3a97a6")
+COLOURS = ("#3b6ea5", "#a0527a", "#4c9a5b", "#8a63b8", "#c2493d", "#6b7785", "#b59a2a", "#3a97a6")
 LIGHT = {"ink": "#1c2430", "soft": "#5d6876", "line": "#d8dde4", "paper": "#ffffff", "panel": "#f6f8fa"}
 DARK = {"ink": "#e4e8ee", "soft": "#9aa6b5", "line": "#38424f", "paper": "#151a21", "panel": "#1d242d"}
 
@@ -33,10 +33,10 @@ _STATE_COLOURS = {
     "lost_unmatched": _GREY,
     "tracked": COLOURS[2],
     "tracked_classified": COLOURS[2],
-    "tracked_unclassified": COLOURS[1],
+    "tracked_unclassified": COLOURS[6],
     "lost": COLOURS[3],
     "lost_classified": COLOURS[3],
-    "lost_unclassified": COLOURS[6],
+    "lost_unclassified": COLOURS[1],
 }
 
 
@@ -46,7 +46,7 @@ def classes() -> list[Entry]:
 
 
 def states(names: Iterable[str]) -> list[Entry]:
-    """Of states: waiting ones grey, final ones green, those in doubt orange, lost ones violet or ochre."""
+    """Legend of states: waiting ones grey, final ones green, those in doubt ochre, lost ones violet or plum."""
     return [{"name": name, "colour": _STATE_COLOURS.get(name, _GREY)} for name in names]
 
 

@@ -11,13 +11,14 @@ from modt.types import NONE, Float64, FrameResult, Int
 
 PLAIN = ("id", "at", "state", "class", "seen", "final", "classified", "points")
 P = tuple(f"p_{name}" for name in CLASS_NAMES)
+WITNESS = tuple(f"motion_{name}" for name in CLASS_NAMES)
 WORLD = tuple(f"world_{key}" for key in WORLD_KEYS)
-SCALED = (*P, *BOX_KEYS, *WORLD)
+SCALED = (*P, *WITNESS, *BOX_KEYS, *WORLD)
 COLUMNS = (*PLAIN, *SCALED)
-"""`at` is the index of the frame in the run, `seen` whether it has a proposal; probabilities are per mille, lengths
-[cm], angles [mrad], speeds [cm/s]. The box of a track that is lost is its last one, where the filter has it now."""
-_ANGLES = {"yaw", "world_heading"}
-SCALE = {name: 1000 if name in P or name in _ANGLES else 100 for name in SCALED}
+"""`at` is the index of the frame in the run, `seen` whether it has a proposal. Probabilities are per mille, lengths
+[cm], angles [mrad], speeds [cm/s]; `motion_CLASS` the log-likelihood of the motion over that of background [1/100].
+The box of a lost track is its last one, moved to where the filter has it."""
+SCALE = {name: 1000 if name in (*P, "yaw", "world_heading") else 100 for name in SCALED}
 
 
 def planar(T_world_sensor: Float64) -> Float64:
@@ -50,4 +51,4 @@ def result_rows(result: FrameResult) -> Float64:
         np.isin(tracks.id, result.classified),
         tracks.points,
     )
-    return np.column_stack([*plain, tracks.posterior, box, tracks.x]).astype(np.float64)
+    return np.column_stack([*plain, tracks.posterior, tracks.witness, box, tracks.x]).astype(np.float64)

@@ -47,19 +47,3 @@ def test_update_equals_the_full_kalman_filter(x, factors, z, variance):
         np.testing.assert_allclose(
             full_covariance(squeezed[i]), (np.eye(4) - K @ H) @ full_covariance(P[i]), atol=1e-9
         )
-
-
-@given(STATES, FACTORS, PLACES, VARIANCES, st.floats(-np.pi, np.pi))
-def test_the_filter_is_rotation_invariant(x, factors, z, variance, turn):
-    c, s = np.cos(turn), np.sin(turn)
-    R = np.array([[c, -s], [s, c]])
-    P = packed_covariance(factors)
-
-    def followed(x, z):
-        return constant_velocity.update(*constant_velocity.predict(x, P, 5.0, 0.1), z, variance)[0]
-
-    turned = followed(np.concatenate([x[:, :2] @ R.T, x[:, 2:] @ R.T], axis=1), z @ R.T)
-    expected = followed(x, z)
-    np.testing.assert_allclose(
-        turned, np.concatenate([expected[:, :2] @ R.T, expected[:, 2:] @ R.T], axis=1), atol=1e-7
-    )

@@ -76,14 +76,6 @@ def test_tracks_of_low_confidence_are_written_on_request(tmp_path, caplog):
     assert len((tmp_path / "all/a.txt").read_text().splitlines()) == 2 * 20
 
 
-def test_a_detector_with_probabilities_is_tracked(tmp_path):
-    for name, score in (("likely", 0.9), ("unlikely", 0.01)):
-        write(tmp_path / f"{name}.txt", score=score)
-    run(tmp_path, "--out", tmp_path / "out", "--quiet")
-    assert len((tmp_path / "out/likely.txt").read_text().splitlines()) == 2 * 20
-    assert (tmp_path / "out/unlikely.txt").read_text() == ""
-
-
 def test_a_track_is_judged_whole_but_online_frame_by_frame(tmp_path):
     with (tmp_path / "a.txt").open("w") as out:
         for i, boxes in enumerate(parked(20, lambda i: np.eye(4))):
@@ -95,36 +87,6 @@ def test_a_track_is_judged_whole_but_online_frame_by_frame(tmp_path):
         lines[name] = [int(line.split()[0]) for line in (tmp_path / name / "a.txt").read_text().splitlines()]
     assert lines["whole"] == list(range(20))
     assert lines["online"] == list(range(5, 20))
-
-
-def test_a_short_gap_is_filled_but_not_online(tmp_path):
-    write(tmp_path / "a.txt")
-    lines = (tmp_path / "a.txt").read_text().splitlines()
-    (tmp_path / "a.txt").write_text("\n".join(line for line in lines if line.split(",")[0] not in ("8", "9")))
-    for name, option, frames in (("whole", [], 20), ("online", ["--online"], 18)):
-        run(tmp_path / "a.txt", "--out", tmp_path / name, "--quiet", *option)
-        assert len((tmp_path / name / "a.txt").read_text().splitlines()) == 2 * frames
-    (found,) = read([tmp_path / "whole/a.txt"])
-    np.testing.assert_allclose(found.box[found.frame == 9][:, :2], [[20, 3], [19, -3]], atol=0.2)
-
-
-def test_an_object_of_two_classes_is_written_as_the_surer_one(tmp_path):
-    box = np.array([[12.0, 1.0, -1.0, 1.0, 0.7, 1.7, 0.0]])
-    for kind, score in ((1, 5.0), (3, 7.0)):
-        (tmp_path / str(kind)).mkdir()
-        with (tmp_path / str(kind) / "a.txt").open("w") as out:
-            for i in range(9):
-                print(i, kind, 0, 0, 50, 99, score, *boxes_to_kitti(box)[0], 0, sep=",", file=out)
-    for detectors, types in (([1], {"Pedestrian"}), ([1, 3], {"Cyclist"})):
-        run(*(tmp_path / str(kind) for kind in detectors), "--out", tmp_path / "out", "--quiet")
-        assert {line.split()[2] for line in (tmp_path / "out/a.txt").read_text().splitlines()} == types
-
-
-def test_boxes_without_a_score_are_tracked(tmp_path):
-    lines = [f"{i} {k} Car 0 0 0 1 1 9 9 1.5 1.8 4 {5 * k} 1.6 12 0" for i in range(5) for k in range(2)]
-    (tmp_path / "a.txt").write_text("\n".join(lines))
-    run(tmp_path / "a.txt", "--out", tmp_path / "out", "--quiet")
-    assert len((tmp_path / "out/a.txt").read_text().splitlines()) == 2 * 5
 
 
 @given(

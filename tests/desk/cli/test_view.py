@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+import subprocess
 from base64 import b64decode
 from io import BytesIO
 from xml.etree import ElementTree
@@ -13,6 +14,7 @@ import pytest
 from modt.classes import CLASS_NAMES
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.recognise import open_scans
+from modt.viewer.html_page import LIVE, content, page
 from modt.viewer.look import LIGHT
 from modt_desk.reporting.run_report import run_tree
 from modt_desk.viewer.recorded_run import RecordedRun
@@ -28,9 +30,10 @@ FRAMES = 12
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """A run on the synthetic street, and the page of it."""
+    """A run on the synthetic street, and the page of it, which opens at its first frame."""
     path = tmp_path_factory.mktemp("runs") / "run"
-    for command in (("replay", "--frames", f"0:{FRAMES}", "--quiet", "--out", path), ("view", path)):
+    replay = ("replay", "--frames", f"0:{FRAMES}", "--quiet", "--out", path)
+    for command in (replay, ("view", path, "--frame", 0, "--out", path / "view.html")):
         done = modt(*command, cwd=path.parent)
         assert done.returncode == 0, done.stderr
     return path
@@ -82,9 +85,30 @@ def test_the_page_holds_the_run(run, records):
     assert [len(cell) > 1000 for cell, _ in page.points] == [True] * FRAMES
 
 
+def test_the_page_opens_where_there_is_an_object(run, records, tmp_path):
+    late = shutil.copytree(run, tmp_path / "late")
+    background = [record | {"tracks": [t | {"class": "background"} for t in record["tracks"]]} for record in records]
+    for first, options, begins in ((5, (), 5), (5, ("--frame", 3), 3), (len(records), (), 0)):
+        lines = [*background[:first], *records[first:]]
+        (late / "tracks.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+        assert modt("view", late, *options, "--out", late / "view.html", cwd=tmp_path).returncode == 0
+        assert Page(late / "view.html").run["start"] == begins
+
+
 def test_the_page_needs_nothing_from_outside(run):
     text = (run / "view.html").read_text()
     assert not re.search(r"https?:|<link|\bsrc=|\bimport\b|fetch\(", re.sub(r'<script type="text[^<]*', "", text))
+
+
+def test_the_scripts_of_both_pages_are_valid(run, tmp_path):
+    if shutil.which("node") is None:
+        pytest.skip("node is not installed")
+    live = "".join(page("modt", "", content([], None, 5), LIVE))
+    for name, text in (("recorded.js", (run / "view.html").read_text()), ("live.js", live)):
+        (script,) = re.findall(r"<script>\n(.*?)</script>", text, re.DOTALL)
+        (tmp_path / name).write_text(script)
+        done = subprocess.run(["node", "--check", tmp_path / name], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_the_page_opens_and_the_slider_moves(run, records, chromium):
@@ -151,12 +175,6 @@ def test_keys_step_and_hide(run, records, chromium):
     assert chromium.opened(run / "view.html", "key:End")["at"] == FRAMES - 1
 
 
-def test_the_page_may_begin_at_a_frame(run, tmp_path):
-    done = modt("view", run, "--frame", 4, "--out", "page.html", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert Page(tmp_path / "page.html").run["start"] == 4
-
-
 def test_a_frame_as_a_picture(run, records):
     image = pytest.importorskip("PIL.Image")
     pytest.importorskip("matplotlib")
@@ -183,27 +201,6 @@ def test_a_frame_as_a_picture(run, records):
         assert colours[(*bytes.fromhex(LIGHT[ground_or_above][1:]), 255)] > 1000
 
 
-def test_a_frame_as_pixels(run):
-    Image = pytest.importorskip("PIL.Image")
-    pytest.importorskip("matplotlib")
-    done = modt("view", run, "--frame", 9, "--out", "view.png", cwd=run)
-    assert done.returncode == 0, done.stderr
-    with Image.open(run / "view.png") as image:
-        assert image.size == (1280, 910)
-        colours = np.array([colour for _, colour in image.convert("RGB").getcolors(1 << 20)])
-    for wanted in ((0xFF, 0xFF, 0xFF), (0x2B, 0x8A, 0x3E)):  # paper, and the edge of what is classified
-        assert np.abs(colours - wanted).sum(axis=1).min() < 20
-
-
-def test_a_film_has_every_frame(run):
-    Image = pytest.importorskip("PIL.Image")
-    pytest.importorskip("matplotlib")
-    done = modt("view", run, "--frame", 4, "--out", "view.gif", cwd=run)
-    assert done.returncode == 0, done.stderr
-    with Image.open(run / "view.gif") as film:
-        assert (film.n_frames, film.info["duration"]) == (FRAMES - 4, 100)
-
-
 def test_a_film_by_ffmpeg(run):
     if shutil.which("ffmpeg") is None:
         pytest.skip("ffmpeg is not installed")
@@ -218,9 +215,9 @@ def test_how_the_class_of_a_track_was_decided(run, records, chromium):
     id_ = max(set(numbers), key=numbers.count)
     done = modt("view", run, "--track", id_, cwd=run)
     assert done.returncode == 0, done.stderr
-    page = run / f"track-{id_}.html"
+    told = run / f"track-{id_}.html"
     seen = [next(t for t in record["tracks"] if t["id"] == id_) for record in records if id_ in record["classified"]]
-    with chromium.tab(page.as_uri(), width=390, ready=LOADED) as tab:
+    with chromium.tab(told.as_uri(), width=390, ready=LOADED) as tab:
         assert not tab.value(WIDE)
         text = tab.value("document.body.innerText")
         pictures = (
@@ -259,7 +256,7 @@ def test_without_its_source_a_run_has_no_points(moved, chromium):
     page = Page(moved / "view.html")
     assert (page.points, page.run["points"]) == ([], None)
     shown = chromium.opened(moved / "view.html")
-    assert (shown["pixels"], shown["at"]) == (0, 0)
+    assert (shown["pixels"], shown["at"]) == (0, page.run["start"])
     assert shown["boxes"] > 1
 
 

@@ -31,12 +31,6 @@ def test_gamma_lies_between_one_and_the_life_of_a_track(model: EnergyModel) -> N
     assert model.short_form_error >= -1e-12
 
 
-def test_short_form_is_the_limit_of_expensive_classification() -> None:
-    model = EnergyModel(e_seg=1e-9, e_class=1.0, n=40, n_go=20)
-    assert model.gamma == pytest.approx(model.n_go)
-    assert model.short_form_error == pytest.approx(0, abs=1e-6)
-
-
 def test_without_costs_there_is_no_saving() -> None:
     model = EnergyModel(e_seg=0.0, e_class=0.0, n=0, n_go=5)
     assert model.gamma == 1.0

@@ -29,11 +29,6 @@ def test_frames_have_the_labels_and_the_scan_of_their_stamp(origin_s):
     assert [(scan.index, scan.path.name) for scan in found.scans.scans] == [(7, "0.bin"), (8, "2.bin")]
 
 
-def test_one_scan_is_enough():
-    found = by_stamp(truth([2.0], [0]), {3: 2.04, 4: 2.06})
-    assert list(found.frames) == [3]
-
-
 def test_without_scans_there_are_no_stamps():
     bare = Truth({}, None, KITTI_RULES)
     assert by_stamp(bare, {0: 0.0}) is bare

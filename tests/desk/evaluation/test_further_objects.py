@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.types import NONE
-from modt_desk.evaluation.evaluation import collect, evaluation, score
+from modt_desk.evaluation.evaluation import score
 from modt_desk.evaluation.further_objects import COLUMNS, with_further
 from modt_desk.evaluation.matching import judge
-from modt_desk.evaluation.report import report
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import KITTI_TYPES, PAPER_TYPES, Role, Truth
 from tests.desk.evaluation.scenes import blob, cars, frame
@@ -127,26 +126,3 @@ def test_any_bytes_are_a_table_or_misuse(tmp_path_factory, data):
     path.write_bytes(HEAD.encode() + CAR_AT_20.encode() + data)
     with suppress(MisuseError):
         with_further(Truth({0: cars(10.0)}, None, KITTI_RULES), path, KITTI_TYPES)
-
-
-def test_the_report_says_what_is_judged_and_how_complete_the_labels_are(tmp_path):
-    def lines(*drives):
-        rows = [collect([frame(truth, [], [])], rules, k) for k, (truth, rules) in enumerate(drives)]
-        return report({"x": evaluation(rows)}).split("\n")
-
-    known, added = (cars(10.0), KITTI_RULES), (further(tmp_path, CAR_AT_20), KITTI_RULES)
-    first, second, *_ = lines(known)
-    assert first.endswith("judged within 40 degrees of straight ahead")
-    assert (
-        "labels of KITTI, unlike simulated ones, leave out road users, and tracks on those count as false" in second
-    )
-    assert (
-        "labels of KITTI, unlike simulated ones, leave out road users; --further adds 1 of them, in 1 labels"
-        in lines(added)[1]
-    )
-    first, second, *_ = lines((cars(10.0), CUBOID_RULES))
-    assert first.endswith("judged all round")
-    assert "labels are taken for complete" in second
-    first, second, *_ = lines(known, (cars(10.0), CUBOID_RULES))
-    assert first.endswith("judged within 40 degrees of straight ahead or all round")
-    assert "leave out road users" in second

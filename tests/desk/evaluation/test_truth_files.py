@@ -3,9 +3,11 @@ import pytest
 from modt.classes import ObjectClass
 from modt.errors import MisuseError
 from modt.types import NONE
+from modt_desk.evaluation.evaluation import score
 from modt_desk.evaluation.rules import CUBOID_RULES, KITTI_ALL_ROUND_RULES, KITTI_RULES
 from modt_desk.evaluation.truth import Role
 from modt_desk.evaluation.truth_files import open_truth
+from tests.desk.evaluation.scenes import frame
 from tests.sources import layouts
 
 ITEM = """<item><objectType>{type}</objectType><h>1.5</h><w>2</w><l>4</l><first_frame>{first}</first_frame>
@@ -91,10 +93,10 @@ def cuboids(folder, text, poses=2):
 def test_cuboids(tmp_path):
     layouts.write_scans(tmp_path / "scans", range(2))
     truth = open_truth(cuboids(tmp_path, "0,3,Motorcycle,9,1,0.5,2,1,1.5,0.1\n0,4,Bus,9,5,0.5,9,2,3,0\n"))
-    frame = truth.frames[0]
-    assert (truth.rules, frame.object_class.tolist()) == (CUBOID_RULES, [ObjectClass.CYCLIST, ObjectClass.CAR])
-    assert frame.role.tolist() == [Role.COUNTED, Role.NEUTRAL]
-    assert frame.T_box_sensor[0, 3] == 5
+    first = truth.frames[0]
+    assert (truth.rules, first.object_class.tolist()) == (CUBOID_RULES, [ObjectClass.CYCLIST, ObjectClass.CAR])
+    assert first.role.tolist() == [Role.COUNTED, Role.NEUTRAL]
+    assert first.T_box_sensor[0, 3] == 5
     assert len(truth.frames[1].id) == 0
 
 
@@ -139,3 +141,12 @@ def test_real_labels(kitti_root):
     assert len(open_truth(kitti_root / "object" / "training").frames) > 100
     assert len(open_truth(kitti_root / "pandaset").frames) == 9
     assert len(open_truth(kitti_root / "pandaset_002").frames) == 40
+
+
+@pytest.mark.kitti
+def test_the_objects_of_drive_0005_as_the_paper_counts_them(kitti_root):
+    truth = open_truth(kitti_root / "tracking" / "label_02" / "0000.txt", paper=True)
+    assert len(truth.frames) == 154
+    found = score(frame(labels, [], [], index=index) for index, labels in truth.frames.items()).tracks
+    assert sum(found[name].labelled.objects for name in ("Car", "Pedestrian", "Cyclist")) == 12
+    assert (found["all"].labelled.objects, round(found["all"].labelled.ideal, 1)) == (12, 34.9)  # Table III

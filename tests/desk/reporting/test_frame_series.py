@@ -21,10 +21,3 @@ def test_points_hold_the_sums_of_their_frames(values: list[int]) -> None:
     expected = [np.mean(part) for part in np.split(np.array(values), ends[:-1])]
     np.testing.assert_allclose(means, expected)
     assert series.total[0] == pytest.approx(sum(values))
-
-
-def test_short_runs_are_kept_frame_by_frame() -> None:
-    series = FrameSeries(2)
-    for k in range(100):
-        series.add([k, 1.0])
-    np.testing.assert_array_equal(series.means[:, 0], np.arange(100))

@@ -8,9 +8,7 @@ import pytest
 
 from modt import assets, profile
 from modt.config import ProfileConfig
-from modt.config.profile import REFLECTANCE_SCALES
 from modt.sensor_fit.beams import cell_m
-from modt.sensor_fit.reflectance import SCALES
 from modt.sources.recognise import open_stream
 from modt_desk.sensor_fit.findings import Finding, Recording
 from modt_desk.sensor_fit.fit import FINDERS, fit
@@ -78,10 +76,6 @@ def test_a_scale_of_several_sensors_counts_with_the_beams_that_are_known(name, s
     said = next(f.evidence for f in findings if f.key == "reflectance")
     assert "as of the pandar64" in said
     assert ("other beams" in said) is (scale == "none")
-
-
-def test_every_scale_that_models_may_learn_can_be_found():
-    assert tuple(SCALES) == REFLECTANCE_SCALES
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from modt import profile
-from modt_desk.simulation.scan_pattern import EveryRay
 from modt_desk.simulation.sensors import SENSORS, sensor
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 
@@ -16,12 +15,12 @@ def test_a_sensor_agrees_with_its_profile(model):
     span_deg, around_deg = np.ptp(elevation_deg), len(model.azimuth_rad) * np.rad2deg(np.ptp(model.azimuth_rad[:2]))
     if config.elevations_deg is not None:
         assert np.sort(config.elevations_deg) == pytest.approx(elevation_deg[::-1])
-    elif isinstance(model.pattern, EveryRay):
+    elif model.sweeps_a_ray == 1:
         assert config.elevation_step_deg == pytest.approx(span_deg / (model.shape[0] - 1), rel=0.02)
-    if isinstance(model.pattern, EveryRay):
+    if model.sweeps_a_ray == 1:
         assert config.azimuth_step_deg == pytest.approx(around_deg / model.shape[1], rel=0.02)
     else:
-        fired = model.pattern.fires(*np.indices(model.shape).reshape(2, -1), 0)
+        fired = model.fires(*np.indices(model.shape).reshape(2, -1), 0)
         spacing_deg = np.sqrt(span_deg * around_deg / fired.sum())
         assert config.elevation_step_deg == config.azimuth_step_deg == pytest.approx(spacing_deg, rel=0.02)
     assert config.period_s == model.period_s
@@ -31,7 +30,7 @@ def test_a_sensor_agrees_with_its_profile(model):
 def test_a_non_repetitive_sensor_fires_other_rays_in_every_sweep():
     model = sensor("mid-360")
     row, column = np.indices(model.shape).reshape(2, -1)
-    sweeps = [model.pattern.fires(row, column, k).reshape(model.shape) for k in range(6)]
+    sweeps = [model.fires(row, column, k).reshape(model.shape) for k in range(6)]
     for fired in sweeps:
         assert fired.sum() == pytest.approx(20_000, rel=0.01)
         assert np.ptp(fired.sum(axis=0)) <= 1

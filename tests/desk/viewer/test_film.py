@@ -66,15 +66,6 @@ def ffmpeg(tmp_path, monkeypatch):
     return install
 
 
-def test_an_mp4_is_piped_image_by_image(tmp_path, ffmpeg):
-    ffmpeg('for out; do :; done\nexec cat > "$out"')
-    film_of(tmp_path / "film.mp4")
-    width, height = SIZE[0], SIZE[1] // 2 * 2
-    images = np.fromfile(tmp_path / "film.mp4", np.uint8).reshape(N, height, width, 4)
-    edges = [left_edge(Image.fromarray(image)) for image in images]
-    assert edges[0] == edges[1] < edges[2] == edges[3] < edges[4]
-
-
 def test_what_ffmpeg_says_is_the_error(tmp_path, ffmpeg):
     ffmpeg("echo no room >&2; exit 1")
     with pytest.raises(ModtError, match=r"cannot be written by ffmpeg \(no room\)"):

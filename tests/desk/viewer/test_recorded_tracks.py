@@ -11,7 +11,7 @@ def track(id_, box, world, state="tracked", class_="car"):
     """A track of a line of tracks.jsonl."""
     return {
         "id": id_, "state": state, "class": class_, "posterior": [0.1, 0.7, 0.15, 0.05],
-        "viewed": True, "final": False,
+        "witness": [0.0, 1.5, -0.6, 0.2], "viewed": True, "final": False,
         "proposal": None if box is None else 0, "points": 12, "age": 3, "missed": 0,
         "box": None if box is None else dict(zip(BOX_KEYS, box, strict=True)),
         "world": dict(zip(WORLD_KEYS, world, strict=True)),
@@ -35,11 +35,14 @@ def test_rows_are_sorted_by_track_and_a_lost_box_stays_in_the_world():
     assert [(row["seen"], row["classified"], row["state"]) for row in rows[:2]] == [(1, 1, 0), (0, 0, 1)]
     assert [rows[1][key] for key in BOX_KEYS] == [600, 100, -100, 450, 180, 150, 500]
     assert [rows[0][f"p_{name}"] for name in CLASS_NAMES] == [100, 700, 150, 50]
+    assert [rows[0][f"motion_{name}"] for name in CLASS_NAMES] == [0, 150, -60, 20]
 
 
-def test_a_record_without_identities_of_what_was_classified_is_read():
-    table = track_table([frame_rows(0, {"tracks": posts(0.0)}, [])], np.zeros((1, 3)))
-    assert not table[:, COLUMNS.index("classified")].any()
+def test_an_earlier_record_is_read():
+    old = [{key: value for key, value in post.items() if key != "witness"} for post in posts(0.0)]
+    table = track_table([frame_rows(0, {"tracks": old}, [])], np.zeros((1, 3)))
+    for name in ("classified", "motion_car"):
+        assert not table[:, COLUMNS.index(name)].any()
 
 
 @pytest.mark.parametrize("frames", [[], [[]]])

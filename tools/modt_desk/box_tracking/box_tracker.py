@@ -12,13 +12,50 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from modt.classes import ObjectClass
 from modt.geometry import wrap
 from modt.types import NONE, Bool, Float64, Int
 from modt_desk.box_tracking import constant_velocity
-from modt_desk.box_tracking.config import BoxTrackingConfig
 
+POSITION_SIGMA_M, SCORE_SCALE = 0.2, 10.0
+"""Standard deviation of a detected centre of score zero, and the increase of the score that divides it by e."""
+ACCELERATION_SIGMA_MPS2 = 10.0
+"""Process noise, which covers the sensor's own motion where no poses are given."""
+INITIAL_SPEED_SIGMA_MPS = 10.0
+"""Standard deviation of the speed of a new track along each axis."""
+SIZE_GAIN, HEIGHT_GAIN = 0.3, 0.7
+"""Least weights of a new size and of a new height of the centre; more follows a detector faster."""
 MAX_COST = 1.0
 """Cost of a pair at the edge of the gate."""
+GATE, LENGTH_SHARE = 13.8, 0.7
+"""Squared Mahalanobis distance at the edge (0.999 quantile of chi2(2)); share of the length added to its radius."""
+HEIGHT_WEIGHT_PER_M, YAW_WEIGHT = 0.2, 0.1
+"""Cost of a difference of height, and of the absolute sine of a difference of yaw."""
+MIN_BIRTH_SCORE = 0.0
+"""Least score of a detection that starts a track."""
+MAX_MISSED = 30
+"""Frames without a detection after which a track is deleted."""
+SCORE_GAIN, AGE_BONUS = 0.5, 0.5
+"""Least weight of a new score in the confidence, and what it gains per unit of the logarithm of the detections."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BoxClass:
+    """What differs between classes; confidences are on the scale of PointRCNN's scores."""
+
+    report_above: float = 1.0  # least confidence of a track in a frame in which it is reported
+    keep_above: float  # least mean confidence of a track that is written
+    range_bonus_per_m: float = 0.0  # added to a score per metre: few points on what is far lower its score
+    yaw_gain: float = 0.7  # weight of a new yaw
+    max_gap: int = 3  # frames without a report that are filled afterwards
+
+
+BOX_CLASSES = {
+    ObjectClass.CAR: BoxClass(report_above=6.5, keep_above=8.5, range_bonus_per_m=0.1),
+    ObjectClass.PEDESTRIAN: BoxClass(keep_above=3.8, yaw_gain=0.5, max_gap=1),
+    ObjectClass.CYCLIST: BoxClass(keep_above=4.2),
+}
+"""Tuned on PointRCNN's detections on KITTI."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +78,7 @@ def assign(cost: Float64) -> tuple[Int, Int]:
 class BoxTracker:
     """Tracks the boxes of one class."""
 
-    def __init__(self, config: BoxTrackingConfig) -> None:
+    def __init__(self, config: BoxClass) -> None:
         self.config = config
         self._next_id = 0
         self._stamp_s: float | None = None
@@ -54,12 +91,10 @@ class BoxTracker:
 
         Scores (D,) increase with the detector's confidence; range_m (D,) is that from the sensor.
         """
-        model = self.config.filter
-        variance = np.square(model.position_sigma_m * np.exp(-np.maximum(score, 0.0) / model.score_scale))
-        # Few points lie on what is far: its score is low for that reason alone.
-        ranged_score = score + self.config.confidence.range_bonus_per_m * range_m
+        variance = np.square(POSITION_SIGMA_M * np.exp(-np.maximum(score, 0.0) / SCORE_SCALE))
+        ranged_score = score + self.config.range_bonus_per_m * range_m
         self._predict(stamp_s)
-        strong = score >= self.config.min_birth_score
+        strong = score >= MIN_BIRTH_SCORE
         rows, columns = self._match(boxes, variance, strong)
         self._source[:] = NONE
         self._missed += 1
@@ -67,7 +102,7 @@ class BoxTracker:
             self._update(rows, columns, boxes, variance, ranged_score)
         unmatched = strong.copy()
         unmatched[columns] = False
-        keep = self._missed <= self.config.max_missed
+        keep = self._missed <= MAX_MISSED
         if not keep.all() or unmatched.any():
             self._delete_and_create(keep, np.flatnonzero(unmatched), boxes, variance, ranged_score)
         return self._report()
@@ -75,8 +110,7 @@ class BoxTracker:
     def _predict(self, stamp_s: float) -> None:
         dt_s = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
-        sigma = self.config.filter.acceleration_sigma_mps2
-        self._x, self._P = constant_velocity.predict(self._x, self._P, sigma, dt_s)
+        self._x, self._P = constant_velocity.predict(self._x, self._P, ACCELERATION_SIGMA_MPS2, dt_s)
         # A gate that widened while a track is missed would end by taking the detection of something else.
         np.copyto(self._reach, self._P[:, 0], where=self._missed == 0)
 
@@ -94,36 +128,35 @@ class BoxTracker:
 
     def _cost(self, boxes: Float64, variance: Float64) -> Float64:
         """(T, D) cost of each pair."""
-        config = self.config.association
         dx, dy = boxes[:, 0] - self._x[:, 0, None], boxes[:, 1] - self._x[:, 1, None]
-        gate_m2 = config.gate * (self._reach[:, None] + variance) + np.square(config.length_share * self._box[:, 3:4])
+        gate_m2 = GATE * (self._reach[:, None] + variance) + np.square(LENGTH_SHARE * self._box[:, 3:4])
         dz = np.abs(boxes[:, 2] - self._box[:, 2, None])
         turn = np.abs(np.sin(boxes[:, 6] - self._box[:, 6, None]))
-        return np.asarray((dx * dx + dy * dy) / gate_m2 + config.height_weight_per_m * dz + config.yaw_weight * turn)
+        return np.asarray((dx * dx + dy * dy) / gate_m2 + HEIGHT_WEIGHT_PER_M * dz + YAW_WEIGHT * turn)
 
     def _update(self, rows: Int, columns: Int, boxes: Float64, variance: Float64, score: Float64) -> None:
-        model, measured = self.config.filter, boxes.take(columns, axis=0)
+        measured = boxes.take(columns, axis=0)
         x, P = self._x.take(rows, axis=0), self._P.take(rows, axis=0)
         self._x[rows], self._P[rows] = constant_velocity.update(x, P, measured[:, :2], variance[columns])
         self._missed[rows] = 0
         self._source[rows] = columns
         hits = self._hits[rows] + 1
         box = self._box.take(rows, axis=0)
-        gain = np.maximum(1.0 / hits, model.size_gain)
+        gain = np.maximum(1.0 / hits, SIZE_GAIN)
         box[:, 3:6] += gain[:, None] * (measured[:, 3:6] - box[:, 3:6])
-        box[:, 2] += model.height_gain * (measured[:, 2] - box[:, 2])
+        box[:, 2] += HEIGHT_GAIN * (measured[:, 2] - box[:, 2])
         turn = wrap(measured[:, 6] - box[:, 6])
         turn = np.where(np.abs(turn) > np.pi / 2, wrap(turn + np.pi), turn)  # yaw is ambiguous by pi
-        box[:, 6] = wrap(box[:, 6] + model.yaw_gain * turn)
+        box[:, 6] = wrap(box[:, 6] + self.config.yaw_gain * turn)
         self._hits[rows], self._box[rows] = hits, box
-        gain = np.maximum(1.0 / hits, self.config.confidence.score_gain)
+        gain = np.maximum(1.0 / hits, SCORE_GAIN)
         self._score[rows] += gain * (score[columns] - self._score[rows])
 
     def _delete_and_create(self, keep: Bool, new: Int, boxes: Float64, variance: Float64, score: Float64) -> None:
         n = len(new)
         x, P = np.zeros((n, 4)), np.zeros((n, 3))
         x[:, :2] = boxes[new, :2]
-        P[:, 0], P[:, 2] = variance[new], np.square(self.config.filter.initial_speed_sigma_mps)
+        P[:, 0], P[:, 2] = variance[new], np.square(INITIAL_SPEED_SIGMA_MPS)
         join = np.concatenate
         self._id = join([self._id[keep], self._next_id + np.arange(n)])
         self._next_id += n
@@ -137,10 +170,9 @@ class BoxTracker:
         self._reach = join([self._reach[keep], np.zeros(n)])
 
     def _report(self) -> BoxTracks:
-        config = self.config.confidence
         rows = np.flatnonzero(self._source != NONE)
-        confidence = self._score[rows] + config.age_bonus * np.log(self._hits[rows])
-        sure = confidence >= config.report_above
+        confidence = self._score[rows] + AGE_BONUS * np.log(self._hits[rows])
+        sure = confidence >= self.config.report_above
         rows = rows[sure]
         box = self._box[rows]
         box[:, :2] = self._x[rows, :2]

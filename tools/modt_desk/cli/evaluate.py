@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from modt.cli.options import add_examples
-from modt.errors import MisuseError
+from modt.errors import MisuseError, install
 from modt_desk.cli import experiments
 from modt_desk.evaluation.rules import IGNORABLE
+
+if TYPE_CHECKING:
+    from modt_desk.evaluation.run_record import RunRecord
+    from modt_desk.evaluation.truth import Truth
 
 DIGITS = 6
 
@@ -28,65 +33,127 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p.add_argument("--sector", type=float, metavar="DEG", help=sector)
     further = "table of objects that the labels of the one drive leave out (docs/evaluation.md)"
     p.add_argument("--further", type=Path, metavar="FILE", help=further)
+    listed = "list tracks that move like road users and have no label, with pictures and a table for --further"
+    p.add_argument("--unlabelled", type=Path, metavar="DIR", help=listed)
     experiments.add_options(p)
     add_examples(
         p,
         "modt evaluate RUN DRIVE                            a run against the labels of its drive",
         "modt evaluate RUN1 DRIVE1 RUN2 DRIVE2 --json       several together, as JSON",
+        "modt evaluate RUN DRIVE --unlabelled DIR           what the labels may leave out",
         "modt evaluate --experiment all --kitti ROOT        the paper's tables and figures",
     )
     p.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Evaluate and print, or make experiments.
+    """Evaluate and print, list what has no label, or make experiments.
 
     Raises:
         MisuseError: a run or its labels cannot be used, or do not belong together.
+        ModtError: a file cannot be written.
     """
     if arguments.experiment:
+        if arguments.unlabelled:
+            raise MisuseError("--experiment", "makes runs of its own", "leave --unlabelled out")
         if arguments.pairs:
             raise MisuseError("--experiment", "takes no runs", "leave RUN TRUTH out, or --experiment")
         return experiments.run(arguments)
-    import json
-    from dataclasses import asdict, replace
-
-    from modt_desk.evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
-    from modt_desk.evaluation.further_objects import with_further
-    from modt_desk.evaluation.report import report
-    from modt_desk.evaluation.run_record import RunRecord
-    from modt_desk.evaluation.truth import KITTI_TYPES, PAPER_TYPES
-    from modt_desk.evaluation.truth_files import open_truth
-
     paths: list[Path] = arguments.pairs
     if not paths or len(paths) % 2:
         raise MisuseError("RUN TRUTH", f"{len(paths)} paths are no pairs", "give each run followed by its labels")
     if arguments.sector is not None and not 0 < arguments.sector <= 180:
         raise MisuseError("--sector", f"{arguments.sector:g} is no half sector", "give more than 0 and at most 180")
-    if arguments.further is not None and len(paths) > 2:
-        raise MisuseError("--further", "is the table of one drive", "judge that drive alone")
+    for option in ("further", "unlabelled"):
+        if getattr(arguments, option) is not None and len(paths) > 2:
+            raise MisuseError(f"--{option}", "is for one drive", "judge that drive alone")
+    if arguments.unlabelled is not None:
+        return list_unlabelled(arguments)
+    judge_runs(arguments)
+    return 0
+
+
+def opened(arguments: argparse.Namespace, path: Path, labels: Path) -> tuple[RunRecord, Truth]:
+    """A run and its labels, with further objects and the rules that are asked for.
+
+    Raises:
+        MisuseError: one of them cannot be used.
+    """
+    from dataclasses import replace
+
+    from modt_desk.evaluation.further_objects import with_further
+    from modt_desk.evaluation.run_record import RunRecord
+    from modt_desk.evaluation.truth import KITTI_TYPES, PAPER_TYPES
+    from modt_desk.evaluation.truth_files import open_truth
+
     paper = arguments.classes == "paper"
+    record = RunRecord.open(path)
+    truth = open_truth(labels, record.stream, paper=paper)
+    if arguments.further is not None:
+        truth = with_further(truth, arguments.further, PAPER_TYPES if paper else KITTI_TYPES)
+    sector_deg = truth.rules.sector_deg if arguments.sector is None else arguments.sector
+    ignored = truth.rules.ignored - set(arguments.count)
+    return record, replace(truth, rules=replace(truth.rules, sector_deg=sector_deg, ignored=ignored))
+
+
+def judge_runs(arguments: argparse.Namespace) -> None:
+    """Print the evaluation of the runs by sensor and over all sensors; write its page where one is asked for.
+
+    Raises:
+        MisuseError: a run or its labels cannot be used, or do not belong together.
+        ModtError: the page cannot be written.
+    """
+    import json
+    from dataclasses import asdict
+
+    from modt_desk.evaluation.evaluation import SCHEMA, DriveRows, collect, evaluation
+    from modt_desk.evaluation.report import report
+
     by_sensor: dict[str, list[DriveRows]] = {}
-    for drive, (path, labels) in enumerate(zip(paths[::2], paths[1::2], strict=True)):
-        record = RunRecord.open(path)
-        truth = open_truth(labels, record.stream, paper=paper)
-        if arguments.further is not None:
-            truth = with_further(truth, arguments.further, PAPER_TYPES if paper else KITTI_TYPES)
-        sector_deg = truth.rules.sector_deg if arguments.sector is None else arguments.sector
-        ignored = truth.rules.ignored - set(arguments.count)
-        rules = replace(truth.rules, sector_deg=sector_deg, ignored=ignored)
-        by_sensor.setdefault(record.sensor, []).append(collect(record.frames(truth), rules, drive))
-    sensors = {name: evaluation(found) for name, found in by_sensor.items()}
+    for drive, pair in enumerate(zip(arguments.pairs[::2], arguments.pairs[1::2], strict=True)):
+        record, truth = opened(arguments, *pair)
+        by_sensor.setdefault(record.sensor, []).append(collect(record.frames(truth), truth.rules, drive))
+    sensors = {name: evaluation(drives) for name, drives in by_sensor.items()}
     if len(sensors) > 1:
-        sensors["all sensors"] = evaluation([rows for found in by_sensor.values() for rows in found])
+        sensors["all sensors"] = evaluation([rows for drives in by_sensor.values() for rows in drives])
     if arguments.html is not None:
         from modt_desk.reporting.page import save
         from modt_desk.viewer.evaluation_page import evaluation_page
 
         save(arguments.html, evaluation_page(sensors))
     if arguments.json:
-        text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(found) for name, found in sensors.items()}})
+        text = json.dumps({"schema": SCHEMA, "sensors": {name: asdict(scores) for name, scores in sensors.items()}})
         print(json.dumps(json.loads(text, parse_float=lambda number: round(float(number), DIGITS)), indent=1))
     else:
         print(report(sensors))
+
+
+def list_unlabelled(arguments: argparse.Namespace) -> int:
+    """Print the tracks that move like road users and have no label; write their pictures and their table.
+
+    Raises:
+        MisuseError: the run or its labels cannot be used, or Matplotlib is not installed.
+        ModtError: a file cannot be written.
+    """
+    from modt.sinks.output import writing
+    from modt_desk.evaluation.unlabelled import listing, unlabelled, write_table
+
+    folder: Path = arguments.unlabelled
+    try:
+        from modt_desk.viewer.film_strip import save_film_strips
+    except ModuleNotFoundError as error:
+        raise MisuseError(folder, f"needs {error.name}", install("view")) from None
+    record, truth = opened(arguments, *arguments.pairs)
+    movers = unlabelled(record, truth)
+    if not movers:
+        print("every track that moves like a road user has a label")
+        return 0
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    table = folder / "further.csv"
+    write_table(table, movers)
+    if truth.scans is not None:
+        save_film_strips(folder, movers, truth.scans)
+    print("\n".join(listing(movers)))
+    print(f"\npictures and rows in {folder}: keep the rows of real road users, then give --further {table}")
     return 0

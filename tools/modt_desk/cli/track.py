@@ -89,18 +89,16 @@ def follow(
     from modt.classes import CLASSES
     from modt.geometry import inverse, transform_boxes
     from modt.sinks.kitti import box_lines
-    from modt_desk.box_tracking.box_tracker import BoxTracker
-    from modt_desk.box_tracking.config import box_tracking_config
+    from modt_desk.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
     from modt_desk.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, boxes_to_kitti
     from modt_desk.box_tracking.whole_tracks import TrackedBoxes, bridged, confident, of_one_class
 
     T = None if poses is None else T_LEVEL_CAMERA @ poses @ inverse(T_LEVEL_CAMERA)
     classes = []
     for number, object_class in enumerate(DETECTED):
-        config = box_tracking_config(object_class)
-        least = config.confidence.keep_above if sure is None else sure
-        report_above = least if online else min(least, config.confidence.report_above)
-        tracker = BoxTracker(replace(config, confidence=replace(config.confidence, report_above=report_above)))
+        config = BOX_CLASSES[object_class]
+        least = config.keep_above if sure is None else sure
+        tracker = BoxTracker(replace(config, report_above=least if online else min(least, config.report_above)))
         found = _reports(tracker, detections.take(detections.object_class == object_class), T, period_s)
         found = replace(found, id=found.id * len(DETECTED) + number)
         classes.append(found if online else bridged(confident(found, least), config.max_gap))

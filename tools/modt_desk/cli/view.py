@@ -23,7 +23,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("view", help="show a recorded run from above, with the points of its source")
     p.add_argument("run_directory", type=Path, metavar="RUN", help="directory written by modt replay or modt run")
     which = p.add_mutually_exclusive_group()
-    frame = "draw one frame, or begin a page or a film there"
+    frame = "draw one frame, or begin there (default: a page at its first object, a film at its first frame)"
     which.add_argument("--frame", type=options.integer(0, 10**9, "the number of a frame"), metavar="N", help=frame)
     film = "make a film, RUN/view.mp4, or RUN/view.gif where ffmpeg is not installed"
     which.add_argument("--animate", action="store_true", help=film)
@@ -63,7 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
     if out.suffix not in FORMS:
         raise MisuseError(out, "no kind of picture", f"give a name that ends with {', '.join(FORMS)}")
     recorded = RecordedRun.read(directory)
-    at = 0 if arguments.frame is None else recorded.position(arguments.frame)
+    if arguments.frame is not None:
+        at = recorded.position(arguments.frame)
+    else:
+        at = 0 if out.suffix in (GIF, MP4) else recorded.first_object
     stream = mark_truth(recorded, directory, arguments.truth, source(recorded, arguments.capture))
     if stream is None and recorded.live:
         print("modt: without points: a live source cannot be read again; --truth may have scans", file=sys.stderr)

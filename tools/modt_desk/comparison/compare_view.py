@@ -80,13 +80,17 @@ def compare_plots(tree: dict[str, Any]) -> list[Plot]:
     basis = energy_plots.basis(modes[base]["gross_J"])
     energy_mJ = {mode: energy_plots.stage_energy_mJ(series[mode]) for mode in series}
     sums_mJ = {mode: np.sum([*parts.values()], axis=0) for mode, parts in energy_mJ.items()}
+    top_mJ = max(float(sums.max(initial=0.0)) for sums in sums_mJ.values())
     points = {mode: (modes[mode]["N_go"], s["gamma_measured_cpu"]) for mode, s in tree["savings"].items()}
     frames = np.arange(tree["frames"], dtype=float)
     classified = [svg.Trace(mode, frames, np.array(series[mode]["classified"], float)) for mode in series]
     return [
         energy_plots.cumulative_energy(sums_mJ, np.ones(len(frames)), f"E1: {base}; {basis}"),
         energy_plots.gamma_curve(tree["unit_costs"]["a"], modes[base]["proposals"], points, "dots: of CPU time"),
-        *(energy_plots.stage_energy(f"{mode}: energy by stage", mJ, frames, basis) for mode, mJ in energy_mJ.items()),
+        *(
+            energy_plots.stage_energy(f"{mode}: energy by stage", mJ, frames, basis, top_mJ)
+            for mode, mJ in energy_mJ.items()
+        ),
         *(energy_plots.life_histogram(f"{mode}: life of tracks", series[mode]["lives"]) for mode in others),
         ("Classifications a frame", svg.lines(classified, "frame", "classified"), "counted"),
     ]

@@ -114,7 +114,7 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
     label, owner = np.zeros((2, len(size)), np.int64)
     label[best[matched]] = truth.object_class[matched]
     range_m = np.bincount(of, np.hypot(points[:, 0], points[:, 1]), len(size)) / np.maximum(size, 1)
-    judged = most(_in_sector(points, rules)) & (range_m <= rules.max_range_m)
+    judged = most_in_sector(frame, size, rules) & (range_m <= rules.max_range_m)
     range_m[best[matched]] = objects["range_m"][matched]
     held = overlap.held > 0.5 * size
     role = np.full(len(size), Role.COUNTED, np.int64)
@@ -147,6 +147,14 @@ def _proposals(frame: JudgedFrame, overlap: Overlap, objects: Rows, pairs: Bool,
         to_call=to_call,
         to_associate=to_call & ~(neutral & no_object) & ~further,
     )
+
+
+def most_in_sector(frame: JudgedFrame, size: Int, rules: Rules) -> Bool:
+    """(P,) whether more than half of the points of each proposal, (P,) in number, lie in the labelled sector."""
+    members = frame.proposal >= 0
+    inside_sector = frame.proposal[members][_in_sector(frame.points[members], rules)]
+    found: Bool = np.bincount(inside_sector, minlength=len(size)) > 0.5 * size
+    return found
 
 
 def _in_sector(points: Float32, rules: Rules) -> Bool:

@@ -30,9 +30,9 @@ def basis(gross_J: Quantity) -> str:
     return f"{gross_J.kind}, its split over stages and frames estimated; without idling and what is unattributed"
 
 
-def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64, note: str) -> Plot:
-    """Stacked energy of the stages over (points,) frames."""
-    return (title, svg.areas(frames, energy_mJ, "frame", "mJ a frame"), note)
+def stage_energy(title: str, energy_mJ: dict[str, Float64], frames: Float64, note: str, top_mJ: float = 0.0) -> Plot:
+    """Stacked energy of the stages over (points,) frames; charts to be compared have one `top_mJ`."""
+    return (title, svg.areas(frames, energy_mJ, "frame", "mJ a frame", top_mJ), note)
 
 
 def cumulative_energy(energy_mJ: dict[str, Float64], each: Float64, note: str, dashed: str = "") -> Plot:

@@ -14,17 +14,17 @@ from modt_desk.reporting.quantity import LEGEND
 _STYLE = """
 *{box-sizing:border-box}
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);margin:0 auto;
-max-width:1100px;padding:24px 20px}
+max-width:1100px;padding:24px 20px;overflow-wrap:anywhere}
 h1{font-size:1.6rem;margin:0}h2{font-size:1.1rem;margin:0 0 .5rem}
 .sub{color:var(--soft);margin:.2rem 0 1.2rem}
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(190px,1fr));gap:12px;margin:0 0 20px}
-.tile{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:12px 14px}
+.tile{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:12px 14px;min-width:0}
 .tile b{display:block;font-size:1.5rem;line-height:1.25;font-variant-numeric:tabular-nums}
 .tile small{color:var(--soft)}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(440px,100%),1fr));gap:16px;margin:0 0 16px}
 section{background:var(--panel);border:1px solid var(--line);border-radius:8px;padding:14px;margin:0 0 16px;
 break-inside:avoid;overflow-x:auto}
-.plots section{margin:0}
+.plots section{margin:0;min-width:0}
 table{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}
 th,td{padding:4px 10px;text-align:right;border-bottom:1px solid var(--line);white-space:nowrap}
 th:first-child,td:first-child{text-align:left;white-space:normal;min-width:7.5rem}

@@ -14,6 +14,8 @@ from modt_desk.reporting.quantity import format_number
 
 WIDTH, HEIGHT = 520, 230
 LEFT, RIGHT, TOP, BOTTOM = 58, 14, 12, 44
+CHARACTER = 10
+"""Width of a digit at most, on narrow pages; labels of an axis that would touch are left out."""
 _MAX_POINTS = 400
 """Points drawn of a line at most, to keep the page small."""
 _LEAST_TICKS = 3
@@ -45,7 +47,7 @@ def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = Fa
     body: list[str] = []
     for k, trace in enumerate(traces):
         x, y = scale.x(_thin(trace.x)), scale.y(_thin(trace.y))
-        if trace.dots:
+        if trace.dots or len(trace.x) == 1:  # a line of one point cannot be seen
             body += _marks(scale, k, trace)
         else:
             dash = ' stroke-dasharray="6 4"' if trace.dashed else ""
@@ -57,21 +59,22 @@ def lines(traces: Sequence[Trace], x_label: str, y_label: str, *, log: bool = Fa
 def _marks(scale: _Scale, k: int, trace: Trace) -> Iterator[str]:
     """Circles over their intervals."""
     x, y = scale.x(trace.x), scale.y(trace.y)
+    style = f' style="fill:{trace.colour}"' if trace.colour else ""
     spans = np.zeros((0, 2)) if trace.span is None else scale.y(trace.span)
     for at, (low, high) in zip(x, spans, strict=False):
         yield f'<line class="l{k}" x1="{at:.1f}" x2="{at:.1f}" y1="{low:.1f}" y2="{high:.1f}"/>'
     names = trace.names or [trace.name] * len(x)
     for name, a, b, u, v in zip(names, x, y, trace.x, trace.y, strict=True):
         said = f"{escape(name)}: {format_number(float(u))}, {format_number(float(v))}"
-        yield f'<circle class="c{k}" cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{said}</title></circle>'
+        yield f'<circle class="c{k}"{style} cx="{a:.1f}" cy="{b:.1f}" r="5"><title>{said}</title></circle>'
 
 
-def areas(x: Float64, parts: dict[str, Float64], x_label: str, y_label: str) -> str:
-    """Parts stacked, the first at the bottom."""
+def areas(x: Float64, parts: dict[str, Float64], x_label: str, y_label: str, at_least: float = 0.0) -> str:
+    """Parts stacked, the first at the bottom, on an axis that reaches to at_least or beyond."""
     x, drawn = _thin(x), {name: _thin(y) for name, y in parts.items()}
     tops = np.cumsum([*drawn.values()], axis=0) if drawn else np.zeros((0, len(x)))
     whole = Trace("", x, tops[-1] if len(tops) else np.zeros(len(x)))
-    scale = _Scale.around([whole], log=False)
+    scale = _Scale.around([whole, Trace("", x[:1], np.array([at_least][: len(x)]))], log=False)
     body, floor = [], np.zeros(len(x))
     for k, top in enumerate(tops):
         outline = np.concatenate([scale.x(x), scale.x(x)[::-1]])
@@ -148,9 +151,12 @@ def _frame(
         y = float(scale.y(np.array([tick]))[0])
         parts.append(f'<line class="grid" x1="{LEFT}" x2="{right}" y1="{y:.1f}" y2="{y:.1f}"/>')
         parts.append(f'<text class="end" x="{LEFT - 6}" y="{y + 4:.1f}">{tick:g}</text>')
+    free = 0.0
     for tick in scale.ticks(scale.x0, scale.x1):
-        x = float(scale.x(np.array([tick]))[0])
-        parts.append(f'<text class="mid" x="{x:.1f}" y="{floor + 16}">{tick:g}</text>')
+        x, half = float(scale.x(np.array([tick]))[0]), CHARACTER / 2 * len(f"{tick:g}")
+        if x - half >= free:
+            free = x + half + CHARACTER
+            parts.append(f'<text class="mid" x="{x:.1f}" y="{floor + 16}">{tick:g}</text>')
     middle = (TOP + floor) / 2
     parts += [
         body,

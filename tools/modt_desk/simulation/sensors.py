@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.types import Float32, Float64
-from modt_desk.simulation.scan_pattern import EVERY_RAY, NonRepetitive, ScanPattern
+from modt.types import Bool, Float32, Float64, Int
+
+COLUMN_STEP, SWEEP_STEP = (np.sqrt(5) - 1) / 2, np.sqrt(2) - 1
+"""Irrational steps of the ray that a non-repetitive sensor fires, so that no two columns or sweeps are alike."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class SensorModel:
     azimuth_rad: Float64  # (A,) of each column, ascending, counter-clockwise from straight ahead
     origin_m: Float64 | float = 0.0  # (B,) height of each beam's origin above the sensor's, or one for all
     rotating: bool = True  # a sweep is one turn of the columns
-    pattern: ScanPattern = EVERY_RAY  # rays of the grid fired in a sweep
+    sweeps_a_ray: int = 1  # of sweeps, one in which a ray is fired; more than 1 for a non-repetitive sensor
     height_m: float  # usual mounting height above the ground
     min_range_m: float  # of a return
     max_range_m: float  # of a return
@@ -69,6 +71,11 @@ class SensorModel:
     def tangent(self) -> Float32:
         """(B,) rise of each beam over horizontal distance."""
         return np.tan(self.elevation_rad).astype(np.float32)
+
+    def fires(self, row: Int, column: Int, sweep: int) -> Bool:
+        """(n,) whether the rays at (n,) beams and columns are fired in a sweep."""
+        offset = np.floor((COLUMN_STEP * column + SWEEP_STEP * sweep) % 1 * self.sweeps_a_ray)
+        return np.asarray(row % self.sweeps_a_ray == offset)
 
 
 def _beams(top_deg: float, bottom_deg: float, n: int) -> Float64:
@@ -176,7 +183,7 @@ _MODELS = (
         elevation_rad=_beams(52.0, -7.0, 237),
         azimuth_rad=_columns(1440),
         rotating=False,
-        pattern=NonRepetitive(17),
+        sweeps_a_ray=17,
         elevation_sigma_rad=0.0018,
         height_m=0.5,
         min_range_m=0.1,

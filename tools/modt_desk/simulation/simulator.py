@@ -72,7 +72,7 @@ class Simulator:
         offset = np.append(self._intensity_offset[solids.body, solids.material], np.float32(0))
         distance, intensity, ray = self.receiver.receive(image.distance, material, image.solid, offset, rng)
         row, column = np.divmod(ray, self.sensor.shape[1])
-        fired = self.sensor.pattern.fires(row, column, index)
+        fired = self.sensor.fires(row, column, index)
         ray, row, column, intensity = ray[fired], row[fired], column[fired], intensity[fired]
         s = distance.ravel()[ray]
         jitter = rng.standard_normal(len(s), np.float32) * np.float32(self.sensor.azimuth_sigma_rad)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import subprocess
 from collections.abc import Iterable
 from itertools import chain
@@ -21,7 +20,6 @@ SHARP_DPI = 200
 """Resolution of the points in an SVG [pixel/inch]."""
 _REPEATABLE = {"svg.fonttype": "none", "svg.hashsalt": "modt"}
 """Text stays text, and the same picture is the same bytes."""
-logging.getLogger("matplotlib").setLevel(logging.ERROR)  # an error of ffmpeg is reported once
 
 
 def save_picture(path: Path, figure: Figure, title: str) -> None:

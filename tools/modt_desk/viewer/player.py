@@ -15,6 +15,7 @@ from modt_desk.viewer.extent import reach_m
 from modt_desk.viewer.recorded_run import RecordedRun
 from modt_desk.viewer.truth_marks import LEGEND
 
+SCRIPT = Path(__file__).parent / "recorded.js"
 POINT_BYTES = 20_000_000
 """Of the points of a page, about."""
 CELL_BYTES = 1.5
@@ -43,7 +44,7 @@ def save_player(path: Path, run: RecordedRun, start: int, step_cm: int, sweeps: 
     if sweeps is None:
         about += "; the source of its points is not found"
     head, tail = page(
-        run.facts["stream"]["name"], about, _content(run, start, None if sweeps is None else step_cm), "recorded"
+        run.facts["stream"]["name"], about, _content(run, start, None if sweeps is None else step_cm), SCRIPT
     )
     with writing(path), path.open("w", encoding="utf-8") as file:
         file.write(head)

@@ -23,7 +23,7 @@ from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
 from modt.sinks.tracks import SCHEMA, recorded_pose
 from modt.types import Float64, Int
-from modt.viewer.track_rows import planar
+from modt.viewer.track_rows import COLUMNS, planar
 from modt_desk.energy.run_energy import run_energy
 from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
@@ -92,6 +92,12 @@ class RecordedRun:
     def numbers(self) -> list[int]:
         """Of the frames."""
         return [recorded["frame"] for recorded in self.frames]
+
+    @property
+    def first_object(self) -> int:
+        """Index of the first frame in which an object is reported; 0 where none is."""
+        at, class_ = (self.tracks[:, COLUMNS.index(name)] for name in ("at", "class"))
+        return int(at[class_ > 0].min(initial=len(self.frames))) % len(self.frames)
 
     @property
     def budget(self) -> str:

@@ -33,6 +33,7 @@ def frame_rows(at: int, record: dict[str, Any], states: list[str]) -> list[list[
                 track["id"] in classified,
                 track["points"],
                 *track["posterior"],
+                *track.get("witness", [0.0] * len(CLASS_NAMES)),  # earlier runs have none
                 *(box[key] for key in BOX_KEYS),
                 *(track["world"][key] for key in WORLD_KEYS),
             ]

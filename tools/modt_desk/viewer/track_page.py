@@ -1,4 +1,4 @@
-"""How the class of a track was decided: a page of its states, its views, and what the posterior was after each."""
+"""How the class of a track was decided: a page of its states, its views, its motion, and the posterior after each."""
 
 from __future__ import annotations
 
@@ -49,21 +49,29 @@ def track_page(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32])
     number = {int(row["at"]): run.numbers[int(row["at"])] for row in rows}
     classified = [row for row in rows if row["classified"]]
     spent_mJ = sum(run.frames[int(row["at"])].get("call_mJ", 0.0) for row in classified)
-    final = next((row for row in rows if row["final"]), None)
-    certain = (
-        (f"{number[int(final['at'])]}", "its class is settled") if final else ("never", "its class is not settled")
-    )
-    name = CLASS_NAMES[int(last["class"])]
+    settled = settled_from(rows)
     facts = [
-        ("said at the end", name, f"posterior {100 * last[f'p_{name}']:.1f} %"),
+        ("reported at the end", CLASS_NAMES[int(last["class"])], f"posterior {_reported(last)}"),
         ("followed", f"{len(rows)} frames", f"{number[int(first['at'])]} to {number[int(last['at'])]}"),
         ("classifications", f"{len(classified)}", f"{sum(r['seen'] > 0 for r in rows)} by tracking by detection"),
         ("energy of classification", f"{spent_mJ:.1f} mJ", "estimated"),
-        ("certain from frame", *certain),
+        ("settled from frame", "never", "its class may change in the next frame")
+        if settled is None
+        else ("settled from frame", f"{number[int(settled['at'])]}", f"{_reported(settled)} then"),
     ]
     blocks = [tiles(facts), plots(_plots(run, rows)), *_events(run, rows, sweeps)]
     about = f"{run.facts['stream']['name']}, mode {run.facts['mode']}: from proposal to class"
     return page(f"Track {first['id']:g}", about, blocks)
+
+
+def settled_from(rows: list[Row]) -> Row | None:
+    """The frame from which a track keeps its last class as a final one, to its end; None if that is not final."""
+    settled = None
+    for row in reversed(rows):
+        if not row["final"] or row["class"] != rows[-1]["class"]:
+            break
+        settled = row
+    return settled
 
 
 def _plots(run: RecordedRun, rows: list[Row]) -> Iterator[Plot]:
@@ -72,32 +80,46 @@ def _plots(run: RecordedRun, rows: list[Row]) -> Iterator[Plot]:
         svg.Trace(c, frame, np.array([row[f"p_{c}"] for row in rows]), colour=spec.colour)
         for c, spec in zip(CLASS_NAMES, CLASSES.values(), strict=True)
     ]
-    yield "Posterior", svg.lines(traces, "frame", "probability"), "after each frame, of views and box sizes"
+    yield "Posterior", svg.lines(traces, "frame", "probability"), "after each frame, of views, box sizes and motion"
+    motion = [
+        svg.Trace(c, frame, np.array([row[f"motion_{c}"] for row in rows]), colour=spec.colour)
+        for c, spec in [*zip(CLASS_NAMES, CLASSES.values(), strict=True)][1:]
+    ]
+    yield "Motion", svg.lines(motion, "frame", "log-likelihood"), "of its motion, over that of background"
     points = svg.Trace("", frame, np.array([row["points"] for row in rows]))
     yield "Points", svg.lines([points], "frame", "points"), "of its last proposal"
 
 
 def _events(run: RecordedRun, rows: list[Row], sweeps: Mapping[int, Float32]) -> Iterator[str]:
-    """A block for each change of state and each classification."""
+    """A block for each classification and each change of the state or of the class that is reported."""
     before: Row | None = None
     for row in rows:
         at, said = int(row["at"]), []
         if row["classified"]:
             posterior = ", ".join(f"{c} {100 * row[f'p_{c}']:.1f} %" for c in CLASS_NAMES)
-            name = CLASS_NAMES[int(row["class"])]
-            was = "" if before is None else f"; {name} before: {100 * before[f'p_{name}']:.1f} %"
+            motion = ", ".join(f"{c} {row[f'motion_{c}']:+.1f}" for c in CLASS_NAMES[1:])
             where = f"{np.hypot(row['x'], row['y']):.0f} m away, {row['l']:.1f} × {row['w']:.1f} × {row['h']:.1f} m"
-            said.append(
-                f"Classified, {row['points']:g} points, {where}, {run.frames[at].get('call_mJ', 0.0):.1f} mJ."
-            )
-            said.append(f"Posterior: {posterior}{was}.")
+            call_mJ = run.frames[at].get("call_mJ", 0.0)
+            said.append(f"Classified, {row['points']:g} points, {where}, {call_mJ:.1f} mJ.")
+            said.append(f"Posterior: {posterior}.")
+            said.append(f"Motion, log-likelihood over background: {motion}.")
         if before is None or row["state"] != before["state"]:
             state = run.states[int(row["state"])].replace("_", " ")
             said.append(f"Begins as {state}." if before is None else f"Becomes {state}.")
+        if before is None or row["class"] != before["class"]:
+            said.append(f"Reported as {_reported(row)}.")
         if row["final"] and not (before and before["final"]):
-            said.append("Certain: the class is not asked for again unless the view improves.")
+            said.append(f"The class is settled: {_reported(row)}. It is asked for again only if the view improves.")
+        if before and before["final"] and not row["final"]:
+            said.append("The class is open.")
         if said:
             pictures = crop_picture([row[key] for key in BOX_KEYS], sweeps[at]) if at in sweeps else ""
             lines = "<br>".join(map(escape, said))
             yield f"<section><h2>Frame {run.numbers[at]}</h2><p>{lines}</p>{pictures}</section>"
         before = row
+
+
+def _reported(row: Row) -> str:
+    """The class that is reported, with its own probability."""
+    name = CLASS_NAMES[int(row["class"])]
+    return f"{name} {100 * row[f'p_{name}']:.1f} %"

@@ -20,7 +20,9 @@ from modt_desk.evaluation.truth import FrameTruth, Truth
 
 MARGIN_M = 0.02
 """Around the boxes of proposals, which are rounded."""
-_OUTCOMES = {"found": COLOURS[7], "missed": "#d6177f", "not judged": COLOURS[5], "false": "#e07b00"}
+ERROR = "#d6177f"
+"""Colour of errors: missed objects, whose outline is dotted, and false tracks."""
+_OUTCOMES = {"found": COLOURS[7], "missed": ERROR, "not judged": COLOURS[5], "false": ERROR}
 LEGEND: dict[str, Entry] = {name: {"name": name, "colour": colour} for name, colour in _OUTCOMES.items()}
 """What became of labelled objects; `false`: tracks that are said to be what they are not."""
 DRAWN = [BOX_KEYS.index(key) for key in ("x", "y", "l", "w", "yaw")]

@@ -44,7 +44,6 @@ async function addTracks(packed, from) {
 }
 
 const sweeps = new Map();
-let packedSweep = (at) => element(`points-${at}`).textContent;
 
 function readSweep(at) {
   if (!run.points || at > last) return Promise.resolve(null);

@@ -153,7 +153,9 @@ function drawRings() {
     context.beginPath();
     context.arc(state.x, state.y, range * state.metre, 0, 7);
     stroke(colours.line, 1);
-    context.fillText(`${range} m`, state.x + 4 * dot, state.y - range * state.metre - 3 * dot);
+    const text = `${range} m`, left = state.x + 4 * dot, foot = state.y - range * state.metre;
+    context.fillText(text, left, foot - 3 * dot);
+    taken.push([left, foot - 14 * dot, left + context.measureText(text).width, foot]);
   }
   const size = (10 * dot) / state.metre;
   path([[1, 0], [-0.7, 0.6], [-0.7, -0.6]].map(([x, y]) => screen(size * x, size * y)), true);
@@ -163,6 +165,7 @@ function drawRings() {
 
 function draw() {
   dot = devicePixelRatio || 1;
+  taken = [[state.x - 10 * dot, state.y - 8 * dot, state.x + 10 * dot, state.y + 8 * dot]]; // the sensor
   drawPoints();
   drawRings();
   const frame = frames[state.at], wrong = new Set(state.truth ? frame.false : []);
@@ -171,7 +174,6 @@ function draw() {
   shown.sort((a, b) => a.class - b.class || a.seen - b.seen);
   for (const row of shown) drawTrack(row, wrong.has(row.id));
   context.font = `${12 * dot}px system-ui,sans-serif`;
-  taken = [[state.x - 10 * dot, state.y - 8 * dot, state.x + 10 * dot, state.y + 8 * dot]]; // the sensor
   if (state.truth) (frame.truth || []).forEach(drawTruth);
   for (const row of shown.reverse())
     if ((state.labels && row.class) || row.id === chosen) {

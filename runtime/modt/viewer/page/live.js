@@ -4,8 +4,8 @@ const HISTORY = 600; // frames
 const packedSweeps = [], said = document.querySelector("header span");
 let waiting = 0, done = Promise.resolve(), lost = false;
 
-packedSweep = (at) => packedSweeps[at];
-play = () => go(last);
+const packedSweep = (at) => packedSweeps[at];
+const play = () => go(last);
 state.at = last = -1;
 speed.hidden = true;
 element("play").textContent = "Newest";

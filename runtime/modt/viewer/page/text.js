@@ -38,19 +38,23 @@ function showFrame() {
   slider.value = state.at;
 }
 
+const percent = (row, { name }) => `${name} ${(100 * row[`p_${name}`]).toFixed(1)} %`;
+const motion = (row) => run.classes.slice(1).map(({ name }) => `${name} ${row[`motion_${name}`].toFixed(1)}`).join(", ");
 const stateOf = (row) => run.states[row.state].name.replaceAll("_", " ");
 
-// Every change of state and every classification of a track.
+// Every classification of a track, and every change of its state and of the class that is reported.
 function events(rows) {
   const found = [];
   rows.forEach((row, k) => {
     if (row.classified) {
-      const said = run.classes.map((c) => `${c.name} ${(100 * row[`p_${c.name}`]).toFixed(1)} %`).join(", ");
+      const posterior = run.classes.map((c) => percent(row, c)).join(", ");
       const view = [row.l, row.w, row.h].map((side) => side.toFixed(1)).join(" × ");
       const range = Math.hypot(row.x, row.y).toFixed(0);
-      found.push([row.at, `classified: ${row.points} points, ${view} m at ${range} m: ${said}`]);
+      found.push([row.at, `classified: ${row.points} points, ${view} m at ${range} m: ${posterior}`]);
     }
-    if (k === 0 || row.state !== rows[k - 1].state) found.push([row.at, stateOf(row)]);
+    const before = rows[k - 1] || {};
+    if (row.state !== before.state) found.push([row.at, stateOf(row)]);
+    if (row.class !== before.class) found.push([row.at, `reported as ${percent(row, run.classes[row.class])}`]);
   });
   return found;
 }
@@ -64,7 +68,8 @@ function showStory() {
   add(box, "b", row ? label(row) : `#${id}, not in this frame`);
   let spent = 0;
   for (const row of rows) if (row.classified) spent += frames[row.at].call_mJ || 0;
-  const now = row ? `${stateOf(row)}, ${row.points} points, ${row.world_speed_mps.toFixed(1)} m/s; ` : "";
+  const pace = row && `${row.world_speed_mps.toFixed(1)} m/s, motion says ${motion(row)}`;
+  const now = row ? `${stateOf(row)}, ${row.points} points, ${pace}; ` : "";
   const [begin, end] = [rows[0], rows[rows.length - 1]].map((row) => frames[row.at].frame);
   add(box, "div", `${now}frames ${begin} to ${end}; ${spent.toFixed(1)} mJ of classification (estimated)`);
   const list = add(box, "ol");

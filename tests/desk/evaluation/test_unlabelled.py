@@ -1,0 +1,102 @@
+"""Tracks that move like road users and have no label."""
+
+import csv
+import xml.etree.ElementTree as ET
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from modt.geometry import transform_boxes
+from modt_desk.evaluation.unlabelled import moving
+from tests.cli.commands import modt
+
+STAMPS_S = np.arange(30) / 10
+RNG = np.random.default_rng(3)
+
+
+def boxes(x, length=0.6, scatter_m=0.02):
+    """(30, 7) boxes along x, seen with some scatter."""
+    out = np.tile([0.0, 5.0, 1.0, 0.0, 0.5, 1.7, 0.0], (len(STAMPS_S), 1))
+    out[:, 0], out[:, 3] = x, length
+    out[:, :2] += RNG.normal(0, scatter_m, (len(out), 2))
+    return out
+
+
+WALKER = boxes(1.3 * STAMPS_S)
+
+
+@pytest.mark.parametrize(
+    ("name", "world", "moves"),
+    [
+        ("walker", WALKER, True),
+        ("car", boxes(8 * STAMPS_S, 4.0, 0.1), True),
+        ("post, beside a drifting pose", boxes(0.3 * STAMPS_S), False),
+        ("wall of which more and more is seen", boxes(2 * STAMPS_S, 1 + 4 * STAMPS_S), False),
+        ("parts of a wall in turn", boxes(3 * np.floor(STAMPS_S)), False),
+        ("what is scattered", boxes(0 * STAMPS_S, scatter_m=1.0), False),
+    ],
+)
+def test_what_moves_like_a_road_user(name, world, moves):
+    assert moving(STAMPS_S, world).all() == moves == moving(STAMPS_S, world).any(), name
+
+
+def test_the_frames_of_the_motion_are_found():
+    begins = moving(STAMPS_S, boxes(4 * np.maximum(STAMPS_S - 1, 0), scatter_m=0.0))
+    assert not begins[:5].any()
+    assert begins[12:].all()
+    quick = slice(8)  # a track shorter than the window is judged as a whole
+    assert moving(STAMPS_S[quick], boxes(5 * STAMPS_S)[quick]).all()
+    assert not moving(STAMPS_S[:4], boxes(5 * STAMPS_S)[:4]).any()
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-100, 100))
+def test_it_is_the_same_from_everywhere(yaw, x):
+    T = np.eye(4)
+    T[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+    T[0, 3] = x
+    assert moving(STAMPS_S, transform_boxes(T, WALKER)).all()
+
+
+@pytest.mark.command
+def test_a_label_that_is_left_out_is_found_and_put_back(tmp_path):
+    pytest.importorskip("matplotlib")
+
+    def done(*command):
+        found = modt(*command, cwd=tmp_path)
+        assert (found.returncode, found.stderr) == (0, "")
+        return found.stdout
+
+    def listed(folder, *options):
+        done("evaluate", "run", drive, *options, "--unlabelled", folder)
+        path = tmp_path / folder / "further.csv"
+        return list(csv.DictReader(path.read_text().splitlines())) if path.exists() else []
+
+    done("simulate", "--sensor", "vlp-16", "--seconds", "2.5", "--seed", "5", "--all-around", "--out", "sim")
+    (drive,) = (tmp_path / "sim").glob("*/*_sync")
+    done("replay", drive, "--profile", "vlp-16", "--fov", "full", "--labels", "--quiet", "--out", "run")
+    before = {row["object"] for row in listed("before")}
+    labels = ET.parse(drive / "tracklet_labels.xml")
+    tracklets = labels.find("tracklets")
+    removed = next(item for item in tracklets.iter("item") if _walks_near(item))
+    tracklets.remove(removed)
+    labels.write(drive / "tracklet_labels.xml")
+    rows = [row for row in listed("after") if row["object"] not in before]
+    ((track, type_),) = {(row["object"], row["type"]) for row in rows}
+    assert type_ == "Pedestrian"
+    begin, poses = int(removed.findtext("first_frame")), removed.findall("poses/item")
+    for row in rows:
+        pose = poses[int(row["frame"]) - begin]
+        off = [float(row[axis]) - float(pose.findtext(f"t{axis}")) for axis in "xy"]
+        assert np.hypot(*off) < 0.4
+    assert (tmp_path / "after" / f"track-{track}.png").read_bytes()[:4] == b"\x89PNG"
+    further = ("--further", "after/further.csv")
+    assert f"--further adds {len(before) + 1} objects" in done("evaluate", "run", drive, *further)
+    assert listed("completed", *further) == []
+
+
+def _walks_near(item):
+    """Whether a tracklet is of somebody who walks within 20 m in all frames."""
+    places = np.array([[float(pose.findtext(f"t{axis}")) for axis in "xy"] for pose in item.iterfind("poses/item")])
+    return len(places) == 25 and item.findtext("objectType") == "Pedestrian" and (np.hypot(*places.T) < 20).all()

@@ -1,0 +1,210 @@
+"""Tracks that move like road users where no label is: what the labels of a drive may leave out."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from modt.classes import CLASSES, ObjectClass
+from modt.geometry import corners, inverse, se3, transform_boxes, yaw_of
+from modt.sinks.output import writing
+from modt.sinks.tracks import BOX_KEYS, recorded_pose
+from modt.types import Bool, Float64, Int
+from modt_desk.evaluation.further_objects import COLUMNS
+from modt_desk.evaluation.matching import most_in_sector
+from modt_desk.evaluation.overlap import FOOT_M, Overlap
+from modt_desk.evaluation.run_record import RunRecord
+from modt_desk.evaluation.truth import Truth
+
+WINDOW_S = 2.0
+"""Time within which a motion is judged; a shorter track is judged as a whole."""
+MIN_SIGHTINGS = 5
+"""Fewer frames in a window show no motion."""
+MIN_GONE_M = 1.2
+"""Distance gone within a window from which a track moves: a slow walker's, above the drift of poses."""
+MAX_SPEED_MPS = 30.0
+"""A faster track jumps between objects."""
+ENDS_SHARE = 0.9
+"""Both ends of a road user move with its centre. Of a wall whose visible part changes, one end stays behind."""
+STEADINESS = 15.0
+"""Distance gone over the scatter about an even motion: a road user's centre moves evenly, that of a wall jumps."""
+MIN_SCATTER_M = 0.05
+"""Scatter that every outline has."""
+STEP_S = 0.5
+"""Steps of the path that straightness compares with the way from its begin to its end."""
+CAR_LENGTH_M, CAR_WIDTH_M, RIDING_MPS = 2.6, 1.3, 2.5
+"""A longer or wider mover is taken for a car; of the others, a faster one for a cyclist."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sightings:
+    """A track in the n frames in which it is seen, judged and without a label."""
+
+    frame: Int  # (n,)
+    stamp_s: Float64  # (n,)
+    box: Float64  # (n, 7) level frame of the sensor
+    T_world_sensor: Float64  # (n, 4, 4)
+    called: Sequence[str]  # (n,) class that the run gave the track
+
+    @property
+    def world(self) -> Float64:
+        """(n, 7) boxes in the world."""
+        placed = [transform_boxes(T, box[None])[0] for T, box in zip(self.T_world_sensor, self.box, strict=True)]
+        return np.array(placed).reshape(-1, 7)
+
+
+@dataclass(frozen=True, slots=True)
+class Mover:
+    """A track that moves like a road user and has no label, over n frames."""
+
+    track: int
+    type_: str  # KITTI's type that its size and speed suggest
+    called: str  # class that the run gave it most often
+    frame: Int  # (n,)
+    box: Float64  # (n, 7) sensor frame, along the motion, all of one size
+    gone_m: float  # from its first place to its last
+    straightness: float  # that distance over the length of its path
+    speed_mps: float  # length of its path over time
+
+
+def unlabelled(run: RunRecord, truth: Truth) -> list[Mover]:
+    """The movers among the tracks of a run, those that went farthest first.
+
+    Raises:
+        MisuseError: as `RunRecord.frames`.
+    """
+    R = run.mount.R_level_sensor
+    T_sensor_level = np.eye(4) if R is None else inverse(se3(R, np.zeros(3)))
+    found = (_mover(track, seen, T_sensor_level) for track, seen in _sightings(run, truth).items())
+    return sorted((mover for mover in found if mover is not None), key=lambda mover: -mover.gone_m)
+
+
+def write_table(path: Path, movers: Sequence[Mover]) -> None:
+    """Write the movers as a table of further objects, whose numbers are those of the tracks.
+
+    Raises:
+        ModtError: it cannot be written.
+    """
+    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(COLUMNS)
+        for mover in movers:
+            for frame, (x, y, z, length, width, height, yaw) in zip(mover.frame, mover.box.tolist(), strict=True):
+                numbers = (x, y, z - height / 2, length, width, height, yaw)
+                rows.writerow([frame, mover.track, mover.type_, *(round(number, 3) for number in numbers)])
+
+
+def listing(movers: Sequence[Mover]) -> Iterator[str]:
+    """A line for each mover, below a head."""
+    yield "track   frames      gone m  straight  m/s  l x w x h m       looks like  called"
+    for m in movers:
+        span, size = f"{m.frame[0]} to {m.frame[-1]}", " x ".join(f"{side:.1f}" for side in m.box[0, 3:6].tolist())
+        motion = f"{m.gone_m:6.1f}  {m.straightness:8.2f}  {m.speed_mps:3.1f}"
+        yield f"{m.track:5}   {span:11} {motion}  {size:16}  {m.type_:10}  {m.called}"
+
+
+def moving(stamp_s: Float64, world: Float64) -> Bool:
+    """(n,) which sightings lie in a window in which both ends of a box move evenly.
+
+    Args:
+        stamp_s: (n,) ascending.
+        world: (n, 7) boxes in the world.
+    """
+    out = np.zeros(len(stamp_s), np.bool_)
+    last_window = int(np.searchsorted(stamp_s, stamp_s[-1] - WINDOW_S))
+    ends = np.searchsorted(stamp_s, stamp_s[: last_window + 1] + WINDOW_S, side="right")
+    for first, end in enumerate(ends.tolist()):
+        if end - first >= MIN_SIGHTINGS and _evenly(stamp_s[first:end], world[first:end]):
+            out[first:end] = True
+    return out
+
+
+def _evenly(stamp_s: Float64, world: Float64) -> bool:
+    """Whether the boxes of a window move as a road user does."""
+    t = stamp_s - stamp_s.mean()
+    weight = t / (t @ t)
+    xy = world[:, :2] - world[:, :2].mean(axis=0)
+    velocity = weight @ xy
+    speed = float(np.hypot(*velocity))
+    if not 0 < speed < MAX_SPEED_MPS:
+        return False
+    along = corners(world) @ (velocity / speed)
+    slower_mps = min(weight @ along.min(axis=1), weight @ along.max(axis=1))
+    gone_m = slower_mps * np.ptp(stamp_s)
+    scatter_m = np.sqrt(((xy - t[:, None] * velocity) ** 2).sum(axis=1).mean())
+    steady = gone_m > STEADINESS * max(scatter_m, MIN_SCATTER_M)
+    return bool(gone_m > MIN_GONE_M and slower_mps > ENDS_SHARE * speed and steady)
+
+
+def _sightings(run: RunRecord, truth: Truth) -> dict[int, Sightings]:
+    """The sightings of each track in the judged sector that are not of a labelled object."""
+    rows = defaultdict(list)
+    for (_, record), frame in zip(run.records(), run.frames(truth), strict=True):
+        overlap, pose = Overlap.of(frame), recorded_pose(record)
+        labelled = ((overlap.held > 0.5 * overlap.size) | (overlap.shared > 0.5 * overlap.size)).any(axis=0)
+        free = most_in_sector(frame, overlap.size, truth.rules) & ~labelled
+        for track in record["tracks"]:
+            if track["proposal"] is not None and free[track["proposal"]]:
+                box = [track["box"][key] for key in BOX_KEYS]
+                rows[track["id"]].append((frame.index, record["stamp_s"], box, pose, track["class"]))
+    tracks = {}
+    for track, seen in rows.items():
+        frames, stamps_s, boxes, poses, called = zip(*seen, strict=True)
+        tracks[track] = Sightings(np.array(frames), np.array(stamps_s), np.array(boxes), np.array(poses), called)
+    return tracks
+
+
+def _mover(track: int, seen: Sightings, T_sensor_level: Float64) -> Mover | None:
+    """The track from where it begins to move to where it ends; None if it does not."""
+    rows = np.flatnonzero(moving(seen.stamp_s, seen.world))
+    if not len(rows):
+        return None
+    part = slice(rows[0], rows[-1] + 1)
+    seen = Sightings(
+        seen.frame[part], seen.stamp_s[part], seen.box[part], seen.T_world_sensor[part], seen.called[part]
+    )
+    world, stamp_s = seen.world, seen.stamp_s
+    step = ((stamp_s - stamp_s[0]) // STEP_S).astype(np.int64)
+    path = np.array([world[step == k, :2].mean(axis=0) for k in np.unique(step)])
+    gone_m = float(np.hypot(*(world[-1, :2] - world[0, :2])))
+    path_m = float(np.hypot(*np.diff([world[0, :2], *path[1:-1], world[-1, :2]], axis=0).T).sum())
+    speed_mps = path_m / float(np.ptp(stamp_s))
+    heading = _heading(stamp_s, world)
+    across = np.stack([np.cos(heading), np.sin(heading), -np.sin(heading), np.cos(heading)], axis=-1)
+    extent = np.ptp(corners(world) @ across.reshape(-1, 2, 2).swapaxes(1, 2), axis=1)
+    length, width, height = np.quantile(np.column_stack([extent, world[:, 5]]), 0.9, axis=0).tolist()
+    box = seen.box.copy()
+    box[:, 2] += (height - box[:, 5] - FOOT_M) / 2  # the lowest points stand FOOT_M above the foot
+    box[:, 3:6] = length, width, height + FOOT_M
+    box[:, 6] = heading - [yaw_of(T) for T in seen.T_world_sensor]
+    return Mover(
+        track=track,
+        type_=_type(length, width, speed_mps),
+        called=Counter(seen.called).most_common(1)[0][0],
+        frame=seen.frame,
+        box=transform_boxes(T_sensor_level, box),
+        gone_m=gone_m,
+        straightness=min(gone_m / path_m, 1.0),
+        speed_mps=speed_mps,
+    )
+
+
+def _heading(stamp_s: Float64, world: Float64) -> Float64:
+    """(n,) direction of the motion about each sighting, over a window [rad]."""
+    first = np.searchsorted(stamp_s, stamp_s - WINDOW_S / 2)
+    last = np.searchsorted(stamp_s, stamp_s + WINDOW_S / 2, side="right") - 1
+    dx, dy = (world[last, :2] - world[first, :2]).T
+    heading: Float64 = np.arctan2(dy, dx)
+    return heading
+
+
+def _type(length_m: float, width_m: float, speed_mps: float) -> str:
+    """KITTI's type of a mover."""
+    if length_m > CAR_LENGTH_M or width_m > CAR_WIDTH_M:
+        return CLASSES[ObjectClass.CAR].kitti[0]
+    return CLASSES[ObjectClass.CYCLIST if speed_mps > RIDING_MPS else ObjectClass.PEDESTRIAN].kitti[0]
