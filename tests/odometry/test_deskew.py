@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.observations import observe
-from modt.odometry.odometry import SweepSkew, delays
+from modt.odometry.odometry import delays
 from modt.odometry.registration import Landmarks, Registration
 from modt.placement import Placement, PlanarMotion
 from modt.types import Frame, Proposals
@@ -30,6 +30,11 @@ def skewed_points(xyz, time_s, turn_s, speed, turn):
         local = (place - c) * np.exp(-1j * yaw)
         late = -turn_s * np.angle(local) / (2 * np.pi)
     return np.c_[local.real, local.imag, xyz[:, 2]], late
+
+
+def corrected(proposals, turn_s, motion, T):
+    """(P, 2) correction of the positions of skewed proposals that a pose at the stamp yields [m, world]."""
+    return motion.displacement(proposals.centroid[:, :2], delays(proposals, turn_s)) @ T[:2, :2].T
 
 
 def skewed(boxes, index, turn_s, speed, turn, posed):
@@ -95,10 +100,10 @@ def test_the_delay_across_the_seam_is_the_mean_over_the_bearings(distance, side,
 def test_a_correction_moves_each_observation_by_its_share(speed, turn, faster, turns_more, turn_s):
     """Placing it by the corrected pose and the motion that led there moves it as far."""
     proposals = skewed(np.array([box(12, 4), box(-3, 8), box(-9, -9), box(2, -6)]), 0, turn_s, 0, 0, True)[1]
-    skew, before = SweepSkew.of(proposals, turn_s), constant_turn_pose(0, 0, 0)
+    before = constant_turn_pose(0, 0, 0)
 
     def place(after):
-        step = skew.step(PlanarMotion.between(before, after, PERIOD_S), after)
+        step = corrected(proposals, turn_s, PlanarMotion.between(before, after, PERIOD_S), after)
         return observe(proposals, after).centroid + step
 
     predicted, after = (
@@ -107,7 +112,7 @@ def test_a_correction_moves_each_observation_by_its_share(speed, turn, faster, t
     )
     placed = np.c_[place(predicted), np.zeros((4, 2))] + [0, 0, 0, 1]
     whole = (placed @ (after @ inverse(predicted)).T - placed)[:, :2]
-    expected = skew.share(PERIOD_S)[:, None] * whole
+    expected = (1.0 + delays(proposals, turn_s) / PERIOD_S)[:, None] * whole
     np.testing.assert_allclose(place(after) - place(predicted), expected, atol=0.01)
 
 
@@ -117,10 +122,10 @@ def test_registration_needs_the_shares_of_a_skewed_sweep(known, least_deg, most_
     _, still = frame_of(world, 6, points=80)
     landmarks = Landmarks(observe(still, np.eye(4)).kdop, np.ones(len(world), np.bool_))
     frame, proposals = skewed(world, 6, 0.1, 8.0, 0.6, posed=True)
-    before, true, skew = constant_turn_pose(0.5, 8.0, 0.6), frame.T_world_sensor, SweepSkew.of(proposals, 0.1)
+    before, true = constant_turn_pose(0.5, 8.0, 0.6), frame.T_world_sensor
     predicted = true @ se3(rotation_zyx(0, 0, 0.01), np.array([0.2, 0.0, 0.0]))
-    step = skew.step(PlanarMotion.between(before, predicted, PERIOD_S), predicted)
-    share = skew.share(PERIOD_S) if known else 1.0
+    step = corrected(proposals, 0.1, PlanarMotion.between(before, predicted, PERIOD_S), predicted)
+    share = 1.0 + delays(proposals, 0.1) / PERIOD_S if known else 1.0
     registration = Registration()
     found = registration.correct(landmarks, observe(proposals, predicted).moved(step), share) @ predicted
     assert least_deg <= abs(np.rad2deg(yaw_of(inverse(true) @ found))) < most_deg
@@ -136,8 +141,8 @@ def test_moving_proposals_as_a_whole_leaves_little_error(turn_s):
 
     world = np.array([box(12, 4), box(-3, 8), box(-14, 4), box(-9, -9), box(2, -6), box(25, -12)])
     frame, proposals = skewed(world, 0, turn_s, speed, turn, posed=True)
-    skew = SweepSkew.of(proposals, turn_s)
-    deskewed = observe(proposals, at(0)).moved(skew.step(PlanarMotion.between(at(-PERIOD_S), at(0), PERIOD_S), at(0)))
+    motion = PlanarMotion.between(at(-PERIOD_S), at(0), PERIOD_S)
+    deskewed = observe(proposals, at(0)).moved(corrected(proposals, turn_s, motion, at(0)))
     true_frame, true_proposals = frame_of(world, 0, points=80)
     true = observe(true_proposals, np.eye(4))
     raw = observe(proposals, at(0))
@@ -194,11 +199,11 @@ def test_sweeps_without_skew_are_not_changed():
 
 @given(st.floats(-15, 15), st.floats(-1, 1), st.sampled_from([0.1, -0.1]), st.floats(0, 2 * np.pi))
 def test_a_placement_deskews_positions_like_the_proposals_there(speed, yaw_rate, turn_s, bearing):
-    """Placement.deskew, for positions without points, agrees with SweepSkew for a small proposal."""
+    """Placement.deskew, for positions without points, agrees with the correction of a small proposal."""
     T = se3(rotation_zyx(0, 0, 0.7), np.array([3.0, -2.0, 0.0]))
     motion = PlanarMotion(complex(speed, 0.1 * speed), yaw_rate)
     proposals = one(9 * np.cos(bearing), 9 * np.sin(bearing), 0.0, 0.0)
-    step = SweepSkew.of(proposals, turn_s).step(motion, T)
+    step = corrected(proposals, turn_s, motion, T)
     position = observe(proposals, T).centroid
     np.testing.assert_allclose(Placement(T, motion, turn_s).deskew(position), step, atol=1e-9)
     assert not Placement(T, motion).deskew(position).any()

@@ -105,7 +105,10 @@ def test_reading_and_writing_are_not_in_the_sum_of_the_stages():
 
 def test_the_nearest_return_of_each_class_is_of_the_last_frame():
     proposals = FRAMES[-1].proposals
-    assert around(FRAMES[0]) == {"car": {"count": 1, "nearest_m": 0.0}, "background": {"count": 1, "nearest_m": 0.0}}
+    assert around(FRAMES[0].tracks, FRAMES[0].proposals) == {
+        "car": {"count": 1, "nearest_m": 0.0},
+        "background": {"count": 1, "nearest_m": 0.0},
+    }
     assert whole()["around"] == {"car": {"count": 1, "nearest_m": 7.5}}
     assert proposals.coordinates.shape == (3, 5)
 

@@ -28,8 +28,8 @@ class History:
     doubtful: float | None = None  # last reading, while it is doubtful
     doubtful_s: float = 0.0  # time for which the meter had stood still before it
     doubtful_W: float | None = None  # power that it implies
-    low_W: float = math.inf  # lowest power measured, and below it the highest [W]
-    high_W: float = -math.inf
+    low_W: float = math.inf  # lowest power measured
+    high_W: float = -math.inf  # highest power measured
 
 
 @dataclass(frozen=True, slots=True)

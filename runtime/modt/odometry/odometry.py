@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,38 +14,6 @@ from modt.placement import Placement, PlanarMotion
 from modt.types import Float64, Frame, Proposals
 
 
-@dataclass(frozen=True, slots=True)
-class SweepSkew:
-    """Position and time of view of the proposals of a frame; P rows.
-
-    A proposal is moved as a whole, by the time at which its middle was seen. For a body of radius r at distance d two
-    errors remain. It turns about itself by at most r times the turn of the sensor in half a sweep. Its ends are seen
-    r / (2 pi d) of a sweep before and after its middle (3 cm for a car 10 m away at 10 m/s).
-
-    Attributes:
-        position: (P, 2) their centroids [m, sensor frame at that time].
-        delay_s: (P,) after the stamp.
-    """
-
-    position: Float64
-    delay_s: Float64
-
-    @classmethod
-    def of(cls, proposals: Proposals, turn_s: float) -> SweepSkew | None:
-        """Skew of a head that turns once in turn_s (Frame.turn_s); None for a sweep without skew."""
-        return cls(proposals.centroid[:, :2], delays(proposals, turn_s)) if turn_s else None
-
-    def step(self, motion: PlanarMotion, T_world_sensor: Float64) -> Float64:
-        """(P, 2) correction of the positions that the pose at the stamp yields [m, world]."""
-        step: Float64 = motion.displacement(self.position, self.delay_s) @ T_world_sensor[:2, :2].T
-        return step
-
-    def share(self, dt_s: float) -> Float64:
-        """(P,) share of a correction of the pose that applies at the time of view; dt_s since the last pose."""
-        share: Float64 = 1.0 + self.delay_s / dt_s
-        return share
-
-
 def skews_alike(a: PlanarMotion, b: PlanarMotion, turn_s: float, range_m: float, tolerance_m: float) -> bool:
     """Whether no position within a range is displaced by two motions to places further apart than a tolerance."""
     faster = abs(a.velocity_mps - b.velocity_mps) + range_m * abs(a.yaw_rate_radps - b.yaw_rate_radps)
@@ -56,8 +23,12 @@ def skews_alike(a: PlanarMotion, b: PlanarMotion, turn_s: float, range_m: float,
 def delays(proposals: Proposals, turn_s: float) -> Float64:
     """(P,) time after the stamp at which each proposal was seen [s]; turn_s as in Frame.
 
-    The mean over the bearings that its box covers: a proposal across the seam is seen at both ends of the sweep, and
-    its delay is continuous as its centroid crosses the seam.
+    A proposal is moved as a whole, by the time at which its middle was seen. For a body of radius r at distance d two
+    errors remain. It turns about itself by at most r times the turn of the sensor in half a sweep. Its ends are seen
+    r / (2 pi d) of a sweep before and after its middle (3 cm for a car 10 m away at 10 m/s).
+
+    The time is the mean over the bearings that its box covers. A proposal across the seam is seen at both ends of the
+    sweep, and its delay is continuous as its centroid crosses the seam.
     """
     (x, y), (length, width) = proposals.centroid[:, :2].T, proposals.box[:, 3:5].T
     bearing = np.arctan2(y, x)
@@ -112,7 +83,7 @@ class Odometry:
             far = np.abs(given[:3, 3]).max() > FAR_M
             self._T_world_odometry = se3(np.eye(3), -given[:3, 3] if far else np.zeros(3))
             self._last = Placement(self._T_world_odometry @ given)
-        skew = SweepSkew.of(proposals, frame.turn_s)
+        delay_s = delays(proposals, frame.turn_s) if frame.turn_s else None
         dt_s = 0.0 if self._time_s is None else frame.time_s - self._time_s
         if 2 * dt_s < abs(frame.turn_s):  # the errors of the poses would be extrapolated, so no motion is assumed
             dt_s = np.inf
@@ -123,16 +94,17 @@ class Odometry:
 
         def observed(placement: Placement) -> Observations:
             observations = observe(proposals, placement.T_world_sensor, self._kernels)
-            if skew is None or first:
+            if delay_s is None or first:
                 return observations
-            return observations.moved(skew.step(placement.motion, placement.T_world_sensor))
+            step = placement.motion.displacement(proposals.centroid[:, :2], delay_s)
+            return observations.moved(step @ placement.T_world_sensor[:2, :2].T)
 
         if given is not None and self._T_world_odometry is not None:
             self._landmarks.clear()
             placement = placed(self._T_world_odometry @ given)
         else:
             landmarks = self._landmarks.update(static_tracks(frame.time_s))
-            share = 1.0 if skew is None else skew.share(dt_s)
+            share = 1.0 if delay_s is None else 1.0 + delay_s / dt_s  # of a correction, at the time of view
 
             def registered(placement: Placement) -> Placement:
                 correction = self._registration.correct(landmarks, observed(placement), share)
@@ -141,7 +113,7 @@ class Odometry:
             predicted = placed(before @ (inverse(self._before.T_world_sensor) @ before))  # the last motion continues
             placement = registered(predicted)
             moved = not skews_alike(placement.motion, predicted.motion, frame.turn_s, _RANGE_M, _TOLERANCE_M)
-            if skew is not None and moved:
+            if delay_s is not None and moved:
                 placement = registered(placement)
             if given is not None:  # an odometry that begins late or restarts is aligned with the world of the tracks
                 self._T_world_odometry = placement.T_world_sensor @ inverse(given)

@@ -143,7 +143,7 @@ class Registration:
         Args:
             landmarks: stationary objects of the frames before.
             observations: proposals of the frame, placed by the predicted pose.
-            motion_share: (P,) share of the motion that applies to each observation, as SweepSkew.share.
+            motion_share: (P,) share of the motion that applies to each observation, by the time of its view.
 
         Returns:
             (4, 4) motion of the pose; identity without support for another one.

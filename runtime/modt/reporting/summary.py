@@ -11,7 +11,7 @@ import numpy as np
 from modt.classes import CLASS_NAMES, OBJECTS, ObjectClass
 from modt.pipeline import CLASSIFICATION, SEGMENTATION, SINK, SOURCE
 from modt.reporting.histogram import Histogram
-from modt.types import NONE, FrameResult
+from modt.types import NONE, FrameResult, Proposals, Tracks
 
 _SCHEMA = "modt.summary/1"
 
@@ -52,14 +52,15 @@ class Summary:
     def __init__(self) -> None:
         self.frames = self.proposals = self.classified = self.deferred = 0
         self.lives = TrackLives()
-        self._last: FrameResult | None = None
+        self._last: tuple[Tracks, Proposals] | None = None
         self._calls: Counter[str] = Counter()
         self._items: Counter[str] = Counter()
         self._times: dict[str, dict[str, Histogram]] = defaultdict(lambda: {"wall": Histogram(), "cpu": Histogram()})
 
     def add_result(self, result: FrameResult) -> None:
         """Add the result of a frame."""
-        tracks, self._last = result.tracks, result
+        tracks = result.tracks
+        self._last = tracks, result.proposals  # without the sweep, which would stay in memory
         self.frames += 1
         self.proposals += len(result.proposals)
         self.classified += len(result.classified)
@@ -90,7 +91,7 @@ class Summary:
             "classifications_by_tracking_by_detection": self.proposals,
             "deferred": self.deferred,
             "beta": _ratio(self.classified, self.proposals),
-            "around": {} if self._last is None else around(self._last),
+            "around": around(*self._last) if self._last else {},
             "tracks": self._life(foreground_only=False),
             "foreground_tracks": self._life(foreground_only=True),
             "energy_counts": {"E_seg": self._calls[SEGMENTATION], "E_class": self._items[CLASSIFICATION]},
@@ -113,14 +114,13 @@ def _ratio(a: float, b: float) -> float | None:
     return a / b if b else None
 
 
-def around(result: FrameResult) -> dict[str, dict[str, Any]]:
+def around(tracks: Tracks, proposals: Proposals) -> dict[str, dict[str, Any]]:
     """Tracks with a proposal in a frame: by class their number, and the distance of their nearest return [m]."""
-    tracks, proposals = result.tracks, result.proposals
     distance_m, found = np.hypot(*proposals.coordinates[:2]), defaultdict[str, list[float]](list)
-    for owner, begin, end in zip(
-        tracks.row_of_proposal(len(proposals)), proposals.offsets[:-1], proposals.offsets[1:], strict=True
-    ):
-        found[CLASS_NAMES[tracks.object_class[owner]]].append(float(distance_m[begin:end].min()))
+    for kind, p in zip(tracks.object_class, tracks.proposal, strict=True):
+        if p != NONE:
+            begin, end = proposals.offsets[p : p + 2]
+            found[CLASS_NAMES[kind]].append(float(distance_m[begin:end].min()))
     return {name: {"count": len(at), "nearest_m": round(min(at), 2)} for name, at in found.items()}
 
 

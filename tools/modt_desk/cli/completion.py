@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib import import_module
 
 from modt import assets
@@ -33,25 +34,41 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def parsers() -> Iterator[tuple[str, argparse.ArgumentParser]]:
-    """Parser of every command and group of commands by its words, the longest words first."""
-    for prog, commands in (("modt", modt.COMMANDS), ("modt-profile", modt_profile.COMMANDS)):
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A command or a group of commands.
+
+    Attributes:
+        words: the program and the names that lead to it.
+        summary: its line in the help above it.
+        parser: its parser.
+        names: commands of a group; none of a command.
+    """
+
+    words: str
+    summary: str
+    parser: argparse.ArgumentParser
+    names: tuple[str, ...] = ()
+
+
+def commands() -> Iterator[Command]:
+    """Every command, and every group after its commands."""
+    for prog, modules in (("modt", modt.COMMANDS), ("modt-profile", modt_profile.COMMANDS)):
         top = argparse.ArgumentParser(prog=prog)
         choice = top.add_subparsers()
-        for module in commands.values():
+        for module in modules.values():
             import_module(module).add_parser(choice)
-        yield from _below(prog, top)
+        yield from _below(prog, "", top)
 
 
-def _below(words: str, parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.ArgumentParser]]:
-    for name, inner in _commands(parser).items():
-        yield from _below(f"{words} {name}", inner)
-    yield words, parser
-
-
-def _commands(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    groups = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    return dict(groups[0].choices) if groups else {}
+def _below(words: str, summary: str, parser: argparse.ArgumentParser) -> Iterator[Command]:
+    names: list[str] = []
+    for group in (action for action in parser._actions if isinstance(action, argparse._SubParsersAction)):
+        summaries = {action.dest: action.help or "" for action in group._choices_actions}
+        for name, inner in group.choices.items():
+            names.append(name)
+            yield from _below(f"{words} {name}", summaries[name], inner)
+    yield Command(words, summary, parser, tuple(names))
 
 
 def _values(action: argparse.Action) -> list[str]:
@@ -70,10 +87,11 @@ def bash(shell: str) -> list[str]:
         '  case "${COMP_WORDS[0]##*/} ${COMP_WORDS[*]:1:COMP_CWORD-1} " in',
     ]
     values: dict[str, str] = {}
-    for words, parser in parsers():
-        offered = [*_commands(parser), *(name for action in parser._actions for name in action.option_strings)]
-        lines.append(f'    "{words} "*) words="{" ".join(offered)}" ;;')
-        for action in parser._actions:
+    for command in commands():
+        actions = command.parser._actions
+        offered = [*command.names, *(name for action in actions for name in action.option_strings)]
+        lines.append(f'    "{command.words} "*) words="{" ".join(offered)}" ;;')
+        for action in actions:
             values.update({name: " ".join(_values(action)) for name in action.option_strings if _values(action)})
     lines += ["  esac", '  case "$before" in']
     lines += [f'    {name}) words="{known}" ;;' for name, known in values.items()]
@@ -89,14 +107,14 @@ def bash(shell: str) -> list[str]:
 def fish() -> list[str]:
     """Lines of the script."""
     lines = []
-    for words, parser in parsers():
-        prog, *path = words.split()
-        names = _commands(parser)
+    for command in commands():
+        prog, *path = command.words.split()
+        names = command.names
         given = [f"__fish_seen_subcommand_from {name}" for name in path]
         not_yet = [f"not __fish_seen_subcommand_from {' '.join(names)}"] if names else []
         when = f'-n "{"; and ".join([*given, *not_yet])}" ' if given or not_yet else ""
         lines += [f"complete -c {prog} {when}-f -a {name}" for name in names]
-        for action in parser._actions:
+        for action in command.parser._actions:
             for name in (name for name in action.option_strings if name.startswith("--")):
                 known = f' -x -a "{" ".join(_values(action))}"' if _values(action) else ""
                 lines.append(f"complete -c {prog} {when}-l {name[2:]}{known}")
