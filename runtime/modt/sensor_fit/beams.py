@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -17,7 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from modt import assets, profile
 from modt.config import SensorConfig
 from modt.geometry.beams import Beams, BeamTable, EvenBeams
-from modt.types import Float32, Float64, Int
+from modt.types import Float32, Float64, Int, Self
 
 _GAUSSIAN_REACH = 4.0
 """Half width of a Gaussian, in standard deviations. Rows that are filtered go on mirrored beyond their ends."""

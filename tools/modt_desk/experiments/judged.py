@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Self
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from modt.classes import ObjectClass
 from modt.classification.scheduler import padded_each
 from modt.config import ClassificationConfig
 from modt.geometry import FieldOfView, inverse, transform
-from modt.types import NONE, Float64, FrameResult
+from modt.types import NONE, Float64, FrameResult, Self
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Rows, table
