@@ -79,7 +79,7 @@ def test_no_frame_loads_scipy(command, tmp_path):
 @pytest.mark.parametrize(
     ("module", "of_the_desk"),
     [
-        (main, {"view", "evaluate", "export", "simulate", "track"}),
+        (main, {"view", "evaluate", "export", "simulate", "track", "service"}),
         (profiles, {"fit", "schema"}),
         (profile, {"calibrate", "report", "compare", "predict", "regimes"}),
     ],

@@ -20,6 +20,7 @@ COMMANDS = {
     "export": "modt_desk.cli.export",
     "simulate": "modt_desk.cli.simulate",
     "track": "modt_desk.cli.track",
+    "service": "modt_desk.cli.service",
     "profile": "modt.cli.profiles",
 }
 """Module of each command; those of the desk are named here alone."""

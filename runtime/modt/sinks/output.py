@@ -12,6 +12,7 @@ from typing import Any, BinaryIO, Generic, Literal, Protocol, TypeVar, runtime_c
 from modt.errors import ModtError
 from modt.types import FrameResult
 
+WRITE_REMEDY = "free or unlock the disk, or give another --out; what was recorded before is intact"
 T = TypeVar("T")
 T_contra = TypeVar("T_contra", contravariant=True)
 Health = dict[str, int | str]
@@ -49,7 +50,7 @@ class LedgerSink(Protocol):
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path, remedy: str = WRITE_REMEDY) -> Iterator[None]:
     """Convert a failure of the file system to an error with a remedy.
 
     Raises:
@@ -58,9 +59,7 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        cause = f"cannot be written ({error.strerror or error})"
-        remedy = "free or unlock the disk, or give another --out; what was recorded before is intact"
-        raise ModtError(path, cause, remedy) from None
+        raise ModtError(path, f"cannot be written ({error.strerror or error})", remedy) from None
 
 
 def sync_folder(path: Path) -> None:
