@@ -1,4 +1,4 @@
-"""Filters against those of SciPy; sums may round in another order."""
+"""Filters against slow ones; sums may round in another order."""
 
 import numpy as np
 from hypothesis import given
@@ -26,4 +26,8 @@ def test_running_mean(values, width):
 
 @given(rows, st.sampled_from([1, 3, 7]))
 def test_running_median(values, width):
-    np.testing.assert_array_equal(running_median(values, width), ndimage.median_filter(values, width))
+    padded = np.pad(
+        values, width // 2, "symmetric"
+    )  # older versions of SciPy fail where the window is the longer one
+    expected = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
+    np.testing.assert_array_equal(running_median(values, width), expected)
