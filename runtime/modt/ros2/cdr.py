@@ -95,7 +95,7 @@ class CdrWriter:
         fields, values = text_fields(text)
         self.record(fields, *values)
 
-    def octets(self, octets: bytes) -> None:
+    def octets(self, octets: bytes | memoryview) -> None:
         """Append a sequence of octets."""
         self.record(("I",), len(octets))
         self._message += octets
@@ -107,7 +107,8 @@ class CdrWriter:
 
     def message(self) -> bytes:
         """The whole message, padded to a multiple of four bytes as DDS requires it."""
-        return bytes(self._message) + bytes(-len(self._message) % 4)
+        self._message += bytes(-len(self._message) % 4)
+        return bytes(self._message)
 
 
 Fields = tuple[tuple[str, ...], tuple[float | bytes, ...]]

@@ -134,7 +134,7 @@ class Subscription:
     @property
     def senders(self) -> int:
         """Matched publishers."""
-        return len(self._reader.get_matched_publications())
+        return _count(self._reader, "get_matched_publications")
 
 
 class Publication:
@@ -155,7 +155,12 @@ class Publication:
     @property
     def receivers(self) -> int:
         """Matched subscribers."""
-        return len(self._writer.get_matched_subscriptions())
+        return _count(self._writer, "get_matched_subscriptions")
+
+
+def _count(entity: Any, matched: str) -> int:
+    """Number of matched entities; 1 where the binding cannot tell: 0.10, for the Cyclone DDS of Humble and Jazzy."""
+    return len(getattr(entity, matched)()) if hasattr(entity, matched) else 1
 
 
 def _qos(depth: int, reliable: bool) -> Any:

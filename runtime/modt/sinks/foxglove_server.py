@@ -6,14 +6,14 @@ import foxglove
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sinks.scene import Scene
+from modt.sinks.foxglove_channels import FoxgloveChannels
 
 BACKLOG = 16
 """Messages that may wait for a client; a slow one misses the oldest."""
 PORT = 8765
 
 
-class FoxgloveServer(Scene):
+class FoxgloveServer(FoxgloveChannels):
     """Publishes to those who are connected, at `port`."""
 
     def __init__(self, host: str, port: int, *, points: bool) -> None:

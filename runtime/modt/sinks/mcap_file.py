@@ -15,13 +15,14 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from modt.address import Address
 from modt.errors import MisuseError
+from modt.sinks.foxglove_channels import FoxgloveChannels
 from modt.sinks.output import writing
-from modt.sinks.scene import Scene
 from modt.types import FrameResult
 
 FLUSH_S = 1.0
 """What a crash loses at most."""
-OPTIONS = MCAPWriteOptions(compression=MCAPCompression.Lz4, compression_threads=0)  # the cheapest, none included
+OPTIONS = MCAPWriteOptions(profile="ros2", compression=MCAPCompression.Lz4, compression_threads=0)
+"""LZ4 costs less CPU time than writing uncompressed."""
 PARTS = 8
 """Parts of a recording whose size is limited; the oldest makes room for a new one."""
 
@@ -73,7 +74,7 @@ class McapFile:
     ) -> None:
         self._path, self._max_bytes, self._clock = path, max_bytes, clock
         self._context = foxglove.Context()
-        self._scene = Scene(self._context, points=points)
+        self._channels = FoxgloveChannels(self._context, points=points)
         self._output, self._writer, self._flushed_s = self._part()
 
     def write(self, result: FrameResult, /) -> None:
@@ -85,7 +86,7 @@ class McapFile:
         if self._output.error is not None or self._output.size > self._max_bytes / PARTS:
             self.close()
             self._output, self._writer, self._flushed_s = self._part()
-        self._scene.write(result)
+        self._channels.write(result)
         if self._clock() - self._flushed_s >= FLUSH_S:
             self._flushed_s = self._clock()
             with suppress(RuntimeError):  # the output knows
@@ -97,7 +98,7 @@ class McapFile:
 
     def ledger(self, record: dict[str, Any], /) -> None:
         """Record a line of the ledger; whether it could be written the next frame says."""
-        self._scene.ledger(record)
+        self._channels.ledger(record)
 
     def close(self) -> None:
         """Write the index, and close the part; one without a frame, since the disk is full, is removed."""
