@@ -8,8 +8,8 @@ import pytest
 
 from modt.schemes import open_sink
 from modt.sinks.datagrams import MAX_BYTES
-from modt.sinks.tracks import frame_line, frame_parts, frame_record
-from tests.results import CAR, result
+from modt.sinks.tracks import frame_line, frame_parts
+from tests.results import CAR, frame_record, result
 
 FRAME = result(3, [5, 4], {0: 1, 1: 2}, {1: CAR}, lost=(7,))
 
