@@ -11,8 +11,9 @@ from modt.classes import CLASS_NAMES
 from modt.geometry import rotation_zyx, se3
 from modt.sinks.output import LineFile
 from modt.sinks.records import BROKEN, line, read_records
-from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line, recorded_pose
+from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
 from modt.types import NONE, Cut
+from modt_desk.evaluation.recorded_result import recorded_pose
 from tests.results import CAR, PEDESTRIAN, frame_record, result
 
 

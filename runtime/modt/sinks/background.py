@@ -12,7 +12,7 @@ from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
 from modt.errors import ModtError
-from modt.sinks.output import Health, LedgerSink, Reporting, Writer
+from modt.sinks.output import Health, LedgerSink, Writer
 
 log = logging.getLogger(__name__)
 
@@ -70,7 +70,7 @@ class Background(Generic[T]):
 
     def health(self) -> Health:
         """Items written, dropped for want of room, failed; what is wrong now; what the writer itself counts."""
-        own = self._writer.health() if isinstance(self._writer, Reporting) else {}
+        own: Health = getattr(self._writer, "health", dict)()
         return {
             **own,
             "written": self._written,

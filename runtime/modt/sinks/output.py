@@ -29,21 +29,16 @@ class Writer(Protocol[T_contra]):
         """Close the files."""
 
 
-@runtime_checkable
-class Reporting(Protocol):
-    """What a writer is besides, if it counts."""
+class Sink(Writer[FrameResult], Protocol):
+    """Takes the results of frames."""
 
     def health(self) -> Health:
-        """What has become of the items so far."""
-
-
-class Sink(Writer[FrameResult], Reporting, Protocol):
-    """Takes the results of frames."""
+        """Counts of what has become of the frames so far."""
 
 
 @runtime_checkable
 class LedgerSink(Protocol):
-    """What a sink is besides, if it also takes the lines of the ledger (`modt.ledger/1`, `modt.energy/1`)."""
+    """A sink that also takes the lines of the ledger (`modt.ledger/1`, `modt.energy/1`)."""
 
     def ledger(self, record: dict[str, Any], /) -> None:
         """Write a line of the ledger."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import Any
 
 import numpy as np
 
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES
 from modt.sinks.records import line
-from modt.types import NONE, Float64, FrameResult
+from modt.types import NONE, FrameResult
 
 SCHEMA = "modt.frame/3"
 BOX_KEYS = ("x", "y", "z", "l", "w", "h", "yaw")
@@ -140,16 +139,3 @@ def _rows(result: FrameResult) -> list[str]:
             *(column.tolist() for column in columns), strict=True
         )
     ]
-
-
-def recorded_pose(record: dict[str, Any]) -> Float64:
-    """(4, 4) T_world_sensor of a record.
-
-    Raises:
-        one of modt.sinks.records.BROKEN: the record has none.
-    """
-    T = np.eye(4)
-    T[:3] = np.reshape(record["T_world_sensor"], (3, 4))
-    if not np.isfinite(T).all():
-        raise ValueError("T_world_sensor is not finite")
-    return T

@@ -172,7 +172,8 @@ def _kitti(export: Export, target: Path) -> None:
 
 
 def _semantickitti(export: Export, target: Path) -> None:
-    from modt.sinks.labels import PointLabels, semantic_labels
+    from modt.sinks.labels import PointLabels
+    from modt_desk.evaluation.recorded_result import semantic_labels
 
     labels = PointLabels(target)
     for result in export.results():
