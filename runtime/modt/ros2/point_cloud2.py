@@ -138,7 +138,7 @@ def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
         cdr.text(name)
         cdr.record(("I", "B", "I"), 4 * k, FLOAT32, 1)
     cdr.record(("B", "2I"), 0, 16, 16 * len(points))
-    cdr.octets(np.ascontiguousarray(points, "<f4").data.cast("B"))
+    cdr.octets(np.ascontiguousarray(points, "<f4").reshape(-1).view(np.uint8).data)
     cdr.record(("B",), 1)
     return cdr.message()
 
