@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,6 @@ from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA, frame_line
 from tests.cli.commands import environment
 from tests.results import CAR, result
-from tests.sinks.full_disk import files_of_at_most
 from tests.sinks.test_background import settled
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,19 +27,6 @@ def test_a_file_is_continued(tmp_path):
             sink.write(frame)
         sink.close()
     assert (tmp_path / "lines.jsonl").read_text() == "".join(map(frame_line, FRAMES))
-
-
-def test_a_full_disk_costs_lines_and_what_follows_is_whole(tmp_path, caplog):
-    sink = open_sink(f"file://{tmp_path}/lines.jsonl")
-    with files_of_at_most(len(frame_line(FRAMES[0])) + 10):
-        sink.write(FRAMES[0])
-        sink.write(FRAMES[1])
-        assert settled(sink, written=1, failed=1)
-    sink.write(FRAMES[2])
-    assert settled(sink, written=2, failed=1, state="ok")
-    sink.close()
-    assert [record["frame"] for record in read_records(tmp_path / "lines.jsonl", SCHEMA)] == [0, 2]
-    assert len(caplog.records) == 2
 
 
 @pytest.mark.parametrize("whole", [FRAMES[:1], []])
@@ -74,42 +59,6 @@ def pipe():
     yield ends
     for end in ends:
         os.close(end)
-
-
-def test_a_reader_that_stalls_costs_lines_and_no_time(pipe):
-    reader, writer = pipe
-    background = Background("pipe", Descriptor(writer), 3)
-    sink = FrameLines(background)
-    for k in range(1000):
-        sink.write(FRAMES[k % 5])
-    assert background.health()["dropped"] > 0
-    os.set_blocking(reader, False)
-    tick, read = threading.Event(), b""
-    while not settled_once(background):
-        tick.wait(0.01)
-        read += drained(reader)
-    sink.close()
-    read += drained(reader)
-    lines = read.decode().splitlines(keepends=True)
-    assert set(lines) == {frame_line(frame) for frame in FRAMES}
-    health = sink.health()
-    assert health["written"] == len(lines)
-    assert health["written"] + health["dropped"] == 1000
-
-
-def settled_once(background):
-    health = background.health()
-    return health["waiting"] == 0 and health["written"] + health["dropped"] == 1000
-
-
-def drained(reader):
-    read = b""
-    try:
-        while chunk := os.read(reader, 1 << 16):
-            read += chunk
-    except BlockingIOError:
-        pass
-    return read
 
 
 def test_a_reader_that_leaves_is_counted_and_ends_nothing(pipe, caplog):

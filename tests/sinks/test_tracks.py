@@ -9,8 +9,7 @@ from hypothesis.extra.numpy import arrays
 from modt.class_sizes import unknown_near
 from modt.classes import CLASS_NAMES
 from modt.geometry import rotation_zyx, se3
-from modt.sinks.output import LineFile
-from modt.sinks.records import BROKEN, line, read_records
+from modt.sinks.records import BROKEN, line
 from modt.sinks.tracks import BOX_KEYS, SCHEMA, UNKNOWN_NEAR, WORLD_KEYS, frame_line
 from modt.types import NONE, Cut
 from modt_desk.evaluation.recorded_result import recorded_pose
@@ -77,25 +76,9 @@ def test_what_is_no_pose_is_a_broken_record(pose):
         recorded_pose({})
 
 
-def test_lines_are_read_back(tmp_path):
-    lines = LineFile(tmp_path / "tracks.jsonl", frame_line)
-    for f in range(3):
-        lines.write(result(f, [4], {0: 1}))
-    lines.close()
-    read = list(read_records(tmp_path / "tracks.jsonl", SCHEMA))
-    assert [r["frame"] for r in read] == [0, 1, 2]
-    assert read[-1] == frame_record(result(2, [4], {0: 1}))
-
-
-NUMBERS = st.one_of(
-    st.floats(-200, 200),
-    st.floats(-1e7, 1e7),
-    st.sampled_from([0.0, -0.0, 0.0005, -0.0004, 0.0015, 9999.9995, 10000.0, 99999999.5, 1e8, -1e17, 5e-324]),
-)
-LIKELIHOODS = st.one_of(
-    st.floats(0, 1), st.sampled_from([0.0, 1.0, 1e-6, 1.2e-5, 9.9e-5, 1e-4, 0.99999949, 0.9999996, 1 + 1e-9, -1e-9])
-)
-COUNTS = st.one_of(st.integers(0, 300), st.sampled_from([9999, 10_000, 10**8 - 1, 10**8, 10**12]))
+NUMBERS = st.one_of(st.floats(-200, 200), st.sampled_from([0.0, -0.0, 0.0005, 1e8, -1e17, 5e-324]))
+LIKELIHOODS = st.one_of(st.floats(0, 1), st.sampled_from([0.0, 1.0, 1e-6, 1.2e-5, 1 + 1e-9, -1e-9]))
+COUNTS = st.integers(0, 10**12)
 
 
 @st.composite
