@@ -9,7 +9,7 @@ import pytest
 
 from modt.schemes import open_sink
 from modt.sinks.background import Background
-from modt.sinks.frame_lines import Descriptor, FrameLines
+from modt.sinks.frame_lines import Descriptor
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA, frame_line
 from tests.cli.commands import environment
@@ -63,13 +63,12 @@ def pipe():
 
 def test_a_reader_that_leaves_is_counted_and_ends_nothing(pipe, caplog):
     reader, writer = pipe
-    background = Background("pipe", Descriptor(writer), 3, retry_s=0.0)
-    sink = FrameLines(background)
+    sink = Background("pipe", Descriptor(writer), 3, encode=frame_line, retry_s=0.0)
     os.dup2(writer, reader)  # the reading end is gone, its number is not
     sink.write(FRAMES[0])
-    assert settled(background, failed=1)
+    assert settled(sink, failed=1)
     sink.write(FRAMES[1])
-    assert settled(background, failed=2)
+    assert settled(sink, failed=2)
     sink.close()
     assert "Broken pipe" in str(sink.health()["state"])
     assert len(caplog.records) == 1

@@ -28,7 +28,7 @@ def message_type(name: str) -> type[Any]:
     kind.__init__ = make
     kind.serialize = lambda self, *_, **__: self.message
     kind.deserialize = classmethod(lambda cls, message, *_, **__: cls(message))
-    kind.deserialize_key = classmethod(lambda _cls, *_, **__: None)  # of the notice that a sender has left
+    kind.deserialize_key = classmethod(lambda _cls, *_, **__: None)  # for the notice that a sender has left
     return kind
 
 

@@ -24,13 +24,13 @@ FIGURES = {
     "cpu_ms/total": NUMBER,
     **{f"cpu_ms/{stage}": NUMBER for stage in ledger.STAGES},
 }
-"""Topics of a figure each, and their types."""
+"""Topics with one number or word each, and their types."""
 
 
 class FoxgloveChannels:
     """The topics of `modt.sinks.messages`, and FIGURES below PREFIX, as ROS 2 messages.
 
-    Times are the stamps of the frames. A message is made only while somebody takes it.
+    Messages bear the stamps of the frames, and are encoded only while a client or file takes them.
     """
 
     def __init__(self, context: foxglove.Context, *, points: bool) -> None:
@@ -63,7 +63,7 @@ class FoxgloveChannels:
 
 
 def figures(record: dict[str, Any]) -> dict[str, float | str]:
-    """Those of FIGURES that a line of the ledger has."""
+    """Values of the FIGURES that a line of the ledger contains."""
     if record["schema"] == windows.SCHEMA and usable(record) and record["frames"][2]:
         energy_J, n_frames = record["energy_J"], record["frames"][2]
         watts = energy_J / (1e-9 * record["wall_ns"]) if record["wall_ns"] else 0.0

@@ -66,7 +66,7 @@ class KittiResults:
         self._lines.write(text)
 
     def health(self) -> Health:
-        """The frames with objects."""
+        """Frames with objects that were written."""
         return self._lines.health()
 
     def close(self) -> None:

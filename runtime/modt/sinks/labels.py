@@ -47,11 +47,11 @@ class PointLabels:
         self._written += 1
 
     def health(self) -> Health:
-        """The files written."""
+        """Number of files written."""
         return {"written": self._written}
 
     def close(self) -> None:
-        """No file is open."""
+        """No effect: no file stays open."""
 
 
 def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:

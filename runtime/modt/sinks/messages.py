@@ -16,18 +16,18 @@ from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
 from modt.types import NONE, Float64, FrameResult, Int
 
 PREFIX, FRAME_ID, WORLD_FRAME_ID = "modt", "lidar", "world"
-"""Names where the address, and for the frame of the sensor the input, give none."""
+"""Names used if neither the address nor the input gives one."""
 DETECTIONS, MARKERS, TF = "vision_msgs/Detection3DArray", "visualization_msgs/MarkerArray", static_transforms.TYPE
 UNKNOWN_COVARIANCE = f"{8 * 36}x"
 
 ARROW, CUBE, TEXT = 0, 1, 9
 ADD, DELETE_ALL = 0, 3
 LIFETIME_S = 1
-"""Time after which viewers remove a marker that no frame has replaced [s]."""
+"""Time after which viewers remove a marker that was not replaced [s]."""
 TEXT_M, ABOVE_M = 0.6, 0.5
 """Height of a label, and of its middle above the box [m]."""
 MIN_ARROW_MPS, ARROW_WIDTH_M = 0.3, 0.2
-"""Slower objects have no arrow; an arrow is as long as the way of one second."""
+"""Slower objects have no arrow. An arrow is as long as the way of one second."""
 WHITE = (1.0, 1.0, 1.0, 1.0)
 COLOURS = tuple((*(int(c.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.6) for c in CLASSES.values())
 NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
@@ -119,7 +119,7 @@ def _detection(
 
 
 def markers(result: FrameResult, frame_id: str) -> bytes:
-    """visualization_msgs/MarkerArray: cube, label and, where it moves, arrow of every object in view, all anew."""
+    """visualization_msgs/MarkerArray: a cube, a label and, if it moves, an arrow for each object in view."""
     tracks, rows = result.tracks, seen(result)
     boxes, speed = result.proposals.box[tracks.proposal[rows]], tracks.x[rows, 3]
     ahead = boxes.copy()
@@ -162,7 +162,7 @@ def pose(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:
 
 
 def transform(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:
-    """tf2_msgs/TFMessage: the same as a transform, for viewers."""
+    """tf2_msgs/TFMessage: the pose of the sensor in the world as a transform."""
     T = T_world_sensor(result)
     cdr = CdrWriter()
     cdr.record(("I",), 1)
@@ -188,7 +188,7 @@ def box_poses(boxes: Float64) -> Float64:
 
 
 def in_sensor_frame(poses: Float64, R_level_sensor: Float64 | None) -> Float64:
-    """(n, 7) poses of the level frame in that of a tilted sensor, which the robot's tree of frames knows."""
+    """(n, 7) poses turned from the level frame into that of the tilted sensor, as mounted on the robot."""
     if R_level_sensor is None or not len(poses):
         return poses
     turn = Rotation.from_matrix(R_level_sensor.T)

@@ -11,7 +11,7 @@ from modt.types import FrameResult
 
 
 class Ros2Sink:
-    """Publishes each frame on those of its topics that somebody has subscribed to."""
+    """Publishes each frame on the topics that have subscribers."""
 
     def __init__(self, topics: list[tuple[Topic, Publication]]) -> None:
         self._unsent = 0
@@ -24,7 +24,7 @@ class Ros2Sink:
                 self._unsent += not publication.write(topic.encode(result))
 
     def health(self) -> Health:
-        """Messages that DDS did not take at once, because a reliable subscriber is behind."""
+        """Number of messages that DDS refused because a reliable subscriber is slow."""
         return {"unsent": self._unsent}
 
     def close(self) -> None:
@@ -37,10 +37,10 @@ def open_ros2(address: Address, cores: frozenset[int] | None = None) -> Ros2Sink
 
     Args:
         address: of the sink.
-        cores: for Cyclone's threads, None: where the caller runs.
+        cores: cores of Cyclone's threads; None: where the caller runs.
 
     Raises:
-        MisuseError: Cyclone DDS is not installed, no number of a domain, or other tracks.
+        MisuseError: Cyclone DDS is not installed, or an option is invalid.
         ModtError: the domain cannot be joined.
     """
     made = topics(

@@ -26,11 +26,11 @@ TRACK = (
 BOOLEANS, CLASSES = ("false", "true"), tuple(map(json.dumps, CLASS_NAMES))
 UNCERTAIN = ("null", json.dumps(UNKNOWN_NEAR))
 NUMBER_BYTES = 32
-"""Room for the numbers of a part, and of the parts."""
+"""Room for the numbers in `part` and `parts` [bytes]."""
 
 
 class _Latest:
-    """The line of the latest frame, which several sinks ask for one after the other."""
+    """Cache of the latest line, for several sinks of one frame."""
 
     result: FrameResult | None = None
     line = ""
@@ -105,7 +105,7 @@ def _rows(result: FrameResult) -> list[str]:
         raise ValueError("JSON has no number that is not finite")
     states = tuple(map(json.dumps, result.state_names))
     boxes = [BOX % tuple(box) for box in np.round(result.proposals.box, 3).tolist()]
-    boxes.append("null")  # the last one is that of NONE
+    boxes.append("null")  # index NONE is the last element
     columns = (
         tracks.id,
         tracks.state,
