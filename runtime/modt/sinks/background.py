@@ -109,7 +109,7 @@ class Background(Generic[T]):
 
     def _work(self) -> None:
         with suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # never with real-time priority, as the loop
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # real-time priority is for the loop alone
         while (job := self._next()) is not None:
             try:
                 job()
