@@ -1,4 +1,4 @@
-# Two commands, each does its own set-up on a machine that has Python 3.11 or later and make:
+# Two commands, each does its own set-up on a machine that has Python 3.10 or later and make:
 #   make replay   the whole method on the embedded stream
 #   make test     every check
 # For those who change it: `make quick` (the quick tests, a minute on two cores), `make check` (the checks short of the tests), `make format`, `make hooks` (checks at each commit).
@@ -47,7 +47,7 @@ clean:
 	rm -rf $(VENV) runs build dist .mypy_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 
 $(BIN)/python:
-	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 11), "modt needs Python 3.11 or later; give PYTHON=..."'
+	$(PYTHON) -c 'import sys; assert sys.version_info >= (3, 10), "modt needs Python 3.10 or later; give PYTHON=..."'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
 

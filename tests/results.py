@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+from typing import Any
+
 import numpy as np
 
+from modt.sinks.tracks import frame_line
 from modt.types import NONE, Frame, FrameResult, Proposals, Tracks
 
 STATES = ("unmatched", "tracked", "lost")
@@ -43,6 +47,12 @@ def result(
     frame = Frame(index, index / 10, points)
     T = np.eye(4) if T_world_sensor is None else T_world_sensor
     return FrameResult(frame, T, proposals(counts), tracks, STATES, 0, np.arange(classified))
+
+
+def frame_record(r: FrameResult) -> dict[str, Any]:
+    """The line of a frame in tracks.jsonl, read."""
+    record: dict[str, Any] = json.loads(frame_line(r))
+    return record
 
 
 CAR = [0.1, 0.7, 0.1, 0.1]

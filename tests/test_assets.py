@@ -82,6 +82,9 @@ def test_from_a_wheel(expected, environment, tmp_path):
     package, files = probe(str(environment / "bin" / "python"), cwd=tmp_path, kernels=kernels)
     assert package.startswith(str(environment))
     assert files == expected
+    command = [environment / "bin" / "modt", "service", "install", "--root", tmp_path, "--prefix", "/opt/modt"]
+    subprocess.run(command, check=True, capture_output=True)
+    assert (tmp_path / "etc/systemd/system/modt.service").is_file()
 
 
 @pytest.mark.install

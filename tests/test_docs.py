@@ -9,7 +9,6 @@ import pytest
 
 from modt.classes import CLASS_NAMES
 from modt.reporting.summary import Summary
-from modt.sinks.tracks import frame_record
 from modt_desk.evaluation.class_score import ClassScore
 from modt_desk.evaluation.evaluation import Evaluation, RangeScore
 from modt_desk.evaluation.segmentation_score import SegmentationScore
@@ -106,7 +105,7 @@ def test_modules_of_the_glossary_exist():
 
 
 def test_the_formats_name_every_field():
-    record = frame_record(results.result(0, [5], {0: 0}))
+    record = results.frame_record(results.result(0, [5], {0: 0}))
     scores = (Evaluation, RangeScore, SegmentationScore, ClassScore, TrackScore)
     fields = {f.name for score in scores for f in dataclasses.fields(score)}
     fields |= record.keys() | record["tracks"][0].keys() | Summary().result().keys()

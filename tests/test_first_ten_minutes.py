@@ -18,6 +18,7 @@ COPIED = (
     "tools",
     "models",
     "profiles",
+    "systemd",
     "pyproject.toml",
     "hatch_build.py",
     "Makefile",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-import tomllib
+import sys
 from itertools import chain
 from pathlib import Path
 
@@ -14,10 +14,17 @@ from packaging.requirements import Requirement
 import modt
 from modt.errors import install
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 ROOT = Path(__file__).resolve().parents[1]
 WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
 YAML = [*sorted((ROOT / ".github").rglob("*.yml")), ROOT / ".pre-commit-config.yaml", ROOT / "CITATION.cff"]
 
+PROJECT_FILE = tomllib.loads((ROOT / "pyproject.toml").read_text())
+PROJECT = PROJECT_FILE["project"]
 FOLDERS, TEXTS = ("docs", "runtime", "tools", "systemd"), {".md", ".py", ".conf", ".service", ".yaml", ".txt"}
 CLONE = "in a clone of modt"
 
@@ -42,7 +49,7 @@ def test_make_quick_runs_every_test_once_that_none_of_its_markers_leaves_out():
 
 
 def pytest_options():
-    return tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
+    return PROJECT_FILE["tool"]["pytest"]["ini_options"]
 
 
 def parsed(path: Path):
@@ -56,7 +63,7 @@ def test_yaml_is_a_mapping(path):
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.name)
 def test_workflows_run_the_two_commands_from_the_lowest_python_on(path):
-    lowest = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"].removeprefix(">=")
+    lowest = PROJECT["requires-python"].removeprefix(">=")
     for job in parsed(path)["jobs"].values():
         pythons = [tuple(map(int, version.split("."))) for version in job["strategy"]["matrix"]["python"]]
         assert min(pythons) == tuple(map(int, lowest.split(".")))
@@ -83,9 +90,8 @@ def test_the_lock_of_the_service_holds_each_dependency_within_its_bounds_and_wit
     lock = (ROOT / "systemd" / "requirements.txt").read_text()
     locked = re.findall(r"^(\S+)==(\S+).*\n    --hash=sha256:", lock, re.MULTILINE)
     assert len(locked) == len(re.findall(r"^\S+==", lock, re.MULTILINE))
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = re.match(r"# modt\[(.+)\]", lock)[1].split(",")
-    wanted = [project["dependencies"], *(project["optional-dependencies"][extra] for extra in extras)]
+    wanted = [PROJECT["dependencies"], *(PROJECT["optional-dependencies"][extra] for extra in extras)]
     for requirement in map(Requirement, chain.from_iterable(wanted)):
         versions = [version for name, version in locked if name == requirement.name]
         assert versions, requirement
@@ -115,7 +121,7 @@ def test_no_text_installs_modt_from_an_index_where_nobody_has_published_it():
 
 
 def test_the_remedy_for_a_missing_extra_names_one_that_exists():
-    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    extras = PROJECT["optional-dependencies"]
     code = "".join(p.read_text() for f in ("runtime", "tools") for p in (ROOT / f).rglob("*.py"))
     assert set(re.findall(r"\binstall\([\"'](\w+)[\"']\)", code)) <= set(extras)
     assert install("view") == "pip install '.[view]' in a clone of modt, or 'FILE.whl[view]' of its wheel"

@@ -79,7 +79,7 @@ def test_no_frame_loads_scipy(command, tmp_path):
 @pytest.mark.parametrize(
     ("module", "of_the_desk"),
     [
-        (main, {"view", "evaluate", "export", "simulate", "track", "completion"}),
+        (main, {"view", "evaluate", "export", "simulate", "track", "completion", "service"}),
         (profile_group, {"fit", "schema"}),
         (profile, {"calibrate", "report", "compare", "predict"}),
     ],

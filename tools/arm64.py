@@ -14,13 +14,17 @@ import os
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from modt.native import build
 from tools.options import parser
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path(__file__).resolve().parents[1]
 SUITE, PYTHON, PACKAGES = "bookworm", "3.11", "python3,ca-certificates,gcc,libc6-dev"

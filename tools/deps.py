@@ -1,6 +1,6 @@
 """Check and record what modt depends on: bounds, lock, bill of materials, known weaknesses, and the wheel itself.
 
-    python -m tools.deps oldest [--python 3.11]   # the fast tests with the lowest versions of pyproject.toml
+    python -m tools.deps oldest [--python 3.10]   # the fast tests with the lowest versions of pyproject.toml
     python -m tools.deps newest [--python 3.14]   # … and with the newest
     python -m tools.deps lock                     # systemd/requirements.txt, with hashes
     python -m tools.deps sbom                     # dist/modt.cdx.json, CycloneDX, of that lock
@@ -59,7 +59,7 @@ def tested(resolution: str, version: str) -> int:
 def lock() -> int:
     """Write the lock of the service's environment, of every platform and Python that is allowed."""
     extras = [word for name in EXTRAS for word in ("--extra", name)]
-    form = ["--universal", "--generate-hashes", "--no-annotate", "--python-version", "3.11", "--no-header"]
+    form = ["--universal", "--generate-hashes", "--no-annotate", "--python-version", "3.10", "--no-header"]
     done = _uv("pip", "compile", "--quiet", "--upgrade", *form, *extras, "pyproject.toml")
     LOCK.write_text(f"# modt[{','.join(EXTRAS)}], written by python -m tools.deps lock\n{done.stdout}")
     return 0
@@ -116,7 +116,7 @@ def main() -> int:
     options = parser(__doc__)
     options.add_argument("action", choices=[*RESOLUTIONS, *ACTIONS])
     options.add_argument(
-        "--python", default="3.11", help="version or path, for oldest and newest (default: %(default)s)"
+        "--python", default="3.10", help="version or path, for oldest and newest (default: %(default)s)"
     )
     given = options.parse_args()
     if given.action in RESOLUTIONS:

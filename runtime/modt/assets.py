@@ -1,4 +1,4 @@
-"""Files of the package: models/ and profiles/, and the models of the desk if it is installed.
+"""Files of the package: models/, profiles/ and systemd/, and the models of the desk if it is installed.
 
 They lie beside runtime/ in a checkout and an editable install, and inside the package in a wheel.
 """
@@ -15,7 +15,7 @@ _DESK = (_PACKAGE.parent / "modt_desk", _PACKAGE.parents[1] / "tools" / "modt_de
 
 
 def folder(kind: str) -> Path:
-    """Folder of a kind, "models" or "profiles"."""
+    """Folder of a kind: "models", "profiles" or "systemd"."""
     for root in _ROOTS:
         if (root / kind).is_dir():
             return root / kind

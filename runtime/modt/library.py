@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from operator import index
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +20,7 @@ from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.sources.pose_file import pose_defect
 from modt.sources.scan_file import sanitised
-from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int
+from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int, Self
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,12 +11,17 @@ from dataclasses import dataclass, field, fields
 from enum import IntFlag
 from functools import cache
 from operator import attrgetter
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modt.classes import N_CLASSES
+
+if TYPE_CHECKING:
+    from typing_extensions import Self as Self  # noqa: PLC0414  # typing has it from Python 3.11 on
+else:
+    Self = Any
 
 Float32 = NDArray[np.float32]
 Float64 = NDArray[np.float64]

@@ -1,7 +1,6 @@
 """`modt run` from the outside: a recording as a live source, signals, records, and what systemd is told."""
 
 import json
-import os
 import re
 import signal
 import socket
@@ -10,7 +9,6 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import psutil
 import pytest
 import yaml
@@ -200,22 +198,6 @@ def test_a_source_that_cannot_be_is_a_misuse(source, tmp_path):
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) <= 3
     assert "nowhere" in done.stderr
-
-
-def test_an_empty_sweep_and_a_broken_one_end_nothing(scans, tmp_path):
-    folder = tmp_path / "scans"
-    folder.mkdir()
-    for k, scan in enumerate(sorted(scans.iterdir())):
-        points = np.fromfile(scan, np.float32).reshape(-1, 4)
-        if k == 5:
-            points[:] = np.nan
-        points.tofile(folder / scan.name)
-    (folder / "000007.bin").write_bytes(b"xyz")
-    done = modt("run", folder, "--out", tmp_path / "run", "--profile", "vlp-16", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    sensor = json.loads((tmp_path / "run" / "status.json").read_text())["sensor"]
-    assert sensor["refused_messages"] == {"faulty scans": 2}
-    assert os.path.getsize(tmp_path / "run" / "tracks.jsonl") > 0
 
 
 def test_the_status_of_a_service_while_it_runs_and_after(scans, start, tmp_path):

@@ -48,14 +48,33 @@ def decode(message: bytes, name: str) -> Any:
 
 
 def made(kind: str, /, **values: Any) -> Any:
-    """A message of a type, by its short name."""
-    return store().types[kind](**values)
+    """A message of a type by its name, as `nav_msgs/Odometry`; fields that are not given are zero or empty."""
+    full = kind.replace("/", "/msg/") if "/msg/" not in kind else kind
+    return store().types[full](**{name: values.get(name, _blank(*form)) for name, form in store().fielddefs[full][1]})
+
+
+def _blank(form: Any, of: Any) -> Any:
+    if form.name == "NAME":
+        return made(of)
+    if form.name == "BASE":
+        return {"string": "", "bool": False}.get(of[0], 0)
+    (kind, (element, *_)), n = of
+    return [] if kind.name == "NAME" else np.zeros(n or 0, "u1" if element == "octet" else element)
 
 
 def header(stamp_s: float, frame_id: str) -> Any:
     seconds, nanoseconds = divmod(round(stamp_s * 1e9), 10**9)
-    stamp = made("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
-    return made("std_msgs/msg/Header", stamp=stamp, frame_id=frame_id)
+    stamp = made("builtin_interfaces/Time", sec=seconds, nanosec=nanoseconds)
+    return made("std_msgs/Header", stamp=stamp, frame_id=frame_id)
+
+
+def placed(kind: str, position: list[float], quaternion: list[float]) -> Any:
+    """A geometry_msgs/Pose or Transform."""
+    at, turned = dict(zip("xyz", position, strict=True)), dict(zip("xyzw", quaternion, strict=True))
+    orientation = made("geometry_msgs/Quaternion", **turned)
+    if kind == "Pose":
+        return made("geometry_msgs/Pose", position=made("geometry_msgs/Point", **at), orientation=orientation)
+    return made("geometry_msgs/Transform", translation=made("geometry_msgs/Vector3", **at), rotation=orientation)
 
 
 def cloud(
@@ -68,20 +87,14 @@ def cloud(
 ) -> Any:
     """A PointCloud2 of a structured (height, width) array, its rows padded by some bytes."""
     kinds = {"i1": 1, "u1": 2, "i2": 3, "u2": 4, "i4": 5, "u4": 6, "f4": 7, "f8": 8}
-    fields = [
-        made(
-            "sensor_msgs/msg/PointField",
-            name=name,
-            offset=data.dtype.fields[name][1],
-            datatype=(datatypes or {}).get(name, kinds.get(data.dtype.fields[name][0].str[1:], 0)),
-            count=1,
-        )
-        for name in data.dtype.names
-    ]
+    fields = []
+    for name, (kind, offset) in data.dtype.fields.items():
+        datatype = (datatypes or {}).get(name, kinds.get(kind.str[1:], 0))
+        fields.append(made("sensor_msgs/PointField", name=name, offset=offset, datatype=datatype, count=1))
     rows = np.frombuffer(data.tobytes(), np.uint8).reshape(len(data), -1)
     rows = np.pad(rows, ((0, 0), (0, padding)))
     return made(
-        "sensor_msgs/msg/PointCloud2",
+        "sensor_msgs/PointCloud2",
         header=header(stamp_s, frame_id),
         height=data.shape[0],
         width=data.shape[1],
@@ -107,45 +120,20 @@ def xyzi(n: int, kind: Any = None) -> np.ndarray:
 
 def odometry(stamp_s: float, position: list[float], quaternion: list[float], child: str = "base_link") -> Any:
     """An Odometry message."""
-    return made(
-        "nav_msgs/msg/Odometry",
-        header=header(stamp_s, "odom"),
-        child_frame_id=child,
-        pose=made(
-            "geometry_msgs/msg/PoseWithCovariance",
-            pose=made(
-                "geometry_msgs/msg/Pose",
-                position=made("geometry_msgs/msg/Point", **dict(zip("xyz", position, strict=True))),
-                orientation=made("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", quaternion, strict=True))),
-            ),
-            covariance=np.zeros(36),
-        ),
-        twist=made(
-            "geometry_msgs/msg/TwistWithCovariance",
-            twist=made(
-                "geometry_msgs/msg/Twist",
-                linear=made("geometry_msgs/msg/Vector3", x=1.0, y=0.0, z=0.0),
-                angular=made("geometry_msgs/msg/Vector3", x=0.0, y=0.0, z=0.1),
-            ),
-            covariance=np.zeros(36),
-        ),
-    )
+    pose = made("geometry_msgs/PoseWithCovariance", pose=placed("Pose", position, quaternion))
+    return made("nav_msgs/Odometry", header=header(stamp_s, "odom"), child_frame_id=child, pose=pose)
 
 
 def transforms(*edges: tuple[str, str, list[float], list[float]]) -> Any:
     """A TFMessage of (parent, child, translation, quaternion)."""
     return made(
-        "tf2_msgs/msg/TFMessage",
+        "tf2_msgs/TFMessage",
         transforms=[
             made(
-                "geometry_msgs/msg/TransformStamped",
+                "geometry_msgs/TransformStamped",
                 header=header(0.0, parent),
                 child_frame_id=child,
-                transform=made(
-                    "geometry_msgs/msg/Transform",
-                    translation=made("geometry_msgs/msg/Vector3", **dict(zip("xyz", at, strict=True))),
-                    rotation=made("geometry_msgs/msg/Quaternion", **dict(zip("xyzw", turned, strict=True))),
-                ),
+                transform=placed("Transform", at, turned),
             )
             for parent, child, at, turned in edges
         ],

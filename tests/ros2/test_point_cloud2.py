@@ -158,6 +158,7 @@ def test_a_written_cloud_is_read_by_another_implementation():
     assert (message.height, message.width, message.point_step, message.row_step) == (1, 30, 16, 480)
     np.testing.assert_array_equal(message.data.view(np.float32).reshape(-1, 4), points)
     np.testing.assert_array_equal(read_cloud(write_cloud(12.5, "lidar", points)).points, points)
+    assert len(messages.decode(write_cloud(12.5, "lidar", points[:0]), "sensor_msgs/msg/PointCloud2").data) == 0
 
 
 class TestTimes:

@@ -3,19 +3,17 @@
 import os
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import pytest
 
 from modt.schemes import open_sink
 from modt.sinks.background import Background
-from modt.sinks.frame_lines import Descriptor, FrameLines
+from modt.sinks.frame_lines import Descriptor
 from modt.sinks.records import read_records
 from modt.sinks.tracks import SCHEMA, frame_line
 from tests.cli.commands import environment
 from tests.results import CAR, result
-from tests.sinks.full_disk import files_of_at_most
 from tests.sinks.test_background import settled
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -29,19 +27,6 @@ def test_a_file_is_continued(tmp_path):
             sink.write(frame)
         sink.close()
     assert (tmp_path / "lines.jsonl").read_text() == "".join(map(frame_line, FRAMES))
-
-
-def test_a_full_disk_costs_lines_and_what_follows_is_whole(tmp_path, caplog):
-    sink = open_sink(f"file://{tmp_path}/lines.jsonl")
-    with files_of_at_most(len(frame_line(FRAMES[0])) + 10):
-        sink.write(FRAMES[0])
-        sink.write(FRAMES[1])
-        assert settled(sink, written=1, failed=1)
-    sink.write(FRAMES[2])
-    assert settled(sink, written=2, failed=1, state="ok")
-    sink.close()
-    assert [record["frame"] for record in read_records(tmp_path / "lines.jsonl", SCHEMA)] == [0, 2]
-    assert len(caplog.records) == 2
 
 
 @pytest.mark.parametrize("whole", [FRAMES[:1], []])
@@ -76,51 +61,14 @@ def pipe():
         os.close(end)
 
 
-def test_a_reader_that_stalls_costs_lines_and_no_time(pipe):
-    reader, writer = pipe
-    background = Background("pipe", Descriptor(writer), 3)
-    sink = FrameLines(background)
-    for k in range(1000):
-        sink.write(FRAMES[k % 5])
-    assert background.health()["dropped"] > 0
-    os.set_blocking(reader, False)
-    tick, read = threading.Event(), b""
-    while not settled_once(background):
-        tick.wait(0.01)
-        read += drained(reader)
-    sink.close()
-    read += drained(reader)
-    lines = read.decode().splitlines(keepends=True)
-    assert set(lines) == {frame_line(frame) for frame in FRAMES}
-    health = sink.health()
-    assert health["written"] == len(lines)
-    assert health["written"] + health["dropped"] == 1000
-
-
-def settled_once(background):
-    health = background.health()
-    return health["waiting"] == 0 and health["written"] + health["dropped"] == 1000
-
-
-def drained(reader):
-    read = b""
-    try:
-        while chunk := os.read(reader, 1 << 16):
-            read += chunk
-    except BlockingIOError:
-        pass
-    return read
-
-
 def test_a_reader_that_leaves_is_counted_and_ends_nothing(pipe, caplog):
     reader, writer = pipe
-    background = Background("pipe", Descriptor(writer), 3, retry_s=0.0)
-    sink = FrameLines(background)
+    sink = Background("pipe", Descriptor(writer), 3, encode=frame_line, retry_s=0.0)
     os.dup2(writer, reader)  # the reading end is gone, its number is not
     sink.write(FRAMES[0])
-    assert settled(background, failed=1)
+    assert settled(sink, failed=1)
     sink.write(FRAMES[1])
-    assert settled(background, failed=2)
+    assert settled(sink, failed=2)
     sink.close()
     assert "Broken pipe" in str(sink.health()["state"])
     assert len(caplog.records) == 1

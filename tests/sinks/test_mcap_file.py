@@ -1,6 +1,5 @@
-"""MCAP recordings, read by the public reader."""
+"""MCAP recordings, read by others' readers and by modt."""
 
-import base64
 from contextlib import suppress
 
 import numpy as np
@@ -12,23 +11,23 @@ pytest.importorskip("mcap")
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 
-from modt.classes import CLASSES, ObjectClass
 from modt.errors import ModtError
 from modt.geometry import rotation_zyx, se3
 from modt.schemes import open_sink
 from modt.sinks.mcap_file import McapFile
+from modt.sinks.messages import topics
+from modt.sources.recognise import open_stream
 from tests.results import CAR, PEDESTRIAN, result
-from tests.sinks.foxglove_messages import decoded
 from tests.sinks.full_disk import files_of_at_most
 
 
-def moving(index, speed_mps=2.0):
+def moving(index):
     """A car and a pedestrian in view, a background in view and a lost car; the sensor looks along the world's y."""
-    T = se3(rotation_zyx(0.0, 0.0, np.pi / 2), np.array([3.0, -1.0, 0.5]))
+    T = se3(rotation_zyx(0.0, 0.0, np.pi / 2), np.array([3.0 + index, -1.0, 0.5]))
     made = result(
         index, [5, 4, 3], {0: 11, 1: 12, 2: 13}, {11: CAR, 12: PEDESTRIAN, 9: CAR}, lost=(9,), T_world_sensor=T
     )
-    made.tracks.x[:, 2], made.tracks.x[:, 3] = np.pi / 2, speed_mps
+    made.tracks.x[:, 2:] = np.pi / 2, 2.0
     return made
 
 
@@ -37,19 +36,17 @@ LEDGER = {"schema": "modt.ledger/1", "frame": 1, "cpu_ns": 3_000_000, "stages": 
 
 
 def read(path, topic=None):
-    """Topic, schema, time [ns] and content of the messages of a whole file."""
+    """Topic, time [ns] and bytes of the messages of a whole file."""
     with path.open("rb") as file:
-        return [
-            (c.topic, s.name, m.log_time, decoded(c.message_encoding, s.name, s.data, m.data))
-            for s, c, m in make_reader(file, validate_crcs=True).iter_messages(topics=topic)
-        ]
+        found = make_reader(file, validate_crcs=True).iter_messages(topics=topic)
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in found]
 
 
 def n_frames(path):
     """Frames in a file that may end anywhere."""
     count = 0
     with path.open("rb") as file, suppress(EndOfFile):
-        for _ in NonSeekingReader(file).iter_messages(topics="/tracks", log_time_order=False):
+        for _ in NonSeekingReader(file).iter_messages(topics="/modt/markers", log_time_order=False):
             count += 1
     return count
 
@@ -63,92 +60,40 @@ def record(path, *frames, records=(), **options):
     sink.close()
 
 
-def test_topics_have_the_schemas_that_foxglove_knows(tmp_path):
-    record(tmp_path / "a.mcap", moving(3), records=(WINDOW, LEDGER))
-    found = {topic: (schema, stamp) for topic, schema, stamp, _ in read(tmp_path / "a.mcap")}
-    assert found == {
-        "/tf": ("foxglove.FrameTransform", 300_000_000),
-        "/tracks": ("foxglove.SceneUpdate", 300_000_000),
-        "/points": ("foxglove.PointCloud", 300_000_000),
-        "/energy": ("modt.Energy", 300_000_000),
-        "/stages": ("modt.Stages", 300_000_000),
+def test_another_reader_of_ros_2_finds_what_the_topics_hold(tmp_path):
+    highlevel = pytest.importorskip("rosbags.highlevel")
+    unknown = {**WINDOW, "energy_J": None, "kind": "unavailable"}
+    record(tmp_path / "a.mcap", moving(3), records=(WINDOW, unknown, LEDGER))
+    with highlevel.AnyReader([tmp_path / "a.mcap"]) as reader:
+        found = {c.topic: (raw, reader.deserialize(raw, c.msgtype), stamp) for c, stamp, raw in reader.messages()}
+    assert {stamp for *_, stamp in found.values()} == {300_000_000}
+    for topic in topics(world_frame_id="world", points=True):
+        assert found.pop(topic.name)[0] == topic.encode(moving(3))
+    assert {name: message.data for name, (_, message, _) in found.items()} == {
+        "/modt/energy/mJ_per_frame": 50.0,
+        "/modt/energy/watts": 0.5,
+        "/modt/energy/kind": "measured",
+        "/modt/cpu_ms/total": 3.0,
+        "/modt/cpu_ms/tracking": 2.0,
     }
 
 
-def test_the_pose_of_the_sensor_is_a_transform_from_the_world(tmp_path):
-    record(tmp_path / "a.mcap", moving(3))
-    ((*_, placed),) = read(tmp_path / "a.mcap", "/tf")
-    assert (placed["parent_frame_id"], placed["child_frame_id"]) == ("world", "sensor")
-    assert placed["translation"] == {"x": 3.0, "y": -1.0, "z": 0.5}
-    turned = [placed["rotation"].get(key, 0.0) for key in "xyzw"]
-    np.testing.assert_allclose(turned, [0, 0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-12)
-
-
-def test_an_object_in_view_has_a_cube_a_text_and_an_arrow_along_its_motion(tmp_path):
-    record(tmp_path / "a.mcap", moving(3))
-    ((*_, update),) = read(tmp_path / "a.mcap", "/tracks")
-    assert [deletion["type"] for deletion in update["deletions"]] == ["ALL"]
-    car, person = update["entities"]
-    assert (car["id"], person["id"]) == ("11", "12")
-    assert car["frame_id"] == "sensor"
-    assert car["metadata"] == [{"key": "class", "value": "car"}]
-    (cube,) = car["cubes"]
-    assert cube["size"] == {"x": 4.0, "y": 2.0, "z": 1.5}
-    assert cube["pose"]["position"] == {"x": 10.0, "z": -1.0}
-    colour = [round(255 * cube["color"][part]) for part in "rgb"]
-    assert bytes(colour).hex() == CLASSES[ObjectClass.CAR].colour[1:]
-    assert [text["text"] for text in (*car["texts"], *person["texts"])] == [
-        "car 11: 2.0 m/s",
-        "pedestrian 12: 2.0 m/s",
-    ]
-    (arrow,) = car["arrows"]
-    assert arrow["shaft_length"] == 2.0
-    assert arrow["pose"]["orientation"].get("z", 0.0) == pytest.approx(0.0)  # the world's y is straight ahead
-
-
-def test_the_arrow_of_what_goes_backwards_points_there(tmp_path):
-    record(tmp_path / "a.mcap", moving(3, speed_mps=-2.0))
-    ((*_, update),) = read(tmp_path / "a.mcap", "/tracks")
-    (arrow,) = update["entities"][0]["arrows"]
-    assert arrow["shaft_length"] == 2.0
-    assert abs(arrow["pose"]["orientation"]["z"]) == pytest.approx(1.0)
-
-
-def test_what_stands_has_no_arrow(tmp_path):
-    record(tmp_path / "a.mcap", moving(3, speed_mps=0.0))
-    ((*_, update),) = read(tmp_path / "a.mcap", "/tracks")
-    assert [entity.get("arrows") for entity in update["entities"]] == [None, None]
-
-
-def test_points_are_those_of_the_frame(tmp_path):
-    frame = moving(3)
-    record(tmp_path / "a.mcap", frame)
-    ((*_, cloud),) = read(tmp_path / "a.mcap", "/points")
-    assert [(field["name"], field.get("offset", 0)) for field in cloud["fields"]] == [
-        ("x", 0),
-        ("y", 4),
-        ("z", 8),
-        ("reflectance", 12),
-    ]
-    assert cloud["point_stride"] == 16
-    assert base64.b64decode(cloud["data"]) == frame.frame.points.tobytes()
+def test_modt_itself_replays_the_points_and_the_poses(tmp_path):
+    record(tmp_path / "a.mcap", *map(moving, range(5)))
+    frames = list(open_stream(tmp_path / "a.mcap"))
+    assert len(frames) == 5
+    for k, frame in enumerate(frames):
+        sent = moving(k)
+        assert frame.stamp_s == pytest.approx(0.1 * k)
+        np.testing.assert_array_equal(frame.points[:, :3], sent.frame.points[:, :3])
+        np.testing.assert_allclose(frame.T_world_sensor, sent.T_world_sensor, atol=1e-9)
 
 
 def test_points_can_be_left_out(tmp_path):
     sink = open_sink(f"mcap://{tmp_path}/a.mcap?points=none")
     sink.write(moving(3))
     sink.close()
-    assert {topic for topic, *_ in read(tmp_path / "a.mcap")} == {"/tf", "/tracks"}
-
-
-def test_energy_a_frame_is_that_of_its_window(tmp_path):
-    unknown = {**WINDOW, "energy_J": None, "kind": "unavailable"}
-    record(tmp_path / "a.mcap", moving(0), records=(WINDOW, unknown, LEDGER))
-    found = {topic: content for topic, *_, content in read(tmp_path / "a.mcap", ["/energy", "/stages"])}
-    assert found == {
-        "/energy": {"mJ_per_frame": 50.0, "watts": 0.5, "kind": "measured"},
-        "/stages": {"cpu_ms": 3.0, "tracking_ms": 2.0},
-    }
+    assert "/modt/points" not in {topic for topic, *_ in read(tmp_path / "a.mcap")}
 
 
 def test_an_earlier_recording_is_kept(tmp_path):
@@ -202,4 +147,4 @@ def test_a_full_disk_is_an_error_and_the_recording_goes_on_when_there_is_room(tm
     sink.write(moving(4))
     sink.close()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a-1.mcap", "a.mcap"]
-    assert [stamp for *_, stamp, _ in read(tmp_path / "a-1.mcap", "/tracks")] == [400_000_000]
+    assert [stamp for _, stamp, _ in read(tmp_path / "a-1.mcap", "/modt/markers")] == [400_000_000]

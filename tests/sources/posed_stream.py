@@ -1,11 +1,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Self
 
 from modt.sources.pose_source import PoseSource
 from modt.sources.stream import Faults, Stream, StreamInfo
-from modt.types import Frame
+from modt.types import Frame, Self
 
 
 class PosedStream:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import tempfile
 import threading
 
@@ -227,6 +228,7 @@ def test_the_unpacked_file_goes_with_the_stream(tmp_path, monkeypatch):
     stream = open_stream(folder)
     assert len(list(tmp_path.glob("*.db3"))) == 1
     del stream
+    gc.collect()
     assert not list(tmp_path.glob("*.db3"))
 
 

@@ -58,10 +58,10 @@ CALENDARS += ["%Y-%m-%dT%H:%M:%S.%fZ", "%Y-%m-%d %H:%M:%S.%f", "lidar-%Y.%m.%d-%
 
 
 def calendar(form):
-    from datetime import UTC, datetime
+    from datetime import datetime, timezone
 
     def name(t):
-        return datetime.fromtimestamp(t // 10**9, UTC).replace(microsecond=t % 10**9 // 1000).strftime(form)
+        return datetime.fromtimestamp(t // 10**9, timezone.utc).replace(microsecond=t % 10**9 // 1000).strftime(form)
 
     return name
 

@@ -1,4 +1,4 @@
-"""Faults of a live source and its surroundings, and the counter that must tell of each."""
+"""Faults of a live source and its surroundings, and the counter that must report each."""
 
 from __future__ import annotations
 
@@ -30,18 +30,18 @@ while True:
     time.sleep(0.02)
 """
 HOG_PRIORITY = 20
-"""Above that of the loop, where that has one."""
+"""Above the priority of the loop."""
 FULL_DISK = "full disk"
 """The one fault that may cost records."""
 Sweeps = Sequence[Sweep]
 
 
 class World:
-    """What is wrong now: switches that the faults turn.
+    """Switches that the faults turn.
 
     Attributes:
-        disk_full, meter_lost, stage_broken: what they say.
-        back_s: by which the sensor's clock was set back so far.
+        disk_full, meter_lost, stage_broken: the fault is active.
+        back_s: time by which the sensor's clock was set back so far [s].
     """
 
     def __init__(self, core: int | None, hogs: int, *, fifo: bool) -> None:
@@ -100,16 +100,16 @@ class Fault:
     """One kind of fault.
 
     Attributes:
-        seconds: that it lasts.
-        told: the counter that tells of it.
-        sweeps: what becomes of a sweep meanwhile, by a random generator.
+        seconds: duration.
+        counter: the counter that reports it.
+        sweeps: turns a sweep into faulty ones, by a random generator.
         switch: turns it on and off in the world.
-        silent_if_steady: nothing need tell of it while results come as ever: the loop has room for it.
+        silent_if_steady: no report is needed while results stay regular.
     """
 
     name: str
     seconds: float
-    told: Callable[[Any], int]
+    counter: Callable[[Any], int]
     sweeps: Callable[[Sweep, np.random.Generator], Sweeps] = lambda sweep, _: (sweep,)
     switch: Callable[[World, bool], None] = lambda world, on: None
     silent_if_steady: bool = False

@@ -17,8 +17,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from modt_desk.cli.service import PREFIX, Service
 from modt_desk.simulation.synthetic_stream import SyntheticStream
-from tools.deploy.install import main as install
 from tools.deploy.proof_steps import END
 from tools.options import parser
 
@@ -67,7 +67,7 @@ container=lxc exec chroot . /lib/systemd/systemd --unit=proof.target --show-stat
 def prepare(root: Path) -> None:
     """Files of the copy: the unit as it is installed, a program, a recording, and what drives the proof."""
     source = f"/{SCANS}?loop=yes"
-    install(["--root", str(root), "--source", source, "--options", f"--profile /{PROFILE}"])
+    Service(root, Path(PREFIX)).install([], source, f"--profile /{PROFILE}")
     scans = root / SCANS
     scans.mkdir(parents=True)
     for frame in SyntheticStream("street", "vlp-16", 1.5, 0):

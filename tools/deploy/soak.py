@@ -2,11 +2,11 @@
 
     python -m tools.deploy.soak DRIVE --minutes 30 --seed 1
 
-Every fault must be told by its counter (a process that takes the core only if results stall) and be recovered from
-within a second: the next result is there, and nothing is given up for it; no record is lost but on a full disk;
-between faults at most one deadline in 1,000 is missed, as the machine may do other work; memory and open descriptors
-stay flat. The exit status is 0 if all this holds. `--fifo` takes the priority of a service, and gives hogs a higher
-one.
+Every fault must be reported by its counter (a process that takes the core only if results stall). The next result
+must be there within a second, at full quality. No record is lost except on a full disk. At most one deadline in 1,000
+is missed between faults. Memory and open descriptors stay flat. The exit status is 0 if all this holds.
+
+`--fifo` takes the priority of a service, and gives hogs a higher one.
 """
 
 from __future__ import annotations
@@ -46,13 +46,13 @@ STALL = 1.5
 
 @dataclass(slots=True)
 class Episode:
-    """One occurrence of a fault: when [s], what its counter said before and after, and the time to recover [s]."""
+    """One occurrence of a fault: times [s], its counter before and after, and the time to recover [s]."""
 
     fault: Fault
     begin_s: float
     before: int
     end_s: float = float("inf")
-    told: int = 0
+    after: int = 0
     recovery_s: float = float("inf")
 
 
@@ -125,9 +125,9 @@ class FaultyReader:
         self._reader.close()
 
     def ask(self) -> None:
-        """What the counter of the last fault says now."""
+        """Read the counter of the last fault."""
         if self.episodes and self.session is not None:
-            self.episodes[-1].told = self.episodes[-1].fault.told(self.session)
+            self.episodes[-1].after = self.episodes[-1].fault.counter(self.session)
 
     def _turn_on(self, now_s: float) -> None:
         if not self._waiting:
@@ -135,7 +135,7 @@ class FaultyReader:
         fault = self._waiting.pop()
         assert self.session is not None
         self.ask()
-        self._now = Episode(fault, now_s, fault.told(self.session))
+        self._now = Episode(fault, now_s, fault.counter(self.session))
         self.episodes.append(self._now)
         fault.switch(self._world, True)
 
@@ -152,19 +152,19 @@ def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[s
     times_s = np.array(witness.times_s)
     whole, gaps_s = times_s[np.array(witness.full)], np.diff(times_s)
     stalls_s = times_s[1:][gaps_s > STALL * np.median(gaps_s)]
-    print(f"{'fault':<16}{'times':>6}{'told':>8}{'recovery':>10}  (s, worst)")
+    print(f"{'fault':<16}{'times':>6}{'counted':>8}{'recovery':>10}  (s, worst)")
     for fault in FAULTS:
         own = [e for e in episodes if e.fault is fault and np.isfinite(e.end_s)]
         for e in own:
             after = whole[whole > e.end_s]
             e.recovery_s = float(after[0] - e.end_s) if len(after) else float("inf")
         worst = max((e.recovery_s for e in own), default=0.0)
-        silent = [e for e in own if e.told <= e.before]
+        silent = [e for e in own if e.after <= e.before]
         if fault.silent_if_steady:
             silent = [e for e in silent if ((stalls_s > e.begin_s) & (stalls_s < e.end_s)).any()]
-        print(f"{fault.name:<16}{len(own):>6}{sum(e.told - e.before for e in own):>8}{worst:>10.2f}")
+        print(f"{fault.name:<16}{len(own):>6}{sum(e.after - e.before for e in own):>8}{worst:>10.2f}")
         if silent:
-            wrong.append(f"{fault.name}: no counter told of {len(silent)} of {len(own)}")
+            wrong.append(f"{fault.name}: {len(silent)} of {len(own)} were not counted")
         if worst > MAX_RECOVERY_S:
             wrong.append(f"{fault.name}: recovery took {worst:.1f} s")
     clear = np.ones(len(times_s), np.bool_)
@@ -172,7 +172,7 @@ def judge(witness: Witness, episodes: list[Episode], session: Session) -> list[s
         clear &= (times_s < e.begin_s) | (times_s > e.end_s + SETTLE_S)
     missed = int(np.diff(witness.missed, prepend=0)[clear].sum())
     recording = session.recording.health()
-    lost = recording["lost_lines"] - sum(e.told - e.before for e in episodes if e.fault.name == FULL_DISK)
+    lost = recording["lost_lines"] - sum(e.after - e.before for e in episodes if e.fault.name == FULL_DISK)
     memory_mb, late_mb = _thirds(witness.resident_mb)
     growth = late_mb / memory_mb - 1
     descriptors, late = _thirds(witness.descriptors)

@@ -23,6 +23,7 @@ COMMANDS = {
     "profile": "modt.cli.profile_group",
     "profiles": "modt.cli.profile_list",
     "completion": "modt_desk.cli.completion",
+    "service": "modt_desk.cli.service",
 }
 """Module of each command. Only this table names modules of the desk."""
 

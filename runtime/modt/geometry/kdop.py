@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
-from modt.types import Bool, Float32, Float64, Int, Proposals
+from modt.types import Bool, Float32, Float64, Int, Proposals, Self
 
 Ends = Callable[[Float32, Int, Float32], Float32]
 

@@ -11,7 +11,7 @@ MAX_DOMAIN = 232
 
 
 def name_of(address: Address) -> str:
-    """The name between ros2:// and the options, without slashes at its ends; with two slashes or three."""
+    """The name after ros2:// or ros2:///, without slashes at its ends."""
     return address.text.partition("://")[2].partition("?")[0].strip("/")
 
 
@@ -19,7 +19,7 @@ def topic_of(address: Address) -> str:
     """The name of a topic.
 
     Raises:
-        MisuseError: none.
+        MisuseError: the address has no name.
     """
     name = name_of(address)
     if not name:
@@ -28,12 +28,12 @@ def topic_of(address: Address) -> str:
 
 
 def domain_of(address: Address) -> int:
-    """The domain, ROS_DOMAIN_ID or else 0 where none is stated.
+    """The domain of the address, else ROS_DOMAIN_ID, else 0.
 
     Raises:
-        MisuseError: no number of a domain.
+        MisuseError: not the number of a domain.
     """
     text = address.option("domain") or os.environ.get("ROS_DOMAIN_ID", "") or "0"
     if not (text.isascii() and text.isdecimal()) or int(text) > MAX_DOMAIN:
-        raise MisuseError(address.text, f"domain {text!r} is none", f"give a number from 0 to {MAX_DOMAIN}")
+        raise MisuseError(address.text, f"domain {text!r} does not exist", f"give a number from 0 to {MAX_DOMAIN}")
     return int(text)

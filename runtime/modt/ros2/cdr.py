@@ -10,14 +10,14 @@ import numpy as np
 from modt.types import Float64
 
 HEADER_BYTES = 4
-"""Encapsulation header: the byte order; alignment counts from behind it."""
+"""Encapsulation header with the byte order; alignment counts from its end."""
 MAX_ALIGNMENT = 8
 MAX_TEXT_BYTES = 4096
-"""Longest string that is read."""
+"""Longest string that is accepted."""
 
 
 class MessageError(ValueError):
-    """Bytes that are no usable message, with the reason that they are counted by."""
+    """Bytes that are not a usable message, and the reason under which they are counted."""
 
     def __init__(self, reason: str, cause: str) -> None:
         super().__init__(cause)
@@ -25,7 +25,7 @@ class MessageError(ValueError):
 
 
 class CdrReader:
-    """Reads the fields of a message in their order; never beyond its end.
+    """Reads the fields of a message in order, and never beyond its end.
 
     Raises:
         MessageError: `malformed`: another encapsulation, or lengths beyond the message.
@@ -38,7 +38,7 @@ class CdrReader:
         self.order = "<" if message[1] else ">"
 
     def number(self, code: str) -> int | float:
-        """A number of the type that a format character of `struct` names."""
+        """A number of the type of a format character of `struct`."""
         size = struct.calcsize(code)
         value: int | float = struct.unpack(self.order + code, self._bytes(size, size))[0]
         return value
@@ -95,7 +95,7 @@ class CdrWriter:
         fields, values = text_fields(text)
         self.record(fields, *values)
 
-    def octets(self, octets: bytes) -> None:
+    def octets(self, octets: bytes | memoryview) -> None:
         """Append a sequence of octets."""
         self.record(("I",), len(octets))
         self._message += octets
@@ -107,11 +107,12 @@ class CdrWriter:
 
     def message(self) -> bytes:
         """The whole message, padded to a multiple of four bytes as DDS requires it."""
-        return bytes(self._message) + bytes(-len(self._message) % 4)
+        self._message += bytes(-len(self._message) % 4)
+        return bytes(self._message)
 
 
 Fields = tuple[tuple[str, ...], tuple[float | bytes, ...]]
-"""Fields of a part of a record, and their values."""
+"""Fields of a part of a record with their values."""
 
 
 def text_fields(text: str) -> Fields:
@@ -128,7 +129,7 @@ def header_fields(stamp_s: float, frame_id: str) -> Fields:
 
 @lru_cache(maxsize=1024)
 def _layout(fields: tuple[str, ...], phase: int) -> struct.Struct:
-    """The fields of a record that begins at an offset of so many bytes, by the greatest alignment."""
+    """Layout of a record that begins `phase` bytes behind a multiple of the greatest alignment."""
     at, text = phase, "<"
     for field in fields:
         gap = -at % struct.calcsize("<" + field[-1])

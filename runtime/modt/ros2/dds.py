@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 T = TypeVar("T")
 
 BUFFER_BYTES = 16 << 20
-"""Asked for the socket: a sweep arrives as a burst of up to 2 MB, and the kernel grants what it is configured to."""
+"""Requested socket buffer [bytes]: a sweep arrives as a burst of up to 2 MB."""
 CONFIGURATION = (
     '<CycloneDDS><Domain Id="any"><Internal>'
     f'<SocketReceiveBufferSize min="default" max="{BUFFER_BYTES}B"/>'
@@ -41,23 +41,23 @@ CONFIGURATION = (
 )
 RMEM_MAX = Path("/proc/sys/net/core/rmem_max")
 ENOUGH_BYTES = 4 << 20
-"""Of rmem_max, for a sweep of 120,000 points in fragments of an Ethernet frame."""
+"""Value of rmem_max that suffices for a sweep of 120,000 points in Ethernet fragments [bytes]."""
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A message as received, and when it was sent on the clock of its sender [s]."""
+    """A message as received, and the time of sending by the sender's clock [s]."""
 
     data: bytes
     sent_s: float
 
 
 class Participant:
-    """The process in a DDS domain; one for all its topics, so that they share Cyclone's threads."""
+    """The process in a DDS domain. All topics share one participant, and so Cyclone's threads."""
 
     def __init__(self, domain_id: int) -> None:
         given = os.environ.get("CYCLONEDDS_URI")  # comes last and wins
-        with suppress(DDSException):  # the program that uses this library has set up the domain
+        with suppress(DDSException):  # the program around this library has set up the domain
             self._domain = Domain(domain_id, f"{CONFIGURATION},{given}" if given else CONFIGURATION)
         try:
             self.entity = DomainParticipant(domain_id)
@@ -75,7 +75,7 @@ _lock = threading.Lock()
 
 
 def participant(domain_id: int, cores: frozenset[int] | None = None) -> Participant:
-    """The participant of a domain, joined at first; its threads run on these cores, None: where the caller runs.
+    """The participant of a domain, which is joined first. Its threads run on `cores`, None: where the caller runs.
 
     Raises:
         ModtError: the domain cannot be joined.
@@ -89,7 +89,7 @@ def participant(domain_id: int, cores: frozenset[int] | None = None) -> Particip
 
 
 def on_cores(cores: frozenset[int] | None, make: Callable[[], T]) -> T:
-    """What `make` returns, called by a thread on these cores: the threads that it starts inherit them."""
+    """Result of `make` in a thread on these cores, which the threads that it starts inherit."""
     made: list[T] = []
     errors: list[Exception] = []
 
@@ -121,20 +121,20 @@ class Subscription:
         self._joined = joined
 
     def take(self, timeout_s: float = 0.0) -> list[Message]:
-        """What has arrived, oldest first, waited for at most `timeout_s`."""
+        """The messages that have arrived, oldest first; waits at most `timeout_s` for one."""
         if timeout_s > 0:
             self._arrival.wait(int(timeout_s * 1e9))
         samples = self._reader.take(self._depth)
         return [
             Message(sample.message, 1e-9 * sample.sample_info.source_timestamp)
             for sample in samples
-            if hasattr(sample, "message")  # not the notice that a sender has left
+            if hasattr(sample, "message")  # a notice that a sender has left has none
         ]
 
     @property
     def senders(self) -> int:
         """Matched publishers."""
-        return len(self._reader.get_matched_publications())
+        return _count(self._reader, "get_matched_publications")
 
 
 class Publication:
@@ -145,7 +145,7 @@ class Publication:
         self._writer = DataWriter(joined.entity, joined.topic(name, kind), qos=_qos(depth, reliable=True))
 
     def write(self, message: bytes) -> bool:
-        """Send a message; False where it was not taken."""
+        """Send a message; False if DDS refused it."""
         try:
             self._writer.write(self._kind(message))
         except DDSException:
@@ -155,7 +155,12 @@ class Publication:
     @property
     def receivers(self) -> int:
         """Matched subscribers."""
-        return len(self._writer.get_matched_subscriptions())
+        return _count(self._writer, "get_matched_subscriptions")
+
+
+def _count(entity: Any, matched: str) -> int:
+    """Number of matched entities; 1 where the binding cannot tell: 0.10, for the Cyclone DDS of Humble and Jazzy."""
+    return len(getattr(entity, matched)()) if hasattr(entity, matched) else 1
 
 
 def _qos(depth: int, reliable: bool) -> Any:

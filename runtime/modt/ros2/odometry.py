@@ -13,7 +13,7 @@ from modt.types import Float64
 
 TYPE = "nav_msgs/Odometry"
 UNKNOWN = f"{8 * (36 + 6 + 36)}x"
-"""Covariance of the pose, and twist with its covariance: zeros."""
+"""Zeros for the covariance of the pose, and for the twist with its covariance."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""sensor_msgs/PointCloud2: a view of its bytes becomes a sweep by one copy."""
+"""sensor_msgs/PointCloud2, read into a sweep by one copy."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ FLOAT32 = 7
 REFLECTANCES = ("reflectivity", "reflectance", "remission", "remissions", "intensity", "i")
 """Names of the field, by preference: a calibrated reflectance goes before a raw intensity."""
 _PREFIX = re.compile(r"^(?:(?:scalar|field|vertex|lidar)[_ .])+")
-"""What CloudCompare and others put before them, as in `scalar_Intensity` and `Scalar_field_intensity`."""
+"""Prefixes of CloudCompare and others, as in `scalar_Intensity` and `Scalar_field_intensity`."""
 TIMES = ("time", "t", "timestamp", "offset_time", "time_stamp")
 MAX_FIELDS = 64
 MAX_DELAY_S = 1.0
-"""Time of a point against the header's, by which it is on the same clock; else it counts from the header's."""
+"""Largest difference between point times and header on the same clock [s]; otherwise they count from the header."""
 FULL_SCALES = ((255.0, 65535.0), (1.0, 255.0))
-"""Full scale of the reflectances where more than MAX_SHARE_ABOVE of them lie above a limit."""
+"""Limits and full scales: the first limit that more than MAX_SHARE_ABOVE of the reflectances exceed decides."""
 MAX_SHARE_ABOVE = 0.02
 SAMPLES = 4096
 
@@ -42,10 +42,10 @@ class PointCloud:
     """A sweep as received.
 
     Attributes:
-        stamp_s: of the header [s]; 0 where the driver states none.
-        frame_id: of its coordinates.
-        points: (N, 4) float32 x, y, z [m], reflectance or UNRECORDED; finite, a point that is not lies at the origin.
-        turn: the motion of the head by the time of each point, None where it is not known.
+        stamp_s: stamp of the header [s]; 0 if the driver states none.
+        frame_id: frame of the coordinates.
+        points: (N, 4) float32 x, y, z [m], reflectance or UNRECORDED. Points without a return lie at the origin.
+        turn: motion of the head by the times of the points; None if unknown.
     """
 
     stamp_s: float
@@ -55,7 +55,7 @@ class PointCloud:
 
     @property
     def ahead_s(self) -> float:
-        """Time of straight ahead [s]: the stamp of a sweep that is not skewed; 0 where the driver states none."""
+        """Time of straight ahead, or the stamp of a sweep that is not skewed [s]; 0 if unknown."""
         if self.turn is None or not self.stamp_s:
             return self.stamp_s
         absolute = abs(self.turn.ahead_s - self.stamp_s) < MAX_DELAY_S
@@ -63,7 +63,7 @@ class PointCloud:
 
     @property
     def turn_s(self) -> float:
-        """As Frame.turn_s; 0 where the turn is not known."""
+        """Value of Frame.turn_s; 0 if the turn is unknown."""
         return 0.0 if self.turn is None else self.turn.turn_s
 
 
@@ -79,7 +79,7 @@ class _Field:
 
 @dataclass(frozen=True, slots=True)
 class _Table:
-    """The points in the message, `fields` by name in lower case."""
+    """The points in the message; `fields` by lower-case name."""
 
     data: memoryview
     order: str
@@ -88,7 +88,7 @@ class _Table:
     fields: dict[str, _Field]
 
     def first(self, names: tuple[str, ...]) -> _Field | None:
-        """The first field that is there."""
+        """The first of these fields that exists."""
         return next((self.fields[name] for name in names if name in self.fields), None)
 
     def columns(self, field: _Field, n: int = 1) -> NDArray[np.generic]:
@@ -117,14 +117,14 @@ def read_cloud(message: bytes) -> PointCloud:
     data = cdr.octets()
     if not height * width:
         raise MessageError("empty", "no points")
-    strides = (row_step if height > 1 else point_step * width, point_step)  # of one row, many drivers leave it 0
+    strides = (row_step if height > 1 else point_step * width, point_step)  # a single row may state 0
     if strides[0] < width * point_step or (height - 1) * strides[0] + width * point_step > len(data):
         raise MessageError("malformed", f"{len(data)} bytes are too few for {height} x {width} points")
     fields = {name: field for name, field in fields.items() if field.end <= point_step}
     table = _Table(data, order, (height, width), strides, fields)
     points = _points(table)
     time = table.first(TIMES)
-    with np.errstate(all="ignore"):  # of times that are none
+    with np.errstate(all="ignore"):  # times may be any numbers
         turn = None if time is None else turn_of(points, table.column(time).reshape(-1))
     return PointCloud(stamp_s, frame_id, points, turn)
 
@@ -138,7 +138,7 @@ def write_cloud(stamp_s: float, frame_id: str, points: Float32) -> bytes:
         cdr.text(name)
         cdr.record(("I", "B", "I"), 4 * k, FLOAT32, 1)
     cdr.record(("B", "2I"), 0, 16, 16 * len(points))
-    cdr.octets(points.astype("<f4").tobytes())
+    cdr.octets(np.ascontiguousarray(points, "<f4").reshape(-1).view(np.uint8).data)
     cdr.record(("B",), 1)
     return cdr.message()
 
@@ -166,7 +166,7 @@ def _points(table: _Table) -> Float32:
     points = np.empty((table.shape[0] * table.shape[1], 4), np.float32)
     rows = points.reshape(*table.shape, 4)
     in_row = [_Field(xyz[0].offset + 4 * k, FLOAT32) for k in range(4)]
-    with np.errstate(all="ignore"):  # of float64 beyond float32, and of NaN
+    with np.errstate(all="ignore"):  # float64 beyond float32, and NaN
         if [*xyz, reflectance] == in_row:
             rows[...] = table.columns(xyz[0], 4)
         elif xyz == in_row[:3]:
@@ -185,7 +185,7 @@ def _points(table: _Table) -> Float32:
 
 
 def _scale(reflectance: Float32) -> None:
-    """Brought to [0, 1] in place, from 8 or 16 bits where more than a few of a sample are above 1 or 255."""
+    """Scale to [0, 1] in place, from 8 or 16 bits if more than a few of a sample exceed 1 or 255."""
     sample = reflectance[:: max(1, len(reflectance) // SAMPLES)]
     if sample.max() <= 1.0:
         return
@@ -195,6 +195,6 @@ def _scale(reflectance: Float32) -> None:
 
 
 def _finite(points: Float32) -> None:
-    """Points without a return, not finite in most drivers, go to the origin, in place."""
+    """Move points without a return, which most drivers mark by NaN, to the origin, in place."""
     points[~np.isfinite(points[:, :3]).all(axis=1), :3] = 0.0
     points[~np.isfinite(points[:, 3]), 3] = UNRECORDED

@@ -1,4 +1,4 @@
-"""The motion of a turning head, by the times of its points."""
+"""Motion of a turning head from the times of its points."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from numpy.typing import NDArray
 from modt.types import Float32
 
 SAMPLES = 512
-"""Points that the motion is estimated from."""
+"""Number of points that the motion is estimated from."""
 SPANS_S = (0.02, 0.5)
-"""Durations of a sweep; the unit of the times is that in which they span so much."""
+"""Shortest and longest sweep [s]; the unit of the times is the one that puts their span between."""
 UNITS_S = (1.0, 1e-6, 1e-9)
 MAX_RESIDUAL = 0.03
-"""Share of a turn by which most points may lie off the line of time over bearing."""
+"""Share of a turn by which most points may deviate from the line of time over bearing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A turn of the head: duration as Frame.turn_s, and time of straight ahead by the clock of the points [s]."""
+    """A turn of the head: duration as in Frame.turn_s, and time of straight ahead by the clock of the points [s]."""
 
     turn_s: float
     ahead_s: float
 
 
 def turn_of(points: Float32, times: NDArray[np.generic]) -> Turn | None:
-    """The turn of a sweep whose seam lies behind the sensor; None of another, or where the times are of no head.
+    """The turn of a sweep whose seam lies behind the sensor; None for another seam, or times that fit no turn.
 
     Args:
-        points: (N, 4) of the sweep; those at the origin do not count.
+        points: (N, 4) of the sweep; points at the origin are ignored.
         times: (N,) of the points, in seconds, microseconds or nanoseconds.
     """
     chosen = slice(None, None, max(1, len(points) // SAMPLES))

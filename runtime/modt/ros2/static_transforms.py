@@ -1,4 +1,4 @@
-"""tf2_msgs/TFMessage of /tf_static: where the frames of a robot sit on one another."""
+"""tf2_msgs/TFMessage of /tf_static: the tree of the robot's fixed frames."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class StaticTransforms:
         """Add the transforms of a message.
 
         Raises:
-            MessageError: it is none.
+            MessageError: it is not a TFMessage.
         """
         cdr = CdrReader(message)
         n = cdr.count()
@@ -35,14 +35,14 @@ class StaticTransforms:
             self._parents[_name(child)] = _name(parent), read_pose(cdr)
 
     def between(self, base: str, sensor: str) -> Float64 | None:
-        """(4, 4) pose of one frame in another, None where they are not connected."""
+        """(4, 4) pose of `sensor` in `base`; None if they are not connected."""
         (root, T_root_base), (other, T_other_sensor) = self._root(_name(base)), self._root(_name(sensor))
         return inverse(T_root_base) @ T_other_sensor if root == other else None
 
     def _root(self, frame: str) -> tuple[str, Float64]:
         """The root of a frame, and the pose of the frame in it."""
         T: Float64 = np.eye(4)
-        for _ in range(len(self._parents)):  # a loop is no tree
+        for _ in range(len(self._parents)):  # ends if the transforms form a loop
             if frame not in self._parents:
                 break
             frame, T_parent_frame = self._parents[frame]

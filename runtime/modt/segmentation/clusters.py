@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Self
 
 import numpy as np
 
 from modt.segmentation.grids import Int32, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive, label_max, label_min
-from modt.types import NONE, Bool, Float32, Int
+from modt.types import NONE, Bool, Float32, Int, Self
 
 
 @dataclass(frozen=True, slots=True)

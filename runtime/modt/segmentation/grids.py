@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import NONE, Float32, Int
+from modt.types import NONE, Float32, Int, Self
 
 FAR_M = np.float32(1e6)
 """Farther than any return: cells of points nearer can be numbered."""

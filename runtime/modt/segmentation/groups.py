@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modt.types import NONE, Bool, Float32, Float64, Int
+from modt.types import NONE, Bool, Float32, Float64, Int, Self
 
 T = TypeVar("T", bound=np.generic)
 

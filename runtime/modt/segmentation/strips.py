@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from modt.config.segmentation import CarMergeConfig
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import PointColumns, pseudo_angle
 from modt.segmentation.groups import Groups
-from modt.types import Bool, Float32, Int
+from modt.types import Bool, Float32, Int, Self
 
 DIRECTION, RANGE, HEIGHT, ELEVATION = range(4)
 

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from modt import assets, profile
 from modt.config import SegmentationConfig, SensorConfig
-from modt.types import Float32, Float64, Int
+from modt.types import Float32, Float64, Int, Self
 
 _GAUSSIAN_REACH = 4.0
 """Half width of a Gaussian [standard deviations]. Filtered rows continue mirrored beyond their ends."""

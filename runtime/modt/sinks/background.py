@@ -1,4 +1,4 @@
-"""A thread that writes what the loop must not wait for."""
+"""A thread that writes, so that the loop need not wait."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ from contextlib import suppress
 from typing import Any, Generic, TypeVar
 
 from modt.errors import ModtError
-from modt.sinks.output import Health, LedgerSink, Reporting, Writer
+from modt.sinks.output import Health, LedgerSink, Writer
 
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
 CLOSE_S = 0.6
-"""Time that a writer has at the end, half of it for what waits; one that takes longer is left alone."""
+"""Time limit for shutting a writer down [s]; half of it is reserved for draining its queue."""
 RETRY_S = 1.0
-"""Pause after a failure."""
+"""Pause after a failure [s]."""
 
 
 class Background(Generic[T]):
-    """Writes in a thread of its own, in order; where no room is left, the oldest item that waits gives way.
+    """Writes items in order in its own thread. A full queue drops its oldest item.
 
-    A failure of the writer is logged once, until it writes again, with a traceback if it is none of the system; the
-    item is lost and counted, and after a pause the next one is tried.
+    A failure costs the item, which is counted; the next item is tried after a pause. The first failure in a row is
+    logged, with a traceback if it is neither an OSError nor a ModtError.
 
     Args:
-        name: for messages.
-        writer: used by the thread alone from now on.
-        depth: items that may wait.
+        name: subject of log messages.
+        writer: used by the thread alone.
+        depth: length of the queue.
+        encode: makes of an item, before it is queued, what the writer takes.
         retry_s: pause after a failure.
         close_s: time limit of `close`.
         clock: [s].
@@ -44,11 +45,12 @@ class Background(Generic[T]):
         writer: Writer[T],
         depth: int,
         *,
+        encode: Callable[[Any], T] | None = None,
         retry_s: float = RETRY_S,
         close_s: float = CLOSE_S,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.name, self._writer, self._depth = name, writer, depth
+        self.name, self._writer, self._depth, self._encode = name, writer, depth, encode
         self._retry_s, self._close_s, self._clock = retry_s, close_s, clock
         self._jobs: deque[Callable[[], None]] = deque()
         self._changed = threading.Condition()
@@ -58,19 +60,20 @@ class Background(Generic[T]):
         self._thread = threading.Thread(target=self._work, name="sink", daemon=True)
         self._thread.start()
 
-    def write(self, item: T, /) -> None:
-        """Hand over one item; never waits."""
-        self._put(lambda: self._writer.write(item))
+    def write(self, item: Any, /) -> None:
+        """Queue an item; never waits."""
+        encoded: T = item if self._encode is None else self._encode(item)
+        self._put(lambda: self._writer.write(encoded))
 
     def ledger(self, record: dict[str, Any], /) -> None:
-        """Hand over a line of the ledger, if the writer takes them."""
+        """Queue a line of the ledger, if the writer takes them."""
         writer = self._writer
         if isinstance(writer, LedgerSink):
             self._put(lambda: writer.ledger(record))
 
     def health(self) -> Health:
-        """Items written, dropped for want of room, failed; what is wrong now; what the writer itself counts."""
-        own = self._writer.health() if isinstance(self._writer, Reporting) else {}
+        """Items written, dropped, failed and waiting; the last failure; the writer's own counts."""
+        own: Health = getattr(self._writer, "health", dict)()
         return {
             **own,
             "written": self._written,
@@ -81,7 +84,7 @@ class Background(Generic[T]):
         }
 
     def close(self) -> None:
-        """Write what waits and close the writer, in time; what is left is dropped."""
+        """Drain the queue and close the writer within the time limit; the rest is dropped."""
         with self._changed:
             if self._end_s is None:
                 self._end_s = self._clock() + self._close_s / 2
@@ -106,7 +109,7 @@ class Background(Generic[T]):
 
     def _work(self) -> None:
         with suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # the loop may be of real time, this never is
+            os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))  # real-time priority is for the loop alone
         while (job := self._next()) is not None:
             try:
                 job()
@@ -118,7 +121,7 @@ class Background(Generic[T]):
             self._writer.close()
 
     def _next(self) -> Callable[[], None] | None:
-        """The oldest job, waited for; None at the end."""
+        """Wait for the oldest job; None at the end."""
         with self._changed:
             self._changed.wait_for(lambda: self._jobs or self._end_s is not None)
             late = self._end_s is not None and self._clock() > self._end_s

@@ -17,16 +17,16 @@ from modt.types import FrameResult
 log = logging.getLogger(__name__)
 
 MAX_BYTES = 65_507
-"""Of a datagram over UDP; longer lines are sent in parts."""
+"""Longest datagram over UDP [bytes]. Longer lines are sent in parts."""
 MAX_PATH_BYTES = 107
-"""Of the path of a Unix socket."""
+"""Longest path of a Unix socket [bytes]."""
 SEND_BYTES = 1 << 20
-"""Asked for what a receiver has not read yet; the system may grant less."""
+"""Requested buffer for datagrams that the receiver has not read yet [bytes]."""
 _FULL = (errno.EAGAIN, errno.ENOBUFS)
 
 
 class Datagrams:
-    """One datagram a frame; a receiver that is not there, or behind, costs nothing but the frames that it misses."""
+    """One datagram a frame. An absent or slow receiver misses frames and delays nothing."""
 
     def __init__(self, name: str, family: int, target: Any) -> None:
         self._name, self._target = name, target
@@ -37,7 +37,7 @@ class Datagrams:
         self._state = "ok"
 
     def write(self, result: FrameResult, /) -> None:
-        """Send the line of a frame, or its parts, or none where one cannot be sent.
+        """Send the line of a frame, or its parts; the rest of a frame is dropped where a part cannot be sent.
 
         Raises:
             ValueError: a number is not finite.
@@ -55,7 +55,7 @@ class Datagrams:
         self._socket.close()
 
     def health(self) -> Health:
-        """Frames sent, dropped by a full queue of the receiver, failed without a receiver; what is wrong now."""
+        """Frames sent, dropped at a full queue of the receiver, failed without a receiver; the last failure."""
         return {"written": self._written, "dropped": self._dropped, "failed": self._failed, "state": self._state}
 
     def _miss(self, error: OSError) -> None:
@@ -84,7 +84,7 @@ def open_udp(address: Address) -> Datagrams:
 
 
 def open_unix(address: Address) -> Datagrams:
-    """A receiver that has bound a datagram socket to a path, or will.
+    """A receiver that binds a datagram socket to a path, now or later.
 
     Raises:
         MisuseError: no path, or one that is too long.

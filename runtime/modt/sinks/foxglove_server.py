@@ -6,18 +6,18 @@ import foxglove
 
 from modt.address import Address
 from modt.errors import MisuseError
-from modt.sinks.scene import Scene
+from modt.sinks.foxglove_channels import FoxgloveChannels
 
 BACKLOG = 16
-"""Messages that may wait for a client; a slow one misses the oldest."""
+"""Messages that may wait for a client; a slow client misses the oldest."""
 PORT = 8765
 
 
-class FoxgloveServer(Scene):
-    """Publishes to those who are connected, at `port`."""
+class FoxgloveServer(FoxgloveChannels):
+    """Publishes to the connected clients. `port` is the one that is bound."""
 
     def __init__(self, host: str, port: int, *, points: bool) -> None:
-        self._context = foxglove.Context()  # kept: the server has no hold of it
+        self._context = foxglove.Context()  # the server does not keep it alive
         super().__init__(self._context, points=points)
         self._server = foxglove.start_server(
             name="modt", host=host, port=port, context=self._context, message_backlog_size=BACKLOG
@@ -25,15 +25,15 @@ class FoxgloveServer(Scene):
         self.port = self._server.port
 
     def close(self) -> None:
-        """Disconnect everybody."""
+        """Disconnect all clients."""
         self._server.stop()
 
 
 def open_foxglove(address: Address) -> FoxgloveServer:
-    """A server at 127.0.0.1, which nobody else reaches, if no other host is given.
+    """A server, by default at 127.0.0.1, which no other machine reaches.
 
     Raises:
-        MisuseError: it cannot be bound.
+        MisuseError: the address cannot be bound.
     """
     try:
         port = PORT if address.port is None else address.port

@@ -9,41 +9,17 @@ from pathlib import Path
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sinks.background import Background
-from modt.sinks.output import Health, LineFile, writing
+from modt.sinks.output import LineFile, Writer, writing
 from modt.sinks.tracks import frame_line
-from modt.types import FrameResult
 
 DEPTH = 100
-"""Lines that may wait: 10 s of a disk that stalls."""
+"""Lines that may wait for a stalled disk, 10 s at 10 Hz."""
 LONGEST_LINE = 1 << 22
-"""Of a file that is continued [bytes]."""
-
-
-class FrameLines:
-    """Encodes the line of a frame and hands it on: what waits holds no points."""
-
-    def __init__(self, lines: Background[str]) -> None:
-        self._lines = lines
-
-    def write(self, result: FrameResult, /) -> None:
-        """Hand over the line of a frame.
-
-        Raises:
-            ValueError: a number is not finite.
-        """
-        self._lines.write(frame_line(result))
-
-    def close(self) -> None:
-        """Close the lines."""
-        self._lines.close()
-
-    def health(self) -> Health:
-        """Of the lines."""
-        return self._lines.health()
+"""Longest line that is looked for at the end of a continued file [bytes]."""
 
 
 class Descriptor:
-    """Writes text to a file descriptor that is not its own."""
+    """Writes text to a file descriptor and never closes it."""
 
     def __init__(self, number: int) -> None:
         self._number = number
@@ -52,7 +28,7 @@ class Descriptor:
         """Write all of it; waits for the reader.
 
         Raises:
-            OSError: nobody reads any more.
+            OSError: the reader has left.
         """
         data = text.encode()
         while data:
@@ -62,16 +38,16 @@ class Descriptor:
         """No effect."""
 
 
-def open_stdout(address: Address) -> FrameLines:
+def open_stdout(address: Address) -> Background[str]:
     """Standard output."""
-    return FrameLines(Background(address.text, Descriptor(sys.stdout.fileno()), DEPTH))
+    return in_background(address, Descriptor(sys.stdout.fileno()))
 
 
-def open_file(address: Address) -> FrameLines:
+def open_file(address: Address) -> Background[str]:
     """A file, which is continued after its last whole line.
 
     Raises:
-        MisuseError: the path is none, or not that of a file.
+        MisuseError: no path, or not that of a file.
         ModtError: it cannot be written.
     """
     path = Path(address.path)
@@ -79,11 +55,16 @@ def open_file(address: Address) -> FrameLines:
         raise MisuseError(address.text, "names no file", "write file:///PATH")
     if path.exists():
         _end_with_a_line(path)
-    return FrameLines(Background(address.text, LineFile[str](path, mode="ab"), DEPTH))
+    return in_background(address, LineFile[str](path, mode="ab"))
+
+
+def in_background(address: Address, lines: Writer[str]) -> Background[str]:
+    """A sink that encodes a frame at once, so that no points wait in the queue."""
+    return Background(address.text, lines, DEPTH, encode=frame_line)
 
 
 def _end_with_a_line(path: Path) -> None:
-    """Cut off what a run that was killed left of its last line."""
+    """Cut off an incomplete last line, which a killed run leaves."""
     with writing(path), path.open("r+b") as file:
         begin = max(file.seek(0, os.SEEK_END) - LONGEST_LINE, 0)
         file.seek(begin)

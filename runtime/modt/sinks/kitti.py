@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from modt.classes import CLASSES, ObjectClass
 from modt.geometry import Camera, corners, transform, wrap
 from modt.placement import Mount
 from modt.sinks.output import Health, LineFile, writing
-from modt.types import NONE, Cut, Float64, FrameResult, Int
+from modt.types import NONE, Cut, Float64, FrameResult
 
 KITTI_TYPES = [spec.kitti[0] if spec.kitti else "" for spec in CLASSES.values()]
 
@@ -67,7 +66,7 @@ class KittiResults:
         self._lines.write(text)
 
     def health(self) -> Health:
-        """The frames with objects."""
+        """Frames with objects that were written."""
         return self._lines.health()
 
     def close(self) -> None:
@@ -88,20 +87,3 @@ def _image_boxes(boxes: Float64, camera: Camera) -> Float64:
     out[ahead, :2] = np.clip(uv.min(axis=1), 0, limit)
     out[ahead, 2:] = np.clip(uv.max(axis=1), 0, limit)
     return out
-
-
-def box_lines(
-    frame: Int, kitti_type: Sequence[str], ids: Int, image_box: Float64, hwlxyzry: Float64, score: Float64
-) -> list[str]:
-    """Lines of KITTI's tracking format with a score, for n boxes of another detector.
-
-    Image boxes (n, 4) are left, top, right, bottom [pixel]; boxes (n, 7) h, w, l, x, y, z [m], ry [rad] in camera
-    coordinates.
-    """
-    alpha = wrap(hwlxyzry[:, 6] - np.arctan2(hwlxyzry[:, 3], hwlxyzry[:, 5]))
-    columns = (frame, ids, alpha, image_box, hwlxyzry, score)
-    return [
-        f"{f} {i} {kind} 0 0 {a:.4f} {b[0]:.2f} {b[1]:.2f} {b[2]:.2f} {b[3]:.2f} "
-        f"{d[0]:.4f} {d[1]:.4f} {d[2]:.4f} {d[3]:.4f} {d[4]:.4f} {d[5]:.4f} {d[6]:.4f} {s:.4f}\n"
-        for kind, f, i, a, b, d, s in zip(kitti_type, *(column.tolist() for column in columns), strict=True)
-    ]

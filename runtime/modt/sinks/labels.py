@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from modt.classes import CLASSES
 from modt.sinks.output import Health, writing
-from modt.types import NONE, FrameResult, Int, Tracks
+from modt.types import NONE, FrameResult
 
 MAX_INSTANCE = 0xFFFF
 SEMANTIC = np.array([(*spec.semantic_kitti, 0)[0] for spec in CLASSES.values()])
@@ -47,11 +47,11 @@ class PointLabels:
         self._written += 1
 
     def health(self) -> Health:
-        """The files written."""
+        """Number of files written."""
         return {"written": self._written}
 
     def close(self) -> None:
-        """No file is open."""
+        """No effect: no file stays open."""
 
 
 def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
@@ -62,16 +62,3 @@ def encode(result: FrameResult) -> np.ndarray[tuple[int], np.dtype[np.uint32]]:
     out = np.zeros(len(result.frame.points), np.uint32)
     out[result.proposals.members] = np.repeat(code, result.proposals.count).astype(np.uint32)
     return out
-
-
-def semantic_labels(tracks: Tracks, proposals: Int) -> NDArray[np.uint32]:
-    """(N,) SemanticKITTI's label of each point by the track of its proposal (N,), NONE where it belongs to none.
-
-    Upper 16 bits: the track's id modulo 65535, plus one. Lower 16 bits: SemanticKITTI's label of its class. Points of
-    the background are 0.
-    """
-    code = np.zeros(max(proposals.max(initial=NONE), tracks.proposal.max(initial=NONE)) + 2, np.uint32)
-    seen = np.flatnonzero(tracks.proposal != NONE)
-    label, instance = SEMANTIC[tracks.object_class[seen]], tracks.id[seen] % MAX_INSTANCE + 1
-    code[tracks.proposal[seen]] = np.where(label > 0, instance << 16 | label, 0)
-    return code[proposals]  # the last one is that of NONE

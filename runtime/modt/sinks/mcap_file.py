@@ -15,19 +15,20 @@ from foxglove.mcap import MCAPCompression, MCAPWriteOptions
 
 from modt.address import Address
 from modt.errors import MisuseError
+from modt.sinks.foxglove_channels import FoxgloveChannels
 from modt.sinks.output import writing
-from modt.sinks.scene import Scene
 from modt.types import FrameResult
 
 FLUSH_S = 1.0
-"""What a crash loses at most."""
-OPTIONS = MCAPWriteOptions(compression=MCAPCompression.Lz4, compression_threads=0)  # the cheapest, none included
+"""Time between two flushes [s]: a crash loses no more."""
+OPTIONS = MCAPWriteOptions(profile="ros2", compression=MCAPCompression.Lz4, compression_threads=0)
+"""LZ4 costs less CPU time than writing uncompressed."""
 PARTS = 8
-"""Parts of a recording whose size is limited; the oldest makes room for a new one."""
+"""Number of parts that share the size limit; the oldest is deleted for a new one."""
 
 
 class _Output:
-    """The file of a part; keeps the error that the SDK swallows."""
+    """The file of a part. It keeps the write error, which the SDK swallows."""
 
     def __init__(self, path: Path) -> None:
         with writing(path):
@@ -36,7 +37,7 @@ class _Output:
         self.error: OSError | None = None
 
     def write(self, data: bytes | bytearray) -> int:
-        """Write some of it."""
+        """Write, and return how much was written."""
         try:
             written = self.file.write(data)
         except OSError as error:
@@ -46,7 +47,7 @@ class _Output:
         return written
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Move."""
+        """Move the position."""
         return self.file.seek(offset, whence)
 
     def flush(self) -> None:
@@ -56,16 +57,16 @@ class _Output:
 class McapFile:
     """Records at PATH, then at PATH with -1, -2 … before its suffix.
 
-    A part that cannot be written any more is left readable up to there, and the next frame begins another.
+    After a write error the part ends, readable up to there, and the next frame begins another.
 
     Args:
-        path: of the first part.
+        path: file of the first part.
         points: whether the points are recorded.
-        max_bytes: of all parts, those of earlier runs too; the oldest make room.
+        max_bytes: limit for all parts, including those of earlier runs; the oldest are deleted.
         clock: [s].
 
     Raises:
-        ModtError: it cannot be written.
+        ModtError: the file cannot be written.
     """
 
     def __init__(
@@ -73,22 +74,22 @@ class McapFile:
     ) -> None:
         self._path, self._max_bytes, self._clock = path, max_bytes, clock
         self._context = foxglove.Context()
-        self._scene = Scene(self._context, points=points)
+        self._channels = FoxgloveChannels(self._context, points=points)
         self._output, self._writer, self._flushed_s = self._part()
 
     def write(self, result: FrameResult, /) -> None:
         """Record a frame.
 
         Raises:
-            ModtError: it cannot be written.
+            ModtError: the file cannot be written.
         """
         if self._output.error is not None or self._output.size > self._max_bytes / PARTS:
             self.close()
             self._output, self._writer, self._flushed_s = self._part()
-        self._scene.write(result)
+        self._channels.write(result)
         if self._clock() - self._flushed_s >= FLUSH_S:
             self._flushed_s = self._clock()
-            with suppress(RuntimeError):  # the output knows
+            with suppress(RuntimeError):  # the output has kept the error
                 self._writer.flush()
         with writing(self._output.path):
             if self._output.error is not None:
@@ -96,11 +97,11 @@ class McapFile:
         self._output.frames += 1
 
     def ledger(self, record: dict[str, Any], /) -> None:
-        """Record a line of the ledger; whether it could be written the next frame says."""
-        self._scene.ledger(record)
+        """Record a line of the ledger; a failure is raised with the next frame."""
+        self._channels.ledger(record)
 
     def close(self) -> None:
-        """Write the index, and close the part; one without a frame, since the disk is full, is removed."""
+        """Write the index and close the part. A part that failed before its first frame is removed."""
         with suppress(RuntimeError):
             self._writer.close()
         self._output.file.close()
@@ -117,7 +118,7 @@ class McapFile:
         return output, writer, self._clock()
 
     def _earlier(self) -> list[tuple[int, Path]]:
-        """Numbers and files of the parts that there are, the oldest first."""
+        """Numbers and files of the existing parts, the oldest first."""
         form = re.compile(rf"{re.escape(self._path.stem)}(?:-(\d+))?{re.escape(self._path.suffix)}")
         found = ((form.fullmatch(path.name), path) for path in self._path.parent.glob(f"*{self._path.suffix}"))
         return sorted((int(match[1] or 0), path) for match, path in found if match)
@@ -132,11 +133,11 @@ class McapFile:
 
 
 def open_mcap(address: Address) -> McapFile:
-    """A recording, without the points where `points=none`, of `max_mb` at most.
+    """A recording; `points=none` leaves the points out, `max_mb` limits its size.
 
     Raises:
-        MisuseError: the path is none, or an option is.
-        ModtError: it cannot be written.
+        MisuseError: no file name, or an invalid option.
+        ModtError: the file cannot be written.
     """
     if address.host or not Path(address.path).name:
         raise MisuseError(address.text, "names no file", "write mcap:///PATH")
@@ -145,5 +146,5 @@ def open_mcap(address: Address) -> McapFile:
     except ValueError:
         max_bytes = 0.0
     if not max_bytes > 0:
-        raise MisuseError(address.text, "max_mb is no size", "write max_mb=MEGABYTES")
+        raise MisuseError(address.text, "max_mb is not a size", "write max_mb=MEGABYTES")
     return McapFile(Path(address.path), points=address.choice("points", "all", "none") == "all", max_bytes=max_bytes)

@@ -12,44 +12,40 @@ from typing import Any, BinaryIO, Generic, Literal, Protocol, TypeVar, runtime_c
 from modt.errors import ModtError
 from modt.types import FrameResult
 
+WRITE_REMEDY = "free or unlock the disk, or give another --out; what was recorded before is intact"
 T = TypeVar("T")
 T_contra = TypeVar("T_contra", contravariant=True)
 Health = dict[str, int | str]
-"""Figures of a writer: `written` items, those that are lost by their reasons, and its `state` in words."""
+"""Counts of a writer: items `written`, and lost by reason; its `state` in words."""
 
 
 class Writer(Protocol[T_contra]):
     """Takes items one by one."""
 
     def write(self, item: T_contra, /) -> None:
-        """Write one item; it has reached the operating system on return."""
+        """Write one item; the operating system has it on return."""
 
     def close(self) -> None:
         """Close the files."""
 
 
-@runtime_checkable
-class Reporting(Protocol):
-    """What a writer is besides, if it counts."""
+class Sink(Writer[FrameResult], Protocol):
+    """Takes the results of frames."""
 
     def health(self) -> Health:
-        """What has become of the items so far."""
-
-
-class Sink(Writer[FrameResult], Reporting, Protocol):
-    """Takes the results of frames."""
+        """Counts of what has become of the frames so far."""
 
 
 @runtime_checkable
 class LedgerSink(Protocol):
-    """What a sink is besides, if it also takes the lines of the ledger (`modt.ledger/1`, `modt.energy/1`)."""
+    """A sink that also takes the lines of the ledger (`modt.ledger/1`, `modt.energy/1`)."""
 
     def ledger(self, record: dict[str, Any], /) -> None:
         """Write a line of the ledger."""
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path, remedy: str = WRITE_REMEDY) -> Iterator[None]:
     """Convert a failure of the file system to an error with a remedy.
 
     Raises:
@@ -58,13 +54,11 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        cause = f"cannot be written ({error.strerror or error})"
-        remedy = "free or unlock the disk, or give another --out; what was recorded before is intact"
-        raise ModtError(path, cause, remedy) from None
+        raise ModtError(path, f"cannot be written ({error.strerror or error})", remedy) from None
 
 
 def sync_folder(path: Path) -> None:
-    """Have the names in a folder outlast a power cut; raises OSError."""
+    """Make the names in a folder survive a power cut; raises OSError."""
     number = os.open(path, os.O_RDONLY | os.O_DIRECTORY)
     try:
         os.fsync(number)
@@ -73,10 +67,10 @@ def sync_folder(path: Path) -> None:
 
 
 def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
-    """Write a file atomically, by way of .NAME.part, and follow no link; a lasting one is whole after a power cut.
+    """Write a file atomically through .NAME.part, without following links. A lasting file survives a power cut whole.
 
     Raises:
-        ModtError: it cannot be written.
+        ModtError: the file cannot be written.
     """
     partial = path.with_name(f".{path.name}.part")
     with writing(path):
@@ -98,7 +92,7 @@ def replace_file(path: Path, text: str, *, lasting: bool = False) -> None:
 class LineFile(Generic[T]):
     """An unbuffered text file of whole lines; `encode` gives the lines of an item.
 
-    The mode "ab" continues a file, "wb" begins it anew.
+    Mode "ab" continues a file, "wb" begins a new one.
     """
 
     def __init__(self, path: Path, encode: Callable[[T], str] = str, mode: Literal["wb", "ab"] = "wb") -> None:
@@ -127,10 +121,10 @@ class LineFile(Generic[T]):
         self._written += 1
 
     def sync(self) -> None:
-        """Have all that was written outlast a power cut; waits for the disk.
+        """Make everything written survive a power cut; waits for the disk.
 
         Raises:
-            ModtError: it may not.
+            ModtError: the disk reports a failure.
         """
         with writing(self.path):
             os.fsync(self._file.fileno())
@@ -146,7 +140,7 @@ class LineFile(Generic[T]):
 
 
 def close_together(sinks: Iterable[Sink]) -> None:
-    """Close sinks at the same time, so that several that hang delay the end no more than one."""
+    """Close sinks in parallel, so that hanging ones share one time limit."""
     threads = [threading.Thread(target=sink.close) for sink in sinks]
     for thread in threads:
         thread.start()

@@ -8,7 +8,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations, islice, pairwise
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from modt.sources.pose_buffer import PoseBuffer
 from modt.sources.scan_file import sanitised
 from modt.sources.stamp_check import CLOCK_SET, STEP_S, StampCheck
 from modt.sources.stream import Fault, Faults, StreamInfo
-from modt.types import Float64, Frame
+from modt.types import Float64, Frame, Self
 
 
 @dataclass(frozen=True, slots=True)

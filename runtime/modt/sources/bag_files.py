@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
+import sys
 import tempfile
 import weakref
 from abc import ABC, abstractmethod
@@ -156,7 +157,8 @@ class DatabaseFile(BagFile):
         address = f"file:{quote(str(self._plain))}?immutable=1"
         left = iter(range(self._most // STEPS))
         with closing(sqlite3.connect(address, uri=True, check_same_thread=False)) as database:
-            database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(MAX_RECORD_BYTES, self._plain.stat().st_size))
+            if sys.version_info >= (3, 11):
+                database.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(MAX_RECORD_BYTES, self._plain.stat().st_size))
             database.set_progress_handler(lambda: next(left, None) is None, STEPS)
             database.execute("PRAGMA trusted_schema = OFF")
             for (name,) in database.execute(NO_TABLES):

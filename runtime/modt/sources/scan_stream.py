@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Self
 
 from modt.errors import ModtError, ScanError
 from modt.sources.scan_file import read_scan
 from modt.sources.stream import Fault, Faults, StreamInfo
-from modt.types import Float64, Frame
+from modt.types import Float64, Frame, Self
 
 PERIOD_S = 0.1
 """Time between scans that have no stamps [s]."""

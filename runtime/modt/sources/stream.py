@@ -5,10 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Protocol, Self
+from typing import Protocol
 
 from modt.geometry import Camera
-from modt.types import Frame
+from modt.types import Frame, Self
 
 log = logging.getLogger(__name__)
 

@@ -1,6 +1,5 @@
 """`modt export`, opened by the readers of others."""
 
-import base64
 import csv
 import json
 import shutil
@@ -47,34 +46,32 @@ def test_mcap_holds_points_tracks_and_energy_of_every_frame(recorded, tmp_path):
     pytest.importorskip("mcap")
     from mcap.reader import make_reader
 
-    from tests.sinks.foxglove_messages import decoded
+    from tests.ros2.messages import decode
 
     run, drive = recorded
     assert export(run, "--mcap", tmp_path / "a.mcap") == 0
+    found = {}
     with (tmp_path / "a.mcap").open("rb") as file:
-        found = {}
         for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
-            content = decoded(channel.message_encoding, schema.name, schema.data, message.data)
-            found.setdefault(channel.topic, []).append((message.log_time, content))
+            content = message.log_time, decode(message.data, schema.name)
+            found.setdefault(channel.topic.removeprefix("/modt/"), []).append(content)
     lines = records(run)
     windows = list(read_records(run / "ledger.jsonl", "modt.energy/1", {"modt.ledger/1"}))
-    energies = found.pop("/energy")
-    assert len(energies) == len(windows)
-    (stamp_ns, energy), window = energies[-1], windows[-1]
+    assert len(found["energy/watts"]) == len(windows)
+    (stamp_ns, energy), window = found["energy/mJ_per_frame"][-1], windows[-1]
     assert stamp_ns == round(1e9 * lines[-1]["stamp_s"])
-    assert energy["mJ_per_frame"] == pytest.approx(1e3 * window["energy_J"] / window["frames"][2])
+    assert energy.data == pytest.approx(1e3 * window["energy_J"] / window["frames"][2])
     counts = {topic: len(messages) for topic, messages in found.items()}
-    assert counts == dict.fromkeys(("/tf", "/tracks", "/points", "/stages"), len(lines))
-    for (stamp_ns, update), (_, cloud), record in zip(found["/tracks"], found["/points"], lines, strict=True):
+    every_frame = ("/tf", "detections", "markers", "odometry", "points", "cpu_ms/total")
+    assert counts | dict.fromkeys(every_frame, len(lines)) == counts
+    for (stamp_ns, shown), (_, cloud), record in zip(found["detections"], found["points"], lines, strict=True):
         assert stamp_ns == round(1e9 * record["stamp_s"])
-        shown = objects(record)
-        assert {int(entity["id"]) for entity in update.get("entities", [])} == set(shown)
-        for entity in update.get("entities", []):
-            (cube,) = entity["cubes"]
-            box = shown[int(entity["id"])]["box"]
-            assert cube["size"] == {"x": box["l"], "y": box["w"], "z": box["h"]}
+        sizes = {int(found.id): found.bbox.size for found in shown.detections}
+        assert sizes.keys() == objects(record).keys()
+        for track, there in objects(record).items():
+            assert [sizes[track].x, sizes[track].y, sizes[track].z] == [there["box"][key] for key in "lwh"]
         scan = np.fromfile(drive / "velodyne_points" / "data" / f"{record['frame']:010d}.bin", np.float32)
-        points = np.frombuffer(base64.b64decode(cloud["data"]), np.float32)
+        points = cloud.data.view(np.float32)
         assert (points.reshape(-1, 4)[:, :3] == scan.reshape(-1, 4)[:, :3]).all()
 
 
@@ -86,8 +83,8 @@ def test_mcap_without_points_needs_no_source(recorded, tmp_path):
     with (tmp_path / "a.mcap").open("rb") as file:
         messages = [(c.topic, m.log_time) for _, c, m in reader.make_reader(file).iter_messages()]
     stamps = [round(1e9 * record["stamp_s"]) for record in records(run)[2:4]]
-    assert [stamp for topic, stamp in messages if topic == "/tracks"] == stamps
-    assert "/points" not in dict(messages)
+    assert [stamp for topic, stamp in messages if topic == "/modt/detections"] == stamps
+    assert "/modt/points" not in dict(messages)
 
 
 def test_kitti_results_are_those_of_the_replay(recorded, tmp_path):

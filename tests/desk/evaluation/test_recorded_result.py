@@ -1,16 +1,13 @@
 """Recorded frames are again the results that they were."""
 
-import json
-
 import numpy as np
 import pytest
 
 from modt.geometry import wrap
-from modt.sinks.tracks import frame_record
 from modt.types import NONE
 from modt_desk.evaluation.recorded_result import recorded_result
 from tests.golden.replay import replay
-from tests.results import CAR, result
+from tests.results import CAR, frame_record, result
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +17,7 @@ def results():
 
 
 def recorded(made):
-    return recorded_result(json.loads(json.dumps(frame_record(made))))
+    return recorded_result(frame_record(made))
 
 
 def test_the_record_of_a_recorded_result_is_the_record(results):

@@ -85,7 +85,7 @@ def test_after_it_is_closed_nothing_is_read():
     [
         ("ros2:///points?reliability=perfect", "reliability 'perfect' is unknown"),
         ("ros2://?domain=3", "names no topic"),
-        ("ros2:///points?domain=300", "domain '300' is none"),
+        ("ros2:///points?domain=300", "domain '300' does not exist"),
         ("ros2:///points?colour=red", "option 'colour' is unknown"),
     ],
 )

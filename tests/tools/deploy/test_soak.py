@@ -46,7 +46,7 @@ EPISODE = (FAULTS[0], 48.0, 3, 50.0, 4)
     [
         (witness(), EPISODE, None),
         (witness(missed_at=(49.0, 51.0)), EPISODE, None),
-        (witness(), (*EPISODE[:4], 3), "no counter told"),
+        (witness(), (*EPISODE[:4], 3), "were not counted"),
         (witness(full_from=55.0), EPISODE, "recovery took 5.0 s"),
         (witness(missed_at=(30.0,)), EPISODE, None),
         (witness(missed_at=(30.0, 31.0)), EPISODE, "2 deadlines missed between faults"),
@@ -66,8 +66,8 @@ def test_records_may_be_lost_on_a_full_disk_alone(lost, wrong):
     assert judge(witness(), [Episode(disk, 48.0, 3, 50.0, 10)], session(lost)) == wrong
 
 
-@pytest.mark.parametrize(("stall_s", "wrong"), [(0.0, []), (0.3, ["hog: no counter told of 1 of 1"])])
-def test_a_hog_that_costs_nothing_need_not_be_told(stall_s, wrong):
+@pytest.mark.parametrize(("stall_s", "wrong"), [(0.0, []), (0.3, ["hog: 1 of 1 were not counted"])])
+def test_a_hog_that_costs_nothing_need_not_be_counted(stall_s, wrong):
     hog, seen = next(fault for fault in FAULTS if fault.name == "hog"), witness()
     seen.times_s = [t + stall_s * (t > 49.0) for t in seen.times_s]
     assert judge(seen, [Episode(hog, 48.0, 3, 50.0, 3)], session(0)) == wrong

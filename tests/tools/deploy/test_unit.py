@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.deploy.install import main
+from modt.cli.main import main
 
 pytestmark = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="systemd is not installed here")
 SYSTEM = Path("/usr/lib/systemd/system")
@@ -18,7 +18,8 @@ def analysis(tmp_path):
     """systemd-analyze on the unit with some drop-ins, below a root of its own."""
 
     def analyze(verb, *drop_ins):
-        main(["--root", str(tmp_path), *(word for name in drop_ins for word in ("--with", name))])
+        words = (word for name in drop_ins for word in ("--with", name))
+        main(["service", "install", "--root", str(tmp_path), "--prefix", "/opt/modt", *words])
         for program in ("opt/modt/bin/modt", "bin/kill"):
             path = tmp_path / program
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -163,3 +163,20 @@ def _label(fields: list[str]) -> list[float] | None:
         raise ValueError(fields)
     score = float(fields[17]) if len(fields) > 17 else DEFAULT_SCORE
     return [float(fields[0]), types.index(fields[2]) + 1.0, *box[:4], score, *box[4:], alpha]
+
+
+def box_lines(
+    frame: Int, kitti_type: Sequence[str], ids: Int, image_box: Float64, hwlxyzry: Float64, score: Float64
+) -> list[str]:
+    """Lines of KITTI's tracking format with a score, for n boxes of another detector.
+
+    Image boxes (n, 4) are left, top, right, bottom [pixel]; boxes (n, 7) h, w, l, x, y, z [m], ry [rad] in camera
+    coordinates.
+    """
+    alpha = wrap(hwlxyzry[:, 6] - np.arctan2(hwlxyzry[:, 3], hwlxyzry[:, 5]))
+    columns = (frame, ids, alpha, image_box, hwlxyzry, score)
+    return [
+        f"{f} {i} {kind} 0 0 {a:.4f} {b[0]:.2f} {b[1]:.2f} {b[2]:.2f} {b[3]:.2f} "
+        f"{d[0]:.4f} {d[1]:.4f} {d[2]:.4f} {d[3]:.4f} {d[4]:.4f} {d[5]:.4f} {d[6]:.4f} {s:.4f}\n"
+        for kind, f, i, a, b, d, s in zip(kitti_type, *(column.tolist() for column in columns), strict=True)
+    ]

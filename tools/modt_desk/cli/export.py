@@ -27,7 +27,7 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
     p = commands.add_parser("export", help="write a recorded run in the formats of others")
     p.add_argument("directory", type=Path, metavar="RUN", help="directory of the run")
     form = p.add_mutually_exclusive_group(required=True)
-    form.add_argument("--mcap", type=Path, metavar="FILE", help="Foxglove's schemas")
+    form.add_argument("--mcap", type=Path, metavar="FILE", help="ROS 2 messages, as of --sink mcap://")
     form.add_argument("--kitti", type=Path, metavar="FILE", help="KITTI tracking results")
     labels = "point labels (of replay --labels)"
     form.add_argument("--semantickitti", type=Path, metavar="DIR", help=labels)
@@ -178,7 +178,8 @@ def _kitti(export: Export, target: Path) -> None:
 
 
 def _semantickitti(export: Export, target: Path) -> None:
-    from modt.sinks.labels import PointLabels, semantic_labels
+    from modt.sinks.labels import PointLabels
+    from modt_desk.evaluation.recorded_result import semantic_labels
 
     labels = PointLabels(target)
     for result in export.results():

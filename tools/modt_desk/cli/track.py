@@ -88,9 +88,8 @@ def follow(
 
     from modt.classes import CLASSES
     from modt.geometry import inverse, transform_boxes
-    from modt.sinks.kitti import box_lines
     from modt_desk.box_tracking.box_tracker import BOX_CLASSES, BoxTracker
-    from modt_desk.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, boxes_to_kitti
+    from modt_desk.box_tracking.detections import DETECTED, T_LEVEL_CAMERA, box_lines, boxes_to_kitti
     from modt_desk.box_tracking.whole_tracks import TrackedBoxes, bridged, confident, of_one_class
 
     T = None if poses is None else T_LEVEL_CAMERA @ poses @ inverse(T_LEVEL_CAMERA)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
 from modt.energy.meters.meter import Kind
-from modt.types import Float64, Int
+from modt.types import Float64, Int, Self
 from modt_desk.comparison.comparison import COUNTS, ModeRun, total
 from modt_desk.energy.nonnegative import nonnegative_fit
 from modt_desk.energy.savings import OtherCosts, Reconciliation, UnitCosts, reconcile

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from scipy import stats
 
-from modt.types import Float64, Int
+from modt.types import Float64, Int, Self
 from modt_desk.comparison.comparison import COUNTS
 from modt_desk.comparison.gamma import RunCosts, blocks
 from modt_desk.energy.equations import EnergyModel

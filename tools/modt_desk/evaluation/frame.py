@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Self
 
 import numpy as np
 
 from modt.geometry import FieldOfView
-from modt.types import NONE, Float32, Float64, FrameResult, Int
+from modt.types import NONE, Float32, Float64, FrameResult, Int, Self
 from modt_desk.evaluation.truth import FrameTruth
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any
 
 from modt.placement import Mount
 from modt.sources.stream import Faults, Stream, StreamInfo
-from modt.types import Frame
+from modt.types import Frame, Self
 
 
 def recorded_mount(facts: dict[str, Any]) -> Mount:

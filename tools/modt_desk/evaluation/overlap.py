@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modt.geometry import inverse, transform
-from modt.types import NONE, Bool, Float32, Float64, Int
+from modt.types import NONE, Bool, Float32, Float64, Int, Self
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.truth import FrameTruth
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modt.classes import CLASS_NAMES
 from modt.geometry import transform_boxes
-from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS, recorded_pose
-from modt.types import NONE, Float32, Float64, Frame, FrameResult, Proposals, Tracks
+from modt.sinks.labels import MAX_INSTANCE, SEMANTIC
+from modt.sinks.tracks import BOX_KEYS, WORLD_KEYS
+from modt.types import NONE, Float32, Float64, Frame, FrameResult, Int, Proposals, Tracks
 
 MOST_PROPOSALS = 100_000
 """Of a record that is believed: sweeps have some hundreds."""
@@ -62,3 +64,29 @@ def _proposals(n: int) -> Proposals:
     none = np.zeros(0, np.int64)
     offsets, coordinates = np.zeros(n + 1, np.int64), np.zeros((3, 0), np.float32)
     return Proposals(none, offsets, coordinates, np.zeros((n, 3)), np.zeros((n, 7)), np.zeros(n, np.int64))
+
+
+def semantic_labels(tracks: Tracks, proposals: Int) -> NDArray[np.uint32]:
+    """(N,) SemanticKITTI's label of each point by the track of its proposal (N,), NONE where it belongs to none.
+
+    Upper 16 bits: the track's id modulo 65535, plus one. Lower 16 bits: SemanticKITTI's label of its class. Points of
+    the background are 0.
+    """
+    code = np.zeros(max(proposals.max(initial=NONE), tracks.proposal.max(initial=NONE)) + 2, np.uint32)
+    seen = np.flatnonzero(tracks.proposal != NONE)
+    label, instance = SEMANTIC[tracks.object_class[seen]], tracks.id[seen] % MAX_INSTANCE + 1
+    code[tracks.proposal[seen]] = np.where(label > 0, instance << 16 | label, 0)
+    return code[proposals]  # the last one is that of NONE
+
+
+def recorded_pose(record: dict[str, Any]) -> Float64:
+    """(4, 4) T_world_sensor of a record.
+
+    Raises:
+        one of modt.sinks.records.BROKEN: the record has none.
+    """
+    T = np.eye(4)
+    T[:3] = np.reshape(record["T_world_sensor"], (3, 4))
+    if not np.isfinite(T).all():
+        raise ValueError("T_world_sensor is not finite")
+    return T

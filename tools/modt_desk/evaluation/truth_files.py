@@ -162,5 +162,5 @@ def _rows(path: Path) -> Iterator[Label]:
                     remedy = "write x, y, z, l, w, h, yaw, frame and track as numbers"
                     raise MisuseError(f"{path}:{number}", "no cuboid", remedy) from None
                 yield Label(frame, track, row.get("label", row.get("class", "")), np.array(box))
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise MisuseError(path, f"cannot be read ({error})", "restore the table") from None

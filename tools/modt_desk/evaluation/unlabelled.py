@@ -13,11 +13,12 @@ import numpy as np
 from modt.classes import CLASSES, ObjectClass
 from modt.geometry import corners, inverse, se3, transform_boxes, yaw_of
 from modt.sinks.output import writing
-from modt.sinks.tracks import BOX_KEYS, recorded_pose
+from modt.sinks.tracks import BOX_KEYS
 from modt.types import Bool, Float64, Int
 from modt_desk.evaluation.further_objects import COLUMNS
 from modt_desk.evaluation.matching import most_in_sector
 from modt_desk.evaluation.overlap import FOOT_M, Overlap
+from modt_desk.evaluation.recorded_result import recorded_pose
 from modt_desk.evaluation.run_record import RunRecord
 from modt_desk.evaluation.truth import Truth
 

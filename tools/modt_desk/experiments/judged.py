@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Self
 
 import numpy as np
 
 from modt.classification.scheduler import padded_each
 from modt.config import ClassificationConfig
 from modt.geometry import FieldOfView
-from modt.types import NONE, FrameResult
+from modt.types import NONE, FrameResult, Self
 from modt_desk.evaluation.frame import JudgedFrame
 from modt_desk.evaluation.matching import judge
 from modt_desk.evaluation.rows import OBJECT, PROPOSAL, Rows, table

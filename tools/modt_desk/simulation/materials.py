@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import Self
 
 import numpy as np
+
+from modt.types import Self
 
 
 class Material(IntEnum):

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
-from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modt.types import Bool, Float32, Float64, Int
+from modt.types import Bool, Float32, Float64, Int, Self
 
 N_CUTS = 4
 """Cutting planes of a solid."""

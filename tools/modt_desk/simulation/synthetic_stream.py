@@ -5,14 +5,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Self
 
 import numpy as np
 
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources.stream import Faults, StreamInfo
-from modt.types import Frame
+from modt.types import Frame, Self
 from modt_desk.simulation.crossing import crossing
 from modt_desk.simulation.crowd import crowd
 from modt_desk.simulation.indoors import corridor, hall, lift, lobby, warehouse

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -191,4 +191,4 @@ def _time(stamp_s: float) -> str:
     """Seconds from the begin of a recording, or a date."""
     if stamp_s < _DATES_S:
         return f"{stamp_s:.2f} s"
-    return f"{datetime.fromtimestamp(stamp_s, UTC):%Y-%m-%d %H:%M:%S.%f}"[:-4]
+    return f"{datetime.fromtimestamp(stamp_s, timezone.utc):%Y-%m-%d %H:%M:%S.%f}"[:-4]

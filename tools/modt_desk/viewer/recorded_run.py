@@ -21,10 +21,11 @@ from modt.profile import from_yaml
 from modt.profile.yaml_text import to_yaml
 from modt.sinks.records import BROKEN, read_records, records_of
 from modt.sinks.run_directory import LEDGER, RUN, TRACKS
-from modt.sinks.tracks import SCHEMA, recorded_pose
+from modt.sinks.tracks import SCHEMA
 from modt.types import Float64, Int
 from modt.viewer.track_rows import COLUMNS, planar
 from modt_desk.energy.run_energy import run_energy
+from modt_desk.evaluation.recorded_result import recorded_pose
 from modt_desk.viewer.recorded_tracks import frame_rows, track_table
 
 COUNTS: dict[str, Callable[[Any], Any]] = {

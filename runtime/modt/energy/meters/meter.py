@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from enum import StrEnum
+from enum import Enum
 from pathlib import Path
 
 
-class Kind(StrEnum):
+class Words(str, Enum):
+    """A text that is written as itself."""
+
+    __str__ = str.__str__
+
+
+class Kind(Words):
     """Reliability of a figure; every figure shown carries one."""
 
     MEASURED = "measured"  # counted by hardware or by this program
@@ -23,14 +29,14 @@ def worst(kinds: Iterable[Kind]) -> Kind:
     return max(kinds, key=list(Kind).index)
 
 
-class Measurand(StrEnum):
+class Measurand(Words):
     """The physical quantity of a reading."""
 
     ENERGY = "energy"  # a counter [J]
     POWER = "power"  # a momentary value [W]
 
 
-class Scope(StrEnum):
+class Scope(Words):
     """The consumers a meter covers, from the narrowest."""
 
     PROCESS = "this process, by a model"

@@ -6,7 +6,7 @@ import copy
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from modt import assets
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.packet_decoder import DeviceClock, extra, one_line, refuse
-from modt.types import Bool, Float32
+from modt.types import Bool, Float32, Self
 
 MAX_LOST_FRAMES = 20
 """More frames missing in a row are a sensor that was switched on again."""

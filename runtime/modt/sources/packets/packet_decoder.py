@@ -8,10 +8,11 @@ import logging
 import math
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 from modt.errors import MisuseError, install
 from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.types import Self
 
 MAX_DRIFT = 1e-4
 """Of a sensor's clock against the host's [s/s]."""

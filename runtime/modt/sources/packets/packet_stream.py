@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
-from typing import Self
 
 from modt.errors import ScanError
 from modt.sources.live.sweep_reader import Reception, Sweep
@@ -14,7 +13,7 @@ from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.scan_file import sanitised
 from modt.sources.stamp_check import CLOCK_SET, StampCheck
 from modt.sources.stream import Fault, Faults, StreamInfo
-from modt.types import Frame
+from modt.types import Frame, Self
 
 
 class PacketStream:

@@ -8,7 +8,7 @@ import logging
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from modt.sources.packets.velodyne_models import (
     signature_of,
 )
 from modt.sources.packets.velodyne_turn import AHEAD, SAME_S, Entry, Turn
-from modt.types import Float32, Float64
+from modt.types import Float32, Float64, Self
 
 CYCLE, TAIL = 4160, slice(-6, None)
 """Packets in which all of it is sent; stamp, type and value of a status."""

@@ -1,0 +1,1 @@
+"""modt as a node of ROS 2."""

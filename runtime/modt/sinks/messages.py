@@ -1,0 +1,202 @@
+"""A frame as messages of ROS 2, which the sinks ros2://, mcap:// and foxglove:// publish."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from modt.classes import CLASS_NAMES, CLASSES, ObjectClass
+from modt.geometry import quaternion_of, se3, yaw_of
+from modt.ros2 import odometry, point_cloud2, static_transforms
+from modt.ros2.cdr import CdrWriter, Fields, header_fields, text_fields
+from modt.types import NONE, Float64, FrameResult, Int
+
+PREFIX, FRAME_ID, WORLD_FRAME_ID = "modt", "lidar", "world"
+"""Names used if neither the address nor the input gives one."""
+DETECTIONS, MARKERS, TF = "vision_msgs/Detection3DArray", "visualization_msgs/MarkerArray", static_transforms.TYPE
+UNKNOWN_COVARIANCE = f"{8 * 36}x"
+
+ARROW, CUBE, TEXT = 0, 1, 9
+ADD, DELETE_ALL = 0, 3
+LIFETIME_S = 1
+"""Time after which viewers remove a marker that was not replaced [s]."""
+TEXT_M, ABOVE_M = 0.6, 0.5
+"""Height of a label, and of its middle above the box [m]."""
+MIN_ARROW_MPS, ARROW_WIDTH_M = 0.3, 0.2
+"""Slower objects have no arrow. An arrow is as long as the way of one second."""
+WHITE = (1.0, 1.0, 1.0, 1.0)
+COLOURS = tuple((*(int(c.colour[k : k + 2], 16) / 255 for k in (1, 3, 5)), 0.6) for c in CLASSES.values())
+NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+"""Pose and scale of the marker that deletes all others."""
+NO_TEXT, NO_HEADER = text_fields(""), header_fields(0.0, "")
+UNUSED: Fields = (
+    ("B", "2I", *NO_TEXT[0], *NO_HEADER[0], *NO_TEXT[0], "2I"),
+    (0, 0, 0, *NO_TEXT[1], *NO_HEADER[1], *NO_TEXT[1], 0, 0),
+)
+"""frame_locked, points, colors, texture_resource, texture (header, format, data), uv_coordinates."""
+NO_MESH: Fields = ((*NO_TEXT[0], *NO_TEXT[0], "I", "B"), (*NO_TEXT[1], *NO_TEXT[1], 0, 0))
+"""mesh_resource, mesh_file (filename, data), mesh_use_embedded_materials."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic, the type of its messages, and the function that encodes a frame."""
+
+    name: str
+    type: str
+    encode: Callable[[FrameResult], bytes]
+
+
+def topics(
+    prefix: str = PREFIX,
+    *,
+    frame_id: str = "",
+    world_frame_id: str = "",
+    background: bool = False,
+    points: bool = False,
+) -> list[Topic]:
+    """Topics of the results.
+
+    Args:
+        prefix: begins the names.
+        frame_id: frame of the sensor; "": that of the input, else FRAME_ID.
+        world_frame_id: frame of the poses; "": WORLD_FRAME_ID, and no /tf.
+        background: whether detections hold the background too.
+        points: whether the sweep is published.
+    """
+
+    def topic(name: str, kind: str, encode: Callable[..., bytes], *more: object) -> Topic:
+        return Topic(name, kind, lambda r: encode(r, frame_id or r.frame.frame_id or FRAME_ID, *more))
+
+    made = [
+        topic(f"/{prefix}/detections", DETECTIONS, detections, background),
+        topic(f"/{prefix}/markers", MARKERS, markers),
+        topic(f"/{prefix}/odometry", odometry.TYPE, pose, world_frame_id or WORLD_FRAME_ID),
+    ]
+    if world_frame_id:
+        made.append(topic("/tf", TF, transform, world_frame_id))
+    if points:
+        made.append(topic(f"/{prefix}/points", point_cloud2.TYPE, cloud))
+    return made
+
+
+def seen(result: FrameResult, background: bool = False) -> Int:
+    """Rows of the tracks with a proposal that are objects, or with `background` of all."""
+    tracks = result.tracks
+    return np.flatnonzero((tracks.proposal != NONE) & (background | (tracks.object_class != ObjectClass.BACKGROUND)))
+
+
+def detections(result: FrameResult, frame_id: str, background: bool = False) -> bytes:
+    """vision_msgs/Detection3DArray (version 4): boxes and posteriors of what is in view, the reported class first."""
+    tracks, rows = result.tracks, seen(result, background)
+    boxes = result.proposals.box[tracks.proposal[rows]]
+    poses = in_sensor_frame(box_poses(boxes), result.frame.R_level_sensor)
+    header, header_values = header_fields(result.frame.stamp_s, frame_id)
+    layouts = [_detection(header, class_) for class_ in range(len(CLASS_NAMES))]
+    cdr = CdrWriter()
+    cdr.record((*header, "I"), *header_values, len(rows))
+    columns = tracks.id[rows], tracks.object_class[rows], tracks.posterior[rows], poses, boxes[:, 3:6]
+    for track, class_, posterior, pose, size in zip(*(column.tolist() for column in columns), strict=True):
+        fields, hypotheses = layouts[class_]
+        results = [(*name, posterior[k], *pose) for k, name in hypotheses]
+        cdr.record(fields, *header_values, len(results), *chain.from_iterable(results), *pose, *size)
+        cdr.text(str(track))
+    return cdr.message()
+
+
+def _detection(
+    header: tuple[str, ...], class_: int
+) -> tuple[tuple[str, ...], list[tuple[int, tuple[float | bytes, ...]]]]:
+    """Fields of a detection of a class up to its id; class and name of each hypothesis in their order."""
+    order = [class_, *(k for k in range(len(CLASS_NAMES)) if k != class_)]
+    names = [(k, text_fields(CLASS_NAMES[k])) for k in order]
+    results = chain.from_iterable((*fields, "d", "7d", UNKNOWN_COVARIANCE) for _, (fields, _) in names)
+    return (*header, "I", *results, "7d", "3d"), [(k, values) for k, (_, values) in names]
+
+
+def markers(result: FrameResult, frame_id: str) -> bytes:
+    """visualization_msgs/MarkerArray: a cube, a label and, if it moves, an arrow for each object in view."""
+    tracks, rows = result.tracks, seen(result)
+    boxes, speed = result.proposals.box[tracks.proposal[rows]], tracks.x[rows, 3]
+    ahead = boxes.copy()
+    ahead[:, 6] = tracks.x[rows, 2] - yaw_of(result.T_world_sensor) + np.pi * (speed < 0)
+    above = box_poses(boxes) + np.array([0, 0, 1, 0, 0, 0, 0]) * (boxes[:, 5:6] / 2 + ABOVE_M)
+    poses = (in_sensor_frame(at, result.frame.R_level_sensor) for at in (box_poses(boxes), above, box_poses(ahead)))
+    header = header_fields(result.frame.stamp_s, frame_id)
+    cdr = CdrWriter()
+    cdr.record(("I",), 1 + 2 * len(rows) + int(np.count_nonzero(np.abs(speed) >= MIN_ARROW_MPS)))
+    _marker(cdr, header, "", (0, CUBE, DELETE_ALL), NOWHERE)
+    columns = (tracks.id[rows], tracks.object_class[rows], np.abs(speed), boxes[:, 3:6], *poses)
+    for track, class_, speed_mps, size, pose, top, way in zip(*(column.tolist() for column in columns), strict=True):
+        label, colour = f"{CLASS_NAMES[class_]} {track}, {speed_mps:.1f} m/s", COLOURS[class_]
+        _marker(cdr, header, "objects", (track, CUBE, ADD), (*pose, *size), colour)
+        _marker(cdr, header, "labels", (track, TEXT, ADD), (*top, 0.0, 0.0, TEXT_M), WHITE, label)
+        if speed_mps >= MIN_ARROW_MPS:
+            arrow = (*way, speed_mps, ARROW_WIDTH_M, ARROW_WIDTH_M)
+            _marker(cdr, header, "motion", (track, ARROW, ADD), arrow, (*colour[:3], 1.0))
+    return cdr.message()
+
+
+def _marker(
+    cdr: CdrWriter,
+    header: Fields,
+    namespace: str,
+    number_kind_action: tuple[int, int, int],
+    pose_scale: tuple[float, ...],
+    colour: tuple[float, ...] = WHITE,
+    text: str = "",
+) -> None:
+    name, label = text_fields(namespace), text_fields(text)
+    fields = (*header[0], *name[0], "3i", "10d", "4f", "2i", *UNUSED[0], *label[0], *NO_MESH[0])
+    first = (*header[1], *name[1], *number_kind_action, *pose_scale, *colour, LIFETIME_S, 0)
+    cdr.record(fields, *first, *UNUSED[1], *label[1], *NO_MESH[1])
+
+
+def pose(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:
+    """nav_msgs/Odometry: the pose of the sensor in the world."""
+    return odometry.write_odometry(result.frame.stamp_s, world_frame_id, frame_id, T_world_sensor(result))
+
+
+def transform(result: FrameResult, frame_id: str, world_frame_id: str) -> bytes:
+    """tf2_msgs/TFMessage: the pose of the sensor in the world as a transform."""
+    T = T_world_sensor(result)
+    cdr = CdrWriter()
+    cdr.record(("I",), 1)
+    cdr.header(result.frame.stamp_s, world_frame_id)
+    cdr.text(frame_id)
+    cdr.record(("7d",), *T[:3, 3].tolist(), *quaternion_of(T).tolist())
+    return cdr.message()
+
+
+def cloud(result: FrameResult, frame_id: str) -> bytes:
+    """sensor_msgs/PointCloud2: the sweep."""
+    points, R_level_sensor = result.frame.points, result.frame.R_level_sensor
+    if R_level_sensor is not None:
+        points = np.column_stack([points[:, :3] @ R_level_sensor.astype(np.float32), points[:, 3]])
+    return point_cloud2.write_cloud(result.frame.stamp_s, frame_id, points)
+
+
+def box_poses(boxes: Float64) -> Float64:
+    """(n, 7) positions and quaternions (x, y, z, w) of (n, 7) boxes."""
+    half = boxes[:, 6] / 2
+    zero = np.zeros(len(boxes))
+    return np.column_stack([boxes[:, :3], zero, zero, np.sin(half), np.cos(half)])
+
+
+def in_sensor_frame(poses: Float64, R_level_sensor: Float64 | None) -> Float64:
+    """(n, 7) poses turned from the level frame into that of the tilted sensor, as mounted on the robot."""
+    if R_level_sensor is None or not len(poses):
+        return poses
+    turn = Rotation.from_matrix(R_level_sensor.T)
+    turned = turn * Rotation.from_quat(poses[:, 3:])
+    return np.column_stack([turn.apply(poses[:, :3]), turned.as_quat()])
+
+
+def T_world_sensor(result: FrameResult) -> Float64:
+    """(4, 4) pose of the sensor as it is mounted, tilted or not."""
+    T, R_level_sensor = result.T_world_sensor, result.frame.R_level_sensor
+    return T if R_level_sensor is None else T @ se3(R_level_sensor, np.zeros(3))

@@ -1,0 +1,63 @@
+"""As much of rclpy, and of the packages of its messages, as the node uses; topics lead to this process itself."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections import defaultdict
+from types import ModuleType, SimpleNamespace
+
+PACKAGES = ("sensor_msgs", "nav_msgs", "vision_msgs", "visualization_msgs", "tf2_msgs")
+
+
+class Types(ModuleType):
+    """A module that has a class of any name."""
+
+    def __getattr__(self, name):
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return type(name, (), {"__module__": self.__name__})
+
+
+class Node:
+    """A node whose topics hand bytes from publishers to subscriptions."""
+
+    def __init__(self):
+        self.subscribed, self.published, self.types = defaultdict(list), defaultdict(int), {}
+
+    def create_subscription(self, kind, topic, callback, qos, *, raw):
+        assert raw
+        self.subscribed[topic].append(callback)
+        self.types[topic] = f"{kind.__module__}.{kind.__name__}"
+
+    def create_publisher(self, kind, topic, qos):
+        self.published[topic] += 1
+        self.types[topic] = f"{kind.__module__}.{kind.__name__}"
+        return SimpleNamespace(
+            publish=lambda data: [receive(data) for receive in self.subscribed[topic]],
+            get_subscription_count=lambda: len(self.subscribed[topic]),
+        )
+
+    def count_publishers(self, topic):
+        return self.published[topic]
+
+
+def install(monkeypatch):
+    """Have imports find it; returns the one node."""
+    node, spinning = Node(), threading.Event()
+    executor = SimpleNamespace(add_node=lambda node: None, spin=spinning.set)
+    modules = {
+        "rclpy": {"create_node": lambda name: node, "init": lambda **_: None},
+        "rclpy.executors": {"SingleThreadedExecutor": lambda: executor},
+        "rclpy.qos": {"QoSProfile": SimpleNamespace, "ReliabilityPolicy": SimpleNamespace(RELIABLE=1, BEST_EFFORT=2)},
+        "rclpy.signals": {"SignalHandlerOptions": SimpleNamespace(NO=0)},
+        "rclpy.utilities": {"remove_ros_args": lambda words: words[: words.index("--ros-args")]},
+    }
+    for name, content in modules.items():
+        module = ModuleType(name)
+        vars(module).update(content)
+        monkeypatch.setitem(sys.modules, name, module)
+    for package in PACKAGES:
+        monkeypatch.setitem(sys.modules, package, ModuleType(package))
+        monkeypatch.setitem(sys.modules, f"{package}.msg", Types(f"{package}.msg"))
+    return node

@@ -1,0 +1,134 @@
+"""Results as messages of ROS 2, decoded by another implementation."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from modt.geometry import rotation_zyx, se3, transform
+from modt.placement import Mount
+from modt.ros2.definitions import DEFINITIONS, schema
+from modt.ros2.odometry import read_odometry
+from modt.ros2.point_cloud2 import read_cloud
+from modt.ros2.static_transforms import StaticTransforms
+from modt.sinks import messages as encoded
+from tests.results import CAR, PEDESTRIAN, result
+from tests.ros2 import messages
+
+PLACED = se3(rotation_zyx(0.1, -0.2, 2.0), np.array([10.0, -20.0, 0.5]))
+EMPTY = result(0, [], {})
+FRAME = result(3, [5, 4, 7], {0: 1, 1: 12, 2: 1234567}, {1: CAR, 12: PEDESTRIAN}, lost=(99,), T_world_sensor=PLACED)
+
+
+def published(frame, **options):
+    """The decoded message of each topic."""
+    return {
+        topic.name: messages.decode(topic.encode(frame), topic.type.replace("/", "/msg/"))
+        for topic in encoded.topics(**options)
+    }
+
+
+def detections(frame, **options):
+    return published(frame, **options)["/modt/detections"]
+
+
+def markers(frame):
+    deletion, *shown = published(frame)["/modt/markers"].markers
+    assert deletion.action == encoded.DELETE_ALL
+    return shown
+
+
+def test_topics_are_named_by_the_prefix_and_tf_and_points_are_asked_for():
+    always = {"/robot/detections", "/robot/markers", "/robot/odometry"}
+    assert {topic.name for topic in encoded.topics("robot")} == always
+    more = encoded.topics("robot", world_frame_id="map", points=True)
+    assert {topic.name for topic in more} == {*always, "/tf", "/robot/points"}
+
+
+def test_definitions_are_those_of_another_implementation():
+    typesys = pytest.importorskip("rosbags.typesys")
+    for name in DEFINITIONS:
+        parsed = typesys.get_types_from_msg(schema(name), name.replace("/", "/msg/"))
+        assert {kind: fields for kind, (_, fields) in parsed.items()} == {
+            kind: messages.store().fielddefs[kind][1] for kind in parsed
+        }
+
+
+@pytest.mark.parametrize(
+    ("option", "received", "expected"),
+    [("", "os_sensor", "os_sensor"), ("", "", "lidar"), ("velodyne", "os_sensor", "velodyne")],
+)
+def test_results_are_in_the_frame_of_the_input_unless_another_is_named(option, received, expected):
+    frame = dataclasses.replace(FRAME, frame=dataclasses.replace(FRAME.frame, frame_id=received))
+    shown = published(frame, frame_id=option, world_frame_id="map", points=True)
+    odometry, (tf,) = shown["/modt/odometry"], shown["/tf"].transforms
+    stamped = [shown["/modt/detections"], shown["/modt/points"], *shown["/modt/markers"].markers]
+    assert {message.header.frame_id for message in stamped} == {expected}
+    assert {odometry.child_frame_id, tf.child_frame_id} == {expected}
+    assert {odometry.header.frame_id, tf.header.frame_id} == {"map"}
+    for message in (*stamped, odometry, tf):
+        assert (message.header.stamp.sec, message.header.stamp.nanosec) == (0, 300_000_000)
+
+
+def test_objects_in_view_are_detections_and_the_background_where_it_is_asked_for():
+    assert [found.id for found in detections(FRAME).detections] == ["1", "12"]
+    shown = {
+        found.id: found.results[0].hypothesis.class_id for found in detections(FRAME, background=True).detections
+    }
+    assert shown == {"1": "car", "12": "pedestrian", "1234567": "background"}
+    assert detections(EMPTY).detections == []
+
+
+def test_the_reported_class_comes_first_though_another_is_more_probable():
+    frame = result(1, [5], {0: 7}, {7: [0.6, 0.1, 0.3, 0.0]})
+    frame.tracks.object_class[:] = 2
+    (found,) = detections(frame).detections
+    hypotheses = [(r.hypothesis.class_id, r.hypothesis.score) for r in found.results]
+    assert hypotheses == [("pedestrian", 0.3), ("background", 0.6), ("car", 0.1), ("cyclist", 0.0)]
+
+
+def test_a_detection_has_the_box_in_the_frame_of_the_sensor():
+    frame = result(1, [5], {0: 7}, {7: CAR})
+    frame.proposals.box[0] = [10.0, -2.0, -1.0, 4.0, 1.8, 1.5, 0.5]
+    (found,) = detections(frame).detections
+    at, turned, size = found.bbox.center.position, found.bbox.center.orientation, found.bbox.size
+    assert (at.x, at.y, at.z, size.x, size.y, size.z) == (10.0, -2.0, -1.0, 4.0, 1.8, 1.5)
+    np.testing.assert_allclose([turned.x, turned.y, turned.z, turned.w], [0, 0, np.sin(0.25), np.cos(0.25)])
+    assert found.results[0].pose.pose == found.bbox.center
+
+
+def test_objects_are_cubes_with_labels_and_an_arrow_along_their_motion():
+    frame = result(3, [5, 4, 7], {0: 1, 1: 12, 2: 13}, {1: CAR, 12: PEDESTRIAN, 13: PEDESTRIAN})
+    frame.tracks.x[:, 3] = [2.0, 0.0, -1.5]
+    shown = {(m.ns, m.id): m for m in markers(frame)}
+    everybody = {(name, track) for name in ("objects", "labels") for track in (1, 12, 13)}
+    assert shown.keys() == {*everybody, ("motion", 1), ("motion", 13)}
+    cube, label = shown["objects", 1], shown["labels", 1]
+    assert (cube.type, cube.scale.x, cube.scale.y, cube.scale.z) == (encoded.CUBE, 4.0, 2.0, 1.5)
+    assert (cube.color.r, cube.color.g, cube.color.b) == pytest.approx((0x2F / 255, 0x6F / 255, 0xDE / 255))
+    assert label.text == "car 1, 2.0 m/s"
+    assert label.pose.position.z > cube.pose.position.z + cube.scale.z / 2
+    assert (shown["motion", 1].scale.x, shown["motion", 1].pose.orientation.w) == pytest.approx((2.0, 1.0))
+    assert (shown["motion", 13].scale.x, abs(shown["motion", 13].pose.orientation.z)) == pytest.approx((1.5, 1.0))
+
+
+def test_the_pose_of_the_sensor_is_an_odometry_and_a_transform():
+    topics = {topic.name: topic.encode(FRAME) for topic in encoded.topics(world_frame_id="map")}
+    tree = StaticTransforms()
+    tree.add(topics["/tf"])
+    for T in (tree.between("map", "lidar"), read_odometry(topics["/modt/odometry"]).T_odom_child):
+        np.testing.assert_allclose(T, PLACED, atol=1e-12)
+
+
+def test_points_of_a_tilted_sensor_are_as_it_sent_them_and_in_their_place_in_the_world():
+    level = dataclasses.replace(FRAME.frame, T_world_sensor=PLACED)
+    tilted = Mount.of(10.0, -5.0).level(level)
+    frame = dataclasses.replace(FRAME, frame=tilted, T_world_sensor=tilted.T_world_sensor)
+    topics = {topic.name: topic.encode(frame) for topic in encoded.topics(points=True)}
+    points = read_cloud(topics["/modt/points"]).points
+    np.testing.assert_allclose(points[:, :3], level.points[:, :3], atol=1e-4)
+    T = read_odometry(topics["/modt/odometry"]).T_odom_child
+    inside, placed = points[:, :3].astype(np.float64), tilted.points[:, :3].astype(np.float64)
+    np.testing.assert_allclose(transform(T, inside), transform(tilted.T_world_sensor, placed), atol=1e-3)

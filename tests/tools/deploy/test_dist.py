@@ -1,0 +1,79 @@
+"""A release, a Debian package and an image, built where the tools are."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import modt
+from tests.test_project_files import PROJECT, PROJECT_FILE
+from tools.deploy import deb, dist
+
+ROOT = Path(__file__).resolve().parents[3]
+PYTHON = f"{sys.version_info.major}.{sys.version_info.minor}"
+
+
+@pytest.fixture(scope="module")
+def release(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("dist")
+    assert dist.main(["--out", str(folder), "--target", "native"]) == 0
+    return folder
+
+
+@pytest.mark.install
+def test_a_release_has_checksums_and_a_page_that_names_each_file(release):
+    subprocess.run(["sha256sum", "--check", "--strict", "SHA256SUMS"], cwd=release, check=True, capture_output=True)
+    files = {path.name for path in release.iterdir()} - {"SHA256SUMS", "release.md"}
+    page = (release / "release.md").read_text()
+    assert {name for name in files if f"| {name} |" in page} == files
+    (wheel,) = (name for name in files if name.endswith(".whl"))
+    assert f"pip install --no-deps ./{wheel}" in page
+    assert "First release." in page
+
+
+@pytest.mark.install
+@pytest.mark.skipif(shutil.which("dpkg-deb") is None, reason="dpkg-deb is not installed here")
+def test_a_debian_package_holds_the_program(release, tmp_path):
+    (wheel,) = release.glob("*.whl")
+    package = deb.build_deb(wheel, tmp_path, "amd64", PYTHON, libraries=False)
+    field = subprocess.run(["dpkg-deb", "--field", package], check=True, capture_output=True, text=True).stdout
+    assert {f"Version: {modt.__version__}", f"Depends: python{PYTHON}"} <= set(field.splitlines())
+    subprocess.run(["dpkg-deb", "--extract", package, tmp_path / "root"], check=True)
+    program = tmp_path / "root/opt/modt/bin/modt"
+    assert program.read_text().startswith(f"#!/usr/bin/python{PYTHON}\n")
+    where = f"{tmp_path}/root/opt/modt/lib:{Path(np.__file__).parents[1]}"
+    command = [sys.executable, program, "--version"]
+    done = subprocess.run(command, env={"PYTHONPATH": where}, check=True, capture_output=True, text=True)
+    assert done.stdout == f"modt {modt.__version__}\n"
+    assert (tmp_path / "root/usr/bin/modt").readlink() == Path("/opt/modt/bin/modt")
+
+
+def has_daemon():
+    quiet = subprocess.DEVNULL
+    return shutil.which("docker") and not subprocess.call(["docker", "info"], stdout=quiet, stderr=quiet)
+
+
+@pytest.mark.install
+def test_the_image_runs_modt():
+    if not has_daemon():
+        pytest.skip("no Docker daemon here")
+    subprocess.run(["docker", "build", "--tag", "modt-test", str(ROOT)], check=True)
+    done = subprocess.run(["docker", "run", "--rm", "modt-test", "--version"], check=True, capture_output=True)
+    assert done.stdout.decode() == f"modt {modt.__version__}\n"
+
+
+def test_the_image_is_of_a_supported_python_and_copies_what_its_context_holds():
+    text = (ROOT / "Dockerfile").read_text()
+    pythons = set(re.findall(r"^FROM python:([\d.]+)-slim", text, re.MULTILINE))
+    assert {f"Programming Language :: Python :: {version}" for version in pythons} <= set(PROJECT["classifiers"])
+    held = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
+    assert all((ROOT / name).exists() for name in held)
+    copied = [source for source in re.findall(r"^COPY (?!--from)(\S+)", text, re.MULTILINE) if source != "."]
+    assert [source for source in copied if not any(source.startswith(f"{name}/") for name in held)] == []
+    wheel = PROJECT_FILE["tool"]["hatch"]["build"]["targets"]["wheel"]
+    assert {*wheel["force-include"]} <= held
+    assert all(any(package.startswith(name) for name in held) for package in wheel["packages"])

@@ -1,0 +1,106 @@
+"""Make a Debian package of a wheel and its libraries, for the Python of one distribution.
+
+    python -m tools.deploy.deb dist/modt-….whl --architecture arm64 --python 3.10    # Ubuntu 22.04, JetPack 6
+
+The program and its libraries lie in /opt/modt/lib, apart from those of the system. `modt service install` sets up the
+service; removing the package removes it. Needs dpkg-deb, uv and a package index, on a machine of either kind.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+
+from tools.options import parser
+
+ARCHITECTURES = {"x86_64": "amd64", "aarch64": "arm64"}
+"""Debian's name of each machine."""
+EXTRAS = ("velodyne", "ros2", "foxglove")
+PLACE = "opt/modt"
+PROGRAM = """#!/usr/bin/python{python}
+import sys
+sys.path.insert(0, "/{place}/lib")
+from {module} import main
+raise SystemExit(main())
+"""
+PROGRAMS = {"modt": "modt.cli.main", "modt-profile": "modt.cli.profile"}
+CONTROL = """Package: modt
+Version: {version}
+Architecture: {architecture}
+Depends: python{python}
+Section: science
+Priority: optional
+Maintainer: The maintainers of modt <modt@localhost>
+Description: detects, tracks and classifies moving objects in a LiDAR stream
+ One process on one CPU core, with an account of its energy.
+"""
+BEFORE_REMOVAL = """#!/bin/sh
+set -e
+if [ "$1" = remove ]; then /opt/modt/bin/modt service remove; fi
+"""
+
+
+def build_deb(wheel: Path, out: Path, architecture: str, python: str, *, libraries: bool = True) -> Path:
+    """Write the package; without libraries it needs those of the system."""
+    version = wheel.name.split("-")[1]
+    made = out / f"modt_{version}_{architecture}_python{python}.deb"
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        root.chmod(0o755)
+        _unpack(wheel, root / PLACE / "lib", architecture, python, libraries=libraries)
+        for name, module in PROGRAMS.items():
+            program = root / PLACE / "bin" / name
+            _write(program, PROGRAM.format(python=python, place=PLACE, module=module), 0o755)
+            link = root / "usr/bin" / name
+            link.parent.mkdir(parents=True, exist_ok=True)
+            link.symlink_to(f"/{PLACE}/bin/{name}")
+        control = CONTROL.format(version=version, architecture=architecture, python=python)
+        _write(root / "DEBIAN/control", control, 0o644)
+        _write(root / "DEBIAN/prerm", BEFORE_REMOVAL, 0o755)
+        subprocess.run(["dpkg-deb", "-Zgzip", "--root-owner-group", "--build", str(root), str(made)], check=True)
+    return made
+
+
+def _unpack(wheel: Path, place: Path, architecture: str, python: str, *, libraries: bool) -> None:
+    if not libraries:
+        with zipfile.ZipFile(wheel) as file:
+            file.extractall(place)
+        return
+    machine = next(machine for machine, name in ARCHITECTURES.items() if name == architecture)
+    uv = shutil.which("uv") or str(Path(sys.executable).with_name("uv"))
+    form = ["--only-binary", ":all:", "--python-platform", f"{machine}-manylinux_2_28", "--python-version", python]
+    wanted = f"modt[{','.join(EXTRAS)}] @ {wheel.resolve().as_uri()}"
+    command = [uv, "--no-config", "pip", "install", "--quiet", *form, "--target", str(place), wanted]
+    try:
+        subprocess.run(command, check=True)
+    except FileNotFoundError:
+        raise SystemExit("deb: uv is missing; pip install uv") from None
+
+
+def _write(path: Path, text: str, mode: int) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    path.chmod(mode)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    options = parser(__doc__)
+    options.add_argument("wheel", type=Path, help="a wheel of modt for that machine")
+    options.add_argument(
+        "--architecture", choices=ARCHITECTURES.values(), default="amd64", help="default: %(default)s"
+    )
+    options.add_argument("--python", default="3.10", metavar="VERSION", help="of the system (default: %(default)s)")
+    options.add_argument("--out", type=Path, default=Path("dist"), help="folder (default: %(default)s)")
+    options.add_argument("--no-libraries", action="store_true", help="leave the libraries to the system")
+    given = options.parse_args(arguments)
+    libraries = not given.no_libraries
+    print(build_deb(given.wheel, given.out, given.architecture, given.python, libraries=libraries))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
