@@ -27,9 +27,9 @@ from modt.sources.recognise import CAPTURES, open_stream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 from tools.send.faults import PacketFaults, Timed
-from tools.send.loops import ouster_loop, velodyne_loop
+from tools.send.ideal_packets import LAYOUTS, ideal_calibration, packets_of
+from tools.send.loops import ouster_loop, turn_loop
 from tools.send.pcap_writer import write_capture
-from tools.send.velodyne_packets import LAYOUTS, ideal_calibration, packets_of
 
 SYNTHETIC_S = 5.0
 
@@ -61,9 +61,9 @@ def captured(path: Path, metadata: Path | None, *, once: bool) -> Iterator[Timed
     if once:
         return ((d.stamp_s - datagrams[0].stamp_s, d.payload) for d in datagrams)
     payloads = [d.payload for d in datagrams]
-    if stream.info.layout.startswith("Velodyne"):
-        return velodyne_loop(payloads)
-    return ouster_loop(payloads, metadata or path.with_suffix(".json"))
+    if stream.info.layout.startswith("Ouster"):
+        return ouster_loop(payloads, metadata or path.with_suffix(".json"))
+    return turn_loop(payloads)
 
 
 def made(path: Path | None, model: str, calibration: Path | None, part: tuple[int, int | None]) -> list[Timed]:
@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> None:
     else:
         packets = made(arguments.path, arguments.model, arguments.calibration, arguments.frames)
         if not arguments.once:
-            packets = velodyne_loop([payload for _, payload in packets])
+            packets = turn_loop([payload for _, payload in packets])
     faults = PacketFaults(
         arguments.loss, arguments.duplicates, arguments.reordering, arguments.garbage, arguments.seed
     )

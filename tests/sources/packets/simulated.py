@@ -12,7 +12,7 @@ from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.types import Float32
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.send.faults import Timed
-from tools.send.velodyne_packets import LAYOUTS, packets_of
+from tools.send.ideal_packets import LAYOUTS, packets_of
 
 BEGAN_S = 1.6e9
 

@@ -15,8 +15,8 @@ from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.packets.velodyne_models import model_named
 from modt.sources.pcd_file import read_pcd
 from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets
-from tools.send.loops import velodyne_loop
-from tools.send.velodyne_packets import LAYOUTS, ideal_calibration
+from tools.send.ideal_packets import LAYOUTS, ideal_calibration
+from tools.send.loops import turn_loop
 
 pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
 
@@ -98,7 +98,7 @@ def with_calibration(timed, elevations_deg):
 
 
 def test_an_hdl_64e_that_sends_its_calibration_is_decoded_by_it(caplog):
-    repeated = velodyne_loop([payload for _, payload in packets("hdl-64e", 4)])
+    repeated = turn_loop([payload for _, payload in packets("hdl-64e", 4)])
     timed = [(BEGAN_S + at_s, payload) for (at_s, payload), _ in zip(repeated, range(5200), strict=False)]
     sweeps, reception = sweeps_of(with_calibration(timed, LAYOUTS["hdl-64e"].elevations_deg))
     assert "which is used from now on" in caplog.text

@@ -1,4 +1,4 @@
-"""Live sensors that send packets, received from a UDP socket: Velodyne and Ouster."""
+"""Live sensors that send packets, received from a UDP socket: Velodyne, Ouster and Hesai."""
 
 from __future__ import annotations
 
@@ -127,8 +127,9 @@ def address_of(name: str, host: str) -> str | None:
         raise MisuseError(name, f"host {host} is unknown ({error.strerror})", "give the sensor's address") from None
 
 
-VELODYNE_PORT, OUSTER_PORT = 2368, 7502
-VELODYNE_PERIOD_S = 0.1
+TURN_PORT, OUSTER_PORT = 2368, 7502
+"""Of a Velodyne or a Hesai, and of an Ouster."""
+PERIOD_S = 0.1
 """As delivered, at 600 turns a minute; a sweep tells its own time."""
 
 
@@ -146,7 +147,21 @@ def open_velodyne(address: Address, cores: frozenset[int] | None) -> LiveStream:
     decoder = VelodyneDecoder(
         address.text, model_named(model) if model else None, Path(calibration) if calibration else None
     )
-    return _stream(address, decoder, address.port or VELODYNE_PORT, VELODYNE_PERIOD_S, cores)
+    return _stream(address, decoder, address.port or TURN_PORT, PERIOD_S, cores)
+
+
+def open_hesai(address: Address, cores: frozenset[int] | None) -> LiveStream:
+    """A Hesai at hesai://[HOST][:PORT][?calibration=FILE&group=ADDRESS]; HOST, PORT and group as of a Velodyne.
+
+    Without a file, the sensor itself is asked for its calibration where HOST says which it is.
+    """
+    from modt.sources.packets.hesai import HesaiDecoder, asked_angles, read_angles
+
+    calibration = address.option("calibration")
+    angles_deg = read_angles(Path(calibration)) if calibration else None
+    if not calibration and address.host:
+        angles_deg = asked_angles(address.host)
+    return _stream(address, HesaiDecoder(address.text, angles_deg), address.port or TURN_PORT, PERIOD_S, cores)
 
 
 def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:

@@ -1,4 +1,4 @@
-"""Sweeps as the packets of an ideal Velodyne: a VLP-16, or an HDL-64E without errors of its lasers."""
+"""Sweeps as the packets of an ideal VLP-16, HDL-64E or Hesai XT-32, whose lasers have no errors."""
 
 from __future__ import annotations
 
@@ -13,30 +13,58 @@ import yaml
 from modt.types import Float32, Float64, Frame
 
 UNIT_M = 0.002
-PACKET_BLOCKS, BLOCK_LASERS, TURN = 12, 32, 36_000
-HOUR_US = 3_600_000_000
+TURN = 36_000
+HOUR_US, DAY_US = 3_600_000_000, 86_400_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How a model's packets hold its firings.
+    """How a Velodyne's packets hold its firings.
 
     Attributes:
         elevations_deg: of the lasers, in the order of a firing.
         firing_us: time from one firing to the next.
         headers: of the blocks of a packet, repeated as often as they fit.
         tail: the last two bytes of a packet.
+        blocks, lasers: of a packet, and of a block.
+        unit_m: of distances.
     """
 
     elevations_deg: tuple[float, ...]
     firing_us: float
-    headers: tuple[bytes, ...]
-    tail: bytes
+    headers: tuple[bytes, ...] = ()
+    tail: bytes = b""
+    blocks: int = 12
+    lasers: int = 32
+    unit_m: float = UNIT_M
 
     @property
     def firings(self) -> int:
         """In a packet."""
-        return PACKET_BLOCKS * BLOCK_LASERS // len(self.elevations_deg)
+        return self.blocks * self.lasers // len(self.elevations_deg)
+
+    def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
+        """A packet of the azimuths of its blocks [0.01 deg], and (blocks, lasers, 2) distances and reflectances."""
+        table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1")]))
+        table["distance"], table["reflectance"] = cells[..., 0], cells[..., 1]
+        body = b""
+        for i, azimuth in enumerate(azimuths):
+            body += self.headers[i % len(self.headers)] + struct.pack("<H", azimuth) + table[i].tobytes()
+        return body + struct.pack("<I", round(at_us) % HOUR_US) + self.tail
+
+
+class HesaiLayout(Layout):
+    """How the packets of an XT-32 hold its firings."""
+
+    def packet(self, azimuths: Sequence[int], cells: Float64, at_us: float) -> bytes:
+        """As of Layout; it is stamped with the time of the last firing since midnight."""
+        table = np.zeros(cells.shape[:2], np.dtype([("distance", "<u2"), ("reflectance", "u1"), ("none", "u1")]))
+        table["distance"], table["reflectance"] = cells[..., 0], cells[..., 1]
+        head = bytes((0xEE, 0xFF, 6, 1, 0, 0, self.lasers, self.blocks, 1, round(1000 * self.unit_m), 1, 1))
+        body = b"".join(struct.pack("<H", a) + row.tobytes() for a, row in zip(azimuths, table, strict=True))
+        second, micros = divmod(round(at_us + (self.firings - 1) * self.firing_us) % DAY_US, 1_000_000)
+        date = bytes((119, 1, 1, second // 3600, second // 60 % 60, second % 60))
+        return head + body + bytes(10) + b"\x37\x58\x02" + date + struct.pack("<IB", micros, 0x42) + bytes(4)
 
 
 HDL_64E_DEG = (*(2.0 - i / 3 for i in range(32)), *(-8.83 - i / 2 for i in range(32)))
@@ -44,11 +72,15 @@ VLP_16_DEG = tuple(float(v) for i in range(8) for v in (-15 + 2 * i, 1 + 2 * i))
 LAYOUTS = {
     "hdl-64e": Layout(HDL_64E_DEG, 48.0, (b"\xff\xee", b"\xff\xdd"), b"V\x00"),
     "vlp-16": Layout(VLP_16_DEG, 55.296, (b"\xff\xee",), b"\x37\x22"),
+    "xt-32": HesaiLayout(tuple(15.0 - i for i in range(32)), 50.0, blocks=8, unit_m=0.004),
 }
 
 
 def ideal_calibration(layout: Layout) -> str:
-    """The calibration of the ideal sensor, in the format of ROS's velodyne_pointcloud."""
+    """The calibration of the ideal sensor: Hesai's table, or YAML of ROS's velodyne_pointcloud."""
+    if isinstance(layout, HesaiLayout):
+        rows = (f"{i},{elevation},0" for i, elevation in enumerate(layout.elevations_deg, 1))
+        return "\n".join(("Channel,Elevation,Azimuth", *rows))
     none = ("rot", "dist", "dist_x", "dist_y", "vert_offset", "horiz_offset")
     names = ["rot_correction", *(f"{name}_correction" for name in none[4:]), "dist_correction"]
     names += ["dist_correction_x", "dist_correction_y", "focal_distance", "focal_slope"]
@@ -79,7 +111,7 @@ def _image(points: Float32, layout: Layout, per_turn: int) -> Float64:
     """(per_turn, lasers, 2) distance in units and reflectance in bytes of the nearest point of each firing."""
     x, y, z, reflectance = points.T.astype(np.float64)
     distance = np.sqrt(x * x + y * y + z * z)
-    seen = np.flatnonzero((distance > 0) & (distance < UNIT_M * 65_535))
+    seen = np.flatnonzero((distance > 0) & (distance < layout.unit_m * 65_535))
     seen = seen[np.argsort(-distance[seen], kind="stable")]  # the nearest is written last
     elevation = np.rad2deg(np.arcsin(z[seen] / distance[seen]))
     order = np.argsort(layout.elevations_deg)
@@ -88,18 +120,13 @@ def _image(points: Float32, layout: Layout, per_turn: int) -> Float64:
     turned = (np.pi - np.arctan2(y[seen], x[seen])) / (2 * np.pi)  # 0 behind the sensor, clockwise
     column = (turned * per_turn).astype(np.int64) % per_turn
     image = np.zeros((per_turn, len(layout.elevations_deg), 2))
-    image[column, laser, 0] = np.rint(distance[seen] / UNIT_M)
+    image[column, laser, 0] = np.rint(distance[seen] / layout.unit_m)
     image[column, laser, 1] = np.rint(255 * reflectance[seen].clip(0, 1))
     return image
 
 
 def _packet(firings: Sequence[tuple[int, Float64]], layout: Layout, per_turn: int, at_us: float) -> bytes:
-    lasers = np.concatenate([values for _, values in firings]).reshape(PACKET_BLOCKS, BLOCK_LASERS, 2)
-    cells = np.zeros((PACKET_BLOCKS, BLOCK_LASERS), np.dtype([("distance", "<u2"), ("reflectance", "u1")]))
-    cells["distance"], cells["reflectance"] = lasers[..., 0], lasers[..., 1]
-    body = b""
-    for i in range(PACKET_BLOCKS):
-        firing = firings[i * BLOCK_LASERS // len(layout.elevations_deg)][0]
-        azimuth = (round((firing + 0.5) * TURN / per_turn) + TURN // 2) % TURN
-        body += layout.headers[i % len(layout.headers)] + struct.pack("<H", azimuth) + cells[i].tobytes()
-    return body + struct.pack("<I", round(at_us) % HOUR_US) + layout.tail
+    cells = np.concatenate([values for _, values in firings]).reshape(layout.blocks, layout.lasers, 2)
+    of_block = [firings[i * layout.lasers // len(layout.elevations_deg)][0] for i in range(layout.blocks)]
+    azimuths = [(round((firing + 0.5) * TURN / per_turn) + TURN // 2) % TURN for firing in of_block]
+    return layout.packet(azimuths, cells, at_us)
