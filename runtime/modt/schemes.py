@@ -93,6 +93,7 @@ SENSORS = {
         _opener(_PACKETS, "open_hesai"),
         frozenset({"calibration", "group"}),
     ),
+    "livox": Scheme("livox://[HOST][:PORT][?group=ADDRESS]", _opener(_PACKETS, "open_livox"), frozenset({"group"})),
     "ros2": Scheme(
         "ros2:///TOPIC[?domain=N&reliability=best_effort|reliable]",
         _opener("sources.live.ros2", "open_ros2"),

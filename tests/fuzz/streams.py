@@ -15,6 +15,7 @@ from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.hesai import HesaiDecoder, read_angles
+from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.pose_datagram import DatagramError, read_datagram
@@ -60,6 +61,11 @@ def velodyne_packets(folder: Path) -> Feed:
 @target()
 def hesai_packets(folder: Path) -> Feed:
     return _of_packets(HesaiDecoder("sensor"), _framed(packets("xt-32", 2)[100:500]))
+
+
+@target()
+def livox_packets(folder: Path) -> Feed:
+    return _of_packets(LivoxDecoder("sensor"), _framed(packets("mid-360", 3)[150:450]))
 
 
 @target()
@@ -187,6 +193,7 @@ TARGETS = (
         velodyne_packets,
         velodyne_calibration,
         hesai_packets,
+        livox_packets,
         hesai_calibration,
         ouster_packets,
         ouster_metadata,

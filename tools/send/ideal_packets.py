@@ -1,8 +1,9 @@
-"""Sweeps as the packets of an ideal VLP-16, HDL-64E or Hesai XT-32, whose lasers have no errors."""
+"""Sweeps as the packets of an ideal VLP-16, HDL-64E, Hesai XT-32 or Livox Mid-360, without errors of its lasers."""
 
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count
@@ -76,6 +77,10 @@ LAYOUTS = {
 }
 
 
+MID_360, LIVOX_POINTS = "mid-360", 96
+MODELS = (*LAYOUTS, MID_360)
+
+
 def ideal_calibration(layout: Layout) -> str:
     """The calibration of the ideal sensor: Hesai's table, or YAML of ROS's velodyne_pointcloud."""
     if isinstance(layout, HesaiLayout):
@@ -91,8 +96,31 @@ def ideal_calibration(layout: Layout) -> str:
     return yaml.safe_dump({"num_lasers": len(lasers), "distance_resolution": UNIT_M, "lasers": lasers})
 
 
-def packets_of(frames: Sequence[Frame], layout: Layout, period_s: float) -> Iterator[tuple[float, bytes]]:
+def packets_of(frames: Sequence[Frame], model: str, period_s: float) -> Iterator[tuple[float, bytes]]:
     """Time [s] at which each packet is full, and payload, of sweeps that follow one another without a gap."""
+    if model == MID_360:
+        return livox_packets_of(frames, period_s)
+    return _turning(frames, LAYOUTS[model], period_s)
+
+
+def livox_packets_of(frames: Sequence[Frame], period_s: float) -> Iterator[tuple[float, bytes]]:
+    """As `packets_of`: the points of each sweep are spread over its time in their order, 96 a packet in mm."""
+    row = np.dtype([("xyz", "<i4", 3), ("reflectance", "u1"), ("tag", "u1")])
+    for k, frame in enumerate(frames):
+        n_packets = -(-len(frame.points) // LIVOX_POINTS)
+        step_s = period_s / n_packets
+        for i in range(n_packets):
+            points = frame.points[i * LIVOX_POINTS : (i + 1) * LIVOX_POINTS]
+            table = np.zeros(len(points), row)
+            table["xyz"], table["reflectance"] = np.rint(points[:, :3] * 1000), np.rint(points[:, 3].clip(0, 1) * 255)
+            at_s, body = k * period_s + i * step_s, table.tobytes()
+            span = round(step_s * 1e7 * (len(points) - 1) / LIVOX_POINTS)
+            head = struct.pack("<BHHHHBBB12x", 0, 36 + len(body), span, len(points), i, 0, 1, 0)
+            stamp = struct.pack("<Q", round(at_s * 1e9))
+            yield at_s + step_s, head + struct.pack("<I", zlib.crc32(stamp + body)) + stamp + body
+
+
+def _turning(frames: Sequence[Frame], layout: Layout, period_s: float) -> Iterator[tuple[float, bytes]]:
     per_turn = round(period_s * 1e6 / layout.firing_us)
     images = (_image(frame.points, layout, per_turn) for frame in frames)
     firings = ((i, *firing) for i, image in enumerate(images) for firing in enumerate(image))

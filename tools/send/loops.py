@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator, Sequence
 from itertools import count
 from pathlib import Path
@@ -10,11 +11,33 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import MisuseError
-from modt.sources.packets import hesai
+from modt.sources.packets import hesai, livox
 from modt.sources.packets.packet_decoder import extra
 from modt.sources.packets.turn_decoder import TURN
 from modt.sources.packets.velodyne_models import STAMP_AT, azimuths
 from tools.send.faults import Timed
+
+
+def endless(payloads: Sequence[bytes]) -> Iterator[Timed]:
+    """Packets of a Velodyne, a Hesai or a Livox, as if the sensor had gone on.
+
+    Raises:
+        MisuseError: there is no whole turn of a head.
+    """
+    return livox_loop(payloads) if livox.is_packet(payloads[0]) else turn_loop(payloads)
+
+
+def livox_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
+    """The packets of a Livox, endlessly."""
+    stamps_ns = [int(livox.HEADER.unpack_from(p)[-1]) for p in payloads]
+    step_ns = float(np.median(np.diff(stamps_ns)))
+    sweeps = max(round((stamps_ns[-1] - stamps_ns[0] + step_ns) / livox.SWEEP_NS), 1)
+    for loop in count():
+        for stamp_ns, payload in zip(stamps_ns, payloads, strict=True):
+            ahead_ns = loop * sweeps * livox.SWEEP_NS
+            body = struct.pack("<Q", stamp_ns + ahead_ns) + payload[livox.HEADER.size :]
+            at_s = (stamp_ns + ahead_ns - stamps_ns[0] + step_ns) * 1e-9
+            yield at_s, payload[:24] + struct.pack("<I", zlib.crc32(body)) + body
 
 
 def turn_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:

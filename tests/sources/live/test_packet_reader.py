@@ -15,15 +15,16 @@ from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.packets import PacketReader, address_of, bound_socket
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.hesai import HesaiDecoder
+from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.stream import StreamInfo
 from tests.sources.packets.simulated import packets
-from tools.send.loops import turn_loop
+from tools.send.loops import endless
 from tools.send.packets import send
 from tools.send.pcap_writer import write_capture
 
-MAKERS = {"vlp-16": "velodyne", "xt-32": "hesai"}
+MAKERS = {"vlp-16": "velodyne", "xt-32": "hesai", "mid-360": "livox"}
 """Schemes of simulated models."""
 
 
@@ -207,7 +208,7 @@ def received(address, timed, to, n):
     for _ in range(n - len(frames)):
         take(60.0)
     live.close()
-    live.reader.decoder.decode = decode
+    del live.reader.decoder.decode
     return frames, arrived, live
 
 
@@ -251,12 +252,15 @@ def test_an_ouster_needs_its_metadata():
         open_sensor("ouster://127.0.0.1:7502")
 
 
-@pytest.mark.parametrize(("model", "made", "n"), [("vlp-16", VelodyneDecoder, 900), ("xt-32", HesaiDecoder, 3000)])
+@pytest.mark.parametrize(
+    ("model", "made", "n"),
+    [("vlp-16", VelodyneDecoder, 900), ("xt-32", HesaiDecoder, 3000), ("mid-360", LivoxDecoder, 1000)],
+)
 def test_a_loop_has_no_gap(model, made, n):
     if made is VelodyneDecoder:
         pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
     decoder, reception, sweeps = made("loop"), Reception(), []
-    for _, (at_s, payload) in zip(range(n), turn_loop([p for _, p in packets(model)]), strict=False):
+    for _, (at_s, payload) in zip(range(n), endless([p for _, p in packets(model)]), strict=False):
         sweeps += decoder.decode(at_s, payload, reception)
     assert reception.lost == 0
     assert len(sweeps) in (10, 11)

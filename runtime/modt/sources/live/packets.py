@@ -1,4 +1,4 @@
-"""Live sensors that send packets, received from a UDP socket: Velodyne, Ouster and Hesai."""
+"""Live sensors that send packets, received from a UDP socket: Velodyne, Ouster, Hesai, Livox."""
 
 from __future__ import annotations
 
@@ -127,8 +127,8 @@ def address_of(name: str, host: str) -> str | None:
         raise MisuseError(name, f"host {host} is unknown ({error.strerror})", "give the sensor's address") from None
 
 
-TURN_PORT, OUSTER_PORT = 2368, 7502
-"""Of a Velodyne or a Hesai, and of an Ouster."""
+TURN_PORT, OUSTER_PORT, LIVOX_PORT = 2368, 7502, 56301
+"""Of a Velodyne or a Hesai, of an Ouster, and of a Livox."""
 PERIOD_S = 0.1
 """As delivered, at 600 turns a minute; a sweep tells its own time."""
 
@@ -162,6 +162,13 @@ def open_hesai(address: Address, cores: frozenset[int] | None) -> LiveStream:
     if not calibration and address.host:
         angles_deg = asked_angles(address.host)
     return _stream(address, HesaiDecoder(address.text, angles_deg), address.port or TURN_PORT, PERIOD_S, cores)
+
+
+def open_livox(address: Address, cores: frozenset[int] | None) -> LiveStream:
+    """A Livox Mid-360 at livox://[HOST][:PORT][?group=ADDRESS]; HOST, PORT and group as of a Velodyne."""
+    from modt.sources.packets.livox import LivoxDecoder
+
+    return _stream(address, LivoxDecoder(address.text), address.port or LIVOX_PORT, PERIOD_S, cores)
 
 
 def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:

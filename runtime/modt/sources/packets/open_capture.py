@@ -11,6 +11,7 @@ from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.packets.packet_stream import PacketStream
+from modt.sources.scan_stream import PERIOD_S
 from modt.sources.stream import StreamInfo
 
 
@@ -42,7 +43,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         layout=f"{layout} packets",
         sequence=0,
         n_frames=None,
-        period_s=round(first.turn_s, 3),
+        period_s=round(first.turn_s, 3) or PERIOD_S,
         camera=None,
         has_poses=False,
         profile=decoder.profile,
@@ -53,7 +54,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
 
 def _decoder(capture: Capture, options: Mapping[str, str]) -> tuple[PacketDecoder, str]:
     """The decoder of the first packets that are any sensor's, and what the sensor is."""
-    from modt.sources.packets import hesai, velodyne_models
+    from modt.sources.packets import hesai, livox, velodyne_models
 
     path = capture.path
     beside, angles = path.with_suffix(".json"), path.with_suffix(".csv")
@@ -66,6 +67,8 @@ def _decoder(capture: Capture, options: Mapping[str, str]) -> tuple[PacketDecode
     for datagram in capture if "model" not in options else ():
         if velodyne_models.signature_of(datagram.payload):
             break
+        if livox.is_packet(datagram.payload):
+            return livox.LivoxDecoder(path.stem), "Livox"
         if hesai.model_of(datagram.payload):
             calibration = calibration or (angles if angles.is_file() else None)
             return hesai.HesaiDecoder(path.stem, hesai.read_angles(calibration) if calibration else None), "Hesai"
