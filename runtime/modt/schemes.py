@@ -83,7 +83,7 @@ SENSORS = {
         "velodyne",
     ),
     "ouster": Scheme(
-        "ouster://[HOST][:PORT]?metadata=FILE[&group=ADDRESS]",
+        "ouster://[HOST][:PORT][?metadata=FILE&group=ADDRESS]",
         _opener(_PACKETS, "open_ouster"),
         frozenset({"metadata", "group"}),
         "ouster",

@@ -172,7 +172,9 @@ def open_livox(address: Address, cores: frozenset[int] | None) -> LiveStream:
 
 
 def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """An Ouster at ouster://[HOST][:PORT]?metadata=FILE[&group=ADDRESS]; HOST, PORT and group as of a Velodyne.
+    """An Ouster at ouster://[HOST][:PORT][?metadata=FILE&group=ADDRESS]; HOST, PORT and group as of a Velodyne.
+
+    Without a file, the sensor itself is asked for its metadata.
 
     Raises:
         MisuseError: no metadata.
@@ -180,10 +182,10 @@ def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:
     from modt.sources.packets.ouster import OusterDecoder
 
     metadata = address.option("metadata")
-    if not metadata:
-        remedy = "add ?metadata=FILE, what the sensor says at /api/v1/sensor/metadata"
+    if not metadata and not address.host:
+        remedy = "write ouster://HOST, the sensor's address, to have it asked, or add ?metadata=FILE"
         raise MisuseError(address.text, "its packets cannot be read without the sensor's metadata", remedy)
-    decoder = OusterDecoder(address.text, Path(metadata))
+    decoder = OusterDecoder(address.text, Path(metadata) if metadata else address.host)
     return _stream(address, decoder, address.port or OUSTER_PORT, decoder.period_s, cores)
 
 
