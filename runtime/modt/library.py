@@ -1,10 +1,12 @@
-"""The library: a pipeline for programs that have their own loop."""
+"""The library: recordings and a pipeline for programs that have their own loop."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from operator import index
+from os import PathLike
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
@@ -20,8 +22,25 @@ from modt.energy.ledger import NullLedger
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.sources.pose_file import pose_defect
+from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
+from modt.sources.stream import Stream
 from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int
+
+
+def open(path: str | PathLike[str], **capture: str) -> Stream:
+    """The frames of a recording: a KITTI drive, a folder of scans, a PCAP file or a recording of ROS 2.
+
+    A frame has an index, a stamp_s [s], points (N, 4), and the recording's pose T_world_sensor, else None. The stream
+    can be iterated repeatedly. `between(first, last)` is a part of it, `info` says what it is, `faults` what could
+    not be used. `capture` is what a recording does not tell, as `--capture` of `modt replay`: model, calibration or
+    metadata of a sensor, the topic of a recording.
+
+    Raises:
+        MisuseError: there is no stream at the path, or an option does not apply.
+        ModtError: a recording that cannot be read.
+    """
+    return open_stream(Path(path), capture=capture)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,8 +124,8 @@ class Pipeline:
 
         import modt
         pipeline = modt.Pipeline.from_profile("vlp-16", mode="accurate")
-        for stamp_s, points in sweeps:
-            for found in pipeline.step(points, stamp_s).objects().as_dicts():
+        for frame in modt.open("DRIVE"):
+            for found in pipeline.step(frame).objects().as_dicts():
                 print(found["id"], found["object_class"], found["box_sensor"])
 
     The mode is "conventional", "efficient" or "accurate".
@@ -143,13 +162,18 @@ class Pipeline:
         return pipeline
 
     def step(
-        self, points: ArrayLike, stamp_s: float, T_world_sensor: ArrayLike | None = None, *, turn_s: float = 0.0
+        self,
+        points: ArrayLike | Frame,
+        stamp_s: float | None = None,
+        T_world_sensor: ArrayLike | None = None,
+        *,
+        turn_s: float = 0.0,
     ) -> TrackedObjects:
         """The tracks after one sweep.
 
         Args:
-            points: (N, 3) or (N, 4) x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1]; points
-                that are not finite count as no return.
+            points: a frame of `open`, which needs no other argument; or (N, 3) or (N, 4) x, y, z [m, sensor frame:
+                x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
             T_world_sensor: (4, 4) pose at the stamp; None: the proposals themselves tell the motion of the sensor.
             turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
@@ -158,6 +182,12 @@ class Pipeline:
             MisuseError: arguments of another shape, a stamp that goes back, a matrix that is no pose.
             ScanError: columns that are not x, y, z, reflectance.
         """
+        if isinstance(points, Frame):
+            given = points
+            points, stamp_s, turn_s = given.points, given.stamp_s, given.turn_s
+            T_world_sensor = given.T_world_sensor if T_world_sensor is None else T_world_sensor
+        if stamp_s is None:
+            raise MisuseError("stamp None", "the points have no time", "give the time of the sweep [s]")
         if not np.isfinite(stamp_s) or stamp_s < self._stamp_s:
             last = f"not after the last one, {self._stamp_s!r}"
             raise MisuseError(f"stamp {stamp_s!r}", last, "give rising times [s]")
