@@ -202,3 +202,15 @@ def test_a_profile_that_was_asked_for_is_kept_and_warned_of(frames, caplog):
         library.step(frame.points, frame.stamp_s)
     assert library.config == load("os1-64")
     assert [record.message.count("profile os1-64 is not of this sensor") for record in caplog.records] == [1]
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
+def test_stamps_in_another_unit_are_recognised(factor, unit, caplog):
+    points = np.zeros((3, 4), np.float32)
+    with pytest.raises(MisuseError, match=f"no time in seconds: it is one in {unit}"):
+        modt.Pipeline.from_profile("vlp-16").step(points, 1.7e9 * factor)
+    library = modt.Pipeline.from_profile("vlp-16")
+    for k in range(3):
+        library.step(points, 0.1 * k * factor)
+    (line,) = [r.message for r in caplog.records if r.name == "modt.library"]
+    assert f"are they in {unit}?" in line

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import math
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from operator import index
@@ -24,8 +26,10 @@ from modt.geometry import FieldOfView
 from modt.sources.pose_file import pose_defect
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
-from modt.sources.stream import Stream
+from modt.sources.stream import Stream, no_seconds, unit_of
 from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int
+
+log = logging.getLogger(__name__)
 
 
 def open(path: str | PathLike[str], **capture: str) -> Stream:
@@ -140,7 +144,7 @@ class Pipeline:
         self.mode = mode
         self._asked: profile.Names | ProfileConfig = config
         self._use(config)
-        self._index, self._stamp_s = 0, -np.inf
+        self._index, self._stamp_s, self._warned = 0, -math.inf, False
 
     def _use(self, config: ProfileConfig) -> None:
         chosen = assembly.MODES[self.mode]
@@ -188,7 +192,9 @@ class Pipeline:
             T_world_sensor = given.T_world_sensor if T_world_sensor is None else T_world_sensor
         if stamp_s is None:
             raise MisuseError("stamp None", "the points have no time", "give the time of the sweep [s]")
-        if not np.isfinite(stamp_s) or stamp_s < self._stamp_s:
+        if wrong := no_seconds(stamp_s):
+            raise MisuseError("step", wrong, "give rising times [s]")
+        if stamp_s < self._stamp_s:
             last = f"not after the last one, {self._stamp_s!r}"
             raise MisuseError(f"stamp {stamp_s!r}", last, "give rising times [s]")
         pose = None if T_world_sensor is None else np.array(T_world_sensor, np.float64)
@@ -200,6 +206,11 @@ class Pipeline:
             chosen = choose(self._asked, frame, None)
             if chosen.config != self.config:
                 self._use(chosen.config)
+        unit = unit_of((stamp_s - self._stamp_s) / self.config.sensor.period_s)
+        if unit and not self._warned:
+            self._warned = True
+            passed_s = stamp_s - self._stamp_s
+            log.warning("stamps: %g s lie between two sweeps: are they in %s? Give seconds", passed_s, unit)
         self._index, self._stamp_s = self._index + 1, float(stamp_s)
         result = self._pipeline.step(frame, self._budget)
         tracks, visible = result.tracks, result.tracks.proposal != NONE
