@@ -74,26 +74,26 @@ def _pose_socket(address: Address, config: OdometryConfig) -> PoseSource:
     return PoseSocket(open_socket(address), config, address.text)
 
 
-_PACKETS = "sources.live.packets"
+_PACKETS = _opener("sources.live.packets", "open_packets")
 SENSORS = {
     "velodyne": Scheme(
         "velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE&group=ADDRESS]",
-        _opener(_PACKETS, "open_velodyne"),
+        _PACKETS,
         frozenset({"model", "calibration", "group"}),
         "velodyne",
     ),
     "ouster": Scheme(
         "ouster://[HOST][:PORT][?metadata=FILE&group=ADDRESS]",
-        _opener(_PACKETS, "open_ouster"),
+        _PACKETS,
         frozenset({"metadata", "group"}),
         "ouster",
     ),
     "hesai": Scheme(
         "hesai://[HOST][:PORT][?calibration=FILE&group=ADDRESS]",
-        _opener(_PACKETS, "open_hesai"),
+        _PACKETS,
         frozenset({"calibration", "group"}),
     ),
-    "livox": Scheme("livox://[HOST][:PORT][?group=ADDRESS]", _opener(_PACKETS, "open_livox"), frozenset({"group"})),
+    "livox": Scheme("livox://[HOST][:PORT][?group=ADDRESS]", _PACKETS, frozenset({"group"})),
     "ros2": Scheme(
         "ros2:///TOPIC[?domain=N&reliability=best_effort|reliable]",
         _opener("sources.live.ros2", "open_ros2"),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modt.errors import ScanError
-from modt.sources.point_table import MAX_POINTS, SKIPPED, points_of
+from modt.sources.point_table import MAX_POINTS, SKIPPED, numbers_of, points_of
 from modt.types import Float32
 
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
@@ -83,17 +83,12 @@ def _row(element: Element, encoding: str) -> np.dtype[Any]:
 
 
 def _text(path: Path, body: bytes, skipped: int, n_rows: int, row: np.dtype[Any]) -> NDArray[Any]:
-    width = len(row.names or ())
+    """Rows of the lines after some that are skipped; what follows the numbers of a row is left out."""
+    names = row.names or ()
     lines = [line for line in body.splitlines() if line.strip()][skipped : skipped + n_rows]
-    numbers = [number for line in lines for number in line.split(maxsplit=width)[:width]]
-    if len(numbers) < n_rows * width:
-        raise ScanError(path, f"truncated: {len(numbers)} numbers for {n_rows} points", SKIPPED)
-    try:
-        values = np.array(numbers, np.float64).reshape(-1, width)
-        table = np.empty(n_rows, row)
-        with np.errstate(invalid="ignore", over="ignore"):
-            for i, name in enumerate(row.names or ()):
-                table[name] = values[:, i]
-    except ValueError:
-        raise ScanError(path, "its text holds what is no number", SKIPPED) from None
+    words = [word for line in lines for word in line.split(maxsplit=len(names))[: len(names)]]
+    values, table = numbers_of(words, n_rows, len(names), path), np.empty(n_rows, row)
+    with np.errstate(invalid="ignore", over="ignore"):
+        for i, name in enumerate(names):
+            table[name] = values[:, i]
     return table

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from struct import Struct
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.packet_decoder import DeviceClock, refuse
+from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
 from modt.types import Float32
 
 HEADER = Struct("<BH2xH3xB13x4xQ")
@@ -33,14 +32,13 @@ MAX_GAP = 10
 """Sweeps between two packets beyond which the sensor was off, or its clock was set."""
 
 
-class LivoxDecoder:
+class LivoxDecoder(PacketDecoder):
     """Cuts the packets by the sensor's clock; a sweep that had begun before its first packet was received is none.
 
     Points that the sensor itself calls unlikely are left out.
     """
 
-    profile: str | None = "mid-360"
-    elevations_deg: tuple[float, ...] | None = None
+    profile = "mid-360"
     _window: int
     _before_ns: int | None
     _packets: dict[int, bytes]
@@ -48,12 +46,6 @@ class LivoxDecoder:
     def __init__(self, name: str) -> None:
         self.name = name
         self._forget()
-
-    def again(self) -> Self:
-        """A decoder of the same sensor that has seen no packet yet."""
-        other = copy.copy(self)
-        other._forget()
-        return other
 
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points of a Livox."""
@@ -81,10 +73,6 @@ class LivoxDecoder:
             self._window, self._packets = stamp_ns // SWEEP_NS, {}
         self._packets[stamp_ns] = payload
         return sweeps
-
-    def pause(self, reception: Reception) -> Sequence[Sweep]:
-        """None: the sensor never pauses."""
-        return []
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
         """The last sweep, if all that it waited for is the packet after it."""

@@ -9,9 +9,8 @@ from pathlib import Path
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.capture import Capture
-from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for
 from modt.sources.packets.packet_stream import PacketStream
-from modt.sources.scan_stream import PERIOD_S
 from modt.sources.stream import StreamInfo
 
 
@@ -25,7 +24,12 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         MisuseError: no PCAP file, no packets of a sensor, no whole sweep; an invalid option, a missing extra.
     """
     capture = Capture(path)
-    decoder, layout = _decoder(capture, options)
+    if "model" not in options:
+        options = _beside(path, metadata=".json") | dict(options)
+    maker = _maker(capture, options)
+    if maker == "hesai":
+        options = _beside(path, calibration=".csv") | dict(options)
+    decoder, layout = decoder_for(maker, path.stem, options), maker.capitalize()
     capture.flow = next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
     if capture.flow is None:
         seen = Counter(f"{len(d.payload)} bytes to port {d.port}" for d in capture)
@@ -43,7 +47,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         layout=f"{layout} packets",
         sequence=0,
         n_frames=None,
-        period_s=round(first.turn_s, 3) or PERIOD_S,
+        period_s=round(first.turn_s, 3) or decoder.period_s,
         camera=None,
         has_poses=False,
         profile=decoder.profile,
@@ -52,30 +56,26 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     return PacketStream(info, capture, decoder)
 
 
-def _decoder(capture: Capture, options: Mapping[str, str]) -> tuple[PacketDecoder, str]:
-    """The decoder of the first packets that are any sensor's, and what the sensor is."""
+def _beside(path: Path, **suffixes: str) -> dict[str, str]:
+    """Options that are files with the name of the capture, where these are."""
+    files = {option: path.with_suffix(suffix) for option, suffix in suffixes.items()}
+    return {option: str(file) for option, file in files.items() if file.is_file()}
+
+
+def _maker(capture: Capture, options: Mapping[str, str]) -> str:
+    """Who made the sensor whose packets come first."""
     from modt.sources.packets import hesai, livox, velodyne_models
 
-    path = capture.path
-    beside, angles = path.with_suffix(".json"), path.with_suffix(".csv")
-    metadata = options.get("metadata", str(beside) if beside.is_file() and "model" not in options else "")
-    if metadata:
-        from modt.sources.packets.ouster import OusterDecoder
-
-        return OusterDecoder(path.stem, Path(metadata)), "Ouster"
-    calibration = Path(options["calibration"]) if "calibration" in options else None
+    if "metadata" in options:
+        return "ouster"
     for datagram in capture if "model" not in options else ():
         if velodyne_models.signature_of(datagram.payload):
             break
-        if livox.is_packet(datagram.payload):
-            return livox.LivoxDecoder(path.stem), "Livox"
         if hesai.model_of(datagram.payload):
-            calibration = calibration or (angles if angles.is_file() else None)
-            return hesai.HesaiDecoder(path.stem, hesai.read_angles(calibration) if calibration else None), "Hesai"
-    from modt.sources.packets.velodyne import VelodyneDecoder
-
-    model = velodyne_models.model_named(options["model"]) if "model" in options else None
-    return VelodyneDecoder(path.stem, model, calibration), "Velodyne"
+            return "hesai"
+        if livox.is_packet(datagram.payload):
+            return "livox"
+    return "velodyne"
 
 
 def _first_sweep(capture: Capture, decoder: PacketDecoder) -> Sweep | None:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Sequence
 from http.client import HTTPException
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from modt import assets
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.packet_decoder import DeviceClock, extra, one_line, refuse
+from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, extra, one_line, refuse
 from modt.sources.text_file import read_text
 from modt.types import Bool, Float32
 
@@ -26,11 +25,11 @@ MAX_LOST_FRAMES = 20
 """More frames missing in a row are a sensor that was switched on again."""
 
 
-class OusterDecoder:
+class OusterDecoder(PacketDecoder):
     """Packets to frames of the SDK, which are sweeps: they begin behind the sensor and turn clockwise.
 
-    A sweep that had begun before its first packet was received is no sweep. Of two returns of a firing the first
-    field is taken.
+    A sweep is complete by the last packet of its window. One that had begun before its first packet was received is
+    none. Of two returns of a firing the first field is taken.
     """
 
     def __init__(self, name: str, metadata: Path | str) -> None:
@@ -45,16 +44,10 @@ class OusterDecoder:
         info = self._info
         self._width, self._columns = info.format.columns_per_frame, info.format.columns_per_packet
         self._awaited = _awaited(info.format.column_window, self._width, self._columns)
-        self.elevations_deg: tuple[float, ...] | None = tuple(map(float, info.beam_altitude_angles))
+        self.elevations_deg = tuple(map(float, info.beam_altitude_angles))
         self.period_s = 1.0 / (info.format.fps or 10)
         self.profile = _profile(info.prod_line)
         self._forget()
-
-    def again(self) -> Self:
-        """A decoder of the same sensor that has seen no packet yet."""
-        other = copy.copy(self)
-        other._forget()
-        return other
 
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points that fits the metadata."""
@@ -74,12 +67,6 @@ class OusterDecoder:
             refuse(reception, self.name, "of another sensor than the metadata")
             return []
         return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
-
-    def pause(self, reception: Reception) -> Sequence[Sweep]:
-        """None: the SDK completes a frame by the last packet of its window."""
-        return []
-
-    finish = pause
 
     def _forget(self) -> None:
         used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import logging
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from bisect import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,7 +14,7 @@ from typing import Any, Self
 import numpy as np
 
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.packet_decoder import DeviceClock, refuse
+from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
 from modt.types import Float32, Float64
 
 log = logging.getLogger(__name__)
@@ -134,14 +133,11 @@ SILENCE_S = 1.0
 NO_TURN = Turn(0.0, None)
 
 
-class TurnDecoder(ABC):
+class TurnDecoder(PacketDecoder):
     """Cuts the packets behind the sensor and decodes a turn at a time.
 
     Each beam's part of a turn is cut where the beam looks backwards, not the head. What is received before the first
     cut is no sweep. The packets of one model are followed; a subclass knows the models and their packets.
-
-    Attributes:
-        name, profile, elevations_deg: as in PacketDecoder.
     """
 
     maker: str
@@ -155,7 +151,6 @@ class TurnDecoder(ABC):
 
     def __init__(self, name: str, profile: str | None = None) -> None:
         self.name, self.profile = name, profile
-        self.elevations_deg: tuple[float, ...] | None = None
         self._first: list[tuple[float, bytes]] | None = []
         self._signature: object = None
         self._reach, self._packet_s = 0, 0.0
@@ -180,9 +175,8 @@ class TurnDecoder(ABC):
 
     def again(self) -> Self:
         """A decoder of the same sensor that has seen no packet yet."""
-        other = copy.copy(self)
+        other = super().again()
         other._first = None if self._first is None else []
-        other._forget()
         return other
 
     def accepts(self, payload: bytes) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from collections.abc import Sequence
 from pathlib import Path
@@ -23,35 +22,6 @@ from modt.sources.packets.velodyne_models import (
     signature_of,
 )
 from modt.types import Float32
-
-CYCLE, TAIL = 4160, slice(-6, None)
-"""Packets in which all of it is sent; stamp, type and value of a status."""
-
-
-class CalibrationBytes:
-    """Collects the ends of packets until they hold a calibration."""
-
-    def __init__(self, library: Any) -> None:
-        self._library = library
-        self._tails: list[bytes] = []
-
-    def add(self, payload: bytes) -> tuple[str, Any] | None:
-        """Member of velodyne_decoder.Model and calibration of the unit, once they have been received whole."""
-        self._tails.append(payload[TAIL])
-        if len(self._tails) <= CYCLE:
-            return None
-        tails, self._tails = self._tails, []
-        try:
-            status = self._library.hdl64e.read_status_info(tails)
-        except (ValueError, KeyError):  # packets are missing, or they hold no status
-            return None
-        if status["Calibration Time"] is None:
-            return None
-        table = self._library.hdl64e.status_info_to_calib_dict(status)
-        del table["status"]
-        member = f"HDL64E_{status['Model']}"
-        return member, self._library.Calibration.from_string(json.dumps(table))
-
 
 log = logging.getLogger(__name__)
 
@@ -75,12 +45,7 @@ class VelodyneDecoder(TurnDecoder):
         self._library = extra("velodyne_decoder", "velodyne")
         self._declared, self._calibration = model, None if calibration is None else self._read(calibration)
         self._identity: bytes | None = None
-        self._own: CalibrationBytes | None = None
         super().__init__(name, model.profile if model else None)
-
-    def _forget(self) -> None:
-        super()._forget()
-        self._own = None if self._own is None else CalibrationBytes(self._library)
 
     def _read(self, calibration: Path) -> Any:
         try:
@@ -96,31 +61,17 @@ class VelodyneDecoder(TurnDecoder):
         self.profile = model.profile
         self._identity = None if model.signature.identity is None else bytes([model.signature.identity])
         self._reach, self._packet_s = model.reach, model.interval_us * 1e-6
-        calibration, self._own = self._calibration, None
+        calibration = self._calibration
         if calibration is None and model.calibration is not None:
             calibration = self._library.get_bundled_calibration(model.calibration)
-            self._own = CalibrationBytes(self._library)
-            remedy = "until it has sent its own; better give them by calibration="
-            log.warning("%s: beams as of another %s %s", self.name, model.name, remedy)
-        self._decoder = self._scan_decoder(model.member, calibration)
+            log.warning("%s: beams as of another %s; give its own by calibration=FILE", self.name, model.name)
+        member = getattr(self._library.Model, model.member)
+        self._decoder = self._library.ScanDecoder(self._library.Config(model=member, calibration=calibration))
         return signature
-
-    def _scan_decoder(self, member: str, calibration: Any) -> Any:
-        config = self._library.Config(model=getattr(self._library.Model, member), calibration=calibration)
-        return self._library.ScanDecoder(config)
-
-    def _calibrate(self, own: CalibrationBytes, payload: bytes) -> None:
-        """Use the unit's own calibration from the packet on that completes it."""
-        found = own.add(payload)
-        if found is not None:
-            self._decoder, self._own = self._scan_decoder(*found), None
-            log.warning("%s: it has sent the calibration of its beams, which is used from now on", self.name)
 
     def _entry(self, received_s: float, payload: bytes) -> Entry:
         stamp_s = int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little") * 1e-6
         time_s = self._clock.unwrapped(stamp_s, received_s - self._packet_s)  # it is sent when it is full
-        if self._own is not None:
-            self._calibrate(self._own, payload)
         first, last = azimuths(payload)
         phase = (first + AHEAD) % TURN
         if self._identity is not None:  # the library checks it, and there are packets that lie
