@@ -153,7 +153,7 @@ class TurnDecoder(PacketDecoder):
         self.name, self.profile = name, profile
         self._first: list[tuple[float, bytes]] | None = []
         self._signature: object = None
-        self._reach, self._packet_s = 0, 0.0
+        self._reach, self._packet_s, self._most = 0, 0.0, 0
         self._forget()
 
     @staticmethod
