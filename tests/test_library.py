@@ -14,6 +14,7 @@ from modt.geometry import FieldOfView, inverse, se3
 from modt.profile import load
 from modt.types import NONE
 from modt_desk.simulation.synthetic_stream import SyntheticStream
+from tests.sources import layouts
 
 
 @pytest.fixture(scope="module", name="frames")
@@ -50,6 +51,22 @@ def test_step_returns_what_the_pipeline_finds(frames, mode):
         np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
     assert len(found.objects()) > 0
     assert not (found.objects().object_class == 0).any()
+
+
+def test_frames_of_a_recording_are_stepped_with_their_poses_and_times(tmp_path):
+    drive = modt.open(str(layouts.raw_drive(tmp_path)))
+    by_frame, by_hand = (modt.Pipeline.from_profile("hdl-64e") for _ in range(2))
+    assert drive.info.has_poses
+    for frame in drive:
+        found = by_frame.step(frame)
+        expected = by_hand.step(frame.points, frame.stamp_s, frame.T_world_sensor, turn_s=frame.turn_s)
+        assert found.as_dicts() == expected.as_dicts()
+        np.testing.assert_array_equal(found.T_world_sensor, frame.T_world_sensor)
+    assert frame.index == drive.info.end - 1
+    with pytest.raises(MisuseError, match="no time"):
+        by_hand.step(frame.points)
+    with pytest.raises(MisuseError, match="model does not apply"):
+        modt.open(tmp_path, model="vlp-16")
 
 
 def test_without_poses_the_pose_is_the_registered_one(frames):
@@ -184,3 +201,15 @@ def test_a_profile_that_was_asked_for_is_kept_and_warned_of(frames, caplog):
         library.step(frame.points, frame.stamp_s)
     assert library.config == load("os1-64")
     assert [record.message.count("profile os1-64 is not of this sensor") for record in caplog.records] == [1]
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")])
+def test_stamps_in_another_unit_are_recognised(factor, unit, caplog):
+    points = np.zeros((3, 4), np.float32)
+    with pytest.raises(MisuseError, match=f"no time in seconds: it is one in {unit}"):
+        modt.Pipeline.from_profile("vlp-16").step(points, 1.7e9 * factor)
+    library = modt.Pipeline.from_profile("vlp-16")
+    for k in range(3):
+        library.step(points, 0.1 * k * factor)
+    (line,) = [r.message for r in caplog.records if r.name == "modt.library"]
+    assert f"are they in {unit}?" in line

@@ -1,10 +1,14 @@
-"""The library: a pipeline for programs that have their own loop."""
+"""The library: recordings and a pipeline for programs that have their own loop."""
 
 from __future__ import annotations
 
+import logging
+import math
 from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from operator import index
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,8 +23,27 @@ from modt.config import ProfileConfig
 from modt.errors import MisuseError
 from modt.geometry import FieldOfView
 from modt.sources.pose_file import pose_defect
+from modt.sources.recognise import open_stream
 from modt.sources.scan_file import sanitised
+from modt.sources.stream import Stream, no_seconds, unit_of
 from modt.types import NONE, UNRECORDED, Bool, Float32, Float64, Frame, Int, Self
+
+log = logging.getLogger(__name__)
+
+
+def open(path: str | PathLike[str], **capture: str) -> Stream:
+    """The frames of a recording: a KITTI drive, a folder of scans, a PCAP file or a recording of ROS 2.
+
+    A frame has an index, a stamp_s [s], points (N, 4), and the recording's pose T_world_sensor, else None. The stream
+    can be iterated repeatedly. `between(first, last)` is a part of it, `info` says what it is, `faults` what could
+    not be used. `capture` is what a recording does not tell, as `--capture` of `modt replay`: model, calibration or
+    metadata of a sensor, the topic of a recording.
+
+    Raises:
+        MisuseError: there is no stream at the path, or an option does not apply.
+        ModtError: a recording that cannot be read.
+    """
+    return open_stream(Path(path), capture=capture)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +127,8 @@ class Pipeline:
 
         import modt
         pipeline = modt.Pipeline.from_profile("vlp-16", mode="accurate")
-        for stamp_s, points in sweeps:
-            for found in pipeline.step(points, stamp_s).objects().as_dicts():
+        for frame in modt.open("DRIVE"):
+            for found in pipeline.step(frame).objects().as_dicts():
                 print(found["id"], found["object_class"], found["box_sensor"])
 
     The mode is "conventional", "efficient" or "accurate".
@@ -120,7 +143,7 @@ class Pipeline:
         self.mode = mode
         self._asked: profile.Names | ProfileConfig = config
         self._use(config)
-        self._index, self._stamp_s = 0, -np.inf
+        self._index, self._stamp_s, self._warned = 0, -math.inf, False
 
     def _use(self, config: ProfileConfig) -> None:
         chosen = assembly.MODES[self.mode]
@@ -142,13 +165,18 @@ class Pipeline:
         return pipeline
 
     def step(
-        self, points: ArrayLike, stamp_s: float, T_world_sensor: ArrayLike | None = None, *, turn_s: float = 0.0
+        self,
+        points: ArrayLike | Frame,
+        stamp_s: float | None = None,
+        T_world_sensor: ArrayLike | None = None,
+        *,
+        turn_s: float = 0.0,
     ) -> TrackedObjects:
         """The tracks after one sweep.
 
         Args:
-            points: (N, 3) or (N, 4) x, y, z [m, sensor frame: x forward, y left, z up], reflectance [0, 1]; points
-                that are not finite count as no return.
+            points: a frame of `open`, which needs no other argument; or (N, 3) or (N, 4) x, y, z [m, sensor frame:
+                x forward, y left, z up], reflectance [0, 1]. Points that are not finite count as no return.
             stamp_s: time of the sweep [s], never before that of the last one.
             T_world_sensor: (4, 4) pose at the stamp; None: the proposals themselves tell the motion of the sensor.
             turn_s: as modt.types.Frame.turn_s, for sweeps that are not compensated for the motion of the sensor.
@@ -157,7 +185,15 @@ class Pipeline:
             MisuseError: arguments of another shape, a stamp that goes back, a matrix that is no pose.
             ScanError: columns that are not x, y, z, reflectance.
         """
-        if not np.isfinite(stamp_s) or stamp_s < self._stamp_s:
+        if isinstance(points, Frame):
+            given = points
+            points, stamp_s, turn_s = given.points, given.stamp_s, given.turn_s
+            T_world_sensor = given.T_world_sensor if T_world_sensor is None else T_world_sensor
+        if stamp_s is None:
+            raise MisuseError("stamp None", "the points have no time", "give the time of the sweep [s]")
+        if wrong := no_seconds(stamp_s):
+            raise MisuseError("step", wrong, "give rising times [s]")
+        if stamp_s < self._stamp_s:
             last = f"not after the last one, {self._stamp_s!r}"
             raise MisuseError(f"stamp {stamp_s!r}", last, "give rising times [s]")
         pose = None if T_world_sensor is None else np.array(T_world_sensor, np.float64)
@@ -169,6 +205,11 @@ class Pipeline:
             chosen = choose(self._asked, frame, None)
             if chosen.config != self.config:
                 self._use(chosen.config)
+        unit = unit_of((stamp_s - self._stamp_s) / self.config.sensor.period_s)
+        if unit and not self._warned:
+            self._warned = True
+            passed_s = stamp_s - self._stamp_s
+            log.warning("stamps: %g s lie between two sweeps: are they in %s? Give seconds", passed_s, unit)
         self._index, self._stamp_s = self._index + 1, float(stamp_s)
         result = self._pipeline.step(frame, self._budget)
         tracks, visible = result.tracks, result.tracks.proposal != NONE

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from modt.address import Address, Scheme, open_address
 
@@ -46,74 +48,21 @@ def open_poses(text: str, config: OdometryConfig) -> PoseSource:
     return poses
 
 
-def _velodyne(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    from modt.sources.live.packets import open_velodyne
+def _opener(module: str, name: str) -> Callable[..., Any]:
+    """A function of a module of modt, which is imported when an address is opened."""
 
-    return open_velodyne(address, cores)
+    def opened(*arguments: object) -> Any:
+        return getattr(import_module(f"modt.{module}"), name)(*arguments)
 
-
-def _ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    from modt.sources.live.packets import open_ouster
-
-    return open_ouster(address, cores)
+    return opened
 
 
-def _point_clouds(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    from modt.sources.live.ros2 import open_ros2
-
-    return open_ros2(address, cores)
-
-
-def _stdout(address: Address) -> Sink:
-    from modt.sinks.frame_lines import open_stdout
-
-    return open_stdout(address)
-
-
-def _file(address: Address) -> Sink:
-    from modt.sinks.frame_lines import open_file
-
-    return open_file(address)
-
-
-def _unix(address: Address) -> Sink:
-    from modt.sinks.datagrams import open_unix
-
-    return open_unix(address)
-
-
-def _udp(address: Address) -> Sink:
-    from modt.sinks.datagrams import open_udp
-
-    return open_udp(address)
-
-
-def _mcap(address: Address) -> Sink:
-    from modt.sinks.mcap_file import open_mcap
-
-    return _in_background(address, open_mcap(address), 4)
-
-
-def _foxglove(address: Address) -> Sink:
-    from modt.sinks.foxglove_server import open_foxglove
-
-    return _in_background(address, open_foxglove(address), 4)
-
-
-def _view(address: Address) -> Sink:
-    from modt.viewer.live_page import open_view
-
-    return _in_background(address, open_view(address), 6)
-
-
-def _detections(address: Address) -> Sink:
-    from modt.sinks.ros2 import open_ros2
-
-    return _in_background(address, open_ros2(address), 4)
+def _background(module: str, name: str, depth: int) -> Callable[[Address], Sink]:
+    """The same for a writer that may wait; `depth` frames, with their points, wait for it at most."""
+    return lambda address: _in_background(address, _opener(module, name)(address), depth)
 
 
 def _in_background(address: Address, writer: Writer[FrameResult], depth: int) -> Sink:
-    """A sink for a writer that may wait; `depth` frames, with their points, wait for it at most."""
     from modt.sinks.background import Background
 
     return Background(address.text, writer, depth)
@@ -125,42 +74,50 @@ def _pose_socket(address: Address, config: OdometryConfig) -> PoseSource:
     return PoseSocket(open_socket(address), config, address.text)
 
 
-def _pose_topic(address: Address, config: OdometryConfig) -> PoseSource:
-    from modt.sources.pose_topic import open_topic
-
-    return open_topic(address, config)
-
-
+_PACKETS = _opener("sources.live.packets", "open_packets")
 SENSORS = {
     "velodyne": Scheme(
         "velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE&group=ADDRESS]",
-        _velodyne,
+        _PACKETS,
         frozenset({"model", "calibration", "group"}),
         "velodyne",
     ),
     "ouster": Scheme(
-        "ouster://[HOST][:PORT]?metadata=FILE[&group=ADDRESS]", _ouster, frozenset({"metadata", "group"}), "ouster"
+        "ouster://[HOST][:PORT][?metadata=FILE&group=ADDRESS]",
+        _PACKETS,
+        frozenset({"metadata", "group"}),
+        "ouster",
     ),
+    "hesai": Scheme(
+        "hesai://[HOST][:PORT][?calibration=FILE&group=ADDRESS]",
+        _PACKETS,
+        frozenset({"calibration", "group"}),
+    ),
+    "livox": Scheme("livox://[HOST][:PORT][?group=ADDRESS]", _PACKETS, frozenset({"group"})),
     "ros2": Scheme(
         "ros2:///TOPIC[?domain=N&reliability=best_effort|reliable]",
-        _point_clouds,
+        _opener("sources.live.ros2", "open_ros2"),
         frozenset({"domain", "reliability"}),
         "ros2",
     ),
 }
-_DETECTIONS = frozenset({"domain", "frame_id", "world_frame_id", "tracks"})
+_POINTS, _DETECTIONS = frozenset({"points"}), frozenset({"domain", "frame_id", "world_frame_id", "tracks"})
 SINKS = {
-    "stdout": Scheme("stdout://", _stdout),
-    "file": Scheme("file:///PATH", _file),
-    "unix": Scheme("unix:///PATH", _unix),
-    "udp": Scheme("udp://HOST:PORT", _udp),
-    "mcap": Scheme("mcap:///PATH", _mcap, frozenset({"points", "max_mb"}), "foxglove"),
-    "foxglove": Scheme("foxglove://[HOST][:PORT]", _foxglove, frozenset({"points"}), "foxglove"),
-    "view": Scheme("view://[HOST][:PORT]", _view),
-    "ros2": Scheme("ros2:///PREFIX", _detections, _DETECTIONS, "ros2"),
+    "stdout": Scheme("stdout://", _opener("sinks.frame_lines", "open_stdout")),
+    "file": Scheme("file:///PATH", _opener("sinks.frame_lines", "open_file")),
+    "unix": Scheme("unix:///PATH", _opener("sinks.datagrams", "open_unix")),
+    "udp": Scheme("udp://HOST:PORT", _opener("sinks.datagrams", "open_udp")),
+    "mcap": Scheme("mcap:///PATH", _background("sinks.mcap_file", "open_mcap", 4), _POINTS | {"max_mb"}, "foxglove"),
+    "foxglove": Scheme(
+        "foxglove://[HOST][:PORT]", _background("sinks.foxglove_server", "open_foxglove", 4), _POINTS, "foxglove"
+    ),
+    "view": Scheme("view://[HOST][:PORT]", _background("viewer.live_page", "open_view", 6)),
+    "ros2": Scheme("ros2:///PREFIX", _background("sinks.ros2", "open_ros2", 4), _DETECTIONS, "ros2"),
 }
 POSES = {
     "udp": Scheme("udp://HOST:PORT", _pose_socket),
     "unix": Scheme("unix:///PATH", _pose_socket),
-    "ros2": Scheme("ros2:///TOPIC", _pose_topic, frozenset({"domain", "base_to_sensor"}), "ros2"),
+    "ros2": Scheme(
+        "ros2:///TOPIC", _opener("sources.pose_topic", "open_topic"), frozenset({"domain", "base_to_sensor"}), "ros2"
+    ),
 }

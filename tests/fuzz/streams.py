@@ -14,6 +14,8 @@ from modt.ros2.point_cloud2 import read_cloud, write_cloud
 from modt.ros2.static_transforms import StaticTransforms
 from modt.sources.live.sweep_reader import Reception
 from modt.sources.packets.capture import Capture
+from modt.sources.packets.hesai import HesaiDecoder, read_angles
+from modt.sources.packets.livox import LivoxDecoder
 from modt.sources.packets.open_capture import open_capture
 from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.sources.pose_datagram import DatagramError, read_datagram
@@ -22,8 +24,8 @@ from tests.fuzz.target import Feed, of_file, target
 from tests.ros2 import messages
 from tests.sources import bags, layouts
 from tests.sources.packets.simulated import packets
+from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 from tools.send.pcap_writer import ethernet, ipv4, udp, write_capture
-from tools.send.velodyne_packets import LAYOUTS, ideal_calibration
 
 LENGTH = struct.Struct("<Id")
 """Before a packet in an input: its bytes, and when it was received."""
@@ -54,6 +56,22 @@ def velodyne_packets(folder: Path) -> Feed:
     from modt.sources.packets.velodyne import VelodyneDecoder
 
     return _of_packets(VelodyneDecoder("sensor"), _framed(packets("vlp-16", 3)[60:180]))
+
+
+@target()
+def hesai_packets(folder: Path) -> Feed:
+    return _of_packets(HesaiDecoder("sensor"), _framed(packets("xt-32", 2)[100:500]))
+
+
+@target()
+def livox_packets(folder: Path) -> Feed:
+    return _of_packets(LivoxDecoder("sensor"), _framed(packets("mid-360", 3)[150:450]))
+
+
+@target()
+def hesai_calibration(folder: Path) -> Feed:
+    path = folder / "ideal.csv"
+    return of_file(path, lambda: read_angles(path), ideal_calibration(LAYOUTS["xt-32"]))
 
 
 @target()
@@ -169,6 +187,17 @@ def _of_packets(decoder: PacketDecoder, seed: bytes) -> Feed:
 
 
 TARGETS = (
-    *(pcap, velodyne_capture, velodyne_packets, velodyne_calibration, ouster_packets, ouster_metadata, database),
+    *(
+        pcap,
+        velodyne_capture,
+        velodyne_packets,
+        velodyne_calibration,
+        hesai_packets,
+        livox_packets,
+        hesai_calibration,
+        ouster_packets,
+        ouster_metadata,
+        database,
+    ),
     *(mcap, point_cloud, odometry, transforms, pose_datagram),
 )

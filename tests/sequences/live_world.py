@@ -19,7 +19,8 @@ from modt.ros2.odometry import write_odometry
 from modt.ros2.point_cloud2 import write_cloud
 from modt.sources.live.live_stream import LiveStream
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.velodyne import CYCLE, RECOGNISED_BY, VelodyneDecoder
+from modt.sources.packets.turn_decoder import RECOGNISED_BY
+from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.packets.velodyne_models import STAMP_AT, azimuths
 from modt.sources.pose_datagram import read_datagram
 from modt.sources.pose_topic import PoseTopic
@@ -257,7 +258,6 @@ class LiveWorld:
         assert len(decoder._ending.entries) <= most
         assert len(decoder._first or []) <= RECOGNISED_BY
         assert len(decoder._others) <= RECOGNISED_BY
-        assert decoder._own is None or len(decoder._own._tails) <= CYCLE + 1
         assert max(len(poses.believed), len(poses._doubted)) <= CONFIG.capacity
         assert len(self.stream.faults.first) <= MAX_KEPT_FAULTS
 

@@ -45,6 +45,48 @@ def test_points_of_every_form(form):
     assert not flaws
 
 
+def test_an_ascii_ply_may_have_lists_before_and_after_its_numbers(tmp_path):
+    text = """ply
+format ascii 1.0
+element face 2
+property list uchar int vertex_indices
+element vertex 2
+property float x
+property float y
+property float z
+property float scalar_Intensity
+property list uint float64 descriptor
+element face 1
+property list uchar int vertex_indices
+end_header
+3 0 1 2
+4 0 1 2 3
+
+1.5 2 3 51 2 0.5 0.25
+4 5 6 102 0
+3 0 1 2
+"""
+    points, _ = read(tmp_path / "scan.ply", text.encode())
+    assert points == pytest.approx(np.array([[1.5, 2, 3, 0.2], [4, 5, 6, 0.4]]))
+
+
+def test_a_pcd_of_padded_memory_is_read(tmp_path):
+    row = np.dtype(
+        {
+            "names": ["x", "y", "z", "intensity", "ring"],
+            "formats": ["<f4", "<f4", "<f4", "<f4", "<u2"],
+            "offsets": [0, 4, 8, 16, 20],
+            "itemsize": 32,
+        }
+    )
+    rows = np.zeros(3, row)
+    rows["x"], rows["intensity"] = [1, 2, 3], [51, 102, 255]
+    head = "FIELDS x y z _ intensity ring _\nSIZE 4 4 4 1 4 2 1\nTYPE F F F U F U U\nCOUNT 1 1 1 4 1 1 10\n"
+    head += "WIDTH 3\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3\nDATA binary\n"
+    points, _ = read(tmp_path / "scan.pcd", head.encode() + rows.tobytes())
+    assert points == pytest.approx(np.array([[1, 0, 0, 0.2], [2, 0, 0, 0.4], [3, 0, 0, 1]]))
+
+
 def test_columns_of_any_order_and_type(form):
     points, _ = form(table(ring="u2", z="f8", time="f4", reflectivity="u2", x="f8", intensity="f4", y="f4"))
     np.testing.assert_allclose(points[:, :3], np.arange(5)[:, None] + [4, 6, 1])

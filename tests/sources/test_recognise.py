@@ -49,6 +49,50 @@ def test_odometry_poses_are_converted_to_sensor_poses(tmp_path):
     assert frames[1].stamp_s == 0.104
 
 
+@pytest.mark.parametrize(
+    ("text", "stamps_s", "note"),
+    [
+        ("0.000000e+00\n1.040000e-01\n2.070000e-01\n", [0, 0.104, 0.207], None),
+        ("1317384506.40\n1317384506.50\n1317384506.61\n", [0, 0.1, 0.21], None),
+        ("1317384506400\n1317384506500\n1317384506610\n", [0, 0.1, 0.21], None),
+        ("1317384506400000000\n1317384506500000000\n1317384506610000000\n", [0, 0.1, 0.21], None),
+        ("", [0, 0.1, 0.2], "times.txt is empty: frames 0.1 s apart"),
+        ("a b\nc d\n\n", [0, 0.1, 0.2], "times.txt is no list of time stamps"),
+        ("0.0\nnan\n0.3\n", [0, 0.15, 0.3], "1 frames have no time in .*theirs are interpolated"),
+        ("0.0\n0.15\n", [0, 0.15, 0.3], "times.txt has 2 lines, the last scan is number 2"),
+    ],
+    ids=["KITTI", "since 1970", "ms", "ns", "empty", "no numbers", "one is none", "short"],
+)
+def test_times_of_an_odometry_sequence_are_used_as_far_as_they_go(tmp_path, text, stamps_s, note):
+    sequence = layouts.odometry(tmp_path)
+    (sequence / "times.txt").write_text(text)
+    stream = open_stream(sequence)
+    assert [f.stamp_s for f in stream] == pytest.approx(stamps_s, abs=1e-6)
+    assert bool(stream.info.notes) is (note is not None)
+    assert note is None or re.search(note, stream.info.notes[0])
+
+
+@pytest.mark.parametrize(
+    ("build", "part"),
+    [
+        (layouts.odometry, "poses.txt"),
+        (layouts.odometry, "calib.txt"),
+        (layouts.tracking, "../../oxts/0003.txt"),
+        (layouts.tracking, "../../calib/0003.txt"),
+        (layouts.raw_drive, "velodyne_points/timestamps.txt"),
+        (layouts.raw_drive, "oxts/data/*.txt"),
+        (layouts.raw_drive, "../calib_imu_to_velo.txt"),
+    ],
+)
+def test_an_empty_part_is_a_missing_one(tmp_path, build, part):
+    root = build(tmp_path)
+    for path in root.glob(part) if "*" in part else [root / part]:
+        path.write_text("")
+    stream = open_stream(root)
+    assert len(list(stream)) > 2
+    assert stream.info.notes + stream.info.pose_notes
+
+
 def test_tracking_poses_come_from_oxts(tmp_path):
     stream = open_stream(layouts.tracking(tmp_path))
     assert stream.info.sequence == 3
@@ -319,6 +363,9 @@ def test_a_raw_drive_without_scans_is_refused(tmp_path):
         ("a.LAS", r"is a LAS file; convert it: pdal translate"),
         ("a.laz", r"is a LAS file; convert it: pdal translate"),
         ("a.npy", r"is an array of NumPy; convert it: numpy.load"),
+        ("a.xyz", r"is a table of text; convert it: numpy.loadtxt"),
+        ("a.osf", r"is a recording of Ouster's SDK; convert it: ouster-cli"),
+        ("a.lvx2", r"is a recording of Livox Viewer; record the packets instead: tcpdump"),
     ],
 )
 def test_a_known_file_that_is_not_read_is_one_line_with_its_conversion(tmp_path, name, cause):

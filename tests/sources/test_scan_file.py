@@ -160,3 +160,11 @@ def test_a_few_points_beyond_any_range_are_no_return(tmp_path):
     assert read[7].tolist() == [0.0, 0.0, 0.0, 0.0]
     assert np.array_equal(read[:7], points[:7])
     assert flaws == []
+
+
+def test_a_scan_of_nuscenes_has_a_fifth_column(tmp_path):
+    rows = np.array([[1, 2, 3, 51, 7], [4, 5, 6, 255, 31]] * 8, np.float32)
+    path = tmp_path / "n015__LIDAR_TOP__1532402927647951.pcd.bin"
+    path.write_bytes(rows.tobytes())  # 16 rows of 5, which would be 20 rows of 4
+    points, _ = read_scan(path)
+    assert points == pytest.approx(rows[:, :4] / [1, 1, 1, 255])

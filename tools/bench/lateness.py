@@ -20,7 +20,7 @@ from typing import Any
 
 from modt import host
 from tools.options import parser
-from tools.send.velodyne_packets import LAYOUTS, ideal_calibration
+from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 
 PORT, DOMAIN = 23_680, 96
 LONGEST_S = 120.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator, Sequence
 from itertools import count
 from pathlib import Path
@@ -10,31 +11,100 @@ from pathlib import Path
 import numpy as np
 
 from modt.errors import MisuseError
+from modt.sources.packets import hesai, livox
 from modt.sources.packets.packet_decoder import extra
-from modt.sources.packets.velodyne_models import STAMP_AT, TURN, azimuths
+from modt.sources.packets.turn_decoder import TURN
+from modt.sources.packets.velodyne_models import STAMP_AT, azimuths
 from tools.send.faults import Timed
 
-HOUR_US = 3_600_000_000
+
+def endless(payloads: Sequence[bytes]) -> Iterator[Timed]:
+    """Packets of a Velodyne, a Hesai or a Livox, as if the sensor had gone on.
+
+    Raises:
+        MisuseError: there is no whole turn of a head.
+    """
+    return livox_loop(payloads) if livox.is_packet(payloads[0]) else turn_loop(payloads)
 
 
-def velodyne_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
-    """The whole turns of a Velodyne's packets, endlessly.
+def livox_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
+    """The packets of a Livox, endlessly."""
+    stamps_ns = [int(livox.HEADER.unpack_from(p)[-1]) for p in payloads]
+    step_ns = float(np.median(np.diff(stamps_ns)))
+    sweeps = max(round((stamps_ns[-1] - stamps_ns[0] + step_ns) / livox.SWEEP_NS), 1)
+    for loop in count():
+        for stamp_ns, payload in zip(stamps_ns, payloads, strict=True):
+            ahead_ns = loop * sweeps * livox.SWEEP_NS
+            body = struct.pack("<Q", stamp_ns + ahead_ns) + payload[livox.HEADER.size :]
+            at_s = (stamp_ns + ahead_ns - stamps_ns[0] + step_ns) * 1e-9
+            yield at_s, payload[:24] + struct.pack("<I", zlib.crc32(body)) + body
+
+
+def turn_loop(payloads: Sequence[bytes]) -> Iterator[Timed]:
+    """The whole turns of the packets of a Velodyne or a Hesai, endlessly.
 
     Raises:
         MisuseError: there is no whole turn.
     """
-    phases = np.array([(azimuths(p)[0] + TURN // 2) % TURN for p in payloads])
+    model = hesai.model_of(payloads[0])
+    wire = VelodyneStamps() if model is None else HesaiStamps(model)
+    phases = np.array([(wire.azimuth(p) + TURN // 2) % TURN for p in payloads])
     seams = np.flatnonzero(np.diff(phases) < 0) + 1
     if len(seams) < 2:
         raise MisuseError("capture", "no whole turn to repeat", "give a longer one, or --once")
-    stamps_us = [struct.unpack_from("<I", p, STAMP_AT)[0] for p in payloads]
+    stamps_us = [wire.stamp_us(p) for p in payloads]
     first, end = int(seams[0]), int(seams[-1])
-    duration_us = (stamps_us[end] - stamps_us[first]) % HOUR_US
+    duration_us = (stamps_us[end] - stamps_us[first]) % wire.wrap_us
     for turn in count():
         for i in range(first, end):
-            at_us = turn * duration_us + (stamps_us[i] - stamps_us[first]) % HOUR_US
-            stamp = struct.pack("<I", (stamps_us[first] + at_us) % HOUR_US)
-            yield at_us * 1e-6, payloads[i][:STAMP_AT] + stamp + payloads[i][STAMP_AT + 4 :]
+            at_us = turn * duration_us + (stamps_us[i] - stamps_us[first]) % wire.wrap_us
+            yield at_us * 1e-6, wire.stamped(payloads[i], (stamps_us[first] + at_us) % wire.wrap_us)
+
+
+class VelodyneStamps:
+    """Where a Velodyne's packets have azimuth and time."""
+
+    wrap_us = 3_600_000_000
+
+    def azimuth(self, payload: bytes) -> int:
+        """Of the first block [0.01 deg]."""
+        return azimuths(payload)[0]
+
+    def stamp_us(self, payload: bytes) -> int:
+        """Time of the packet."""
+        return int.from_bytes(payload[STAMP_AT : STAMP_AT + 4], "little")
+
+    def stamped(self, payload: bytes, stamp_us: int) -> bytes:
+        """The packet at another time."""
+        return payload[:STAMP_AT] + struct.pack("<I", stamp_us) + payload[STAMP_AT + 4 :]
+
+
+class HesaiStamps:
+    """The same of a Hesai's packets."""
+
+    wrap_us = 86_400_000_000
+
+    def __init__(self, model: hesai.Model) -> None:
+        self._model = model
+        self._hour_at, self._micros_at = model.tail + model.layout.date + 3, model.tail + model.layout.micros
+
+    def azimuth(self, payload: bytes) -> int:
+        """Of the first block [0.01 deg]."""
+        return int(self._model.azimuths.unpack_from(payload)[0])
+
+    def stamp_us(self, payload: bytes) -> int:
+        """Time of the packet."""
+        hour, minute, second = payload[self._hour_at :][:3]
+        micros = int.from_bytes(payload[self._micros_at :][:4], "little")
+        return (hour * 3600 + minute * 60 + second) * 1_000_000 + micros
+
+    def stamped(self, payload: bytes, stamp_us: int) -> bytes:
+        """The packet at another time."""
+        out = bytearray(payload)
+        second, micros = divmod(stamp_us, 1_000_000)
+        out[self._hour_at : self._hour_at + 3] = second // 3600, second // 60 % 60, second % 60
+        out[self._micros_at : self._micros_at + 4] = struct.pack("<I", micros)
+        return bytes(out)
 
 
 def ouster_loop(payloads: Sequence[bytes], metadata: Path) -> Iterator[Timed]:

@@ -27,9 +27,9 @@ from modt.sources.recognise import CAPTURES, open_stream
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.options import parser
 from tools.send.faults import PacketFaults, Timed
-from tools.send.loops import ouster_loop, velodyne_loop
+from tools.send.ideal_packets import LAYOUTS, MODELS, ideal_calibration, packets_of
+from tools.send.loops import endless, ouster_loop
 from tools.send.pcap_writer import write_capture
-from tools.send.velodyne_packets import LAYOUTS, ideal_calibration, packets_of
 
 SYNTHETIC_S = 5.0
 
@@ -61,18 +61,17 @@ def captured(path: Path, metadata: Path | None, *, once: bool) -> Iterator[Timed
     if once:
         return ((d.stamp_s - datagrams[0].stamp_s, d.payload) for d in datagrams)
     payloads = [d.payload for d in datagrams]
-    if stream.info.layout.startswith("Velodyne"):
-        return velodyne_loop(payloads)
-    return ouster_loop(payloads, metadata or path.with_suffix(".json"))
+    if stream.info.layout.startswith("Ouster"):
+        return ouster_loop(payloads, metadata or path.with_suffix(".json"))
+    return endless(payloads)
 
 
 def made(path: Path | None, model: str, calibration: Path | None, part: tuple[int, int | None]) -> list[Timed]:
     """Packets of an ideal sensor that saw the sweeps of a stream, followed by those of the stream again."""
-    layout = LAYOUTS[model]
-    if calibration is not None:
-        calibration.write_text(ideal_calibration(layout), encoding="utf-8")
+    if calibration is not None and model in LAYOUTS:
+        calibration.write_text(ideal_calibration(LAYOUTS[model]), encoding="utf-8")
     stream = SyntheticStream("street", model, SYNTHETIC_S) if path is None else open_stream(path)
-    return [*packets_of([*stream.between(*part)], layout, stream.info.period_s)]
+    return [*packets_of([*stream.between(*part)], model, stream.info.period_s)]
 
 
 def main() -> None:
@@ -80,7 +79,7 @@ def main() -> None:
     options.add_argument("address", metavar="HOST:PORT")
     options.add_argument("path", type=Path, nargs="?", help="capture or stream")
     options.add_argument("--metadata", type=Path, help="of an Ouster (default: the capture's name with .json)")
-    options.add_argument("--as", dest="model", choices=LAYOUTS, default="vlp-16", help="default: %(default)s")
+    options.add_argument("--as", dest="model", choices=MODELS, default="vlp-16", help="default: %(default)s")
     options.add_argument("--calibration", type=Path, help="file to write, of the ideal sensor")
     options.add_argument("--frames", type=frames, default=(0, None), metavar="A:B", help="of a stream")
     options.add_argument("--once", action="store_true", help="do not repeat")
@@ -104,7 +103,7 @@ def run(arguments: argparse.Namespace) -> None:
     else:
         packets = made(arguments.path, arguments.model, arguments.calibration, arguments.frames)
         if not arguments.once:
-            packets = velodyne_loop([payload for _, payload in packets])
+            packets = endless([payload for _, payload in packets])
     faults = PacketFaults(
         arguments.loss, arguments.duplicates, arguments.reordering, arguments.garbage, arguments.seed
     )

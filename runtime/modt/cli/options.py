@@ -67,8 +67,8 @@ def add_sink_option(p: Parser) -> None:
 def add_capture_option(p: Parser) -> None:
     """Add the facts that a recording does not hold."""
     what = (
-        "of a PCAP file: model=MODEL or calibration=FILE of a Velodyne, metadata=FILE of an Ouster; of a ROS 2 "
-        "recording with several topics of point clouds: topic=NAME; repeatable"
+        "of a PCAP file: model=MODEL, calibration=FILE of a Velodyne, calibration=FILE of a Hesai, metadata=FILE of "
+        "an Ouster; of a ROS 2 recording with several topics of point clouds: topic=NAME; repeatable"
     )
     p.add_argument("--capture", type=capture, action="append", default=[], metavar="KEY=VALUE", help=what)
 

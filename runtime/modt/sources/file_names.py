@@ -15,6 +15,11 @@ _CALENDAR = re.compile(
 )
 _SECONDS = re.compile(r"([0-9]{1,9})(\.)([0-9]+)")
 
+MAX_NS = 1e19
+"""A greater number is no time in any unit."""
+UNITS_NS = (1e11, 10**9), (1e14, 10**6), (1e17, 10**3)
+"""Numbers below which a time is in seconds, milliseconds, microseconds, and what is 1 of each [ns]."""
+
 
 def files_in(folder: Path, suffix: str) -> list[Path]:
     """Regular files with a suffix in a folder, in the order of the times in their names, else of the numbers."""
@@ -45,6 +50,18 @@ def time_ns(text: str) -> int | None:
     """Time in a text [ns], None where there is none."""
     found = _time(text.strip())
     return None if found is None else found[0] * 10**9 + int(found[2].ljust(9, "0"))
+
+
+def seconds_ns(text: str) -> int | None:
+    """A number of seconds [ns], or a number as great as only milli-, micro- or nanoseconds since 1970 are."""
+    try:
+        time = float(text)
+    except ValueError:
+        return None
+    if not abs(time) < MAX_NS:
+        return None
+    unit_ns = next((unit for most, unit in UNITS_NS if abs(time) < most), 1)
+    return round(time * unit_ns)
 
 
 def _time(name: str) -> tuple[int, str, str] | None:

@@ -19,11 +19,10 @@ import numpy as np
 from modt.errors import MisuseError
 from modt.geometry import Camera
 from modt.sources import kitti_calibration, oxts
-from modt.sources.file_names import files_in, time_ns, times_ns
+from modt.sources.file_names import files_in, seconds_ns, time_ns, times_ns
 from modt.sources.pose_file import read_poses, sensor_poses
 from modt.sources.scan_stream import PERIOD_S, ScanReference, ScanStream
 from modt.sources.stream import StreamInfo
-from modt.sources.text_file import read_numbers
 from modt.types import Float64
 
 MAX_NUMBER_DIGITS = 10
@@ -55,7 +54,7 @@ def raw_drive(drive: Path) -> ScanStream:
     poses = _poses_of_raw(drive, notes)
     data = drive / "velodyne_points" / "data"
     frames, _ = _scans(data)
-    stamps = _raw_stamps(drive / "velodyne_points" / "timestamps.txt", frames, notes)
+    stamps = _stamps(drive / "velodyne_points" / "timestamps.txt", frames, notes, time_ns)
     turns = _raw_turns(drive / "velodyne_points", frames, notes)
     return _stream(drive.name, "KITTI raw drive", data, camera, poses, stamps, notes, turns=turns)
 
@@ -71,8 +70,8 @@ def tracking_sequence(scans: Path) -> ScanStream:
     camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, NO_CAMERA)
     records = root / "oxts" / f"{number}.txt"
     poses: Poses = {}
-    if not records.is_file():
-        notes.of_poses.append(f"{records} is missing: {NO_POSES}")
+    if absent := _absent(records):
+        notes.of_poses.append(f"{records} {absent}: {NO_POSES}")
     else:
         T_imu_sensor = _optional(kitti_calibration.T_imu_sensor_of_sequence, calib, notes.of_poses, NO_POSES)
         if T_imu_sensor is not None:
@@ -91,22 +90,14 @@ def odometry_sequence(sequence: Path) -> ScanStream:
     cost = f"{NO_CAMERA}; get Tr from data_odometry_calib.zip"
     camera = _optional(kitti_calibration.camera_of_sequence, calib, notes.of_stream, cost)
     places = (sequence / "poses.txt", sequence.parent.parent / "poses" / f"{sequence.name}.txt")
-    found = next((p for p in places if p.is_file()), None)
+    found = next((p for p in places if not _absent(p)), None)
     poses: Poses = {}
     if found is None or camera is None:
-        lacking = f"{places[0]} is missing" if found is None else f"{found} needs the Tr of {calib}"
-        notes.of_poses.append(f"{lacking}: {NO_POSES}")
+        cause = f"{places[0]} {_absent(places[0])}" if found is None else f"{found} needs the Tr of {calib}"
+        notes.of_poses.append(f"{cause}: {NO_POSES}")
     else:
         poses = dict(enumerate(sensor_poses(read_poses(found), camera.T_camera_sensor)))
-    times = sequence / "times.txt"
-    stamps: dict[int, float] = {}
-    if times.is_file():
-        table = read_numbers(times, "restore it, or remove it")
-        if table.shape[1] != 1:
-            raise MisuseError(times, f"{table.shape[1]} columns, not 1", "restore it, or remove it")
-        stamps = dict(enumerate(table[:, 0].tolist()))
-    else:
-        notes.of_stream.append(f"{times} is missing: frames {PERIOD_S} s apart")
+    stamps = _stamps(sequence / "times.txt", _scans(sequence / "velodyne")[0], notes, seconds_ns)
     return _stream(f"odometry {sequence.name}", "KITTI odometry", sequence / "velodyne", camera, poses, stamps, notes)
 
 
@@ -183,7 +174,8 @@ def _filled(poses: Poses, indices: list[int]) -> Poses:
 
 
 def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
-    records = [r for r in files_in(drive / "oxts" / "data", ".txt") if re.fullmatch("[0-9]+", r.stem)]
+    files = files_in(drive / "oxts" / "data", ".txt")
+    records = [r for r in files if re.fullmatch("[0-9]+", r.stem) and r.stat().st_size]
     if not records:
         notes.of_poses.append(f"{drive / 'oxts' / 'data'} is missing: {NO_POSES}")
         return {}
@@ -194,9 +186,9 @@ def _poses_of_raw(drive: Path, notes: Notes) -> Poses:
     return dict(zip((int(r.stem) for r in records), T_world_imu @ T_imu_sensor, strict=True))
 
 
-def _raw_stamps(path: Path, frames: Sequence[int], notes: Notes) -> dict[int, float]:
+def _stamps(path: Path, frames: Sequence[int], notes: Notes, read: Callable[[str], int | None]) -> dict[int, float]:
     """Seconds since scan 0, by frame; interpolated where missing."""
-    times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "theirs are interpolated")
+    times = _times_ns(path, frames, f"frames {PERIOD_S} s apart", notes, "theirs are interpolated", read)
     if not times:
         return {}
     known, began = sorted(times), min(times.values())
@@ -225,16 +217,23 @@ def _raw_turns(folder: Path, frames: Sequence[int], notes: Notes) -> dict[int, f
     return turns
 
 
-def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_of_few: str = "") -> dict[int, int]:
+def _times_ns(
+    path: Path,
+    frames: Sequence[int],
+    cost: str,
+    notes: Notes,
+    cost_of_few: str = "",
+    read: Callable[[str], int | None] = time_ns,
+) -> dict[int, int]:
     """Times of a KITTI list, by frame [ns]: line i is that of scan i, blank where it is missing.
 
     Defects are noted with their cost, that of single frames without a time by default the same.
     """
-    if not path.is_file():
-        notes.of_stream.append(f"{path} is missing: {cost}")
+    if absent := _absent(path):
+        notes.of_stream.append(f"{path} {absent}: {cost}")
         return {}
     lines = path.read_text(encoding="utf-8", errors="replace").rstrip().split("\n")
-    times = {i: time for i, time in enumerate(map(time_ns, lines)) if time is not None}
+    times = {i: time for i, time in enumerate(map(read, lines)) if time is not None}
     if not times:
         notes.of_stream.append(f"{path} is no list of time stamps: {cost}")
         return {}
@@ -247,6 +246,13 @@ def _times_ns(path: Path, frames: Sequence[int], cost: str, notes: Notes, cost_o
         lacking = f"{len(without)} frames have no time in {path} (the first is {without[0]})"
         notes.of_stream.append(f"{lacking}: {cost_of_few or cost}")
     return times
+
+
+def _absent(path: Path) -> str:
+    """Why a part of a recording is not there, empty if it is; an empty file is what a broken download leaves."""
+    if not path.is_file():
+        return "is missing"
+    return "" if path.stat().st_size else "is empty"
 
 
 def _optional(read: Callable[[Path], T], path: Path, notes: list[str], cost: str) -> T | None:

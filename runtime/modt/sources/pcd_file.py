@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modt.errors import ScanError
-from modt.sources.point_table import MAX_POINTS, SKIPPED, points_of
+from modt.sources.point_table import MAX_POINTS, SKIPPED, numbers_of, points_of
 from modt.types import Float32
 
 MAX_LITERAL = 32
@@ -113,13 +113,7 @@ def _header(path: Path, raw: bytes) -> tuple[Header, int]:
 
 def _ascii(path: Path, header: Header, body: bytes) -> Mapping[str, NDArray[Any]]:
     width = sum(header.counts)
-    numbers = body.split()
-    if len(numbers) < header.n_points * width:
-        raise ScanError(path, f"truncated: {len(numbers)} numbers for {header.n_points} points", SKIPPED)
-    try:
-        table = np.array(numbers[: header.n_points * width], np.float64).reshape(-1, width)
-    except ValueError:
-        raise ScanError(path, "its text holds what is no number", SKIPPED) from None
+    table = numbers_of(body.split(), header.n_points, width, path)
     starts = np.cumsum((0, *header.counts))
     integral = [np.issubdtype(kind, np.integer) for kind in header.kinds]
     columns = zip(header.names, starts, integral, strict=False)

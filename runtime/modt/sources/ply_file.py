@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modt.errors import ScanError
-from modt.sources.point_table import MAX_POINTS, SKIPPED, points_of
+from modt.sources.point_table import MAX_POINTS, SKIPPED, numbers_of, points_of
 from modt.types import Float32
 
 TYPES = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"}
@@ -44,15 +44,20 @@ def read_ply(path: Path, raw: bytes) -> Float32:
         encoding, elements = _header(raw[:end].decode("ascii", "replace"))
         before = list(takewhile(lambda element: element.name != "vertex", elements))
         vertex = elements[len(before)]
-        skipped, row = [_row(element, encoding) for element in before], _row(vertex, encoding)
+        if encoding == "ascii":  # a row is a line, so that lists after the numbers, and elements before, are skipped
+            vertex.properties = list(takewhile(lambda p: not p[1].startswith("list"), vertex.properties))
+            row, skipped_bytes = _row(vertex, encoding), 0
+        else:
+            row = _row(vertex, encoding)
+            skipped_bytes = sum(e.n_rows * _row(e, encoding).itemsize for e in before)
     except (KeyError, ValueError, IndexError):
-        raise ScanError(path, "its header cannot be read, or has lists before or in its vertices", SKIPPED) from None
+        raise ScanError(path, "its header cannot be read, or has lists before its points", SKIPPED) from None
     if not 0 <= vertex.n_rows <= MAX_POINTS or any(not 0 <= e.n_rows <= MAX_POINTS for e in before) or not row.names:
         raise ScanError(path, "its header promises what no scan has", SKIPPED)
     if encoding == "ascii":
-        table = _text(path, raw[start:], sum(e.n_rows * len(e.properties) for e in before), vertex.n_rows, row)
+        table = _text(path, raw[start:], sum(e.n_rows for e in before), vertex.n_rows, row)
     else:
-        start += sum(e.n_rows * kind.itemsize for e, kind in zip(before, skipped, strict=True))
+        start += skipped_bytes
         if len(raw) - start < vertex.n_rows * row.itemsize:
             raise ScanError(path, f"truncated: {len(raw) - start} bytes for {vertex.n_rows} points", SKIPPED)
         table = np.frombuffer(raw, row, vertex.n_rows, start)
@@ -78,16 +83,12 @@ def _row(element: Element, encoding: str) -> np.dtype[Any]:
 
 
 def _text(path: Path, body: bytes, skipped: int, n_rows: int, row: np.dtype[Any]) -> NDArray[Any]:
-    width = len(row.names or ())
-    numbers = body.split()[skipped : skipped + n_rows * width]
-    if len(numbers) < n_rows * width:
-        raise ScanError(path, f"truncated: {len(numbers)} numbers for {n_rows} points", SKIPPED)
-    try:
-        values = np.array(numbers, np.float64).reshape(-1, width)
-        table = np.empty(n_rows, row)
-        with np.errstate(invalid="ignore", over="ignore"):
-            for i, name in enumerate(row.names or ()):
-                table[name] = values[:, i]
-    except ValueError:
-        raise ScanError(path, "its text holds what is no number", SKIPPED) from None
+    """Rows of the lines after some that are skipped; what follows the numbers of a row is left out."""
+    names = row.names or ()
+    lines = [line for line in body.splitlines() if line.strip()][skipped : skipped + n_rows]
+    words = [word for line in lines for word in line.split(maxsplit=len(names))[: len(names)]]
+    values, table = numbers_of(words, n_rows, len(names), path), np.empty(n_rows, row)
+    with np.errstate(invalid="ignore", over="ignore"):
+        for i, name in enumerate(names):
+            table[name] = values[:, i]
     return table

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,20 @@ MAX_POINTS = 10_000_000
 """In a sweep; a header that promises more is wrong."""
 BYTE_MAX, WORD_MAX = 255, 65_535
 SKIPPED = "the frame is skipped; convert it to x, y, z [m] and reflectance"
+
+
+def numbers_of(words: Sequence[bytes], n_points: int, width: int, origin: object) -> NDArray[np.float64]:
+    """(n_points, width) numbers of text.
+
+    Raises:
+        ScanError: there are fewer, or what is no number.
+    """
+    if len(words) < n_points * width:
+        raise ScanError(origin, f"truncated: {len(words)} numbers for {n_points} points", SKIPPED)
+    try:
+        return np.array(words[: n_points * width], np.float64).reshape(-1, width)
+    except ValueError:
+        raise ScanError(origin, "its text holds what is no number", SKIPPED) from None
 
 
 def points_of(columns: Mapping[str, NDArray[Any]], origin: object) -> Float32:

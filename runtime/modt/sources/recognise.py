@@ -12,17 +12,24 @@ from modt.sources.scan_file import READERS
 from modt.sources.scan_stream import PERIOD_S, ScanStream
 from modt.sources.stream import Stream
 
-CAPTURES = frozenset({".pcap", ".cap"})
-"""Suffixes of PCAP files."""
+CAPTURES = frozenset({".pcap", ".cap", ".pcapng"})
+"""Suffixes of captures; of the last kind `Capture` says how it is converted."""
 BAGS = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 """Suffixes of the files of ROS 2 recordings."""
 _LAS = ("is a LAS file", "convert it: pdal translate FILE scans/000000.ply, one file a sweep, and give scans")
-_ARRAY = "numpy.load(FILE)[:, :4].astype('f4').tofile('scans/000000.bin'), columns x, y, z, reflectance"
+_TO_ROWS = "[:, :4].astype('f4').tofile('scans/000000.bin'), columns x, y, z, reflectance"
+_TEXT = ("is a table of text", f"convert it: numpy.loadtxt(FILE){_TO_ROWS}")
+_LIVOX = ("is a recording of Livox Viewer", "record the packets instead: tcpdump -w FILE.pcap udp port 56301")
 FOREIGN = {
     ".bag": ("is a recording of ROS 1", "convert it: pip install rosbags, then rosbags-convert"),
     ".las": _LAS,
     ".laz": _LAS,
-    ".npy": ("is an array of NumPy", f"convert it: {_ARRAY}"),
+    ".npy": ("is an array of NumPy", f"convert it: numpy.load(FILE){_TO_ROWS}"),
+    ".xyz": _TEXT,
+    ".pts": _TEXT,
+    ".osf": ("is a recording of Ouster's SDK", "convert it: ouster-cli source FILE save OUT.pcap"),
+    ".lvx": _LIVOX,
+    ".lvx2": _LIVOX,
 }
 """Cause and remedy by the suffix of well-known files that are not read."""
 MAX_LISTED = 5

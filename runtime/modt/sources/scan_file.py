@@ -10,7 +10,8 @@ import numpy as np
 from modt.errors import ScanError
 from modt.types import UNRECORDED, Float32
 
-ROW_BYTES = 16
+COLUMNS, NUSCENES_COLUMNS = 4, 5
+"""Float32 numbers of a point: KITTI's, and those of nuScenes (`.pcd.bin`), whose fifth is the beam."""
 MAX_BYTES = 256 << 20
 MAX_COORDINATE_M = 1000.0
 MAX_IMPLAUSIBLE_SHARE = 0.02
@@ -42,10 +43,11 @@ def read_scan(path: Path) -> tuple[Float32, list[str]]:
 
 
 def _read_rows(path: Path, raw: bytes) -> Float32:
-    if len(raw) % ROW_BYTES:
-        cause = f"truncated: {len(raw)} bytes are no multiple of {ROW_BYTES}-byte rows"
+    columns = NUSCENES_COLUMNS if path.name.endswith(".pcd.bin") else COLUMNS
+    if len(raw) % (4 * columns):
+        cause = f"truncated: {len(raw)} bytes are no multiple of {4 * columns}-byte rows"
         raise ScanError(path, cause, "the frame is skipped; copy it again, or convert it to x, y, z, reflectance")
-    return np.frombuffer(raw, np.float32).reshape(-1, 4).copy()
+    return np.frombuffer(raw, np.float32).reshape(-1, columns)[:, :COLUMNS].copy()
 
 
 def _read_pcd(path: Path, raw: bytes) -> Float32:

@@ -51,6 +51,15 @@ def unit_of(ratio: float) -> str:
     return next((name for factor, name in units.items() if abs(ratio / factor - 1.0) < 0.02), "")
 
 
+def no_seconds(stamp_s: float) -> str:
+    """Why a stamp is no time in seconds, and the unit in which it is one since 1970; empty if it is one."""
+    if abs(stamp_s) < MAX_STAMP_S:
+        return ""
+    limits = {1e14: "milliseconds", 1e17: "microseconds", 1e20: "nanoseconds"}
+    unit = next((f": it is one in {name}" for most, name in limits.items() if abs(stamp_s) < most), "")
+    return f"stamp {stamp_s:g} is no time in seconds{unit}"
+
+
 MAX_KEPT_FAULTS = 20
 """Faults kept; later ones are only counted."""
 

@@ -11,13 +11,18 @@ from modt.types import Float64
 
 
 def read_lines(path: Path, remedy: str) -> list[str]:
-    """Lines of an ASCII text file, with replacements for other characters.
+    """Lines of a text file, as of `read_text`."""
+    return read_text(path, remedy).splitlines()
+
+
+def read_text(path: Path, remedy: str) -> str:
+    """A file as text, with replacements for what is none.
 
     Raises:
         MisuseError: it cannot be read.
     """
     try:
-        return path.read_text(encoding="ascii", errors="replace").splitlines()
+        return path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:
         raise MisuseError(path, f"cannot be read ({error.strerror})", remedy) from None
 

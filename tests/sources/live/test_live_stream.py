@@ -262,7 +262,7 @@ def test_a_stamp_that_is_no_time_in_seconds_is_refused_and_forgotten(stamp_s, ca
     driven.sweep(0.1, 1.7e9)
     for _ in range(20):
         assert driven.sweep(0.1, stamp_s) is None
-    assert "is no time in seconds; have its driver write seconds" in caplog.text
+    assert "is no time in seconds" in caplog.text
     assert driven.sweep(0.1, 1.7e9 + 2.1).stamp_s == 1.7e9 + 2.1
     assert driven.stream.time_steps == 0
 

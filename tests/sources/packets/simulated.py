@@ -12,7 +12,7 @@ from modt.sources.packets.packet_decoder import PacketDecoder
 from modt.types import Float32
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tools.send.faults import Timed
-from tools.send.velodyne_packets import LAYOUTS, packets_of
+from tools.send.ideal_packets import packets_of
 
 BEGAN_S = 1.6e9
 
@@ -21,7 +21,7 @@ BEGAN_S = 1.6e9
 def packets(model: str = "vlp-16", sweeps: int = 5) -> tuple[Timed, ...]:
     """Of an ideal sensor in the synthetic street: a turn that had begun, whole ones, and one cut short."""
     frames = list(SyntheticStream("street", model, 0.1 * sweeps, seed=1))
-    return tuple((BEGAN_S + at_s, payload) for at_s, payload in packets_of(frames, LAYOUTS[model], 0.1))
+    return tuple((BEGAN_S + at_s, payload) for at_s, payload in packets_of(frames, model, 0.1))
 
 
 def decoded(decoder: PacketDecoder, timed: Iterable[Timed]) -> tuple[list[Sweep], Reception]:

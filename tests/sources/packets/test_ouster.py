@@ -1,10 +1,15 @@
 """Ouster's packets: the SDK's frames, everything else counted."""
 
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
 import numpy as np
 import pytest
 
 from modt.errors import MisuseError
+from modt.schemes import open_sensor
 from modt.sources.live.sweep_reader import Reception
+from modt.sources.packets import ouster
 from modt.sources.packets.capture import Capture
 from modt.sources.packets.ouster import OusterDecoder
 from tests.sources.packets.simulated import bearing_deg, decoded, equal
@@ -129,6 +134,45 @@ def test_what_is_no_metadata_is_refused(tmp_path, text):
         OusterDecoder("sensor", path)
     with pytest.raises(MisuseError, match="cannot be read"):
         OusterDecoder("sensor", tmp_path / "nowhere.json")
+
+
+class Answers(BaseHTTPRequestHandler):
+    """A sensor's HTTP server."""
+
+    text: str | None
+
+    def do_GET(self):
+        found = self.path == "/api/v1/sensor/metadata" and self.text is not None
+        self.send_response(200 if found else 404)
+        self.end_headers()
+        self.wfile.write(self.text.encode() if found else b"")
+
+    def log_message(self, *said):
+        pass
+
+
+@pytest.mark.kitti
+@pytest.mark.parametrize(("kind", "cause"), [("sensor", ""), ("other", "HTTP Error 404"), ("off", "refused")])
+def test_a_sensor_is_asked_for_its_metadata(kind, cause, kitti_root, monkeypatch):
+    monkeypatch.setenv("http_proxy", "http://192.0.2.1:1")  # a sensor is never behind one
+    text = (kitti_root / "ouster" / METADATA).read_text()
+    monkeypatch.setattr(Answers, "text", text if kind == "sensor" else None, raising=False)
+    with HTTPServer(("127.0.0.1", 0), Answers) as server:
+        monkeypatch.setattr(ouster, "METADATA", ouster.METADATA.replace("{host}", f"{{host}}:{server.server_port}"))
+        if kind == "off":
+            server.server_close()
+        asked = threading.Thread(target=server.handle_request)
+        if kind != "off":
+            asked.start()
+        if cause:
+            with pytest.raises(MisuseError, match=rf"{cause}.*check the sensor's address.*metadata=FILE"):
+                open_sensor("ouster://127.0.0.1:0")
+        else:
+            live = open_sensor("ouster://127.0.0.1:0")
+            assert (live.info.profile, len(live.info.elevations_deg)) == ("os1-128", 128)
+            live.close()
+        if kind != "off":
+            asked.join()
 
 
 def test_a_sensor_that_was_switched_on_again_is_still_the_one_of_the_metadata(timed, metadata):

@@ -1,5 +1,6 @@
 """Captures as streams."""
 
+import numpy as np
 import pytest
 
 from modt.errors import MisuseError
@@ -21,6 +22,16 @@ def path(tmp_path):
 def test_a_capture_is_recognised(path):
     info = open_stream(path).info
     assert (info.name, info.layout, info.profile, info.period_s) == ("drive", "Velodyne packets", "vlp-16", 0.1)
+
+
+def test_a_hesai_is_recognised_and_has_the_calibration_beside_its_capture(tmp_path, caplog):
+    write_capture(tmp_path / "drive.pcap", packets("xt-32", 3), 2368)
+    (tmp_path / "drive.csv").write_text("\n".join(f"{i + 1},{15 - 0.9 * i},0" for i in range(32)))
+    stream = open_stream(tmp_path / "drive.pcap")
+    assert (stream.info.layout, stream.info.profile, stream.info.period_s) == ("Hesai packets", "xt-32", 0.1)
+    assert stream.info.elevations_deg == pytest.approx(15 - 0.9 * np.arange(32))
+    assert len(list(stream)) == 2
+    assert not caplog.records
 
 
 def test_a_broken_end_is_a_fault_and_what_came_before_is_used(path, caplog):

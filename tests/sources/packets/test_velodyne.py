@@ -15,8 +15,7 @@ from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.packets.velodyne_models import model_named
 from modt.sources.pcd_file import read_pcd
 from tests.sources.packets.simulated import BEGAN_S, bearing_deg, decoded, equal, packets
-from tools.send.loops import velodyne_loop
-from tools.send.velodyne_packets import LAYOUTS, ideal_calibration
+from tools.send.ideal_packets import LAYOUTS, ideal_calibration
 
 pytest.importorskip("velodyne_decoder", reason="needs the extra [velodyne]")
 
@@ -78,37 +77,7 @@ def test_an_hdl_64e_without_its_calibration_is_warned_of(caplog):
     sweeps, _ = decoded(decoder, packets("hdl-64e", 4))
     assert decoder.profile == "hdl-64e"
     assert len(sweeps) == 2
-    assert "better give them by calibration=" in caplog.text
-
-
-def with_calibration(timed, elevations_deg):
-    """Packets of an HDL-64E S2 that send its calibration as their status: 7 of 16 packets hold a byte of it."""
-    rows = [struct.pack("<Bhh", i, round(100 * deg), 0).ljust(21, b"\0") for i, deg in enumerate(elevations_deg)]
-    made = bytes((11, 9, 26, 13, 2, 25, 50))  # when it was calibrated, and the humidity, after the last laser
-    table = b"UNIT#\0\0" + b"".join(row.ljust(28, b"\0") for row in rows[:-1]) + rows[-1] + made
-    table += bytes(19) + struct.pack("<H", 1820)
-    clock = dict(zip("HMSDNYGTV", (13, 2, 25, 26, 9, 11, 0, 30, 1), strict=True))
-    kinds = "HMSDNYGTV1234567"
-    sent = 0
-    for i, (at_s, payload) in enumerate(timed):
-        kind = kinds[i % 16]
-        value = clock.get(kind, table[sent % 1820])
-        sent += kind not in clock
-        yield at_s, payload[:1204] + bytes([ord(kind), value])
-
-
-def test_an_hdl_64e_that_sends_its_calibration_is_decoded_by_it(caplog):
-    repeated = velodyne_loop([payload for _, payload in packets("hdl-64e", 4)])
-    timed = [(BEGAN_S + at_s, payload) for (at_s, payload), _ in zip(repeated, range(5200), strict=False)]
-    sweeps, reception = sweeps_of(with_calibration(timed, LAYOUTS["hdl-64e"].elevations_deg))
-    assert "which is used from now on" in caplog.text
-    assert (reception.lost, reception.refused) == (0, {})
-
-    def off_deg(sweep):
-        elevation = np.rad2deg(np.arcsin(sweep.points[:, 2] / np.linalg.norm(sweep.points[:, :3], axis=1)))
-        return np.abs(elevation[:, None] - LAYOUTS["hdl-64e"].elevations_deg).min(axis=1).max()
-
-    assert off_deg(sweeps[-1]) < 0.01 < off_deg(sweeps[0])
+    assert "give its own by calibration=FILE" in caplog.text
 
 
 def test_lost_packets_are_counted_and_their_sweep_is_incomplete():
@@ -354,7 +323,6 @@ def test_another_model_is_adopted_once_the_one_before_is_silent(caplog):
     decoder = VelodyneDecoder("sensor")
     sweeps, reception = decoded(decoder, [*other, *later])
     assert decoder.profile == "vlp-16"
-    assert decoder._own is None  # no calibration of the other is looked for
     assert len(sweeps) >= 17
     assert reception.refused["of another model than the packets before"] == 20
     assert "packets are of another model, and those of the one before have ended" in caplog.text

@@ -12,7 +12,7 @@ from modt.sources.recognise import open_stream
 from tests.sources import layouts
 from tests.sources.packets.simulated import packets
 from tools.send import packets as sender
-from tools.send.loops import ouster_loop, velodyne_loop
+from tools.send.loops import ouster_loop, turn_loop
 from tools.send.pcap_writer import write_capture
 
 
@@ -40,7 +40,7 @@ def test_each_packet_is_sent_when_it_is_due():
 
 def test_a_loop_needs_a_whole_turn():
     with pytest.raises(MisuseError, match="no whole turn"):
-        next(velodyne_loop([p for _, p in packets()][:60]))
+        next(turn_loop([p for _, p in packets()][:60]))
 
 
 def written(tmp_path, monkeypatch, *arguments):

@@ -14,7 +14,7 @@ from modt.errors import ModtError, ScanError
 from modt.sources.live.sweep_reader import Received, StreamEndedError, Sweep, SweepReader
 from modt.sources.packets.packet_decoder import DeviceClock
 from modt.sources.scan_file import sanitised
-from modt.sources.stream import MAX_STAMP_S, Fault, Faults, StreamInfo, unit_of
+from modt.sources.stream import Fault, Faults, StreamInfo, no_seconds, unit_of
 from modt.types import Frame
 
 log = logging.getLogger(__name__)
@@ -183,8 +183,8 @@ class LiveStream:
         """Why a sweep is refused, empty if not: steady time passes as stamps do, or as arrivals where those step."""
         if (age_s := self._looked_s - arrived_s) > LATE_S:
             return f"taken {age_s:.1f} s after it came: this process was stopped, or has too little CPU time"
-        if not abs(stamp_s) < MAX_STAMP_S:
-            return f"stamp {stamp_s:g} is no time in seconds; have its driver write seconds"
+        if cause := no_seconds(stamp_s):
+            return f"{cause}; have its driver write seconds"
         before_s, passed_s, waited_s = self._delay.offset_s, stamp_s, stamp_s
         if self._taken is not None:
             passed_s, waited_s = stamp_s - self._taken[0], arrived_s - self._taken[1]

@@ -1,4 +1,4 @@
-"""Live sensors that send packets, received from a UDP socket: Velodyne and Ouster."""
+"""Live sensors that send packets, received from a UDP socket: Velodyne, Ouster, Hesai, Livox."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 from modt.address import Address
 from modt.errors import MisuseError
 from modt.sources.live.live_stream import LATE_S, LiveStream
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.packet_decoder import PacketDecoder, refuse
+from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for, refuse
 from modt.sources.stream import StreamInfo
 
 log = logging.getLogger(__name__)
@@ -127,49 +126,20 @@ def address_of(name: str, host: str) -> str | None:
         raise MisuseError(name, f"host {host} is unknown ({error.strerror})", "give the sensor's address") from None
 
 
-VELODYNE_PORT, OUSTER_PORT = 2368, 7502
-VELODYNE_PERIOD_S = 0.1
-"""As delivered, at 600 turns a minute; a sweep tells its own time."""
+PORTS = {"velodyne": 2368, "hesai": 2368, "ouster": 7502, "livox": 56301}
+"""To which the sensors send as delivered."""
 
 
-def open_velodyne(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """A Velodyne at velodyne://[HOST][:PORT][?model=MODEL&calibration=FILE&group=ADDRESS].
+def open_packets(address: Address, cores: frozenset[int] | None) -> LiveStream:
+    """A sensor at MAKER://[HOST][:PORT][?OPTION=VALUE&group=ADDRESS]; the other options are those of `decoder_for`.
 
     HOST is the sensor, whose packets alone are used; PORT of this machine, or of a multicast group, is where it sends
     them.
     """
-    from modt.sources.packets.velodyne import VelodyneDecoder
-    from modt.sources.packets.velodyne_models import model_named
-
-    model = address.option("model")
-    calibration = address.option("calibration")
-    decoder = VelodyneDecoder(
-        address.text, model_named(model) if model else None, Path(calibration) if calibration else None
-    )
-    return _stream(address, decoder, address.port or VELODYNE_PORT, VELODYNE_PERIOD_S, cores)
-
-
-def open_ouster(address: Address, cores: frozenset[int] | None) -> LiveStream:
-    """An Ouster at ouster://[HOST][:PORT]?metadata=FILE[&group=ADDRESS]; HOST, PORT and group as of a Velodyne.
-
-    Raises:
-        MisuseError: no metadata.
-    """
-    from modt.sources.packets.ouster import OusterDecoder
-
-    metadata = address.option("metadata")
-    if not metadata:
-        remedy = "add ?metadata=FILE, what the sensor says at /api/v1/sensor/metadata"
-        raise MisuseError(address.text, "its packets cannot be read without the sensor's metadata", remedy)
-    decoder = OusterDecoder(address.text, Path(metadata))
-    return _stream(address, decoder, address.port or OUSTER_PORT, decoder.period_s, cores)
-
-
-def _stream(
-    address: Address, decoder: PacketDecoder, port: int, period_s: float, cores: frozenset[int] | None
-) -> LiveStream:
-    source = address_of(address.text, address.host)
-    reader = PacketReader(bound_socket(address.text, port, address.option("group")), decoder, source)
-    info = StreamInfo(address.text, f"{address.scheme} packets", 0, None, period_s, None, has_poses=False)
+    name, port = address.text, address.port or PORTS[address.scheme]
+    decoder = decoder_for(address.scheme, name, address.options, address.host)
+    source = address_of(name, address.host)
+    reader = PacketReader(bound_socket(name, port, address.option("group")), decoder, source)
+    info = StreamInfo(name, f"{address.scheme} packets", 0, None, decoder.period_s, None, has_poses=False)
     info = replace(info, profile=decoder.profile, elevations_deg=decoder.elevations_deg)
     return LiveStream(info, reader, cores=cores)

@@ -9,7 +9,7 @@ from pathlib import Path
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.capture import Capture
-from modt.sources.packets.packet_decoder import PacketDecoder
+from modt.sources.packets.packet_decoder import PacketDecoder, decoder_for
 from modt.sources.packets.packet_stream import PacketStream
 from modt.sources.stream import StreamInfo
 
@@ -17,20 +17,27 @@ from modt.sources.stream import StreamInfo
 def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     """The stream of the sensor whose packets come first in a PCAP file.
 
-    `options` may have model and calibration of a Velodyne, or the file with the metadata of an Ouster, which is by
-    default the one with the name of the capture and the suffix .json.
+    `options` may have model and calibration of a Velodyne, the calibration of a Hesai, or the file with the metadata
+    of an Ouster. The last two are by default the files with the name of the capture and the suffix .csv or .json.
 
     Raises:
         MisuseError: no PCAP file, no packets of a sensor, no whole sweep; an invalid option, a missing extra.
     """
     capture = Capture(path)
-    decoder, layout = _decoder(path, options)
+    if "model" not in options:
+        options = _beside(path, metadata=".json") | dict(options)
+    maker = _maker(capture, options)
+    if maker == "hesai":
+        options = _beside(path, calibration=".csv") | dict(options)
+    decoder, layout = decoder_for(maker, path.stem, options), maker.capitalize()
     capture.flow = next(((d.source, d.port) for d in capture if decoder.accepts(d.payload)), None)
     if capture.flow is None:
         seen = Counter(f"{len(d.payload)} bytes to port {d.port}" for d in capture)
         there = f"{seen.total()} UDP datagrams, mostly of {seen.most_common(1)[0][0]}" if seen else "no UDP datagram"
-        remedy = f"for an Ouster, save its metadata as {path.with_suffix('.json')} or give metadata=FILE"
-        remedy = remedy if layout == "Velodyne" else "give the metadata of the sensor that sent them"
+        if layout == "Ouster":
+            remedy = "give the metadata of the sensor that sent them"
+        else:
+            remedy = f"for an Ouster, save its metadata as {path.with_suffix('.json')} or give metadata=FILE"
         raise MisuseError(path, f"no packets of a {layout} ({there})", remedy)
     first = _first_sweep(capture, decoder)
     if first is None:
@@ -40,7 +47,7 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
         layout=f"{layout} packets",
         sequence=0,
         n_frames=None,
-        period_s=round(first.turn_s, 3),
+        period_s=round(first.turn_s, 3) or decoder.period_s,
         camera=None,
         has_poses=False,
         profile=decoder.profile,
@@ -49,19 +56,26 @@ def open_capture(path: Path, options: Mapping[str, str]) -> PacketStream:
     return PacketStream(info, capture, decoder)
 
 
-def _decoder(path: Path, options: Mapping[str, str]) -> tuple[PacketDecoder, str]:
-    beside = path.with_suffix(".json")
-    metadata = options.get("metadata", str(beside) if beside.is_file() and "model" not in options else "")
-    if metadata:
-        from modt.sources.packets.ouster import OusterDecoder
+def _beside(path: Path, **suffixes: str) -> dict[str, str]:
+    """Options that are files with the name of the capture, where these are."""
+    files = {option: path.with_suffix(suffix) for option, suffix in suffixes.items()}
+    return {option: str(file) for option, file in files.items() if file.is_file()}
 
-        return OusterDecoder(path.stem, Path(metadata)), "Ouster"
-    from modt.sources.packets.velodyne import VelodyneDecoder
-    from modt.sources.packets.velodyne_models import model_named
 
-    model = model_named(options["model"]) if "model" in options else None
-    calibration = Path(options["calibration"]) if "calibration" in options else None
-    return VelodyneDecoder(path.stem, model, calibration), "Velodyne"
+def _maker(capture: Capture, options: Mapping[str, str]) -> str:
+    """Who made the sensor whose packets come first."""
+    from modt.sources.packets import hesai, livox, velodyne_models
+
+    if "metadata" in options:
+        return "ouster"
+    for datagram in capture if "model" not in options else ():
+        if velodyne_models.signature_of(datagram.payload):
+            break
+        if hesai.model_of(datagram.payload):
+            return "hesai"
+        if livox.is_packet(datagram.payload):
+            return "livox"
+    return "velodyne"
 
 
 def _first_sweep(capture: Capture, decoder: PacketDecoder) -> Sweep | None:

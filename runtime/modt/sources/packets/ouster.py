@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Sequence
+from http.client import HTTPException
 from pathlib import Path
 from typing import Any
 
@@ -13,22 +13,27 @@ import numpy as np
 from modt import assets
 from modt.errors import MisuseError
 from modt.sources.live.sweep_reader import Reception, Sweep
-from modt.sources.packets.packet_decoder import DeviceClock, extra, one_line, refuse
-from modt.types import Bool, Float32, Self
+from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, extra, one_line, refuse
+from modt.sources.text_file import read_text
+from modt.types import Bool, Float32
 
+METADATA = "http://{host}/api/v1/sensor/metadata"
+"""Where a sensor says what it is."""
+TIMEOUT_S = 5.0
+MAX_METADATA_BYTES = 2**20
 MAX_LOST_FRAMES = 20
 """More frames missing in a row are a sensor that was switched on again."""
 
 
-class OusterDecoder:
+class OusterDecoder(PacketDecoder):
     """Packets to frames of the SDK, which are sweeps: they begin behind the sensor and turn clockwise.
 
-    A sweep that had begun before its first packet was received is no sweep. Of two returns of a firing the first
-    field is taken.
+    A sweep is complete by the last packet of its window. One that had begun before its first packet was received is
+    none. Of two returns of a firing the first field is taken.
     """
 
-    def __init__(self, name: str, metadata: Path) -> None:
-        """A decoder for the source of a name.
+    def __init__(self, name: str, metadata: Path | str) -> None:
+        """A decoder for the source of a name; `metadata`: a file, or the host that is the sensor.
 
         Raises:
             MisuseError: ouster-sdk is missing, or the metadata cannot be read.
@@ -39,16 +44,10 @@ class OusterDecoder:
         info = self._info
         self._width, self._columns = info.format.columns_per_frame, info.format.columns_per_packet
         self._awaited = _awaited(info.format.column_window, self._width, self._columns)
-        self.elevations_deg: tuple[float, ...] | None = tuple(map(float, info.beam_altitude_angles))
+        self.elevations_deg = tuple(map(float, info.beam_altitude_angles))
         self.period_s = 1.0 / (info.format.fps or 10)
         self.profile = _profile(info.prod_line)
         self._forget()
-
-    def again(self) -> Self:
-        """A decoder of the same sensor that has seen no packet yet."""
-        other = copy.copy(self)
-        other._forget()
-        return other
 
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points that fits the metadata."""
@@ -69,26 +68,19 @@ class OusterDecoder:
             return []
         return self._sweeps(reception) if self._batcher.batch(packet, self._frame) else []
 
-    def pause(self, reception: Reception) -> Sequence[Sweep]:
-        """None: the SDK completes a frame by the last packet of its window."""
-        return []
-
-    finish = pause
-
     def _forget(self) -> None:
         used = [kind for kind in self._sdk.get_field_types(self._info) if kind.name in ("RANGE", "REFLECTIVITY")]
         self._batcher, self._frame = self._sdk.FrameBatcher(self._info), self._sdk.LidarFrame(self._info, used)
         self._clock = DeviceClock()
         self._last_id: int | None = None
 
-    def _read(self, metadata: Path) -> tuple[Any, Any, Any]:
+    def _read(self, metadata: Path | str) -> tuple[Any, Any, Any]:
         """What the SDK makes of the metadata: the sensor, the format of its packets, its directions."""
         sdk, remedy = self._sdk, "save what the sensor says at /api/v1/sensor/metadata"
+        text = _asked(metadata) if isinstance(metadata, str) else read_text(metadata, remedy)
         try:
-            info = sdk.SensorInfo(metadata.read_text("utf-8"))
+            info = sdk.SensorInfo(text)
             made = info, sdk.PacketFormat(info), sdk.XYZLutFloat(info, False)
-        except OSError as error:
-            raise MisuseError(metadata, f"cannot be read ({error.strerror})", remedy) from None
         except Exception as error:  # of the SDK's parser, of no common type
             raise MisuseError(metadata, f"no metadata of an Ouster ({one_line(error)})", remedy) from None
         width, columns = info.format.columns_per_frame, info.format.columns_per_packet
@@ -145,6 +137,22 @@ class OusterDecoder:
         points[:, 3] = self._frame.field("REFLECTIVITY").reshape(-1)[kept]
         points[:, 3] *= np.float32(1 / 255)
         return points
+
+
+def _asked(host: str) -> str:
+    """The metadata that a sensor gives."""
+    from urllib.request import ProxyHandler, build_opener  # loaded where it is needed: it brings much
+
+    address = METADATA.format(host=host)
+    try:
+        with build_opener(ProxyHandler({})).open(address, timeout=TIMEOUT_S) as answer:
+            text: str = answer.read(MAX_METADATA_BYTES).decode("utf-8", "replace")
+    except (OSError, ValueError, HTTPException) as error:
+        remedy = (
+            "check the sensor's address and this machine's network, or save what it says there and add ?metadata=FILE"
+        )
+        raise MisuseError(address, f"the sensor does not give its metadata ({one_line(error)})", remedy) from None
+    return text
 
 
 def _awaited(window: tuple[int, int], width: int, columns: int) -> Bool:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import atexit
+import copy
 import gc
 import logging
 import math
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from importlib import import_module
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
 from modt.errors import MisuseError, install
 from modt.sources.live.sweep_reader import Reception, Sweep
@@ -63,33 +66,80 @@ MAX_QUOTED = 200
 log = logging.getLogger(__name__)
 
 
-class PacketDecoder(Protocol):
+class PacketDecoder(ABC):
     """Packets of one sensor to sweeps.
 
     Attributes:
         name: of the source, for messages.
         profile: shipped profile of the sensor; None where there is none, or before its packets have told.
-        elevations_deg: of its beams, where the sensor's metadata have them.
+        elevations_deg: of its beams, where they are known.
+        period_s: time of a sweep as delivered; a sweep tells its own.
     """
 
     name: str
-    profile: str | None
-    elevations_deg: tuple[float, ...] | None
+    profile: str | None = None
+    elevations_deg: tuple[float, ...] | None = None
+    period_s = 0.1
 
+    def again(self) -> Self:
+        """A decoder of the same sensor that has seen no packet yet."""
+        other = copy.copy(self)
+        other._forget()
+        return other
+
+    @abstractmethod
+    def _forget(self) -> None:
+        """Be as before the first packet."""
+
+    @abstractmethod
     def accepts(self, payload: bytes) -> bool:
         """Whether a payload is a packet of points of this kind of sensor."""
 
+    @abstractmethod
     def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
         """Sweeps completed by a packet; what cannot be used or is missing is counted, never raised."""
 
     def pause(self, reception: Reception) -> Sequence[Sweep]:
         """The sweep, if the sensor is known not to look any further in this turn; called where it sends nothing."""
+        return []
 
     def finish(self, reception: Reception) -> Sequence[Sweep]:
         """The last sweep, if all that it waits for is the packet after it."""
+        return []
 
-    def again(self) -> Self:
-        """A decoder of the same sensor that has seen no packet yet."""
+
+def decoder_for(maker: str, name: str, options: Mapping[str, str], host: str = "") -> PacketDecoder:
+    """A decoder for the sensors of a maker, the scheme of their addresses.
+
+    `options` may have the model and calibration of a Velodyne, the calibration of a Hesai, the metadata of an Ouster;
+    `host` is the sensor that is asked for what is not given, empty where it is not known.
+
+    Raises:
+        MisuseError: an option that is invalid, no metadata, a missing extra.
+    """
+    calibration = Path(options["calibration"]) if options.get("calibration") else None
+    if maker == "livox":
+        from modt.sources.packets.livox import LivoxDecoder
+
+        return LivoxDecoder(name)
+    if maker == "hesai":
+        from modt.sources.packets.hesai import HesaiDecoder, asked_angles, read_angles
+
+        if calibration is not None:
+            return HesaiDecoder(name, read_angles(calibration))
+        return HesaiDecoder(name, asked_angles(host) if host else None)
+    if maker == "ouster":
+        from modt.sources.packets.ouster import OusterDecoder
+
+        metadata = options.get("metadata")
+        if not metadata and not host:
+            remedy = "write ouster://HOST, the sensor's address, to have it asked, or add ?metadata=FILE"
+            raise MisuseError(name, "its packets cannot be read without the sensor's metadata", remedy)
+        return OusterDecoder(name, Path(metadata) if metadata else host)
+    from modt.sources.packets.velodyne import VelodyneDecoder
+    from modt.sources.packets.velodyne_models import model_named
+
+    return VelodyneDecoder(name, model_named(options["model"]) if options.get("model") else None, calibration)
 
 
 def extra(module: str, name: str) -> Any:

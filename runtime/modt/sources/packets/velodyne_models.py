@@ -12,6 +12,7 @@ from struct import Struct
 from typing import NamedTuple
 
 from modt.errors import MisuseError
+from modt.sources.packets.turn_decoder import TURN
 
 log = logging.getLogger(__name__)
 
@@ -20,8 +21,6 @@ BANKS, AZIMUTHS = slice(1, 1200, 100), Struct("<" + 12 * "2xH96x")
 STAMP_AT, RETURN_AT, IDENTITY_AT = 1200, 1204, 1205
 DUAL = 0x39
 """Return mode: two returns of each firing."""
-TURN = 36_000
-"""A turn of the head [0.01 deg]."""
 PACE_TOLERANCE = 0.05
 UPPER, UPPER_LOWER = frozenset({0xEE}), frozenset({0xEE, 0xDD})
 FOUR_BANKS = UPPER_LOWER | {0xCC, 0xBB}

@@ -1,0 +1,130 @@
+"""Packets of a Livox Mid-360 (protocol of Livox SDK2) to sweeps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from struct import Struct
+from typing import Any
+
+import numpy as np
+
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
+from modt.types import Float32
+
+HEADER = Struct("<BH2xH3xB13x4xQ")
+"""Version, bytes, points, data type, time of the first point [ns]."""
+_TAIL = [("reflectance", "u1"), ("tag", "u1")]
+_AXES = ("x", "y", "z")
+POINTS: dict[int, tuple[np.dtype[Any], float]] = {
+    1: (np.dtype([*((axis, "<i4") for axis in _AXES), *_TAIL]), 0.001),
+    2: (np.dtype([*((axis, "<i2") for axis in _AXES), *_TAIL]), 0.01),
+    3: (np.dtype([("depth", "<u4"), ("zenith", "<u2"), ("azimuth", "<u2"), *_TAIL]), 0.001),
+}
+"""A point and its unit of length [m] by data type; 3 has angles [0.01 deg]."""
+LOW_CONFIDENCE = np.array([any(tag >> bit & 3 == 2 for bit in (0, 2, 4)) for tag in range(256)])
+"""Tags of points that lie between two objects, or are rain, fog or dust, rather than anything solid."""
+SWEEP_NS = 100_000_000
+"""The sensor never repeats its pattern: a sweep is what it saw in this time, that of the profile."""
+MAX_PACKETS = 1000
+"""In a sweep; a Mid-360 sends 208."""
+MAX_GAP = 10
+"""Sweeps between two packets beyond which the sensor was off, or its clock was set."""
+
+
+class LivoxDecoder(PacketDecoder):
+    """Cuts the packets by the sensor's clock; a sweep that had begun before its first packet was received is none.
+
+    Points that the sensor itself calls unlikely are left out.
+    """
+
+    profile = "mid-360"
+    _window: int
+    _before_ns: int | None
+    _packets: dict[int, bytes]
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._forget()
+
+    def accepts(self, payload: bytes) -> bool:
+        """Whether a payload is a packet of points of a Livox."""
+        return is_packet(payload)
+
+    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+        """Sweeps completed by a packet."""
+        if not is_packet(payload):
+            refuse(reception, self.name, "no packet of points of a Livox")
+            return []
+        stamp_ns = HEADER.unpack_from(payload)[-1]
+        ahead = stamp_ns // SWEEP_NS - self._window
+        late = ahead == -1 or stamp_ns in self._packets
+        if late or (ahead == 0 and len(self._packets) >= MAX_PACKETS):
+            reason = "late or twice" if late else "more than a sweep has; do several sensors send to this port?"
+            refuse(reception, self.name, reason)
+            return []
+        self._clock.unwrapped(stamp_ns * 1e-9, received_s)
+        sweeps = []
+        if not 0 <= ahead <= MAX_GAP:
+            self._before_ns = None
+        elif ahead:
+            sweeps = self._sweep(reception)
+        if ahead:
+            self._window, self._packets = stamp_ns // SWEEP_NS, {}
+        self._packets[stamp_ns] = payload
+        return sweeps
+
+    def finish(self, reception: Reception) -> Sequence[Sweep]:
+        """The last sweep, if all that it waited for is the packet after it."""
+        stamps_ns = sorted(self._packets)
+        step_ns = stamps_ns[-1] - stamps_ns[-2] if len(stamps_ns) > 1 else 0
+        ends = len(stamps_ns) > 1 and (stamps_ns[-1] + step_ns) // SWEEP_NS > self._window
+        sweeps = self._sweep(reception) if ends else []
+        self._forget()
+        return sweeps
+
+    def _forget(self) -> None:
+        self._clock = DeviceClock()
+        self._window = -2 * MAX_GAP
+        self._before_ns, self._packets = None, {}
+
+    def _sweep(self, reception: Reception) -> list[Sweep]:
+        """The sweep of the packets kept, if its begin was received."""
+        stamps_ns = sorted(self._packets)
+        before_ns, self._before_ns = self._before_ns, stamps_ns[-1]
+        if before_ns is None:
+            return []
+        gaps_ns = np.diff([before_ns, *stamps_ns])
+        lost = int((np.rint(gaps_ns / np.median(gaps_ns)) - 1).sum())
+        reception.lost += lost
+        points = np.concatenate([_points(self._packets[stamp_ns]) for stamp_ns in stamps_ns])
+        middle_s = (self._window + 0.5) * SWEEP_NS * 1e-9
+        return [Sweep(middle_s + self._clock.offset_s, points, complete=lost == 0)]
+
+
+def is_packet(payload: bytes) -> bool:
+    """Whether a payload is a packet of points of a Livox."""
+    if len(payload) <= HEADER.size:
+        return False
+    version, length, points, kind, _ = HEADER.unpack_from(payload)
+    if version != 0 or kind not in POINTS or length != len(payload):
+        return False
+    return bool(length == HEADER.size + points * POINTS[kind][0].itemsize)
+
+
+def _points(payload: bytes) -> Float32:
+    """(N, 4) points of a packet."""
+    row, unit_m = POINTS[payload[10]]
+    table = np.frombuffer(payload, row, offset=HEADER.size)
+    table = table[~LOW_CONFIDENCE[table["tag"]]]
+    points = np.empty((len(table), 4), np.float32)
+    if "depth" in (row.names or ()):
+        zenith, azimuth = np.deg2rad(table["zenith"] * 0.01), np.deg2rad(table["azimuth"] * 0.01)
+        across = table["depth"] * np.sin(zenith)
+        units = across * np.cos(azimuth), across * np.sin(azimuth), table["depth"] * np.cos(zenith)
+    else:
+        units = tuple(table[axis] for axis in _AXES)
+    for i, column in enumerate(units):
+        points[:, i] = column * unit_m
+    points[:, 3] = table["reflectance"] / 255
+    return points[points[:, :3].any(axis=1)]

@@ -1,0 +1,302 @@
+"""Turns of a rotating head, cut from its packets: what the decoders of Velodyne and Hesai share."""
+
+from __future__ import annotations
+
+import logging
+import math
+from abc import abstractmethod
+from bisect import bisect
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from modt.sources.live.sweep_reader import Reception, Sweep
+from modt.sources.packets.packet_decoder import DeviceClock, PacketDecoder, refuse
+from modt.types import Float32, Float64, Self
+
+log = logging.getLogger(__name__)
+
+TURN = 36_000
+"""A turn of the head [0.01 deg]."""
+AHEAD = TURN // 2
+"""Phase of a head that looks straight ahead; it is 0 behind the sensor."""
+MIN_HOLE = 10
+"""Missing packets in a row that may be what the sensor is set not to see."""
+SAME_S = 0.5e-6
+"""Packets whose times differ by less are one packet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A packet of a turn.
+
+    Attributes:
+        time_s: of its first block, on the clock of the sensor.
+        phase, end: of the head at its first and last block, clockwise from behind the sensor [0.01 deg]; below 0 or
+            above TURN in the packets that a turn shares with its neighbours.
+        packet: for the decoder.
+    """
+
+    time_s: float
+    phase: int
+    end: int
+    packet: Any
+
+    def turned(self, by: int) -> Entry:
+        """The same packet as part of a neighbouring turn."""
+        return replace(self, phase=self.phase + by, end=self.end + by)
+
+
+@dataclass(slots=True)
+class Turn:
+    """The packets of a turn, ordered by time.
+
+    Attributes:
+        began_s: time of the first of its own packets.
+        before: last packet of the turn before; None: the head was first heard of within this turn.
+        entries: its own packets, and those of its neighbours whose beams may have looked into it.
+    """
+
+    began_s: float
+    before: Entry | None
+    entries: list[Entry] = field(default_factory=list)
+
+    @property
+    def reaches_seam(self) -> bool:
+        """Whether the packet after its last one would be of the next turn."""
+        last = self.entries[-1] if self.entries else None
+        return last is not None and last.end + (last.end - last.phase) // 4 > TURN
+
+    def ends_at(self, holes: Float64) -> bool:
+        """Whether a hole of the turn before, of which it was the beginning, is reached."""
+        last = self.entries[-1] if self.entries else None
+        if last is None or self.before is None:
+            return False
+        step = last.phase - self.entries[-2].phase if len(self.entries) > 1 else 0
+        return bool((np.abs(last.phase - TURN - holes) <= step / 2).any())
+
+    def insert(self, entry: Entry) -> bool:
+        """Add a packet that comes late; whether it is of this turn and new."""
+        at = bisect(self.entries, entry.time_s - SAME_S, key=attrgetter("time_s"))
+        after_s = self.entries[at].time_s if at < len(self.entries) else math.inf
+        if entry.time_s < self.began_s or after_s < entry.time_s + SAME_S:
+            return False
+        self.entries.insert(at, entry)
+        return True
+
+    def shared(self, reach: int) -> list[Entry]:
+        """The packets at its end that the next turn needs as well."""
+        return [e.turned(-TURN) for e in self.entries if e.end > TURN - reach]
+
+    def times(self) -> tuple[float, float]:
+        """Times [s] at which the head looks straight ahead, and in which it turns once."""
+        first, last = self.entries[0], self.entries[-1]
+        turn_s = (last.time_s - first.time_s) * TURN / max(last.phase - first.phase, 1)
+        near = min(self.entries, key=lambda e: abs(e.phase - AHEAD))
+        return near.time_s + (AHEAD - near.phase) / TURN * turn_s, turn_s
+
+    def missing(self, holes: Float64 | None) -> tuple[int, Float64, float]:
+        """Packets missing, phases at which long holes begin, and the interval between packets [s].
+
+        A long hole that begins where one of the `holes` of the turn before did is not missing, nor is any if that is
+        None: the sensor is set not to see there.
+        """
+        own = [e for e in self.entries if 0 <= e.phase < TURN]
+        if self.before is not None:
+            own.insert(0, self.before.turned(-TURN))
+        times_s, phases = np.array([(e.time_s, e.phase) for e in own]).T
+        gaps_s = np.diff(times_s)
+        interval_s = float(np.median(gaps_s)) if len(gaps_s) else 0.0
+        if interval_s <= 0:
+            return 0, np.zeros(0), 0.0
+        count = np.rint(gaps_s / interval_s) - 1
+        long, begins = count >= MIN_HOLE, phases[:-1]
+        if holes is None:
+            known = long
+        else:
+            step = 2 * float(np.median(np.diff(phases)))
+            known = long & (np.abs(begins[:, None] - holes) <= step).any(axis=1)
+        return int(count[~known].clip(0).sum()), begins[long], interval_s
+
+
+RECOGNISED_BY = 20
+"""Packets by which the model is recognised."""
+LONGEST_TURN_S = 0.3
+"""At the slowest that the heads are set to turn, and half as long again."""
+LEAST_TURN = 1000
+"""A head that falls back by more has begun another turn [0.01 deg]; by less, it stands still."""
+SILENCE_S = 1.0
+"""Packets missing for longer are those of a sensor that was off."""
+NO_TURN = Turn(0.0, None)
+
+
+class TurnDecoder(PacketDecoder):
+    """Cuts the packets behind the sensor and decodes a turn at a time.
+
+    Each beam's part of a turn is cut where the beam looks backwards, not the head. What is received before the first
+    cut is no sweep. The packets of one model are followed; a subclass knows the models and their packets.
+    """
+
+    maker: str
+    unknown: str
+    """Why packets of a model that cannot be decoded are refused."""
+    wrap_s: float
+    """Time after which the stamps of the device begin again [s]."""
+    _last: Entry | None
+    _turn: Turn
+    _ending: Turn
+
+    def __init__(self, name: str, profile: str | None = None) -> None:
+        self.name, self.profile = name, profile
+        self._first: list[tuple[float, bytes]] | None = []
+        self._signature: object = None
+        self._reach, self._packet_s, self._most = 0, 0.0, 0
+        self._forget()
+
+    @staticmethod
+    @abstractmethod
+    def signature(payload: bytes) -> object:
+        """What the packets of one model share; None if a payload is no packet of points of this maker."""
+
+    @abstractmethod
+    def _recognise(self, payloads: Sequence[bytes]) -> object:
+        """The signature of most of the packets, with all that decodes them ready; None for an unknown model."""
+
+    @abstractmethod
+    def _entry(self, received_s: float, payload: bytes) -> Entry:
+        """A packet of the model that is followed."""
+
+    @abstractmethod
+    def _table(self, entries: Sequence[Entry]) -> Float32:
+        """(N, 4 or more) x, y, z [m, sensor frame], reflectance, and other columns, of the points of packets."""
+
+    def again(self) -> Self:
+        """A decoder of the same sensor that has seen no packet yet."""
+        other = super().again()
+        other._first = None if self._first is None else []
+        return other
+
+    def accepts(self, payload: bytes) -> bool:
+        """Whether a payload is a packet of points of this maker."""
+        return self.signature(payload) is not None
+
+    def decode(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+        """Sweeps completed by a packet."""
+        signature = self.signature(payload)
+        if signature is None:
+            refuse(reception, self.name, f"no packet of a {self.maker}")
+            return []
+        if self._first is None:
+            return self._packet(received_s, payload, signature, reception)
+        self._first.append((received_s, payload))
+        return self._begin(reception) if len(self._first) == RECOGNISED_BY else []
+
+    def pause(self, reception: Reception) -> Sequence[Sweep]:
+        """The sweep, if the turn has reached where it ended in the turn before: what the sensor is set not to see."""
+        turn = self._turn
+        if self._holes is None or not turn.ends_at(self._holes):
+            return []
+        self._turn = Turn(turn.began_s, None, turn.entries)  # handed over
+        return self._sweeps(turn, reception)
+
+    def finish(self, reception: Reception) -> Sequence[Sweep]:
+        """The last sweep, if all that it waited for is the packet after it."""
+        sweeps = [*self._begin(reception)] if self._first else []
+        for turn in (self._ending, self._turn):
+            if turn.reaches_seam:
+                sweeps += self._sweeps(turn, reception)
+        self._forget()
+        return sweeps
+
+    def _forget(self) -> None:
+        self._clock = DeviceClock(self.wrap_s)
+        self._last = None
+        self._turn = self._ending = NO_TURN
+        self._holes: Float64 | None = None
+        self._interval_s, self._longest_s, self._heard_s = 0.0, LONGEST_TURN_S, -math.inf
+        self._others: list[tuple[float, bytes]] = []  # packets of another model since this one was heard
+
+    def _begin(self, reception: Reception) -> Sequence[Sweep]:
+        """Recognise the model by the packets kept, and decode them."""
+        first, self._first = self._first or [], []
+        signature = self._recognise([payload for _, payload in first])
+        if signature is None:
+            for _ in first:
+                refuse(reception, self.name, self.unknown)
+            return []
+        self._signature, self._first = signature, None
+        self._most = math.ceil(2 * LONGEST_TURN_S / self._packet_s)  # of two returns
+        return [s for r, p in first for s in self._packet(r, p, self.signature(p), reception)]
+
+    def _packet(self, received_s: float, payload: bytes, signature: object, reception: Reception) -> Sequence[Sweep]:
+        if signature != self._signature:
+            return self._foreign(received_s, payload, reception)
+        self._heard_s = received_s
+        self._others.clear()
+        return self._follow(self._entry(received_s, payload), reception)
+
+    def _foreign(self, received_s: float, payload: bytes, reception: Reception) -> Sequence[Sweep]:
+        """Refuse a packet of another model; after RECOGNISED_BY while the known one is silent, recognise it anew."""
+        refuse(reception, self.name, "of another model than the packets before")
+        if abs(received_s - self._heard_s) < SILENCE_S:
+            return []
+        self._others.append((received_s, payload))
+        if len(self._others) < RECOGNISED_BY:
+            return []
+        log.warning("%s: packets are of another model, and those of the one before have ended", self.name)
+        self._first = self._others
+        self._forget()
+        return self._begin(reception)
+
+    def _follow(self, entry: Entry, reception: Reception) -> Sequence[Sweep]:
+        """Add a packet to its turn; the sweep that ends with it."""
+        last = self._last
+        gap_s = 0.0 if last is None else entry.time_s - last.time_s
+        if last is None or max(abs(gap_s), entry.time_s - self._turn.began_s) > self._longest_s:
+            if self._interval_s and 0 < gap_s < SILENCE_S:
+                reception.lost += max(round(gap_s / self._interval_s) - 1, 0)
+            return self._start(entry)
+        if len(self._turn.entries) >= self._most:
+            refuse(reception, self.name, "more than a turn has; do several sensors send to this port?")
+            return [] if gap_s < SAME_S else self._start(entry)
+        if gap_s < SAME_S:
+            if not self._turn.insert(entry):
+                refuse(reception, self.name, "late or twice")
+            return []
+        self._last = entry
+        if entry.phase < last.phase - LEAST_TURN:
+            self._ending, self._turn = self._turn, Turn(entry.time_s, last, self._turn.shared(self._reach))
+        self._turn.entries.append(entry)
+        if not self._ending.entries:
+            return []
+        if entry.phase < self._reach:
+            self._ending.entries.append(entry.turned(TURN))
+            return []
+        ended, self._ending = self._ending, NO_TURN
+        return self._sweeps(ended, reception)
+
+    def _start(self, entry: Entry) -> Sequence[Sweep]:
+        """Wait for the next cut: the head may have turned any number of times."""
+        self._last, self._turn, self._ending = entry, Turn(entry.time_s, None, [entry]), NO_TURN
+        self._longest_s = LONGEST_TURN_S
+        return []
+
+    def _sweeps(self, turn: Turn, reception: Reception) -> Sequence[Sweep]:
+        if turn.before is None:
+            return []
+        lost, self._holes, self._interval_s = turn.missing(self._holes)
+        reception.lost += lost
+        ahead_s, turn_s = turn.times()
+        self._longest_s = min(1.5 * turn_s, LONGEST_TURN_S)
+        return [Sweep(ahead_s + self._clock.offset_s, self._points(turn.entries), turn_s, complete=lost == 0)]
+
+    def _points(self, entries: Sequence[Entry]) -> Float32:
+        """Table of a turn: of the packets whose beams look beyond the seam, the points on its own side of it."""
+        heads = [e for e in entries if e.phase < self._reach]
+        tails = [e for e in entries if e.end > TURN - self._reach]
+        table = self._table([e for e in entries if e.phase >= self._reach and e.end <= TURN - self._reach])
+        left, right = self._table(heads), self._table(tails)
+        return np.concatenate([left[left[:, 1] >= 0], table, right[right[:, 1] < 0]])

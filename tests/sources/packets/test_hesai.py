@@ -1,0 +1,230 @@
+"""Hesai's packets, by bytes written as the manuals lay them out, and against another decoder."""
+
+import socket
+import sqlite3
+import struct
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from modt.errors import MisuseError
+from modt.sources.packets.hesai import GET_CALIBRATION, HesaiDecoder, asked_angles, model_of, read_angles
+from modt.sources.pcd_file import read_pcd
+from tests.sources.packets.simulated import BEGAN_S, decoded, packets
+
+TURN_S = 0.1
+RANGE = 2500
+"""Of every point, in units."""
+
+
+@dataclass(frozen=True)
+class Written:
+    """A model's packets: header, bytes before an azimuth, size of a channel, of blocks and channels, and tail.
+
+    The tail is the return mode (m), year to second (d), microseconds (u), and numbers of other bytes.
+    """
+
+    header: str
+    before: str
+    cell: int
+    blocks: int
+    channels: int
+    tail: str
+    firing_s: float
+    unit_m: float = 0.004
+
+    def packet(self, at_s: float, mode: int = 0x37, cells: bytes = b"") -> bytes:
+        """Packet of a head that looked ahead at a whole turn and was sent at a time of the day."""
+        returns = {0x39: 2, 0x3D: 3}.get(mode, 1)
+        firings = self.blocks // returns
+        body = b""
+        for k in range(self.blocks):
+            turned = (at_s - (firings - 1 - k // returns) * self.firing_s) / TURN_S
+            body += bytes.fromhex(self.before) + struct.pack("<H", round(turned * 36_000) % 36_000)
+            own = cells[self.cell * self.channels * (k % returns) :][: self.cell * self.channels]
+            body += own or struct.pack("<HB", RANGE, 51).ljust(self.cell, b"\0") * self.channels
+        second, micros = divmod(round(at_s * 1e6), 1_000_000)
+        values = {
+            "m": bytes([mode]),
+            "d": bytes((125, 11, 30, second // 3600, second // 60 % 60, second % 60)),
+            "u": struct.pack("<I", micros),
+        }
+        tail = b"".join(values.get(word) or bytes(int(word)) for word in self.tail.split())
+        return bytes.fromhex(self.header) + body + tail
+
+    def turns(self, n: float, **said: object) -> list[tuple[float, bytes]]:
+        """Packets of so many turns."""
+        firings = self.blocks // {0x39: 2, 0x3D: 3}.get(said.get("mode", 0), 1)
+        step_s, day_s = firings * self.firing_s, 36_000.0
+        times_s = [day_s + step_s * k for k in range(int(n * TURN_S / step_s))]
+        return [(BEGAN_S + at_s, self.packet(at_s, **said)) for at_s in times_s]
+
+
+WRITTEN = {
+    "Pandar40P": Written("", "ffee", 3, 10, 40, "5 1 2 2 u m 1 d", 55.56e-6),
+    "Pandar64": Written("eeff400600040000", "", 3, 6, 64, "5 1 2 2 u m 1 d 4", 55.56e-6),
+    "PandarQT64": Written("eeff03010000400401040201", "", 4, 4, 64, "10 2 u m 1 d 4", 166.67e-6),
+    "PandarQT128": Written("eeff0302030080020104021d", "", 4, 2, 128, "4 17 12 m 2 d u 1 4 4 32", 111.11e-6),
+    "PandarXT-16": Written("eeff06010000100801040201", "", 4, 8, 16, "10 m 2 d u 1 4", 50e-6),
+    "PandarXT-32": Written("eeff06010000200801040201", "", 4, 8, 32, "10 m 2 d u 1 4", 50e-6),
+    "PandarXT-32M": Written("eeff06010000200601050301", "", 4, 6, 32, "10 m 2 d u 1 4", 50e-6, 0.005),
+}
+
+
+def angles_of(channels):
+    """Elevation and azimuth [deg]; the beams look to either side of the head."""
+    return np.column_stack([np.linspace(20, -25, channels), 5.0 * (-1.0) ** np.arange(channels)])
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_each_model_is_decoded_by_its_angles(name):
+    model = WRITTEN[name]
+    angles_deg = angles_of(model.channels)
+    decoder = HesaiDecoder("sensor", angles_deg)
+    sweeps, reception = decoded(decoder, model.turns(2.7))
+    assert model_of(model.packet(0.0)).name == name
+    assert (len(sweeps), reception.lost, reception.refused) == (2, 0, {})
+    for k, sweep in enumerate(sweeps, 1):
+        assert sweep.complete
+        assert sweep.turn_s == pytest.approx(TURN_S, rel=1e-3)
+        assert sweep.stamp_s == pytest.approx(BEGAN_S + 36_000 + TURN_S * k, abs=1e-3)  # straight ahead
+        x, y, z, reflectance = sweep.points.T
+        distance = np.sqrt(x * x + y * y + z * z)
+        assert distance == pytest.approx(RANGE * model.unit_m, rel=1e-4)
+        assert reflectance == pytest.approx(0.2)
+        assert len(x) == pytest.approx(TURN_S / model.firing_s * model.channels, rel=0.002)
+    elevation = np.rad2deg(np.arcsin(z / distance))
+    assert np.unique(elevation.round(2)) == pytest.approx(np.sort(angles_deg[:, 0]), abs=0.02)
+    top = np.abs(elevation - angles_deg[0, 0]) < 0.01
+    bearing = np.unwrap(np.arctan2(y[top], x[top]))
+    assert np.all(np.diff(bearing) < 0)  # clockwise
+    assert bearing[0] == pytest.approx(np.pi, abs=0.03)  # each beam is cut where it looks backwards itself
+
+
+@pytest.mark.parametrize(("mode", "seen"), [(0x37, 3.0), (0x39, 7.0), (0x3D, 7.0)])
+def test_of_several_returns_the_one_of_the_greatest_reflectance_is_taken(mode, seen):
+    model = WRITTEN["PandarXT-32M"]
+    cells = b"".join(struct.pack("<HBB", round(m / 0.005), r, 0) * 32 for m, r in ((3.0, 10), (7.0, 90), (9.0, 5)))
+    sweeps, reception = decoded(HesaiDecoder("sensor", angles_of(32)), model.turns(2.7, mode=mode, cells=cells))
+    assert [s.complete for s in sweeps] == [True, True]
+    assert np.linalg.norm(sweeps[0].points[:, :3], axis=1) == pytest.approx(seen, rel=1e-4)
+    assert reception.lost == 0
+
+
+def test_garbage_and_packets_of_another_model_are_counted_and_change_nothing():
+    model, other = WRITTEN["PandarXT-32"], WRITTEN["PandarXT-16"]
+    timed, rng = model.turns(2.7), np.random.default_rng(0)
+    whole, _ = decoded(HesaiDecoder("sensor", angles_of(32)), timed)
+    dirty = [*timed]
+    for i in range(400, 40, -40):
+        at_s, payload = timed[i]
+        beyond = payload[:12] + b"\xff\xff" + payload[14:]  # an azimuth
+        junk = (rng.bytes(1080), b"", payload[:-40], payload + bytes(200), beyond, other.packet(36_000.0))
+        dirty[i:i] = [(at_s, bytes_) for bytes_ in junk]
+    sweeps, reception = decoded(HesaiDecoder("sensor", angles_of(32)), dirty)
+    assert [s.points.tobytes() for s in sweeps] == [s.points.tobytes() for s in whole]
+    assert reception.refused == {"no packet of a Hesai": 45, "of another model than the packets before": 9}
+    assert reception.lost == 0
+
+
+def test_an_ideal_xt_32_sees_the_scene_it_is_in(caplog):
+    from modt_desk.simulation.synthetic_stream import SyntheticStream
+
+    decoder = HesaiDecoder("sensor")
+    sweeps, _ = decoded(decoder, packets("xt-32", 4))
+    assert decoder.profile == "xt-32"
+    assert "beams as of any PandarXT-32" in caplog.text
+    scene = list(SyntheticStream("street", "xt-32", 0.4, seed=1))
+    assert len(sweeps) == 3
+    for sweep, frame in zip(sweeps, scene[1:4], strict=True):
+        distance, _ = cKDTree(frame.points[:, :3]).query(sweep.points[:, :3])
+        assert np.quantile(distance, 0.95) < 0.05  # m
+
+
+def test_a_model_whose_units_differ_needs_its_calibration(tmp_path):
+    with pytest.raises(MisuseError, match="the calibration of this Pandar64 is not given; give calibration=FILE"):
+        decoded(HesaiDecoder("sensor"), WRITTEN["Pandar64"].turns(0.1))
+    with pytest.raises(MisuseError, match="the calibration of this Pandar64 has 32 channels"):
+        decoded(HesaiDecoder("sensor", angles_of(32)), WRITTEN["Pandar64"].turns(0.1))
+    path = tmp_path / "angles.csv"
+    for text in ("", "Channel,Elevation,Azimuth\n", "1,95.0,0\n", "1,nan,0\n"):
+        path.write_text(text)
+        with pytest.raises(MisuseError, match="no calibration of a Hesai"):
+            read_angles(path)
+
+
+@pytest.mark.parametrize(
+    ("answer", "n"),
+    [
+        (
+            b"\x47\x74\x05\x00"
+            + struct.pack(">I", 52)
+            + b"Laser id,Elevation,Azimuth\r\n1,15.5,-1.04\r\n2,14,3.1\r\n",
+            2,
+        ),
+        (b"\x47\x74\x05\x01" + bytes(4), None),
+        (b"\x47\x74\x05\x00\xff\xff\xff\xff", None),
+        (b"\x47", None),
+    ],
+)
+def test_the_sensor_is_asked_for_its_calibration(answer, n, caplog):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def give():
+            asking, _ = server.accept()
+            with asking:
+                assert asking.recv(100) == GET_CALIBRATION == bytes.fromhex("4774050000000000")
+                asking.sendall(answer)
+
+        giving = threading.Thread(target=give)
+        giving.start()
+        angles_deg = asked_angles("127.0.0.1", server.getsockname()[1])
+        giving.join()
+    assert (None if angles_deg is None else angles_deg.tolist()) == (n and [[15.5, -1.04], [14, 3.1]])
+    assert ("does not give its calibration" in caplog.text) is (n is None)
+
+
+def packets_of_bag(folder):
+    """Hesai's packets in the messages of a rosbag2 file."""
+    (path,) = folder.glob("*.db3")
+    bag = sqlite3.connect(f"file:{path}?mode=ro&immutable=1", uri=True)
+    messages = [data for (data,) in bag.execute("select data from messages order by timestamp")]
+    bag.close()
+    for data in messages:
+        at = 16 + struct.unpack_from("<I", data, 12)[0]
+        at += -at % 4
+        for k in range(struct.unpack_from("<I", data, at)[0]):
+            start = at + 4 + 1512 * k
+            second, fraction = struct.unpack_from("<II", data, start)
+            (size,) = struct.unpack_from("<I", data, start + 1508)
+            yield second + 1e-9 * fraction, data[start + 8 : start + 8 + size]
+
+
+@pytest.mark.kitti
+@pytest.mark.parametrize(
+    ("name", "table", "n_sweeps"),
+    [
+        ("40p-1673400149412331409", "Pandar40P", 3),
+        ("64-1673403880599376836", "Pandar64", 3),
+        ("qt64-1673401195788312575", "PandarQT64", 3),
+        ("qt128-1730273789074637152", "PandarQT128", 1),
+        ("xt16-1732848127890747768", "PandarXT16", 2),
+        ("xt32-1673400677802009732", "PandarXT32", 3),
+        ("xt32m-1660893203042895158", "PandarXT32M", 3),
+    ],
+)
+def test_points_are_those_of_another_decoder(kitti_root, name, table, n_sweeps):
+    folder = kitti_root / "packets"
+    decoder = HesaiDecoder("sensor", read_angles(folder / "calibration" / f"{table}.csv"))
+    sweeps, reception = decoded(decoder, packets_of_bag(folder / name))
+    assert (len(sweeps), reception.refused) == (n_sweeps, {})
+    assert [s.turn_s for s in sweeps] == pytest.approx([0.1] * n_sweeps, abs=2e-4)
+    (cloud,) = (folder / name).glob("*.pcd")
+    theirs = read_pcd(cloud, cloud.read_bytes())[:, :3]  # x right, y forward; cut elsewhere, both returns
+    ours = np.concatenate([s.points[:, :3] for s in sweeps])
+    distance, _ = cKDTree(ours).query(np.column_stack([theirs[:, 1], -theirs[:, 0], theirs[:, 2]]))
+    assert np.median(distance) < 1e-4
+    assert np.quantile(distance, 0.9) < 0.02

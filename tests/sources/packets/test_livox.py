@@ -1,0 +1,113 @@
+"""Packets of a Livox, by bytes written as its protocol lays them out."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from modt.sources.live.sweep_reader import Reception
+from modt.sources.packets.livox import MAX_PACKETS, LivoxDecoder
+from tests.sources.packets.simulated import BEGAN_S, decoded, packets
+
+STEP_S = 480e-6
+"""Between the packets of a Mid-360."""
+
+
+def packet(at_s, points, kind=1):
+    """A packet by the offsets of the public protocol; points as bytes."""
+    body = b"".join(points)
+    out = bytearray(36)
+    out[0] = 0  # version
+    out[1:3] = struct.pack("<H", 36 + len(body))
+    out[3:5] = struct.pack("<H", 4752)  # from the first to the last point [0.1 us]
+    out[5:7] = struct.pack("<H", len(points))
+    out[7:9] = struct.pack("<H", 1234)  # number of the packet
+    out[10] = kind
+    out[28:36] = struct.pack("<Q", round(at_s * 1e9))
+    return bytes(out) + body
+
+
+def timed(n, begin_s=7.0, **said):
+    point = struct.pack("<iiiBB", 1500, -2500, 250, 51, 0)
+    times_s = [begin_s + STEP_S * k for k in range(n)]
+    return [(BEGAN_S + at_s, packet(at_s, **{"points": [point] * 96} | said)) for at_s in times_s]
+
+
+@pytest.mark.parametrize(
+    ("kind", "point", "xyz"),
+    [
+        (1, struct.pack("<iiiBB", 1500, -2500, 250, 51, 0), (1.5, -2.5, 0.25)),
+        (2, struct.pack("<hhhBB", 150, -250, 25, 51, 0), (1.5, -2.5, 0.25)),
+        (3, struct.pack("<IHHBB", 2000, 9000, 27000, 51, 0), (0.0, -2.0, 0.0)),
+        (3, struct.pack("<IHHBB", 2000, 6000, 0, 51, 0), (np.sqrt(3), 0.0, 1.0)),
+    ],
+)
+def test_each_data_type_is_decoded(kind, point, xyz):
+    sweeps, reception = decoded(LivoxDecoder("sensor"), timed(700, points=[point] * 3, kind=kind))
+    assert (len(sweeps), reception.lost, reception.refused) == (2, 0, {})
+    for k, sweep in enumerate(sweeps):
+        assert sweep.complete
+        assert sweep.turn_s == 0.0
+        assert sweep.stamp_s == pytest.approx(BEGAN_S + 7.15 + 0.1 * k, abs=1e-6)
+        assert len(sweep.points) == pytest.approx(3 * 0.1 / STEP_S, abs=3)
+        assert sweep.points[:, :3] == pytest.approx(np.tile(xyz, (len(sweep.points), 1)), abs=1e-6)
+        assert sweep.points[:, 3] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("tag", "kept"), [(0, True), (0x15, True), (0x02, False), (0x08, False), (0x20, False)])
+def test_points_without_a_return_or_of_low_confidence_are_left_out(tag, kept):
+    sound = struct.pack("<iiiBB", 4000, 0, 0, 0, 0)
+    other, none = struct.pack("<iiiBB", 1000, 0, 0, 0, tag), bytes(14)
+    (sweep, *_), _ = decoded(LivoxDecoder("sensor"), timed(500, points=[sound, other, none]))
+    assert set(sweep.points[:, 0].tolist()) == ({1.0, 4.0} if kept else {4.0})
+
+
+@pytest.mark.slow
+def test_packets_of_a_simulated_sweep_are_the_sweep():
+    from modt_desk.simulation.synthetic_stream import SyntheticStream
+
+    sweeps, reception = decoded(LivoxDecoder("sensor"), packets("mid-360", 3))
+    scene = list(SyntheticStream("street", "mid-360", 0.3, seed=1))
+    assert (len(sweeps), reception.lost) == (2, 0)  # it cannot know that the first one is whole
+    for sweep, frame in zip(sweeps, scene[1:], strict=True):
+        seen = frame.points[frame.points[:, :3].any(axis=1)]
+        assert sweep.points[:, :3] == pytest.approx(seen[:, :3], abs=1e-3)
+
+
+def test_lost_packets_are_counted_and_others_change_nothing():
+    whole, _ = decoded(LivoxDecoder("sensor"), timed(1100))
+    rng, dirty = np.random.default_rng(0), timed(1100)
+    dirty[400], dirty[401] = dirty[401], dirty[400]
+    for i in range(1000, 20, -20):
+        at_s, payload = dirty[i]
+        dirty[i:i] = [(at_s, p) for p in (rng.bytes(1380), payload[:-1], payload[:10] + b"\0" + payload[11:], b"")]
+    dirty.insert(700, dirty[699])
+    sweeps, reception = decoded(LivoxDecoder("sensor"), dirty)
+    assert [s.points.tobytes() for s in sweeps] == [s.points.tobytes() for s in whole]
+    assert reception.refused.pop("late or twice") in (0, 1)
+    assert reception.refused == {"no packet of points of a Livox": 4 * 49}
+    gone = timed(1100)
+    del gone[500:520]
+    sweeps, reception = decoded(LivoxDecoder("sensor"), gone)
+    assert reception.lost == 20
+    assert [s.complete for s in sweeps].count(False) == 1
+
+
+def test_a_clock_that_is_set_or_a_silence_costs_the_sweep_under_way():
+    for step_s in (-5.0, 5.0, 1e5):
+        later = [(at_s + 5.0, p) for at_s, p in timed(1100, 8.0 + step_s)]
+        sweeps, reception = decoded(LivoxDecoder("sensor"), [*timed(1100), *later])
+        assert len(sweeps) in (8, 9)
+        assert all(s.complete for s in sweeps)
+        assert reception.lost == 0
+
+
+def test_a_sweep_holds_no_more_packets_than_a_sensor_sends():
+    decoder, reception = LivoxDecoder("sensor"), Reception()
+    for at_s, payload in timed(300):
+        decoder.decode(at_s, payload, reception)
+    at_s, payload = timed(300)[-1]
+    for k in range(3000):
+        decoder.decode(at_s, payload[:28] + struct.pack("<Q", 7_145_000_000 + k) + payload[36:], reception)
+    assert len(decoder._packets) == MAX_PACKETS
+    assert reception.refused["more than a sweep has; do several sensors send to this port?"] > 2000
