@@ -189,8 +189,8 @@ class Session:
             },
         }
         directory, writer = self.recording.directory, self.recording.writer
-        writer.write(self.recording.finish)
         self.summary |= self._monitor.finish(self.status)
+        writer.write(self.recording.finish)
         text = json.dumps(self.summary, indent=2) + "\n"
         writer.write(lambda: directory.write(SUMMARY, text) if self.recording.parts else None)
         writer.close()

@@ -29,10 +29,9 @@ def run(arguments: argparse.Namespace) -> int:
         MisuseError: there is no status at the start.
     """
     from modt.app.status_text import status_text
-    from modt.sinks.run_directory import STATUS
 
-    path = arguments.directory / STATUS
-    text = status_text(read(path), time.time())
+    directory = arguments.directory
+    text = status_text(read(directory), time.time())
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         print(text)
         return 0
@@ -44,15 +43,15 @@ def run(arguments: argparse.Namespace) -> int:
                 screen.show([*text.splitlines(), "", "q ends"])
                 if screen.key(PERIOD_S) in tuple(QUIT):
                     return 0
-                text = _text(path)
+                text = _text(directory)
     except KeyboardInterrupt:
         return 0
 
 
-def _text(path: Path) -> str:
+def _text(directory: Path) -> str:
     from modt.app.status_text import status_text
 
     try:
-        return status_text(read(path), time.time())
+        return status_text(read(directory), time.time())
     except MisuseError as error:  # another part of the records begins, or the service ends
         return str(error)

@@ -121,19 +121,27 @@ class EnergyConfig(StageConfig):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopConfig(StageConfig):
-    """What the loop keeps to, and what it gives up for it."""
+    """Limits that the loop of a live source keeps to."""
 
-    range_share: float = number(0.6, 0.05, 1.0, "", "of sensor.max_range_m that is kept where the range is reduced")
-    power_W: float | None = number(None, 0.01, 1000.0, "W", "limit, by the meter or the board's model; null: none")
+    power_W: float | None = number(
+        None, 0.01, 1000.0, "W", "limit of the board's power, by its meter or else its model; null: none"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordingConfig(StageConfig):
-    """Records of the live loop."""
+    """Records of a live source."""
 
     keep: str = choice("all", ("all", "tracks", "ledger", "none"), "which records are written")
     disk_mb: float = number(
         2000.0, 1.0, 1e7, "MB", "of the records of this run and earlier ones; the oldest are deleted"
+    )
+    gb_per_day: float = number(
+        10.0,
+        0.01,
+        1e5,
+        "GB",
+        "written to the disk by the tracks, after the first 0.5 GB; frames beyond it are left out",
     )
 
 
