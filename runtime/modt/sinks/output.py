@@ -143,7 +143,9 @@ class LineFile(Generic[T]):
 
     def removed(self) -> bool:
         """Whether it has no name left, so that what was written is lost when it is closed."""
-        return os.fstat(self._file.fileno()).st_nlink == 0
+        with suppress(OSError):
+            return os.fstat(self._file.fileno()).st_nlink == 0
+        return False
 
     def health(self) -> Health:
         """The items written."""
