@@ -4,7 +4,7 @@
 
 A run without faults lists every call that touches the disk, a socket, a clock or the meter. In half of the runs one
 of them fails, evenly over their kinds, in the others two do; in three runs of ten the calls of a kind fail for two
-seconds. The run must go on, what is recorded must be whole, every line that is missing must be counted, and the status
+seconds. The run must go on, what is recorded must be whole, every missing line must be counted, and the status
 must be readable throughout. Prints each broken promise with the calls that break it; then the exit status is 1.
 """
 

@@ -56,6 +56,8 @@ def read(directory: Path) -> dict[str, Any]:
     owners = {os.getuid(), place.stat().st_uid}  # anybody may write to the folder in memory
     path = memory if memory.is_file() and memory.stat().st_uid in owners else beside
     try:
+        if path.exists() and not path.is_file():
+            raise ValueError("no file")  # a pipe may never end
         status = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise MisuseError(path, f"no status ({error})", "give the run directory of a modt run") from None

@@ -14,8 +14,10 @@ def read_lines(path: Path, remedy: str) -> list[str]:
     """Lines of an ASCII text file, with replacements for other characters.
 
     Raises:
-        MisuseError: it cannot be read.
+        MisuseError: it cannot be read, or is a pipe or device, which may never end.
     """
+    if path.exists() and not path.is_file():
+        raise MisuseError(path, "is no file", remedy)
     try:
         return path.read_text(encoding="ascii", errors="replace").splitlines()
     except OSError as error:
