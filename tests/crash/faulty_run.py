@@ -38,13 +38,14 @@ from modt.energy.windows import SCHEMA as ENERGY_SCHEMA
 from modt.energy.windows import Clocks, Windows
 from modt.errors import ModtError
 from modt.reporting.summary import Summary
+from modt.sinks import run_directory
 from modt.sinks.background import Background
 from modt.sinks.datagrams import Datagrams
 from modt.sinks.frame_lines import FrameLines
 from modt.sinks.output import LineFile
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.records import read_records
-from modt.sinks.run_directory import MEMORY, RunDirectory
+from modt.sinks.run_directory import RunDirectory
 from modt.sinks.tracks import SCHEMA
 from modt.sources.live import live_stream
 from modt.sources.live.live_stream import LiveStream
@@ -159,13 +160,15 @@ class Faults:
         return call(*given, **options)
 
     def ours(self, place: Any) -> str:
-        """What a path or a descriptor is called in the list of calls; empty if it is none of the run's."""
+        """Name of a path or a descriptor in the list of calls; empty if it is none of the run's, or is in memory."""
         try:
             path = self._readlink(f"/proc/self/fd/{place}") if isinstance(place, int) else os.fspath(place)
         except (OSError, TypeError):
             return ""
         path = path.decode() if isinstance(path, bytes) else path
-        if path.startswith((self._folder, f"{MEMORY}/modt-", "/proc/")) or self._folder.startswith(path):
+        if path.startswith(f"{self._folder}/memory"):
+            return ""
+        if path.startswith((self._folder, "/proc/")) or self._folder.startswith(path):
             return path.rpartition("/")[2] or "/"
         return ""
 
@@ -360,6 +363,8 @@ class FaultyRun:
             supervisor = Systemd(str(folder / "notify"), 1.0, clock=lambda: faults.now_s)
             stack.enter_context(patch.object(metering, "windows", self._windows))
             stack.enter_context(patch.object(live_stream, "READ_S", PAUSE_S))
+            (folder / "memory").mkdir()
+            stack.enter_context(patch.object(run_directory, "MEMORY", folder / "memory"))
             stack.enter_context(faults.installed())
             session = Session(
                 source, stages, recording, sinks, deadlines, Containment(), monitor, stop, Summary(0), [meter], None,

@@ -23,6 +23,13 @@ from tests.results import CAR, result
 from tests.sinks.test_recording import Time
 
 
+@pytest.fixture(autouse=True)
+def memory(tmp_path, monkeypatch):
+    """A folder in the place of that in memory."""
+    (tmp_path / "memory").mkdir()
+    monkeypatch.setattr("modt.sinks.run_directory.MEMORY", tmp_path / "memory")
+
+
 def mount(*arguments):
     done = subprocess.run(["mount", *map(str, arguments)], capture_output=True, text=True, check=False)
     if done.returncode:
