@@ -219,10 +219,12 @@ class Recording:
         try:
             action()
         except Exception as error:
+            cause = error.cause if isinstance(error, ModtError) else f"{type(error).__name__}: {error}"
             if self.cause is None:
                 self.pauses += 1
-                log.warning("%s: recording pauses until it can be written: %s", self.directory.path, error)
-            self.cause = error.cause if isinstance(error, ModtError) else f"{type(error).__name__}: {error}"
+                subject = error.subject if isinstance(error, ModtError) else self.directory.path
+                log.warning("%s: %s; recording pauses until it can", subject, cause)
+            self.cause = cause
             self._retry_s = self._clock() + RETRY_S
             return False
         if self.cause is not None:
