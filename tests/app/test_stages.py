@@ -10,7 +10,7 @@ import pytest
 from modt import profile
 from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.inputs import Request
-from modt.app.stages import SensorWatch, Stages, within
+from modt.app.stages import RANGE_SHARE, SensorWatch, Stages, within
 from modt.energy.ledger import Ledger
 from modt.errors import MisuseError
 from modt.types import NONE, UNLIMITED, Frame
@@ -177,7 +177,7 @@ def test_a_profile_that_the_source_names_is_the_base_of_what_is_found():
 
 def test_a_reduced_frame_holds_what_is_near():
     stages, frame = stages_of(), frames()[0]
-    reach_m = stages.config.loop.range_share * stages.config.sensor.max_range_m
+    reach_m = RANGE_SHARE * stages.config.sensor.max_range_m
     result = stages.step(frame, UNLIMITED, reduced=True)
     distance_m = np.hypot(*result.frame.points[:, :2].T)
     assert distance_m.max() <= reach_m

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from modt.app.timing import RestCost, Timing
+from modt.app.deadlines import Deadlines
+from modt.app.timing import Timing
 
 
 def test_a_frame_is_missed_when_its_result_comes_after_the_next_sweep():
@@ -41,13 +42,15 @@ def line(**ms):
 
 
 def test_the_cost_of_the_rest_rises_at_once_and_falls_slowly():
-    rest = RestCost()
-    rest.add(line(segmentation=10, tracking=5, classification=50))
-    assert rest.ms == pytest.approx(15)
-    rest.add(line(segmentation=30))
-    assert rest.ms == pytest.approx(30)
-    rest.add(line(segmentation=10))
-    assert 28 < rest.ms < 30
+    deadlines = Deadlines(0.1, lambda: 0.0)
+
+    def rest_ms(**ms):
+        deadlines.finish(0.0, line(**ms))
+        return deadlines.report()["other_stages_ms"]
+
+    assert rest_ms(segmentation=10, tracking=5, classification=50) == pytest.approx(15)
+    assert rest_ms(segmentation=30) == pytest.approx(30)
+    assert 28 < rest_ms(segmentation=10) < 30
     for _ in range(200):
-        rest.add(line(segmentation=10))
-    assert rest.ms == pytest.approx(10, rel=0.01)
+        last_ms = rest_ms(segmentation=10)
+    assert last_ms == pytest.approx(10, rel=0.01)

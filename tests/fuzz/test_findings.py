@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from modt.cli.status import read as read_status
 from modt.errors import ModtError
 from modt.ros2.cdr import CdrWriter
+from modt.sinks.records import read_records
+from modt.sources.pose_file import read_poses
 from modt.sources.recognise import open_stream
 from modt.sources.scan_file import read_scan
 from tests.desk.reporting.test_run_report import ledger_line
@@ -191,3 +195,16 @@ def test_a_chunk_of_2_to_the_63_bytes_is_refused(tmp_path: Path) -> None:
     path.write_bytes(chunk_of(2**63, tmp_path))
     with limits(), pytest.raises(ModtError, match="holds no message"):
         open_stream(path)
+
+
+@pytest.mark.parametrize("read", ["poses", "records", "status"])
+def test_a_pipe_in_the_place_of_a_file_is_refused_at_once(read, tmp_path):
+    path = tmp_path / "status.json"
+    os.mkfifo(path)
+    readers = {
+        "poses": lambda: read_poses(path),
+        "records": lambda: list(read_records(path, "modt.frame/3")),
+        "status": lambda: read_status(tmp_path),
+    }
+    with pytest.raises(ModtError, match="no file"):
+        readers[read]()

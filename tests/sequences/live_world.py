@@ -22,6 +22,7 @@ from modt.sources.live.sweep_reader import Reception, Sweep
 from modt.sources.packets.turn_decoder import RECOGNISED_BY
 from modt.sources.packets.velodyne import VelodyneDecoder
 from modt.sources.packets.velodyne_models import STAMP_AT, azimuths
+from modt.sources.pose_buffer import CAPACITY, MAX_AGE_S, POSITION_NOISE_M
 from modt.sources.pose_datagram import read_datagram
 from modt.sources.pose_topic import PoseTopic
 from modt.sources.received_poses import ReceivedPoses
@@ -34,7 +35,7 @@ SPEED_MPS = 5.0
 TURN_S = 0.1
 POSES_A_TURN = 5
 HOUR_US = 3_600_000_000
-REACH_M = CONFIG.position_noise_m + 2 * CONFIG.max_speed_mps * CONFIG.max_age_s
+REACH_M = POSITION_NOISE_M + 2 * CONFIG.max_speed_mps * MAX_AGE_S
 """No pose of a frame is farther from every pose that was sent."""
 MOST_KINDS, MOST_REASONS = 60, 40
 MESSAGE_CPU_S, SLACK_CPU_S = 0.004, 1.0
@@ -60,7 +61,7 @@ class Datagrams(ReceivedPoses):
         self.held: list[bytes] = []
 
     def _take(self) -> list[bytes]:
-        taken, self.held = self.held[-CONFIG.capacity :], []
+        taken, self.held = self.held[-CAPACITY:], []
         self.received += len(taken)
         return taken
 
@@ -258,7 +259,7 @@ class LiveWorld:
         assert len(decoder._ending.entries) <= most
         assert len(decoder._first or []) <= RECOGNISED_BY
         assert len(decoder._others) <= RECOGNISED_BY
-        assert max(len(poses.believed), len(poses._doubted)) <= CONFIG.capacity
+        assert max(len(poses.believed), len(poses._doubted)) <= CAPACITY
         assert len(self.stream.faults.first) <= MAX_KEPT_FAULTS
 
     def recovers(self) -> None:

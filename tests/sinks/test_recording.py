@@ -4,6 +4,7 @@ import errno
 import json
 import logging
 
+import numpy as np
 import pytest
 
 from modt.config import RecordingConfig
@@ -152,6 +153,25 @@ def test_lines_that_the_writer_has_no_room_for_are_counted(tmp_path):
     recording.write(frame(0))
     recording.ledger(json.loads("{}"))
     assert recording.health()["lost_lines"] == 2
+
+
+def test_beyond_the_bytes_of_a_day_frames_are_left_out_evenly_and_counted(tmp_path, monkeypatch):
+    monkeypatch.setattr("modt.sinks.recording.WHOLE_BYTES", 10_000.0)
+    time = Time()
+    recording = made(tmp_path, time=time, gb_per_day=0.1)
+    for k in range(2000):
+        time.now += 0.1
+        recording.write(frame(k))
+        recording.ledger({"schema": "modt.ledger/1", "frame": k})
+    recording.finish()
+    kept = [r["frame"] for r in read_records(tmp_path / "run" / "tracks.jsonl", SCHEMA)]
+    assert kept[:8] == list(range(8))
+    steps = np.diff(kept[50:])
+    assert max(steps) - min(steps) <= 1
+    assert recording.health()["thinned_lines"] == 2000 - len(kept)
+    assert recording.health()["lost_lines"] == 0
+    size = (tmp_path / "run" / "tracks.jsonl").stat().st_size
+    assert size <= 10_000 + 0.1e9 / 86_400 * time.now + 2_000
 
 
 def test_a_replay_is_recorded_whole_whatever_the_profile_keeps(tmp_path):

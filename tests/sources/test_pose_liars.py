@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modt.config import OdometryConfig
+from modt.sources.pose_buffer import MAX_AGE_S, POSITION_NOISE_M
 from modt.sources.pose_socket import PoseSocket
 from modt.types import Frame
 
@@ -222,7 +223,7 @@ def test_while_most_datagrams_are_honest_no_pose_is_far_off(seed, share, rate_hz
     errors = robot.drive(5.0, lies)
     after = robot.drive(1.5)
     robot.close()
-    assert np.nanmax(errors) < CONFIG.position_noise_m + CONFIG.max_speed_mps * CONFIG.max_age_s
-    assert np.nanmedian(errors) < 2 * CONFIG.position_noise_m
+    assert np.nanmax(errors) < POSITION_NOISE_M + CONFIG.max_speed_mps * MAX_AGE_S
+    assert np.nanmedian(errors) < 2 * POSITION_NOISE_M
     assert after[9:].max() < 0.01
     assert np.isnan(errors).mean() < 0.3

@@ -15,9 +15,9 @@ from modt.config import OdometryConfig
 from modt.errors import MisuseError
 from modt.geometry import inverse, rotation_zyx, se3, yaw_of
 from modt.schemes import POSES, open_poses
-from modt.sources.pose_buffer import PoseBuffer, interpolate
+from modt.sources.pose_buffer import MAX_AGE_S, PoseBuffer, interpolate
 from modt.sources.pose_datagram import DatagramError, read_datagram
-from modt.sources.pose_socket import PoseSocket, open_socket
+from modt.sources.pose_socket import DatagramQueue, PoseSocket, open_socket
 from modt.types import Frame
 
 CONFIG = OdometryConfig()
@@ -149,8 +149,8 @@ def test_poses_are_extrapolated(pair):
     for k in range(5):
         there.send(planar(0.1 * k, 1.0 * k, 0.0, 0.02 * k))
     np.testing.assert_allclose(pose_of(odometry, frame(0.5)), matrix([5.0, 0.0, 0.1]), atol=1e-9)
-    assert pose_of(odometry, frame(0.4 + CONFIG.max_age_s + 0.01)) is None
-    assert pose_of(odometry, frame(0.4 + CONFIG.max_age_s - 0.01)) is not None
+    assert pose_of(odometry, frame(0.4 + MAX_AGE_S + 0.01)) is None
+    assert pose_of(odometry, frame(0.4 + MAX_AGE_S - 0.01)) is not None
 
 
 def test_extrapolation_does_not_amplify_noise():
@@ -234,7 +234,8 @@ def test_no_motion_below_the_speed_limit_is_a_restart(steps):
 def test_of_a_flood_the_newest_are_kept():
     there, here = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
     there.setblocking(False)
-    odometry = PoseSocket(here, OdometryConfig(capacity=4), "test")
+    odometry = PoseSocket(here, CONFIG, "test")
+    odometry._queue = DatagramQueue(here, 4, 4096)
     for k in range(6):
         there.send(planar(0.1 * k, 1.0 * k))
     assert pose_of(odometry, frame(0.5))[0, 3] == 5.0

@@ -178,7 +178,7 @@ FAULTS = (
     Fault("reordering", 2.0, lambda s: s.source.faults.skipped, _late),
     Fault("other sensor", 3.0, lambda s: s.stages.misfits, _other_sensor),
     Fault("lying stamps", 2.0, lambda s: s.source.faults.skipped, _lie),
-    Fault("clock set back", 0.2, lambda s: s.source.time_steps, switch=_set_back),
+    Fault("clock set back", 0.2, lambda s: s.source.health()["time_steps"], switch=_set_back),
     Fault(FULL_DISK, 3.0, lambda s: s.recording.lost, switch=_switch("disk_full")),
     Fault("meter lost", 3.0, lambda s: s.power.unread, switch=_switch("meter_lost")),
     Fault("failing stage", 1.0, lambda s: s.failures.counts.total(), switch=_switch("stage_broken")),

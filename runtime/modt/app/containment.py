@@ -6,10 +6,12 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable
-from typing import NoReturn
+from typing import ParamSpec, TypeVar
 
 from modt.errors import ModtError
 
+P = ParamSpec("P")
+R = TypeVar("R")
 log = logging.getLogger(__name__)
 
 MAX_IN_A_ROW = 10
@@ -46,6 +48,14 @@ class Containment:
             cause = f"{self.in_a_row} failures in a row, the last one {_kind(error)}: {error}"
             raise ModtError(where, cause, "report it, with the traceback above") from error
 
+    def spare(self, where: str, call: Callable[P, R], /, *arguments: P.args, **options: P.kwargs) -> R | None:
+        """Result of a call that a frame can do without; None where it fails, which is counted."""
+        try:
+            return call(*arguments, **options)
+        except Exception as error:
+            self.note(error, where)
+            return None
+
     def note(self, error: Exception, where: str) -> None:
         """Count an exception that cost no frame."""
         if not self._contains:
@@ -54,17 +64,6 @@ class Containment:
         self.counts[kind] += 1
         if self.counts[kind] == 1:
             log.error("%s; later ones are only counted", kind, exc_info=error)
-
-    def end(self, error: Exception) -> NoReturn:
-        """Report that the source has failed.
-
-        Raises:
-            ModtError: it has.
-        """
-        if not self._contains:
-            raise error
-        cause = f"nothing can be received any more ({_kind(error)}: {error})"
-        raise ModtError("source", cause, "check its network interface and start again") from error
 
 
 class OncePerSecond(logging.Filter):

@@ -9,9 +9,12 @@ from collections.abc import Callable
 from typing import Any
 
 from modt.app.ladder import GIVEN_UP, Change, Ladder, Step, budget_at
-from modt.app.timing import RestCost, Timing
+from modt.app.timing import Timing
+from modt.pipeline import CLASSIFICATION
 from modt.types import Budget
 
+DECAY = 0.95
+"""Weight of the past a frame, in the cost of the other stages; a greater cost counts at once."""
 log = logging.getLogger(__name__)
 
 
@@ -25,14 +28,15 @@ class Deadlines:
         period_s: of the sensor.
 
     Attributes:
-        ladder, timing, rest: what is known of the frames so far.
+        ladder, timing: what is known of the frames so far.
+        rest_ms: cost of a frame beside its classification: a maximum over the last frames that decays.
         changes: number of times that each step of the ladder was entered.
         shed: sweeps left out by the last step, or that arrived during the first frame.
         budget_ms: time for classification in the last frame.
     """
 
     def __init__(self, period_s: float, clock: Callable[[], float] = time.monotonic) -> None:
-        self.ladder, self.timing, self.rest = Ladder(), Timing(), RestCost()
+        self.ladder, self.timing, self.rest_ms = Ladder(), Timing(), 0.0
         self.changes: Counter[str] = Counter()
         self.shed = 0
         self.budget_ms = 0.0
@@ -57,14 +61,15 @@ class Deadlines:
         """What a frame that starts now may spend, of the whole budget of its profile."""
         self._start_s = self._clock()
         deadline_s = self._period_s + (self._start_s if self._fresh_s is None else arrived_s)
-        left_ms = max(1e3 * (deadline_s - self._start_s) - self.rest.ms, 0.0)
+        left_ms = max(1e3 * (deadline_s - self._start_s) - self.rest_ms, 0.0)
         budget = budget_at(self.ladder.step, whole, left_ms, frame)
         self.budget_ms = min(ms for ms in (left_ms, budget.cpu_ms, budget.mean_ms) if ms is not None)
         return budget
 
     def finish(self, arrived_s: float, line: dict[str, Any]) -> None:
         """Judge the frame that ends now, by its ledger line."""
-        self.rest.add(line)
+        ms = 1e-6 * sum(row["wall_ns"] for stage, row in line["stages"].items() if stage != CLASSIFICATION)
+        self.rest_ms = max(ms, DECAY * self.rest_ms + (1 - DECAY) * ms)
         now_s = self._clock()
         if self._fresh_s is None:
             self._fresh_s = now_s
@@ -82,7 +87,7 @@ class Deadlines:
         return {
             **self.timing.report(),
             "budget_ms": round(self.budget_ms, 3),
-            "other_stages_ms": round(self.rest.ms, 3),
+            "other_stages_ms": round(self.rest_ms, 3),
             "step": self.ladder.step.name.lower(),
             "steps_entered": dict(self.changes),
             "shed_sweeps": self.shed,

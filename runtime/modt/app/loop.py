@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from modt.app.containment import RENEW_AFTER, Containment
 from modt.app.deadlines import Deadlines, NoDeadlines
@@ -151,13 +151,14 @@ class Loop:
             except ModtError:
                 raise
             except Exception as error:
-                self._failures.end(error)
+                self._failures.fail(error, "source")
+                received = None
             if received is not None and self._stop.signal is None:
                 yield received
             supervisor.alive()
             if self._clock() - reported_s >= REPORT_S:
                 reported_s = self._clock()
-                self._spare("status", self._report, supervisor)
+                self._failures.spare("status", self._report, supervisor)
 
     def _process(self, received: Received) -> None:
         if not self._deadlines.admit(received.arrived_s):
@@ -181,17 +182,10 @@ class Loop:
         budget = self._deadlines.budget(stages.budget, received.arrived_s, frame.index)
         result = stages.step(frame, budget, reduced=self._deadlines.reduced)
         for name, sink in self._sinks.items():
-            self._spare(name, stages.ledger.run, SINK, sink.write, result)
+            self._failures.spare(name, stages.ledger.run, SINK, sink.write, result)
         line = stages.ledger.close_frame(frame.index)
-        self._spare("records", self._observe, result, line)
+        self._failures.spare("records", self._observe, result, line)
         return line
-
-    def _spare(self, where: str, call: Callable[..., None], *arguments: Any) -> None:
-        """Call what a frame can do without."""
-        try:
-            call(*arguments)
-        except Exception as error:
-            self._failures.note(error, where)
 
     def _reload(self, supervisor: Supervisor) -> None:
         supervisor.reloading()

@@ -61,7 +61,9 @@ class Session:
         meters: Sequence[Meter],
         core: int | None,
         lacking: Sequence[str] = (),
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        self._clock = clock
         self.source, self.stages, self.recording, self.sinks = source, stages, recording, sinks
         self.deadlines, self.failures, self.stop = deadlines, failures, stop
         self._monitor, self._totals, self._core, self._lacking = monitor, totals, core, list(lacking)
@@ -75,12 +77,13 @@ class Session:
             deadlines,
             failures,
             stop,
+            clock,
         )
         self._ledgers = [sink for sink in outputs.values() if isinstance(sink, LedgerSink)]
         self._followed = stages.chosen
         self.power, self.summary = Power(), dict[str, Any]()
         self._windows = metering.windows(meters, core)
-        self._began_s = time.monotonic()
+        self._began_s = clock()
         self._counts = Counts(totals, self._began_s)
         self._without_reflectance = 0
         self._tracks: Tracks | None = None  # of the last frame
@@ -98,8 +101,8 @@ class Session:
             stack.callback(self._finish)
             stack.callback(close_together, self.sinks.values())
             for part in (self.stages.odometry, self.source, supervisor):
-                stack.callback(part.close)
-            stack.callback(lambda: self._ledger(self._windows.close()))
+                stack.callback(self.failures.spare, "end", part.close)
+            stack.callback(self.failures.spare, "records", lambda: self._ledger(self._windows.close()))
             stack.enter_context(self.stop.on_signals())
             self.source.start()
             self.loop.run(supervisor)
@@ -107,7 +110,8 @@ class Session:
 
     def status(self) -> dict[str, Any]:
         """The document modt.status/1."""
-        now_s, info = time.monotonic(), self.stages.info
+        now_s, info = self._clock(), self.stages.info
+        resident_mb = self.failures.spare("host", lambda: round(host.resident_mb(), 1))
         loop = {
             "failures": dict(self.failures.counts),
             "reloads": self.loop.reloads,
@@ -131,7 +135,7 @@ class Session:
             "odometry": self.stages.odometry.report(),
             "sinks": self._sinks_health(),
             "recording": self.recording.health(),
-            "host": {"core": self._core, "resident_mb": round(host.resident_mb(), 1), "lacking": self._lacking},
+            "host": {"core": self._core, "resident_mb": resident_mb, "lacking": self._lacking},
         }
 
     def _observe(self, result: FrameResult, line: dict[str, Any]) -> None:
@@ -162,7 +166,7 @@ class Session:
 
     def _finish(self) -> None:
         """Write what waits, and the summary."""
-        elapsed_s, frames, stages = time.monotonic() - self._began_s, self._totals.frames, self.stages
+        elapsed_s, frames, stages = self._clock() - self._began_s, self._totals.frames, self.stages
         faults = self.source.faults
         self.summary = self._totals.result() | {
             "run": {
@@ -179,7 +183,7 @@ class Session:
             },
             "odometry": stages.odometry.report(),
             "class_frequency": dict(zip(CLASS_NAMES, stages.pipeline.decision.frequency.tolist(), strict=True)),
-            "host": host.usage(self._core),
+            "host": self.failures.spare("host", host.usage, self._core),
             "sinks": self._sinks_health(),
             "faults": {
                 "count": faults.count,
@@ -189,8 +193,8 @@ class Session:
             },
         }
         directory, writer = self.recording.directory, self.recording.writer
-        writer.write(self.recording.finish)
         self.summary |= self._monitor.finish(self.status)
+        writer.write(self.recording.finish)
         text = json.dumps(self.summary, indent=2) + "\n"
         writer.write(lambda: directory.write(SUMMARY, text) if self.recording.parts else None)
         writer.close()

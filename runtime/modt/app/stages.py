@@ -30,6 +30,10 @@ RATIO = 2.0
 """Of the numbers of returns of two sweeps that are of another size."""
 
 
+RANGE_SHARE = 0.6
+"""Share of sensor.max_range_m that is kept while the range is reduced."""
+
+
 class NoWatch:
     """The sensor of a recording is that of its first sweep."""
 
@@ -125,7 +129,7 @@ class Stages:
         frame = self.odometry.place(frame)
         if reduced:
             config = self.config
-            frame = replace(frame, points=within(frame.points, config.loop.range_share * config.sensor.max_range_m))
+            frame = replace(frame, points=within(frame.points, RANGE_SHARE * config.sensor.max_range_m))
         result = self.pipeline.step(frame, budget)
         if isinstance(self.pipeline.tracker, Tracker) and isinstance(result.tracks, TrackTable):
             self._good = result.tracks, self.pipeline.tracker.next_id

@@ -8,7 +8,7 @@ from modt.app.status import STALE_S, one_line
 
 
 def status_text(status: dict[str, Any], now_s: float) -> str:
-    """Some lines for a terminal."""
+    """Some lines for a terminal, without characters that would steer it."""
     loop, sensor, recording = status["loop"], status["sensor"], status["recording"]
     age_s = now_s - status["time_s"]
     state = (
@@ -33,7 +33,7 @@ def status_text(status: dict[str, Any], now_s: float) -> str:
         *(f"  failures    {kind}: {n}" for kind, n in loop["failures"].items()),
         *(f"  lacking     {what}" for what in status["host"]["lacking"]),
     ]
-    return "\n".join(lines)
+    return "\n".join("".join(c if c.isprintable() else "?" for c in line) for line in lines)
 
 
 def _times(figures: dict[str, float]) -> str:

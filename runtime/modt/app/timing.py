@@ -1,4 +1,4 @@
-"""Punctuality of the loop: every frame against its deadline, and the time that is left for classification."""
+"""Punctuality of the loop: every frame against its deadline."""
 
 from __future__ import annotations
 
@@ -6,11 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from modt.pipeline import CLASSIFICATION
 from modt.reporting.histogram import Histogram
 
-DECAY = 0.95
-"""Weight of the past a frame, in the cost of the other stages; a greater cost counts at once."""
 _BITS = 5
 """Leading bits held of a time [ns]: an error below 3 %, in at most 960 counts."""
 
@@ -53,16 +50,3 @@ class Timing:
 
 def _figures_ms(times_ns: Histogram) -> dict[str, float]:
     return {name: round(ms, 3) for name, ms in times_ns.figures(1e6, p50=0.5, p99=0.99).items()}
-
-
-class RestCost:
-    """What a frame costs beside its classification: a maximum over the last frames that decays."""
-
-    def __init__(self) -> None:
-        self.ms = 0.0
-
-    def add(self, ledger_line: dict[str, Any]) -> None:
-        """Add the ledger line of a frame."""
-        stages = ledger_line["stages"].items()
-        ms = 1e-6 * sum(row["wall_ns"] for stage, row in stages if stage != CLASSIFICATION)
-        self.ms = max(ms, DECAY * self.ms + (1 - DECAY) * ms)

@@ -75,6 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
         handler.addFilter(OncePerSecond())
     status = session.run(supervisor)["status"]
     counts, recording = status["counts"], session.recording.health()
-    records = f"records in {out}" if recording["parts"] else f"nothing is recorded: {recording['failing']}"
+    records = f"records in {out}" if recording["parts"] else "nothing is recorded"
+    records += f", {recording['lost_lines']} lines are lost" if recording["lost_lines"] else ""
+    records += f": {recording['failing']}" if recording["failing"] else ""
     print(f"modt: {counts['frames']} frames; {one_line(status)}; {records}", file=sys.stderr)
     return INTERRUPTED if session.stop.signal == "SIGINT" else 0

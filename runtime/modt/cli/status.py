@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import time
 from pathlib import Path
 from typing import Any
@@ -37,26 +38,32 @@ def run(arguments: argparse.Namespace) -> int:
     from modt.app.status import STALE_S
     from modt.app.status_text import status_text
     from modt.sinks.records import records_of
-    from modt.sinks.run_directory import STATUS
 
-    path, now_s = arguments.directory / STATUS, time.time()
-    status = read(path)
-    with records_of(path):
+    directory, now_s = arguments.directory, time.time()
+    status = read(directory)
+    with records_of(directory):
         text = json.dumps(status, indent=1) if arguments.json else status_text(status, now_s)
         stale = bool(now_s - status["time_s"] >= STALE_S)
     print(text)
     return int(stale)
 
 
-def read(path: Path) -> dict[str, Any]:
-    """A status.
+def read(directory: Path) -> dict[str, Any]:
+    """The status of a run: in memory while its disk cannot be written, else beside its records.
 
     Raises:
         MisuseError: there is none.
     """
     from modt.app.status import SCHEMA
+    from modt.sinks.run_directory import status_paths
 
+    beside, memory = status_paths(directory)
+    place = next(folder for folder in (directory, *directory.absolute().parents) if folder.exists())
+    owners = {os.getuid(), place.stat().st_uid}  # anybody may write to the folder in memory
+    path = memory if memory.is_file() and memory.stat().st_uid in owners else beside
     try:
+        if path.exists() and not path.is_file():
+            raise ValueError("no file")  # a pipe may never end
         status = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise MisuseError(path, f"no status ({error})", "give the run directory of a modt run") from None

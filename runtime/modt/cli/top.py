@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -12,13 +13,13 @@ from modt.cli.status import add_directory, read
 from modt.errors import MisuseError
 
 PERIOD_S = 1.0
-"""That of the status."""
-QUIT = "qQ\x04"
+"""Interval between two status files [s]."""
+CLEAR = "\x1b[H\x1b[2J"
 
 
 def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Declare the command and its options."""
-    p = commands.add_parser("top", help="show what a running modt run is doing, until q is pressed")
+    p = commands.add_parser("top", help="show what a running modt run is doing, until Ctrl-C is pressed")
     add_directory(p)
     options.add_examples(
         p,
@@ -29,36 +30,31 @@ def add_parser(commands: argparse._SubParsersAction[argparse.ArgumentParser]) ->
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Show the status until q or Ctrl-C; without a terminal print it once.
+    """Show the status until Ctrl-C; without a terminal print it once.
 
     Raises:
         MisuseError: there is no status at the start.
     """
     from modt.app.status_text import status_text
-    from modt.sinks.run_directory import STATUS
 
-    path = arguments.directory / STATUS
-    text = status_text(read(path), time.time())
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+    text = status_text(read(arguments.directory), time.time())
+    if not sys.stdout.isatty():
         print(text)
         return 0
-    from modt.cli.screen import full_screen  # termios is no part of Windows
-
     try:
-        with full_screen(sys.stdin, sys.stdout) as screen:
-            while True:
-                screen.show([*text.splitlines(), "", "q ends"])
-                if screen.key(PERIOD_S) in tuple(QUIT):
-                    return 0
-                text = _text(path)
+        while True:
+            rows = text.splitlines()[: shutil.get_terminal_size().lines - 1]
+            print(CLEAR + "\n".join(rows), flush=True)
+            time.sleep(PERIOD_S)
+            text = _text(arguments.directory)
     except KeyboardInterrupt:
         return 0
 
 
-def _text(path: Path) -> str:
+def _text(directory: Path) -> str:
     from modt.app.status_text import status_text
 
     try:
-        return status_text(read(path), time.time())
+        return status_text(read(directory), time.time())
     except MisuseError as error:  # another part of the records begins, or the service ends
         return str(error)

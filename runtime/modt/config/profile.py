@@ -115,8 +115,9 @@ class EnergyConfig(StageConfig):
 class LoopConfig(StageConfig):
     """Limits of the live loop, in effect with `modt run`."""
 
-    range_share: float = number(0.6, 0.05, 1.0, "", "of sensor.max_range_m that is kept where the range is reduced")
-    power_W: float | None = number(None, 0.01, 1000.0, "W", "limit, by the meter or the board's model; null: none")
+    power_W: float | None = number(
+        None, 0.01, 1000.0, "W", "limit of the board's power, by its meter or else its model; null: none"
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -126,6 +127,13 @@ class RecordingConfig(StageConfig):
     keep: str = choice("all", ("all", "tracks", "ledger", "none"), "which records are written")
     disk_mb: float = number(
         2000.0, 1.0, 1e7, "MB", "of the records of this run and earlier ones; the oldest are deleted"
+    )
+    gb_per_day: float = number(
+        10.0,
+        0.01,
+        1e5,
+        "GB",
+        "written to the disk by the tracks, after the first 0.5 GB; frames beyond it are left out",
     )
 
 

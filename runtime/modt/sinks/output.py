@@ -129,6 +129,18 @@ class LineFile(Generic[T]):
         with writing(self.path):
             os.fsync(self._file.fileno())
 
+    def present(self) -> bool:
+        """Whether its path still leads to it."""
+        with suppress(OSError):
+            return os.path.samestat(os.fstat(self._file.fileno()), os.stat(self.path))
+        return False
+
+    def removed(self) -> bool:
+        """Whether it has no name left, so that what was written is lost when it is closed."""
+        with suppress(OSError):
+            return os.fstat(self._file.fileno()).st_nlink == 0
+        return False
+
     def health(self) -> Health:
         """The items written."""
         return {"written": self._written}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from modt.config import RecordingConfig
@@ -26,9 +27,12 @@ KEPT = {"all": (TRACKS, LEDGER), "tracks": (TRACKS,), "ledger": (LEDGER,), "none
 PARTS = 8
 """The disk holds this many parts."""
 RESERVED_BYTES = 20_000
-"""Of a part, for run.yaml, status.json and summary.json."""
-RETRY_S = 2.0
-"""Between attempts to write again after a failure."""
+"""Bytes of each part that are kept for run.yaml, status.json and summary.json."""
+RETRY_S = 1.0
+"""Time from a failure to the next attempt to write [s]."""
+WHOLE_BYTES = 5e8
+"""Records of frames that are written whole before `gb_per_day` thins them: a run on a desk loses no frame."""
+DAY_S = 86_400.0
 JOBS = 128
 """Jobs that wait for the disk at most."""
 CLOSE_S = 1.0
@@ -54,12 +58,22 @@ class AtOnce:
 class Recording:
     """tracks.jsonl and ledger.jsonl; while they cannot be written, lines are lost, counted, and the loop goes on.
 
+    Once a second it looks whether its files are still where they were begun. If somebody has removed or moved them,
+    it begins another part.
+
     Args:
         directory: where they go.
         config: what is kept.
         writer: runs what writes, in a thread; `write`, `ledger`, `start` and `follow` are for the loop, the rest for
             that thread.
         describe: text of run.yaml for a new part.
+
+    Attributes:
+        lines: number written.
+        lost: number of those that could not be written, or may be missing since their file was removed or not synced.
+        thinned: number left out to keep to `gb_per_day`.
+        pauses, parts: number of times that writing failed, and of parts begun.
+        cause: why nothing can be written now; None while all is well.
     """
 
     def __init__(
@@ -71,12 +85,13 @@ class Recording:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.directory, self.config = directory, config
-        self.lines = self.lost = self.pauses = self.parts = 0
-        self.cause: str | None = None  # why nothing can be written now
+        self.lines = self.lost = self.thinned = self.pauses = self.parts = 0
+        self.cause: str | None = None
         self.writer, self._describe, self._clock = writer, describe, clock
         self._files: dict[str, LineFile[str]] = {}
         self._begun, self._bytes, self._retry_s = False, 0, float("-inf")
-        self._synced, self._named = 0, 0  # lines, and files, that outlast a power cut
+        self._unsynced, self._named = 0, 0  # lines, and files, that a power cut may take
+        self._allowed_bytes, self._allowed_s = WHOLE_BYTES, clock()
 
     def start(self) -> None:
         """Begin the first part."""
@@ -84,13 +99,16 @@ class Recording:
 
     def write(self, result: FrameResult) -> None:
         """Hand over the line of a frame."""
-        if TRACKS in KEPT[self.config.keep]:
-            self._submit(TRACKS, frame_line(result))
+        if TRACKS in KEPT[self.config.keep] and self._allows():
+            text = frame_line(result)
+            self._allowed_bytes -= len(text)
+            self.writer.write(lambda: self._append(TRACKS, text))
 
     def ledger(self, record: dict[str, Any]) -> None:
         """Hand over a line of the ledger."""
         if LEDGER in KEPT[self.config.keep]:
-            self._submit(LEDGER, line(record))
+            text = line(record)
+            self.writer.write(lambda: self._append(LEDGER, text))
 
     def follow(self, config: RecordingConfig) -> None:
         """Keep what another profile says, and describe it."""
@@ -102,6 +120,7 @@ class Recording:
         counts = {
             "lines": self.lines,
             "lost_lines": self.lost + int(self.writer.health()["dropped"]),
+            "thinned_lines": self.thinned,
             "pauses": self.pauses,
             "parts": self.parts,
         }
@@ -111,45 +130,73 @@ class Recording:
         """No effect: `finish` ends the files on their own thread."""
 
     def state(self, status: str) -> None:
-        """Write status.json, and have the lines so far outlast a power cut; once a second."""
+        """Write the status, beside the records or in memory, and have the lines so far outlast a power cut."""
+        self._look()
         self.sync()
-        if self.cause is None and self._begun:
-            self._attempt(lambda: self.directory.write(STATUS, status))
+        if self._ready() or self._begun:
+            with suppress(ModtError):
+                self.directory.write(STATUS, status)
+                self.directory.in_memory(None)
+                return
+        self.directory.in_memory(status)
 
     def sync(self) -> None:
-        """Have the lines so far outlast a power cut."""
-        if self.cause is None and self._synced != self.lines and self._attempt(self._sync):
-            self._synced = self.lines
+        """Have the lines so far outlast a power cut; those that may not are lost."""
+        if self.cause is None and self._unsynced:
+            if not self._attempt(self._sync):
+                self.lost += self._unsynced
+                self._leave()
+            self._unsynced = 0
 
     def finish(self) -> None:
         """Close the files."""
+        self._look()
         self.sync()
-        files, self._files, self._named = self._files, {}, 0
-        for file in files.values():
-            file.close()
+        self._leave()
 
-    def _submit(self, name: str, text: str) -> None:
-        self.writer.write(lambda: self._append(name, text))
+    def _allows(self) -> bool:
+        """Whether the bytes of a day suffice for another frame."""
+        now_s, self._allowed_s = self._allowed_s, self._clock()
+        self._allowed_bytes += 1e9 * self.config.gb_per_day / DAY_S * max(self._allowed_s - now_s, 0.0)
+        self._allowed_bytes = min(self._allowed_bytes, WHOLE_BYTES)
+        self.thinned += self._allowed_bytes < 0
+        return self._allowed_bytes >= 0
 
     def _append(self, name: str, text: str) -> None:
-        if self.cause is not None and self._clock() < self._retry_s:
-            self.lost += 1
-            return
-        limit_bytes = 1e6 * self.config.disk_mb / PARTS
-        if self._begun and self._bytes + len(text) > limit_bytes:
+        if self._begun and self._bytes + len(text) > 1e6 * self.config.disk_mb / PARTS:
             self.finish()
-            self._begun = False
-        if not self._begun:
-            self._begin()
-        if not self._begun or not self._attempt(lambda: self._line(name, text)):
+        if not self._ready() or not self._attempt(lambda: self._line(name, text)):
             self.lost += 1
             return
         self.lines, self._bytes = self.lines + 1, self._bytes + len(text)
+        self._unsynced += 1
+
+    def _ready(self) -> bool:
+        """Whether a part is open, or can be begun now."""
+        if self.cause is not None and self._clock() < self._retry_s:
+            return False
+        if not self._begun:
+            self._begin()
+        return self._begun
 
     def _begin(self) -> None:
         limit_bytes = 1e6 * self.config.disk_mb * (1 - 1 / PARTS)
         self._begun = self._attempt(lambda: self.directory.begin(self._describe(), limit_bytes))
         self._bytes, self.parts = RESERVED_BYTES, self.parts + self._begun
+
+    def _look(self) -> None:
+        """Leave a part whose files are not where they were begun; the lines of a file without a name are lost."""
+        if self._begun and not (self.directory.present() and all(file.present() for file in self._files.values())):
+            removed = sum(int(file.health()["written"]) for file in self._files.values() if file.removed())
+            self.lost, self._unsynced = self.lost + removed, 0
+            log.warning("%s: records were removed or moved; %d lines are lost", self.directory.path, removed)
+            self._leave()
+
+    def _leave(self) -> None:
+        files, self._files, self._named, self._begun = self._files, {}, 0, False
+        for file in files.values():
+            with suppress(ModtError):
+                file.close()
 
     def _redescribe(self) -> None:
         if self._begun:
@@ -157,7 +204,7 @@ class Recording:
 
     def _line(self, name: str, text: str) -> None:
         if name not in self._files:
-            self._files[name] = LineFile(self.directory.path / name)
+            self._files[name] = LineFile(self.directory.path / name, mode="ab")
         self._files[name].write(text)
 
     def _sync(self) -> None:
@@ -171,11 +218,14 @@ class Recording:
         """Whether an action went well; failures pause the recording, and its return is logged."""
         try:
             action()
-        except ModtError as error:
+        except Exception as error:
+            cause = error.cause if isinstance(error, ModtError) else f"{type(error).__name__}: {error}"
             if self.cause is None:
                 self.pauses += 1
-                log.warning("%s: %s; recording pauses until it can", error.subject, error.cause)
-            self.cause, self._retry_s = error.cause, self._clock() + RETRY_S
+                subject = error.subject if isinstance(error, ModtError) else self.directory.path
+                log.warning("%s: %s; recording pauses until it can", subject, cause)
+            self.cause = cause
+            self._retry_s = self._clock() + RETRY_S
             return False
         if self.cause is not None:
             log.warning("%s: recording again; %d lines are lost", self.directory.path, self.lost)
@@ -230,6 +280,9 @@ class WholeRecording(Recording):
         super().finish()
         for writer in self._more:
             writer.close()
+
+    def _allows(self) -> bool:
+        return True
 
     def _attempt(self, action: Callable[[], None]) -> bool:
         action()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import hashlib
 import os
 import re
 from collections.abc import Iterator
@@ -15,7 +16,15 @@ from modt.sinks.output import replace_file, sync_folder, writing
 RUN, TRACKS, LEDGER, SUMMARY, STATUS = "run.yaml", "tracks.jsonl", "ledger.jsonl", "summary.json", "status.json"
 MARK = "service: true"
 """Line of run.yaml in the directories of a service: no other directory is ever deleted."""
+MEMORY = Path("/dev/shm")
+"""Folder of the status while the disk of the records cannot be written."""
 _KNOWN = {form.format(name) for name in (RUN, TRACKS, LEDGER, SUMMARY, STATUS) for form in ("{}", ".{}.part")}
+
+
+def status_paths(directory: Path) -> tuple[Path, Path]:
+    """Where the status of a run is: beside its records and, while those cannot be written, in memory."""
+    name = hashlib.sha256(os.fsencode(directory.resolve())).hexdigest()[:16]
+    return directory / STATUS, MEMORY / f"modt-{name}.json"
 
 
 class RunDirectory:
@@ -32,6 +41,7 @@ class RunDirectory:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.before: Path | None = None
+        self._disk = next(folder for folder in path.absolute().parents if os.path.ismount(folder))
         if path.exists() and not path.is_dir():
             raise MisuseError(path, "is a file", "give a directory as --out")
         foreign = sorted({p.name for p in path.iterdir()} - _KNOWN) if path.is_dir() else []
@@ -58,6 +68,7 @@ class RunDirectory:
                 raise ModtError(self.path, "another run of modt records into it", remedy) from None
             except OSError:  # said when the recording begins
                 pass
+            stack.callback(self.in_memory, None)
             yield
 
     def begin(self, description: str, limit_bytes: float) -> None:
@@ -67,6 +78,8 @@ class RunDirectory:
             ModtError: the disk is full, or cannot be written.
         """
         with writing(self.path):
+            if not os.path.ismount(self._disk):
+                raise OSError(f"{self._disk} is not mounted")
             self._keep()
             self._trim(limit_bytes)
             self.path.mkdir(parents=True, exist_ok=True)
@@ -79,6 +92,19 @@ class RunDirectory:
             ModtError: it cannot be written.
         """
         replace_file(self.path / name, text, lasting=lasting)
+
+    def present(self) -> bool:
+        """Whether the present part is still at its path."""
+        return os.path.isfile(self.path / RUN)
+
+    def in_memory(self, status: str | None) -> None:
+        """Keep the status in memory, None removes it; one that cannot be kept is left out."""
+        path = status_paths(self.path)[1]
+        with suppress(OSError, ModtError):
+            if status is None:
+                path.unlink(missing_ok=True)
+            else:
+                replace_file(path, status)
 
     def sync(self) -> None:
         """Have the names of the present part and its files outlast a power cut.

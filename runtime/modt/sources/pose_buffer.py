@@ -11,8 +11,18 @@ from modt.config import OdometryConfig
 from modt.geometry import se3, turn_between
 from modt.types import Float64
 
+CAPACITY = 256
+"""Poses kept, and messages read for a frame at most [count]: the newest."""
+MAX_AGE_S = 0.3
+"""Greatest distance in time of a frame from its poses [s]; beyond it the frame has none."""
+MAX_ACCELERATION_MPS2 = 10.0
+"""Acceleration of the sensor beyond which a pose is doubted [m/s2]."""
+POSITION_NOISE_M = 0.5
+"""Distance between two poses that is noise, not speed [m]."""
+CONFIRM_S = 0.2
+"""Time for which doubted poses must continue one another to be believed [s]."""
 _LEVER_M = 5.0
-"""Distance that a turn of one radian counts as."""
+"""Distance that a turn of one radian counts as [m]."""
 _UNKNOWN_INTERVAL_S = 0.5
 
 
@@ -21,8 +31,8 @@ class PoseBuffer:
 
     def __init__(self, config: OdometryConfig) -> None:
         self.config = config
-        self._stamps: deque[float] = deque(maxlen=config.capacity)
-        self._poses: deque[Float64] = deque(maxlen=config.capacity)
+        self._stamps: deque[float] = deque(maxlen=CAPACITY)
+        self._poses: deque[Float64] = deque(maxlen=CAPACITY)
 
     def __len__(self) -> int:
         return len(self._stamps)
@@ -54,21 +64,21 @@ class PoseBuffer:
             return "out_of_order" if dt_s < 0 else "repeated"
         interval_s = self._stamps[-1] - self._stamps[-2] if len(self) > 1 else _UNKNOWN_INTERVAL_S
         ahead_s = min(dt_s, stamp_s - now_s)
-        if ahead_s > max(self.config.max_age_s, 2 * interval_s):
+        if ahead_s > max(MAX_AGE_S, 2 * interval_s):
             return "early"
         if self.leaps(stamp_s, T):
             return "leap"
-        slack_m = self.config.position_noise_m + self.config.max_acceleration_mps2 * dt_s * dt_s
+        slack_m = POSITION_NOISE_M + MAX_ACCELERATION_MPS2 * dt_s * dt_s
         return "leap" if self._off_m(stamp_s, T) > slack_m else None
 
     def leaps(self, stamp_s: float, T: Float64) -> bool:
         """Whether a (4, 4) pose is farther from the latest than its sensor can have moved: it is of another world."""
         if not self._poses:
             return False
-        dt_s = stamp_s - self.newest_s if stamp_s > self.newest_s else self.config.max_age_s
+        dt_s = stamp_s - self.newest_s if stamp_s > self.newest_s else MAX_AGE_S
         last = self._poses[-1]
         apart_m = float(np.linalg.norm(T[:3, 3] - last[:3, 3])) + _LEVER_M * _turn_rad(last, T)
-        return apart_m > self.config.position_noise_m + self.config.max_speed_mps * dt_s
+        return apart_m > POSITION_NOISE_M + self.config.max_speed_mps * dt_s
 
     def clear(self) -> None:
         """Remove all poses."""
@@ -83,7 +93,7 @@ class PoseBuffer:
         (t0, a), (t1, b) = ((self._stamps[k], self._poses[k]) for k in ends)
         if stamp_s == t1:
             return b.copy()
-        if max(abs(stamp_s - t1), min(stamp_s, t1) - t0) > self.config.max_age_s:
+        if max(abs(stamp_s - t1), min(stamp_s, t1) - t0) > MAX_AGE_S:
             return None
         T = interpolate(a, b, (stamp_s - t0) / (t1 - t0))
         return None if stamp_s > t1 and self.leaps(stamp_s, T) else T
@@ -96,7 +106,7 @@ class PoseBuffer:
             first = after if stamps[after] == stamp_s else after - 1
             return (first, after) if first >= 0 else None
         before = int(np.searchsorted(stamps, 2 * self.newest_s - stamp_s, "right")) - 1
-        before = max(before, int(np.searchsorted(stamps, self.newest_s - self.config.max_age_s)))
+        before = max(before, int(np.searchsorted(stamps, self.newest_s - MAX_AGE_S)))
         before = min(before, len(self) - 2)
         return (before, len(self) - 1) if before >= 0 else None
 
@@ -153,7 +163,7 @@ class PoseSequence:
             self._vote_against()
         elif doubt != "repeated":
             self._consider(stamp_s, T, now_s)
-            if self._votes >= _MIN_VOTES and self._doubted.span_s >= self.config.confirm_s:
+            if self._votes >= _MIN_VOTES and self._doubted.span_s >= CONFIRM_S:
                 self.restarts += self.believed.leaps(stamp_s, T)
                 self.believed, self._doubted, self._votes = self._doubted, PoseBuffer(self.config), 0
                 return None

@@ -15,6 +15,7 @@ from typing import Any
 from modt.address import Address
 from modt.config import OdometryConfig
 from modt.errors import MisuseError
+from modt.sources.pose_buffer import CAPACITY
 from modt.sources.pose_datagram import MAX_BYTES, DatagramError, read_datagram
 from modt.sources.received_poses import ReceivedPoses
 
@@ -96,18 +97,18 @@ class PoseSocket(ReceivedPoses):
 
     def __init__(self, bound: socket.socket, config: OdometryConfig, name: str) -> None:
         super().__init__(config, name)
-        self._queue = DatagramQueue(bound, config.capacity, MAX_BYTES + 1)
+        self._queue = DatagramQueue(bound, CAPACITY, MAX_BYTES + 1)
 
     def close(self) -> None:
         """Close the socket and remove its file."""
         self._queue.close()
 
     def _take(self) -> list[bytes]:
-        """The newest `capacity` datagrams: a flood must not delay the frame."""
+        """The newest CAPACITY datagrams: a flood must not delay the frame."""
         taken, crowded_out = self._queue.take()
         self.received, self.overflowed = self.received + len(taken) + crowded_out, self._queue.overflowed
         if crowded_out:
-            self._refuse(DatagramError("crowded_out", f"more than {self.config.capacity} a frame"), crowded_out)
+            self._refuse(DatagramError("crowded_out", f"more than {CAPACITY} a frame"), crowded_out)
         return taken
 
     _read = staticmethod(read_datagram)

@@ -12,6 +12,7 @@ from modt.ros2.address import domain_of, topic_of
 from modt.ros2.cdr import MessageError
 from modt.ros2.dds import Message, Subscription, participant
 from modt.ros2.odometry import TYPE, read_odometry
+from modt.sources.pose_buffer import CAPACITY
 from modt.sources.pose_datagram import DatagramError
 from modt.sources.pose_file import pose_defect
 from modt.sources.received_poses import ReceivedPoses
@@ -56,7 +57,7 @@ def open_topic(address: Address, config: OdometryConfig, cores: frozenset[int] |
     topic = topic_of(address)
     T_base_sensor = _mount(address.option("base_to_sensor", "0,0,0,0,0,0"), address.text)
     joined = participant(domain_of(address), cores)
-    return PoseTopic(Subscription(joined, topic, TYPE, depth=config.capacity), config, address.text, T_base_sensor)
+    return PoseTopic(Subscription(joined, topic, TYPE, depth=CAPACITY), config, address.text, T_base_sensor)
 
 
 def _mount(text: str, subject: str) -> Float64:

@@ -13,12 +13,14 @@ from dataclasses import replace
 from typing import Any
 
 from modt.config import OdometryConfig
-from modt.sources.pose_buffer import PoseSequence
+from modt.sources.pose_buffer import MAX_AGE_S, PoseSequence
 from modt.sources.pose_datagram import DatagramError
 from modt.sources.pose_source import PoseSource
 from modt.sources.stream import MAX_STAMP_S, unit_of
 from modt.types import Float64, Frame
 
+MAX_AHEAD_S = 60.0
+"""Lead of a pose over its frame beyond which it is of another clock [s]."""
 log = logging.getLogger(__name__)
 
 
@@ -37,7 +39,7 @@ class ReceivedPoses(PoseSource):
     """Reasons of a refusal; each has a counter."""
 
     def __init__(self, config: OdometryConfig, name: str) -> None:
-        self.name, self.config = name, config
+        self.name = name
         self._poses = PoseSequence(config)
         self.received = self.overflowed = self.used = self.posed = self.unposed = 0
         self.refused: Counter[str] = Counter()
@@ -85,13 +87,13 @@ class ReceivedPoses(PoseSource):
 
     def _keep(self, stamp_s: float, T: Float64, now_s: float) -> None:
         cause = f"stamp {stamp_s:.15g} s when the frame's is {now_s:.15g} s"
-        if stamp_s and now_s and abs(stamp_s - now_s) > self.config.max_ahead_s:
+        if stamp_s and now_s and abs(stamp_s - now_s) > MAX_AHEAD_S:
             for whose, ratio in (("this one seems", stamp_s / now_s), ("the sensor's seem", now_s / stamp_s)):
                 if unit := unit_of(ratio):
                     raise DatagramError("unit", f"{cause}: {whose} to be in {unit}; give seconds")
         if abs(stamp_s) > MAX_STAMP_S:
             raise DatagramError("malformed", f"{cause}: no time in seconds")
-        if stamp_s > now_s + self.config.max_ahead_s:
+        if stamp_s > now_s + MAX_AHEAD_S:
             raise DatagramError("ahead", f"{cause}: is it the stream's clock?")
         newest_s, restarts = self._poses.believed.newest_s, self.restarts
         doubt = self._poses.add(stamp_s, T, now_s)
@@ -100,7 +102,7 @@ class ReceivedPoses(PoseSource):
             meaning = "the sender seems to have restarted, tracks keep their positions"
             remedy = "let it keep its origin, or raise odometry.max_speed_mps for a faster robot"
             log.warning("%s: %s: %s; %s; later ones are only counted", self.name, where, meaning, remedy)
-        if stamp_s < now_s - self.config.max_age_s:
+        if stamp_s < now_s - MAX_AGE_S:
             raise DatagramError("stale", cause)
         if doubt is not None:
             raise DatagramError(doubt, f"stamp {stamp_s:.3f} s after {newest_s:.3f} s")

@@ -19,8 +19,10 @@ def read_text(path: Path, remedy: str) -> str:
     """A file as text, with replacements for what is none.
 
     Raises:
-        MisuseError: it cannot be read.
+        MisuseError: it cannot be read, or is a pipe or device, which may never end.
     """
+    if path.exists() and not path.is_file():
+        raise MisuseError(path, "is no file", remedy)
     try:
         return path.read_text(encoding="utf-8-sig", errors="replace")
     except OSError as error:

@@ -25,7 +25,6 @@ import yaml
 from modt import profile
 from modt.app import assembly, inputs, kernel_choice
 from modt.app.ladder import Ladder
-from modt.app.stages import within
 from modt.config import ProfileConfig
 from modt.energy.ledger import Ledger
 from modt.geometry import FieldOfView
@@ -183,19 +182,22 @@ def far_blind(config: ProfileConfig, _folder: Path) -> str:
 
 
 def live(config: ProfileConfig, _folder: Path) -> str:
-    """The ladder of a board whose windows are of 1 and 3 W, and what it leaves of a sweep."""
+    """The ladder of a board whose windows are of 1 and 3 W."""
     ladder, said = Ladder(config.loop.power_W), []
     for k, watts in enumerate((1.0, 3.0, 3.0, 3.0, 1.0)):
         ladder.power(2.0 * k, watts)
         said.append(ladder.step.name)
-    frame = frames(3, 1.0)[0]
-    return f"{said}{len(within(frame.points, config.loop.range_share * config.sensor.max_range_m))}"
+    return str(said)
 
 
 def recorded(config: ProfileConfig, folder: Path) -> str:
-    """Which records are kept, and how many bytes of them."""
+    """Which records are kept, and how many bytes of them, half a day after the first 0.5 GB are spent."""
     folder.mkdir(parents=True, exist_ok=True)
-    recording = Recording(RunDirectory(folder / "run"), config.recording, AtOnce(), lambda: f"{MARK}\n")
+    times_s = iter([0.0, 1.0, 43_200.0])
+    recording = Recording(
+        RunDirectory(folder / "run"), config.recording, AtOnce(), lambda: f"{MARK}\n", lambda: next(times_s, 43_200.0)
+    )
+    recording._allowed_bytes = -4e9
     for k in range(2):
         recording.ledger({"frame": k, "filler": "x" * 1_000_000})
         recording.write(result(k, [5], {0: 1}))

@@ -14,6 +14,7 @@ from modt.errors import ModtError, ScanError
 from modt.sources.live.sweep_reader import Received, StreamEndedError, Sweep, SweepReader
 from modt.sources.packets.packet_decoder import DeviceClock
 from modt.sources.scan_file import sanitised
+from modt.sources.stamp_check import StampCheck
 from modt.sources.stream import Fault, Faults, StreamInfo, no_seconds, unit_of
 from modt.types import Frame
 
@@ -23,10 +24,6 @@ SILENT_S = 2.0
 """Time without a sweep after which a sensor counts as silent."""
 READ_S = 0.2
 """Time that the receiving thread waits for a message before it looks whether it is to end."""
-STEP_S = 1.0
-"""Difference of the time that passed by stamps and by arrivals, from which a stamp is doubted."""
-DOUBT_S = 0.5
-"""Time for which doubtful stamps are refused; if they keep coming, a clock was set, and they are followed."""
 JITTER_S = 0.1
 """Change of the least delay from stamp to arrival, beyond which the stamps have stepped."""
 LATE_S = 1.0
@@ -51,7 +48,7 @@ class LiveStream:
         faults: unusable sweeps and points.
         sweeps, incomplete, dropped: counts of sweeps received, of those with missing messages, of those replaced by a
             newer one before they were taken.
-        silences, time_steps: number of times that the sensor fell silent, and that its stamps stepped.
+        silences: number of times that the sensor fell silent.
     """
 
     def __init__(
@@ -61,19 +58,19 @@ class LiveStream:
         *,
         cores: frozenset[int] | None = None,
         clock: Callable[[], float] = time.monotonic,
+        pause: Callable[[float], None] = time.sleep,
     ) -> None:
         """`cores`: where the receiving thread may run; None leaves it where it is started."""
         self.info, self.reader, self.faults = info, reader, Faults()
-        self.sweeps = self.incomplete = self.dropped = self.silences = self.time_steps = 0
-        self._cores, self._clock = cores, clock
+        self.sweeps = self.incomplete = self.dropped = self.silences = 0
+        self._cores, self._clock, self._pause = cores, clock, pause
         self._arrived = threading.Condition()
         self._newest: Arrival | None = None
         self._error: Exception | None = None
         self._ended = self._silent = False
         self._last_s = self._looked_s = clock()
         self._index, self._steady_s, self._delay = 0, 0.0, DeviceClock()
-        self._taken: tuple[float, float] | None = None  # stamp and arrival of the last frame
-        self._doubted_s: float | None = None  # arrival of the first doubtful stamp since then
+        self._check = StampCheck(live=True)
         self._thread = threading.Thread(target=self._receive, name="receiver", daemon=True)
 
     @property
@@ -121,7 +118,7 @@ class LiveStream:
             "incomplete_sweeps": self.incomplete,
             "dropped_sweeps": self.dropped,
             "silences": self.silences,
-            "time_steps": self.time_steps,
+            "time_steps": self._check.steps,
             "silent": self._silent,
             "frame_id": reception.frame_id,
         }
@@ -137,19 +134,23 @@ class LiveStream:
         lacking = host.serve_loop(self._cores)
         if lacking:
             log.warning("%s: %s", self.info.name, lacking)
-        while not self._ended:
-            try:
-                for sweep in self.reader.read(READ_S):
-                    self._put(sweep)
-            except (StreamEndedError, ModtError, OSError) as error:
-                with self._arrived:
-                    self._error = None if self._ended else error
-                    self._arrived.notify()
-                return
-            except Exception as error:
-                if self.reader.reception.refuse(f"failed ({type(error).__name__})"):
-                    log.exception("%s: a message is left out: report this; later ones are counted", self.info.name)
-                time.sleep(0.001)  # where each read fails, others need the CPU
+        while not self._ended and self._error is None:
+            self._read()
+
+    def _read(self) -> None:
+        """Receive once; a failure is counted, whether it is of a message or of the system, and reading goes on."""
+        try:
+            for sweep in self.reader.read(READ_S):
+                self._put(sweep)
+        except (StreamEndedError, ModtError) as error:
+            with self._arrived:
+                self._error = error
+                self._arrived.notify()
+        except Exception as error:
+            if not self._ended and self.reader.reception.refuse(f"failed ({type(error).__name__})"):
+                remedy = "check its network interface" if isinstance(error, OSError) else "report this"
+                log.exception("%s: a message is left out: %s; later ones are counted", self.info.name, remedy)
+            self._pause(0.001)  # where each read fails, others need the CPU
 
     def _put(self, sweep: Sweep) -> None:
         try:  # here, off the loop's thread
@@ -185,25 +186,17 @@ class LiveStream:
             return f"taken {age_s:.1f} s after it came: this process was stopped, or has too little CPU time"
         if cause := no_seconds(stamp_s):
             return f"{cause}; have its driver write seconds"
-        before_s, passed_s, waited_s = self._delay.offset_s, stamp_s, stamp_s
-        if self._taken is not None:
-            passed_s, waited_s = stamp_s - self._taken[0], arrived_s - self._taken[1]
-            ahead_s = passed_s - waited_s
-            if passed_s <= 0 or abs(ahead_s) > STEP_S:
-                self._doubted_s = arrived_s if self._doubted_s is None else self._doubted_s
-                if arrived_s - self._doubted_s < DOUBT_S:
-                    what = f"{abs(passed_s):.3f} s {'before' if passed_s < 0 else 'after'} the last sweep"
-                    late = ": this process, the sender or the network was stopped" if passed_s > 0 > ahead_s else ""
-                    return f"stamped {what}, which arrived {waited_s:.3f} s ago{late}"
-                self.time_steps += 1
-                unit = unit_of(passed_s / waited_s)
-                why = f"are they in {unit}? have its driver write s" if unit else "a clock was set, or they come late"
-                what = f"stamps have stepped by {ahead_s:+.3f} s against their arrival"
-                log.warning("%s: %s: %s; they are followed", self.info.name, what, why)
+        check, steps, doubting, before_s = self._check, self._check.steps, self._check.doubting, self._delay.offset_s
+        if doubt := check.doubt(stamp_s, arrived_s):
+            return doubt
+        if check.steps > steps:
+            unit = unit_of(check.passed_s / check.waited_s) if check.waited_s else None
+            why = f"are they in {unit}? have its driver write s" if unit else "a clock was set, or they come late"
+            what = f"stamps have stepped by {check.passed_s - check.waited_s:+.3f} s against their arrival"
+            log.warning("%s: %s: %s; they are followed", self.info.name, what, why)
         self._delay.unwrapped(stamp_s, arrived_s)
-        stepped = self._doubted_s is not None or abs(self._delay.offset_s - before_s) > JITTER_S
-        self._steady_s += waited_s if stepped else passed_s
-        self._taken, self._doubted_s = (stamp_s, arrived_s), None
+        stepped = doubting or abs(self._delay.offset_s - before_s) > JITTER_S
+        self._steady_s += check.waited_s if stepped else check.passed_s
         return ""
 
     def _fault(self, index: int, cause: str, *, skipped: bool) -> None:

@@ -1,0 +1,74 @@
+"""Fail the calls of the system that a short run of a service makes, one by one and then two at a time.
+
+    python -m tools.faults --runs 2000 --seed 1
+
+A run without faults lists every call that touches the disk, a socket, a clock or the meter. In half of the runs one
+of them fails, evenly over their kinds, in the others two do; in three runs of ten the calls of a kind fail for two
+seconds. The run must go on, what is recorded must be whole, every missing line must be counted, and the status
+must be readable throughout. Prints each broken promise with the calls that break it; then the exit status is 1.
+"""
+
+from __future__ import annotations
+
+import logging
+import shutil
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from tools.options import parser
+
+LASTING_S = 2.0
+MOST_PRINTED = 40
+
+
+def main() -> None:
+    options = parser(__doc__)
+    options.add_argument("--runs", type=int, default=2000, help="in all (default: %(default)s)")
+    options.add_argument("--seed", type=int, default=1)
+    given = options.parse_args()
+    from tests.crash.faulty_run import FaultyRun
+
+    logging.disable(logging.CRITICAL)
+    rng, began_s = np.random.default_rng(given.seed), time.perf_counter()
+    broken = Counter[str]()
+    calls = list[str]()
+    for n in range(given.runs + 1):
+        failing: dict[int, int] = {}
+        lasting_s = 0.0
+        if n:
+            single, ways = n <= given.runs // 2, int(rng.integers(1000))
+            # Half of the runs fail one call, evenly over the kinds of them; the other half two.
+            kinds = sorted({*calls})
+            chosen = [kinds[n % len(kinds)]] if single else rng.choice(kinds, 2)
+            at = [int(rng.choice([k for k, name in enumerate(calls) if name == one])) for one in chosen]
+            failing = {k: ways + i for i, k in enumerate(at)}
+            lasting_s = LASTING_S * (rng.random() < 0.3)
+        folder = Path(tempfile.mkdtemp(prefix="modt-faults-"))
+        run = FaultyRun(folder, failing, lasting_s)
+        try:
+            run.run()
+            run.check()
+        except Exception as error:
+            names = ", ".join(f"{calls[k] if calls else ''} ({k}, {way})" for k, way in failing.items())
+            what = f"{type(error).__name__}: {str(error).splitlines()[0][:150] if str(error) else ''}"
+            broken[what] += 1
+            if broken.total() <= MOST_PRINTED:
+                print(f"broken by {names} for {lasting_s:g} s: {what}", flush=True)
+        calls = calls or run.faults.calls
+        shutil.rmtree(folder)
+        if n % 100 == 0:
+            print(
+                f"{n} runs of {len(calls)} calls, {time.perf_counter() - began_s:.0f} s, {broken.total()} broken",
+                flush=True,
+            )
+    print("\n".join(f"{number} times {what}" for what, number in broken.most_common()) or "every promise was kept")
+    sys.exit(bool(broken))
+
+
+if __name__ == "__main__":
+    main()
