@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from modt import profile
 from modt.config import SegmentationConfig, SensorConfig
-from modt.config.segmentation import CarMergeConfig
 from modt.geometry import FieldOfView
 from modt.native import build
 from modt.native.library import NotAvailableError, load
@@ -23,6 +22,7 @@ from modt.segmentation.groups import Groups, consecutive
 from modt.segmentation.kernels import NUMPY
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
+from modt.segmentation.strips import CarLimits
 from modt.types import NONE, UNRECORDED
 from modt_desk.simulation.synthetic_stream import SyntheticStream
 from tests.geometry.test_kdop_pairs import WEIGHTS, random_pairs
@@ -173,9 +173,9 @@ def test_cells_and_components(kernels, seed, n, sigma):
 @given(seed=st.integers(0, 10_000), n=st.integers(0, 60), beam_deg=st.floats(0.05, 2.0))
 @settings(max_examples=100, deadline=None)
 def test_strips(kernels, seed, n, beam_deg):
-    rng, config = np.random.default_rng(seed), CarMergeConfig()
+    rng = np.random.default_rng(seed)
     bounds, beam_rad = strips(rng, n + 1), np.full(n + 1, np.deg2rad(beam_deg), np.float32)
-    assert same(*(k.merge_strips(bounds, beam_rad, config) for k in (NUMPY, kernels)))
+    assert same(*(k.merge_strips(bounds, beam_rad, CarLimits()) for k in (NUMPY, kernels)))
 
 
 @given(

@@ -24,14 +24,7 @@ PAGE = ("sensor", "classification", "scheduler", "odometry", "energy", "loop", "
 
 CONDITIONS = {
     "sensor.blind_range_m": "sensor.blind_sectors_deg",
-    "segmentation.sensor_height": "sensor.height_m: null",
-    "segmentation.sensor_height.default_m": "sensor.height_m: null, no ground in sight",
-    "segmentation.view_margin": "--fov camera",
     "tracking.paper": "association: paper",
-    "tracking.kdop": "association: kdop",
-    "tracking.split": "association: kdop",
-    "tracking.merge": "association: kdop",
-    "tracking.background_map": "association: kdop",
     "scheduler": "--mode accurate, efficient",
     "scheduler.worth": "a binding budget",
     "scheduler.cost": "scheduler.cpu_ms_per_frame or energy_mJ_per_frame",

@@ -13,30 +13,19 @@ from modt.config.odometry import LandmarkConfig, OdometryConfig, RegistrationCon
 from modt.config.profile import EnergyConfig, LoopConfig, ProfileConfig, RecordingConfig, SensorConfig, WindowConfig
 from modt.config.segmentation import SegmentationConfig
 from modt.config.tracking import (
-    BackgroundMapConfig,
-    FilterConfig,
-    FragmentConfig,
-    KdopAssociationConfig,
-    MergeConfig,
     PaperAssociationConfig,
-    SplitConfig,
     TrackingConfig,
 )
 
 __all__ = [
-    "BackgroundMapConfig",
     "CallWorthConfig",
     "ClassificationConfig",
     "CostModelConfig",
     "DecisionConfig",
     "EnergyConfig",
-    "FilterConfig",
-    "FragmentConfig",
     "FusionConfig",
-    "KdopAssociationConfig",
     "LandmarkConfig",
     "LoopConfig",
-    "MergeConfig",
     "OdometryConfig",
     "PaperAssociationConfig",
     "ProfileConfig",
@@ -45,7 +34,6 @@ __all__ = [
     "SchedulerConfig",
     "SegmentationConfig",
     "SensorConfig",
-    "SplitConfig",
     "StageConfig",
     "TrackingConfig",
     "ValueRangeError",

@@ -6,7 +6,6 @@ from typing import Protocol
 
 import numpy as np
 
-from modt.config.segmentation import CarMergeConfig
 from modt.geometry.kernels import GeometryKernels, NumpyGeometryKernels
 from modt.segmentation.clusters import (
     Cells,
@@ -22,7 +21,7 @@ from modt.segmentation.clusters import (
 from modt.segmentation.grids import PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import GroundEstimator
 from modt.segmentation.groups import Groups, best_headings, reflectance_sums
-from modt.segmentation.strips import ViewBounds, merge_strips, view_bounds
+from modt.segmentation.strips import CarLimits, ViewBounds, merge_strips, view_bounds
 from modt.types import Bool, Float32, Float64, Int
 
 
@@ -58,7 +57,7 @@ class Kernels(GeometryKernels, Protocol):
     def view_bounds(self, clusters: Clusters, number: Int, n: int) -> ViewBounds:
         """Bounds of n clusters in the view, given (G,) the number of each, or NONE."""
 
-    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, config: CarMergeConfig) -> Int:
+    def merge_strips(self, bounds: ViewBounds, beam_rad: Float32, limits: CarLimits) -> Int:
         """(G,) first of the clusters that make one car with each, given (G,) the spacing of beams there [rad]."""
 
     def group(self, labels: Int, n: int) -> Groups:

@@ -32,7 +32,6 @@ from modt.energy.ledger import Ledger
 from modt.energy.meters.meter import Conditions
 from modt.energy.windows import Clocks, Windows
 from modt.geometry import FieldOfView
-from modt.segmentation.ground import HeightEstimator
 from modt.sinks.recording import AtOnce, Recording
 from modt.sinks.run_directory import MARK, RunDirectory
 from modt.sources.pose_socket import PoseSocket
@@ -94,25 +93,6 @@ def street(config: ProfileConfig, _folder: Path) -> str:
 
 def long_street(config: ProfileConfig, _folder: Path) -> str:
     return replay(frames(6, 4.0), config)
-
-
-def unknown_height(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(3, 1.0), changed(config, "sensor.height_m", None))
-
-
-def heights(config: ProfileConfig, _folder: Path) -> str:
-    """Estimates of the sensor's height, frame by frame."""
-    estimator = HeightEstimator(config.sensor, config.segmentation)
-    return str([estimator.height_m(frame.points) for frame in frames(3, 1.0)])
-
-
-def no_ground(config: ProfileConfig, _folder: Path) -> str:
-    raised = [dataclasses.replace(f, points=f.points[f.points[:, 2] > -0.2]) for f in frames(3, 1.0)]
-    return replay(tuple(raised), changed(config, "sensor.height_m", None))
-
-
-def camera(config: ProfileConfig, _folder: Path) -> str:
-    return replay(frames(3, 1.0), config, view=FieldOfView.of_camera(CAMERA))
 
 
 def efficient(config: ProfileConfig, _folder: Path) -> str:
@@ -274,13 +254,8 @@ def kernels(config: ProfileConfig, _folder: Path) -> str:
 
 SCENARIOS: dict[str, Scenario] = {
     "": street,
-    "sensor.height_m: null": unknown_height,
     "sensor.blind_sectors_deg": near_blind,
-    "sensor.height_m: null, no ground in sight": no_ground,
-    "--fov camera": camera,
     "association: paper": paper,
-    "association: kdop": street,
-    "association: kdop, --fov camera": camera,
     "--mode accurate": street,
     "--mode efficient": efficient,
     "--mode accurate, efficient": street,
@@ -304,16 +279,9 @@ RARE: dict[str, Scenario] = {
     "loop.": live,
     "recording.": recorded,
     "sensor.blind_sectors_deg": far_blind,
-    "segmentation.ground.start_m": long_street,
     "segmentation.kernels": kernels,
-    "segmentation.sensor_height.sweeps": heights,
-    "segmentation.person_splitting.min_gap_columns": long_street,
-    "segmentation.car_merging.min_person_top_m": long_street,
     "tracking.paper.gate": printed,
-    "tracking.split.": long_street,
-    "tracking.merge.": long_street,
     "scheduler.cost.": noisy_clock,
-    "tracking.background_map.": long_street,
     "odometry.registration.max_turn_rad": turning,
     "energy.windows.": windows,
     "decision.hysteresis": long_street,
