@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 from modt import profile
 from modt.config import SegmentationConfig, SensorConfig
 from modt.geometry import FieldOfView
+from modt.geometry.native_kernels import NativeGeometryKernels
 from modt.native import build
 from modt.native.library import NotAvailableError, load
 from modt.segmentation.clusters import Clusters
 from modt.segmentation.grids import FAR_M, PointColumns, SqrtRangeGrid
 from modt.segmentation.groups import Groups, consecutive
-from modt.segmentation.kernels import NUMPY
+from modt.segmentation.kernels import NUMPY, Kernels
 from modt.segmentation.native_kernels import NativeKernels
 from modt.segmentation.segmenter import Segmenter
 from modt.segmentation.strips import CarLimits
@@ -263,3 +264,9 @@ def test_another_kind_of_array_is_refused(kernels):
         kernels.group_sums(np.zeros((1, 4)), np.array([0, 4]))
     with pytest.raises(TypeError, match="contiguous"):
         kernels.group(np.zeros(8, np.int64)[::2], 1)
+
+
+def test_every_pass_is_compiled():
+    passes = {name for kind in Kernels.__mro__[:-1] for name in vars(kind) if not name.startswith("_")}
+    compiled = {name for kind in (NativeKernels, NativeGeometryKernels) for name in vars(kind)}
+    assert passes - {"name"} <= compiled

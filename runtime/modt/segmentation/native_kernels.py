@@ -16,6 +16,7 @@ from modt.segmentation.clusters import Cells, ClusterBounds, Clusters, Members
 from modt.segmentation.grids import FAR_M, RING_STEP, SECTORS, PointColumns, SqrtRangeGrid
 from modt.segmentation.ground import FLANK_M, FLANK_SECTORS, MAX_GAP_M, NEAR_M, NOISE_M, SLOPE_GAIN, GroundEstimator
 from modt.segmentation.groups import AXES, BRIGHT, DARK, HEADINGS, Groups
+from modt.segmentation.kernels import Kernels
 from modt.segmentation.strips import DIRECTION, CarLimits, ViewBounds
 from modt.types import NONE, Bool, Float32, Float64, Int
 
@@ -86,7 +87,7 @@ class _GroundBuffers:
         return self._scratch
 
 
-class NativeKernels(NativeGeometryKernels):
+class NativeKernels(NativeGeometryKernels, Kernels):
     """The passes in C.
 
     Args:
